@@ -1,0 +1,236 @@
+"""The space that the walls of the box and the solid blocks leave for the sand.
+
+Blocks are taken to lie apart from one another. What of a block lies outside the box is not
+subtracted, except for a cuboid tilted in 3D, which is taken to lie inside the box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from analysis.intersections import cut_polygon, disc_polygon_m2, polygon_area_m2, sphere_prism_m3
+from sandmould.scenario.geometry import Array, Block, Scene, Wall
+
+_UPRIGHT = 1e-9
+"""Largest slope at which a wall or a block counts as upright or level."""
+
+
+@dataclass(frozen=True)
+class _Prism:
+    """A convex section swept along the third of three orthonormal axes."""
+
+    origin_m: Array
+    axes: Array
+    section_m: Array
+    low_m: float
+    high_m: float
+
+    def part_m3(self, position_m: Array, radius_m: Array) -> Array:
+        """Volume of each sphere inside, (n,) float64, m3."""
+        local_m = (position_m - self.origin_m) @ self.axes.T
+        return sphere_prism_m3(local_m, radius_m, self.section_m, self.low_m, self.high_m)
+
+    def below_m3(self, height_m: Array) -> Array:
+        """Volume under each height, (m,) float64, m3; the section of a tilted one is a box's."""
+        if abs(self.axes[2, 2]) > 1.0 - _UPRIGHT:
+            level = np.clip(height_m - self.origin_m[2], self.low_m, self.high_m)
+            return abs(polygon_area_m2(self.section_m)) * (level - self.low_m)
+        size_m = np.append(np.ptp(self.section_m, axis=0), self.high_m - self.low_m)
+        return _cuboid_below_m3(size_m, self.axes[:, 2], height_m - self.origin_m[2])
+
+
+def free_part(position_m: Array, radius_m: Array, scene: Scene) -> Array:
+    """Measure of the part of each disc or sphere that lies in free space.
+
+    Parameters
+    ----------
+    position_m : (n, d) float64, m
+    radius_m : (n,) float64, m
+    scene : Scene
+        In 3D every wall must be upright or level.
+
+    Returns
+    -------
+    (n,) float64, m2 in 2D or m3 in 3D
+        Never negative, even where blocks overlap one another.
+
+    Raises
+    ------
+    ValueError
+        When a wall of a 3D scene is oblique.
+    """
+    margin_m = 2.0 * radius_m.max(initial=0.0)
+    low_m = position_m.min(axis=0, initial=np.inf) - margin_m
+    high_m = position_m.max(axis=0, initial=-np.inf) + margin_m
+    if scene.dimension == 2:
+        box_m = _box_polygon(scene.walls, low_m, high_m)
+        part = disc_polygon_m2(position_m, radius_m, box_m)
+        for block in scene.blocks:
+            part -= disc_polygon_m2(position_m, radius_m, _block_polygon(block, scene.walls))
+    else:
+        box = _box_prism(scene.walls, low_m, high_m)
+        part = box.part_m3(position_m, radius_m)
+        for block in scene.blocks:
+            part -= _block_prism(block, scene.walls).part_m3(position_m, radius_m)
+    return np.maximum(part, 0.0)
+
+
+def free_measure_between(scene: Scene, edges_m: Array) -> Array:
+    """Area or volume of free space in each slab between successive heights, exact.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its walls must close the box on every side; in 3D they must be upright or level.
+    edges_m : (m + 1,) float64, m
+        Rising heights.
+
+    Returns
+    -------
+    (m,) float64, m2 in 2D or m3 in 3D
+
+    Raises
+    ------
+    ValueError
+        When the box is open at a side, or a wall of a 3D scene is oblique.
+    """
+    if scene.dimension == 2:
+        box_m = box_section(scene, float(edges_m[0]), float(edges_m[-1]))
+        below = _polygon_below_m2(box_m, edges_m)
+        for block in scene.blocks:
+            below = below - _polygon_below_m2(_block_polygon(block, scene.walls), edges_m)
+    else:
+        section_m = box_section(scene)
+        floor_m, lid_m = _levels(scene.walls)
+        box = _Prism(np.zeros(3), np.eye(3), section_m, floor_m, lid_m)
+        level = np.clip(edges_m, floor_m, lid_m)
+        below = abs(polygon_area_m2(box.section_m)) * (level - level[0])
+        for block in scene.blocks:
+            below = below - _block_prism(block, scene.walls).below_m3(edges_m)
+    return np.maximum(np.diff(below), 0.0)
+
+
+def box_section(scene: Scene, low_m: float = 0.0, high_m: float = 0.0) -> Array:
+    """Polygon of the box: between two heights in 2D, in plan in 3D.
+
+    Parameters
+    ----------
+    scene : Scene
+    low_m, high_m : float, m
+        Heights that bound the polygon in 2D; not used in 3D.
+
+    Returns
+    -------
+    (k, 2) float64, m
+
+    Raises
+    ------
+    ValueError
+        When the walls leave the box open at a side.
+    """
+    points_m = np.array([wall.point_m for wall in scene.walls]).reshape(-1, scene.dimension)
+    far_m = 10.0 * (1.0 + np.abs(points_m).max(initial=0.0))
+    lowest, highest = np.full(2, -far_m), np.full(2, far_m)
+    if scene.dimension == 2:
+        lowest[1], highest[1] = low_m, high_m
+    polygon_m = _box_polygon(scene.walls, lowest, highest)
+    sides_m = polygon_m[:, : 3 - scene.dimension + 1] if scene.dimension == 2 else polygon_m
+    if len(polygon_m) and np.abs(sides_m).max() >= far_m:
+        raise ValueError("the walls leave the box open at a side, so it has no section")
+    return polygon_m
+
+
+def _box_polygon(walls: tuple[Wall, ...], low_m: Array, high_m: Array) -> Array:
+    """Rectangle cut by the walls; of those of 3D, by the upright ones."""
+    x, y = (low_m[0], high_m[0]), (low_m[1], high_m[1])
+    polygon_m = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
+    return _within(polygon_m, walls)
+
+
+def _within(polygon_m: Array, walls: tuple[Wall, ...]) -> Array:
+    """Part of a polygon (in plan, in 3D) on the sand's side of all walls."""
+    for wall in walls:
+        if len(wall.normal) == 2 or not _is_level(wall):
+            polygon_m = cut_polygon(polygon_m, wall.point_m[:2], wall.normal[:2])
+    return polygon_m
+
+
+def _is_level(wall: Wall) -> bool:
+    """Tell a floor or lid of a 3D box from an upright wall."""
+    slope = abs(float(wall.normal[2]))
+    if _UPRIGHT < slope < 1.0 - _UPRIGHT:
+        raise ValueError(f"wall {wall.name!r} is oblique: walls in 3D must be upright or level")
+    return slope > 0.5
+
+
+def _levels(walls: tuple[Wall, ...]) -> tuple[float, float]:
+    """Heights of floor and lid of a 3D box, infinite where there is none."""
+    level = [wall for wall in walls if _is_level(wall)]
+    floors_m = [float(wall.point_m[2]) for wall in level if wall.normal[2] > 0.0]
+    lids_m = [float(wall.point_m[2]) for wall in level if wall.normal[2] < 0.0]
+    return max(floors_m, default=-np.inf), min(lids_m, default=np.inf)
+
+
+def _box_prism(walls: tuple[Wall, ...], low_m: Array, high_m: Array) -> _Prism:
+    """Box of a 3D scene, bounded where it is open."""
+    floor_m, lid_m = _levels(walls)
+    section_m = _box_polygon(walls, low_m[:2], high_m[:2])
+    bottom_m, top_m = max(floor_m, float(low_m[2])), min(lid_m, float(high_m[2]))
+    return _Prism(np.zeros(3), np.eye(3), section_m, bottom_m, top_m)
+
+
+def _rectangle(centre_m: Array, first_m: Array, second_m: Array) -> Array:
+    """Corners in turn, from the centre and two half sides."""
+    signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    return centre_m + signs @ np.array([first_m, second_m])
+
+
+def _block_polygon(block: Block, walls: tuple[Wall, ...]) -> Array:
+    """Part of a 2D block inside the box."""
+    sides_m = block.half_size_m[:, None] * block.axes
+    return _within(_rectangle(block.centre_m, sides_m[0], sides_m[1]), walls)
+
+
+def _block_prism(block: Block, walls: tuple[Wall, ...]) -> _Prism:
+    """Part of a 3D block inside the box if it stands upright, else the whole block."""
+    sides_m = block.half_size_m[:, None] * block.axes
+    upright = int(np.argmax(np.abs(block.axes[:, 2])))
+    if abs(block.axes[upright, 2]) > 1.0 - _UPRIGHT:
+        first, second = (i for i in range(3) if i != upright)
+        section_m = _rectangle(block.centre_m[:2], sides_m[first, :2], sides_m[second, :2])
+        half_m, z_m = float(block.half_size_m[upright]), float(block.centre_m[2])
+        floor_m, lid_m = _levels(walls)
+        low_m, high_m = max(z_m - half_m, floor_m), min(z_m + half_m, lid_m)
+        return _Prism(np.zeros(3), np.eye(3), _within(section_m, walls), low_m, high_m)
+    a, b, c = block.half_size_m
+    section_m = _rectangle(np.zeros(2), np.array([a, 0.0]), np.array([0.0, b]))
+    return _Prism(block.centre_m, block.axes, section_m, -float(c), float(c))
+
+
+def _polygon_below_m2(polygon_m: Array, height_m: Array) -> Array:
+    """Area of a polygon under each height."""
+    down = np.array([0.0, -1.0])
+    cut = [cut_polygon(polygon_m, np.array([0.0, h]), down) for h in height_m]
+    return np.array([abs(polygon_area_m2(part)) for part in cut])
+
+
+def _cuboid_below_m3(size_m: Array, slope: Array, height_m: Array) -> Array:
+    """Volume of a tilted cuboid under heights measured from its centre.
+
+    The height of a point drawn at random in the cuboid is a sum of uniform numbers, one an axis;
+    its distribution is the inclusion-exclusion sum over the corners of powers of (h - corner).
+    """
+    rise_m = size_m * np.abs(slope)
+    # a side all but level adds nothing to the spread and would only cancel digits
+    rise_m = rise_m[rise_m > 1e-5 * rise_m.max()]
+    corners = np.array(list(product((0.0, 1.0), repeat=len(rise_m))))
+    from_bottom = height_m + 0.5 * rise_m.sum()
+    powers = np.maximum(from_bottom[:, None] - corners @ rise_m, 0.0) ** len(rise_m)
+    factorial = {1: 1.0, 2: 2.0, 3: 6.0}[len(rise_m)]
+    signs = (-1.0) ** corners.sum(axis=1)
+    share = powers @ signs / (factorial * rise_m.prod())
+    inside = np.abs(height_m) < 0.5 * rise_m.sum()
+    return float(size_m.prod()) * np.where(inside, share, height_m > 0.0)

@@ -1,0 +1,58 @@
+"""The state of every grain at one instant, in the frame of the moulding box."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Grains at one instant, sorted by id; positions and velocities relative to the box."""
+
+    time_s: float
+    """Simulated time since the first grain was inserted."""
+    vibration_time_s: float
+    """Time since the first vibration stage began; negative before it."""
+    stage: str
+    id: NDArray[np.int64]
+    """(n,) int64, starting at 1."""
+    layer: NDArray[np.int64]
+    """(n,) int64: the layer of fill that brought the grain, starting at 1."""
+    position_m: NDArray[np.float64]
+    """(n, d) float64, m."""
+    velocity_m_s: NDArray[np.float64]
+    """(n, d) float64, m/s."""
+    spin_rad_s: NDArray[np.float64]
+    """(n, 3) float64, rad/s; in 2D only the last component differs from zero."""
+    radius_m: NDArray[np.float64]
+    """(n,) float64, m."""
+
+    def save(self, path: Path) -> None:
+        """Write to an ``.npz`` file, first under a temporary name."""
+        partial = path.with_name(path.name + ".partial")
+        with partial.open("wb") as file:
+            np.savez(file, **{f.name: getattr(self, f.name) for f in fields(self)})
+        os.replace(partial, path)
+
+    @classmethod
+    def load(cls, path: Path) -> Snapshot:
+        """Read from an ``.npz`` file.
+
+        Raises
+        ------
+        ValueError
+            When the file is cut short or is no snapshot.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                values = {f.name: data[f.name] for f in fields(cls)}
+        except Exception as error:
+            raise ValueError(f"{path}: not a readable snapshot ({error})") from error
+        for scalar, kind in (("time_s", float), ("vibration_time_s", float), ("stage", str)):
+            values[scalar] = kind(values[scalar])
+        return cls(**values)

@@ -1,0 +1,34 @@
+"""What is wrong with a file of the user's, in one sentence a finding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One value that cannot be used."""
+
+    key: str
+    """Key path, such as ``sand.density_kg_m3``."""
+    value: Any
+    valid: str
+    """What would be valid, such as 'a number greater than 0'."""
+    file: str = ""
+
+    def __str__(self) -> str:
+        where = f"{self.file}: " if self.file else ""
+        shown = repr(self.value)
+        if len(shown) > 120:
+            shown = shown[:117] + "..."
+        return f"{where}{self.key} = {shown} cannot be used: valid is {self.valid}."
+
+
+class BadInputError(Exception):
+    """A study or scenario that must not start; its text has one line a problem."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(p) for p in self.problems))

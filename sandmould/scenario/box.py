@@ -1,0 +1,195 @@
+"""The moulding box and the obstacles in it, and their geometry."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from sandmould.scenario.geometry import Array, Block, Bore, Scene, Wall
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.sand import ARGUED
+
+
+class Box(Section):
+    """Inner size of the moulding box; its walls also guide the sand that falls from above."""
+
+    width_m: float = quantity(0.1, "Inner width along x.", unit="m", source=ARGUED, gt=0, le=100)
+    depth_m: float = quantity(
+        0.05, "Inner depth along y, 3D only.", unit="m", source=ARGUED, gt=0, le=100
+    )
+    height_m: float = quantity(0.1, "Inner height.", unit="m", source=ARGUED, gt=0, le=100)
+
+
+class Plate(Section):
+    """A solid rectangle (2D) or cuboid (3D)."""
+
+    kind: Literal["plate"]
+    name: str = quantity("plate", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
+    centre_m: tuple[float, ...] = quantity(
+        ..., "Centre, one number a dimension.", unit="m", source="user", min_length=2, max_length=3
+    )
+    size_m: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
+        ..., "Edge lengths, one a dimension.", unit="m", source="user", min_length=2, max_length=3
+    )
+    angle_deg: float = quantity(
+        0.0, "Turn in the plane of x and the vertical.", unit="deg", source="user", ge=-180, le=180
+    )
+
+
+class Tube(Section):
+    """A straight horizontal tube along x: two plates in 2D, a prism of flat facets in 3D."""
+
+    kind: Literal["tube"]
+    name: str = quantity("tube", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
+    diameter_m: float = quantity(
+        ...,
+        "Inner diameter; in 3D that of the circle with the area of the prism's bore.",
+        unit="m",
+        source="user",
+        gt=0,
+    )
+    length_m: float = quantity(..., "Inner length.", unit="m", source="user", gt=0)
+    wall_thickness_m: float = quantity(
+        0.003, "Thickness of the tube's wall.", unit="m", source=ARGUED, gt=0
+    )
+    left_end_x_m: float = quantity(..., "x of the tube's left end.", unit="m", source="user", ge=0)
+    axis_height_m: float = quantity(..., "Height of the axis.", unit="m", source="user", gt=0)
+    axis_y_m: float | None = quantity(
+        None, "y of the axis in 3D; the middle of the box unless given.", unit="m", source=ARGUED
+    )
+    closed_end: Literal["none", "left", "right"] = quantity(
+        "right", "Which end is closed; the mouth is the other one.", source=ARGUED
+    )
+    facets: int = quantity(
+        8, "Number of flat facets of the tube in 3D.", source=ARGUED, ge=3, le=64
+    )
+
+    @property
+    def right_end_x_m(self) -> float:
+        """Right end of the bore, x."""
+        return self.left_end_x_m + self.length_m
+
+
+class Polygon(Section):
+    """A solid outlined by straight edges, 2D only."""
+
+    kind: Literal["polygon"]
+    name: str = quantity("polygon", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
+    vertices_m: tuple[tuple[float, float], ...] = quantity(
+        ..., "Vertices, counter-clockwise.", unit="m", source="user", min_length=3
+    )
+
+
+Obstacle = Annotated[Plate | Tube | Polygon, Field(discriminator="kind")]
+
+
+def _turn(angle_deg: float, dimension: int) -> Array:
+    """Axes turned by an angle in the plane of x and the vertical, one a row."""
+    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    axes = np.eye(dimension)
+    axes[0, 0], axes[0, -1], axes[-1, 0], axes[-1, -1] = c, s, -s, c
+    return axes
+
+
+def plate_blocks(plate: Plate, dimension: int) -> list[Block]:
+    """Geometry of a plate."""
+    half = np.array(plate.size_m) / 2
+    return [Block(plate.name, np.array(plate.centre_m), half, _turn(plate.angle_deg, dimension))]
+
+
+def _tube_axis_point(tube: Tube, box: Box, dimension: int) -> Array:
+    if dimension == 2:
+        return np.array([0.0, tube.axis_height_m])
+    y = box.depth_m / 2 if tube.axis_y_m is None else tube.axis_y_m
+    return np.array([0.0, y, tube.axis_height_m])
+
+
+def facet_apothem_m(tube: Tube) -> float:
+    """Distance of a facet from the axis so that the bore has the circle's area.
+
+    A regular n-gon with apothem h has the area n h^2 tan(pi/n).
+    """
+    circle = math.pi / 4 * tube.diameter_m**2
+    return math.sqrt(circle / (tube.facets * math.tan(math.pi / tube.facets)))
+
+
+def tube_blocks(tube: Tube, box: Box, dimension: int) -> list[Block]:
+    """Geometry of a tube: its walls, and an end plate unless the box wall closes it."""
+    half_length, half_wall = tube.length_m / 2, tube.wall_thickness_m / 2
+    axis = _tube_axis_point(tube, box, dimension)
+    middle = axis + np.eye(dimension)[0] * (tube.left_end_x_m + half_length)
+    blocks = []
+    if dimension == 2:
+        across = (tube.diameter_m + tube.wall_thickness_m) / 2
+        for name, side in (("lower", -1.0), ("upper", 1.0)):
+            centre = middle + np.array([0.0, side * across])
+            half = np.array([half_length, half_wall])
+            blocks.append(Block(f"{tube.name}_{name}", centre, half, np.eye(2)))
+        end_half = np.array([half_wall, tube.diameter_m / 2 + tube.wall_thickness_m])
+    else:
+        apothem = facet_apothem_m(tube)
+        outer = apothem + tube.wall_thickness_m
+        half_width = outer * math.tan(math.pi / tube.facets)
+        for i in range(tube.facets):
+            angle = 2 * math.pi * (i + 0.5) / tube.facets
+            outward = np.array([0.0, math.cos(angle), math.sin(angle)])
+            along = np.array([0.0, -math.sin(angle), math.cos(angle)])
+            axes = np.array([[1.0, 0.0, 0.0], outward, along])
+            half = np.array([half_length, half_wall, half_width])
+            centre = middle + outward * (apothem + half_wall)
+            blocks.append(Block(f"{tube.name}_{i + 1:02d}", centre, half, axes))
+        end_half = np.array([half_wall, outer, outer])
+    closing_x = {"left": tube.left_end_x_m, "right": tube.right_end_x_m}.get(tube.closed_end)
+    at_wall = closing_x is not None and (closing_x <= 0 or closing_x >= box.width_m)
+    if closing_x is not None and not at_wall:
+        side = -1.0 if tube.closed_end == "left" else 1.0
+        centre = axis + np.eye(dimension)[0] * (closing_x + side * half_wall)
+        blocks.append(Block(f"{tube.name}_end", centre, end_half, np.eye(dimension)))
+    return blocks
+
+
+def tube_bore(tube: Tube, box: Box, dimension: int) -> Bore:
+    """The tube's cavity, from its mouth (the left end unless that is closed)."""
+    from_right = tube.closed_end == "left"
+    mouth = _tube_axis_point(tube, box, dimension)
+    mouth[0] = tube.right_end_x_m if from_right else tube.left_end_x_m
+    axis = np.eye(dimension)[0] * (-1.0 if from_right else 1.0)
+    if dimension == 2:
+        section = np.array([[-tube.diameter_m / 2], [tube.diameter_m / 2]])
+    else:
+        corner = facet_apothem_m(tube) / math.cos(math.pi / tube.facets)
+        angles = 2 * math.pi * np.arange(tube.facets) / tube.facets
+        section = corner * np.column_stack([np.cos(angles), np.sin(angles)])
+    return Bore(tube.name, mouth, axis, tube.length_m, np.eye(dimension)[1:], section)
+
+
+def box_walls(box: Box, dimension: int) -> list[Wall]:
+    """Floor and side walls, normals pointing into the sand."""
+    unit = np.eye(dimension)
+    walls = [
+        Wall("floor", np.zeros(dimension), unit[-1]),
+        Wall("left", np.zeros(dimension), unit[0]),
+        Wall("right", unit[0] * box.width_m, -unit[0]),
+    ]
+    if dimension == 3:
+        walls += [
+            Wall("front", np.zeros(3), unit[1]),
+            Wall("back", unit[1] * box.depth_m, -unit[1]),
+        ]
+    return walls
+
+
+def build_scene(box: Box, obstacles: tuple[Plate | Tube | Polygon, ...], dimension: int) -> Scene:
+    """Geometry of a box with plates and tubes; outlines of polygons are left to the engine."""
+    blocks: list[Block] = []
+    bores: list[Bore] = []
+    for obstacle in obstacles:
+        if isinstance(obstacle, Plate):
+            blocks += plate_blocks(obstacle, dimension)
+        elif isinstance(obstacle, Tube):
+            blocks += tube_blocks(obstacle, box, dimension)
+            bores.append(tube_bore(obstacle, box, dimension))
+    return Scene(dimension, tuple(box_walls(box, dimension)), tuple(blocks), tuple(bores))

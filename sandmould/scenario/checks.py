@@ -1,0 +1,155 @@
+"""What types alone cannot see: a scene whose parts do not go together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.box import Plate, Tube, plate_blocks, tube_blocks
+from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
+from sandmould.scenario.scenario import Scenario
+
+
+def problems(scenario: Scenario) -> list[Problem]:
+    """List all that keeps a well-typed scenario from being run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Returns
+    -------
+    list of Problem
+    """
+    found = [*_obstacles(scenario), *_grains(scenario), *_time(scenario), *_vibration(scenario)]
+    # The bed can only be predicted for a scene that is otherwise sound.
+    return found or [*_fill(scenario)]
+
+
+def _obstacles(s: Scenario) -> Iterator[Problem]:
+    names = [o.name for o in s.obstacles]
+    for i, obstacle in enumerate(s.obstacles):
+        key = f"obstacles.{i}"
+        if names.index(obstacle.name) != i:
+            yield Problem(f"{key}.name", obstacle.name, "a name no other obstacle has")
+        if isinstance(obstacle, Plate):
+            yield from _plate(s, obstacle, key)
+        elif isinstance(obstacle, Tube):
+            yield from _tube(s, obstacle, key)
+        elif s.dimension == 3:
+            yield Problem(f"{key}.kind", "polygon", "plate or tube in 3D")
+
+
+def _plate(s: Scenario, plate: Plate, key: str) -> Iterator[Problem]:
+    for part in ("centre_m", "size_m"):
+        value = getattr(plate, part)
+        if len(value) != s.dimension:
+            yield Problem(f"{key}.{part}", list(value), f"{s.dimension} numbers, one a dimension")
+            return
+    if not _in_box(s, plate_blocks(plate, s.dimension)[0].corners()):
+        yield Problem(
+            f"{key}.centre_m", list(plate.centre_m), f"a plate inside the box, {_size(s)}"
+        )
+
+
+def _tube(s: Scenario, tube: Tube, key: str) -> Iterator[Problem]:
+    if tube.right_end_x_m > s.box.width_m * (1 + 1e-9):
+        yield Problem(
+            f"{key}.length_m",
+            tube.length_m,
+            f"at most {s.box.width_m - tube.left_end_x_m:.6g}, so that the tube ends in the box",
+        )
+    elif not _in_box(s, np.vstack([b.corners() for b in tube_blocks(tube, s.box, s.dimension)])):
+        yield Problem(
+            f"{key}.axis_height_m", tube.axis_height_m, f"a tube inside the box, {_size(s)}"
+        )
+    largest = s.sand.classes(s.dimension)[-1].diameter_m
+    if largest >= tube.diameter_m:
+        yield Problem(
+            f"{key}.diameter_m",
+            tube.diameter_m,
+            f"more than the largest grain, {largest:.6g} m",
+        )
+
+
+def _in_box(s: Scenario, corners: np.ndarray) -> bool:
+    size = [s.box.width_m, s.box.depth_m, s.box.height_m] if s.dimension == 3 else [
+        s.box.width_m, s.box.height_m]  # fmt: skip
+    slack = 1e-9 * max(size)
+    return bool((corners >= -slack).all() and (corners <= np.array(size) + slack).all())
+
+
+def _size(s: Scenario) -> str:
+    depth = f" x {s.box.depth_m:g}" if s.dimension == 3 else ""
+    return f"{s.box.width_m:g}{depth} x {s.box.height_m:g} m"
+
+
+def _grains(s: Scenario) -> Iterator[Problem]:
+    largest = s.sand.classes(s.dimension)[-1].diameter_m
+    narrowest = min(s.box.width_m, s.box.depth_m) if s.dimension == 3 else s.box.width_m
+    if largest * 3 > narrowest:
+        key = "box.width_m" if narrowest == s.box.width_m else "box.depth_m"
+        yield Problem(key, narrowest, f"at least three of the largest grains, {3 * largest:.6g} m")
+
+
+def _time(s: Scenario) -> Iterator[Problem]:
+    critical = s.critical_step
+    own = s.time_step.step_s
+    if own is not None and own > critical.step_s:
+        yield Problem(
+            "time_step.step_s",
+            own,
+            f"at most the critical step {critical.step_s:.4g} s, set by {critical.cause}",
+        )
+    elif s.record.series_every_s < s.step_s:
+        yield Problem(
+            "record.series_every_s",
+            s.record.series_every_s,
+            f"at least the time step {s.step_s:.4g} s",
+        )
+    if s.record.snapshot_every_s < s.record.series_every_s:
+        yield Problem(
+            "record.snapshot_every_s",
+            s.record.snapshot_every_s,
+            f"at least record.series_every_s, {s.record.series_every_s:g} s",
+        )
+
+
+def _vibration(s: Scenario) -> Iterator[Problem]:
+    stages = [(f"vibration.{i}", v) for i, v in enumerate(s.vibration)]
+    if s.fill.vibration_between_layers is not None:
+        stages.append(("fill.vibration_between_layers", s.fill.vibration_between_layers))
+    for key, stage in stages:
+        if not isinstance(stage.direction, str) and len(stage.direction) != s.dimension:
+            yield Problem(
+                f"{key}.direction",
+                list(stage.direction),
+                f"vertical, horizontal or {s.dimension} numbers",
+            )
+        steps = 1 / (stage.frequency_hz * s.step_s)
+        if steps < 20:
+            yield Problem(
+                f"{key}.frequency_hz",
+                stage.frequency_hz,
+                f"at most {1 / (20 * s.step_s):.4g} Hz, 20 time steps a period",
+            )
+
+
+def _fill(s: Scenario) -> Iterator[Problem]:
+    counts = plan_counts(s)
+    for i, count in enumerate(counts):
+        if count < 1:
+            yield Problem("fill.layers", f"layer {i + 1}", "a layer of at least one grain")
+            return
+    if sum(counts) > 20_000_000:
+        yield Problem("fill.layers", f"{sum(counts)} grains", "at most 20 million grains")
+        return
+    height = predicted_bed_height_m(s, counts)
+    if height > s.box.height_m:
+        yield Problem(
+            "fill.layers",
+            f"a bed about {height:.4g} m high",
+            f"layers that fit into box.height_m, {s.box.height_m:g} m",
+        )

@@ -1,0 +1,90 @@
+"""How the sand comes into the box: layers, their drop, when they count as settled."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.sand import ARGUED
+from sandmould.scenario.vibration import VibrationStage
+
+
+class Layer(Section):
+    """One layer of sand, or several equal ones, by height, mass or number of grains."""
+
+    height_m: float | None = quantity(
+        None, "Height the layer adds to an even bed.", unit="m", source=ARGUED, gt=0, le=10
+    )
+    mass_kg: float | None = quantity(
+        None, "Mass of the layer.", unit="kg", source=ARGUED, gt=0, le=1e5
+    )
+    count: int | None = quantity(
+        None, "Number of grains in the layer.", source=ARGUED, ge=1, le=10_000_000
+    )
+    repeat: int = quantity(
+        1, "How many such layers follow each other.", source=ARGUED, ge=1, le=100
+    )
+
+    @model_validator(mode="after")
+    def _one_amount(self) -> Layer:
+        if sum(v is not None for v in (self.height_m, self.mass_kg, self.count)) != 1:
+            raise PydanticCustomError("layer", "exactly one of height_m, mass_kg and count")
+        return self
+
+
+class Settling(Section):
+    """When a layer is at rest, so that the next may come."""
+
+    rms_speed_m_s: float = quantity(
+        0.01,
+        "Root mean square speed of all grains, weighted by mass, below which the bed is at rest.",
+        unit="m/s",
+        source=ARGUED,
+        gt=0,
+        le=10,
+    )
+    shortest_s: float = quantity(
+        0.05, "The rule is asked no sooner than this.", unit="s", source=ARGUED, ge=0, le=100
+    )
+    longest_s: float = quantity(
+        2.0, "A bed not at rest by then ends the run.", unit="s", source=ARGUED, gt=0, le=1000
+    )
+
+    @model_validator(mode="after")
+    def _order(self) -> Settling:
+        if self.longest_s <= self.shortest_s:
+            raise PydanticCustomError("settling", "a longest_s greater than shortest_s")
+        return self
+
+
+class Fill(Section):
+    """Layers of sand dropped one after the other, each on a bed at rest."""
+
+    layers: tuple[Layer, ...] = Field(
+        (Layer(height_m=0.02, repeat=2),), min_length=1, description="Layers from the bottom up."
+    )
+    drop_height_m: float = quantity(
+        0.005,
+        "Gap between the bed's highest grain and the lowest of the new layer.",
+        unit="m",
+        source=ARGUED,
+        ge=0,
+        le=10,
+    )
+    nominal_solid_fraction: float | None = quantity(
+        None,
+        "Solid fraction that turns a layer's height into grains; 0.80 in 2D and 0.58 in 3D "
+        "unless given.",
+        source=ARGUED,
+        gt=0,
+        lt=1,
+    )
+    settling: Settling = Field(Settling(), description="When a layer counts as settled.")
+    vibration_between_layers: VibrationStage | None = Field(
+        None, description="Vibration after each layer but the last."
+    )
+
+    def each_layer(self) -> tuple[Layer, ...]:
+        """The layers with repeats written out."""
+        return tuple(layer for layer in self.layers for _ in range(layer.repeat))

@@ -1,0 +1,160 @@
+"""The scene as flat walls, oriented solid blocks and the bores of tubes.
+
+The vertical axis is the last one: y in 2D, z in 3D. Everything here is in the frame of the
+moulding box, at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A flat wall of the moulding box, unbounded, with sand on the side of its normal."""
+
+    name: str
+    point_m: Array
+    """(d,) float64, m: any point of the wall."""
+    normal: Array
+    """(d,) float64: unit normal pointing into the sand."""
+
+    def distance_m(self, position_m: Array) -> Array:
+        """Signed distance of points from the wall, positive on the sand's side.
+
+        Parameters
+        ----------
+        position_m : (n, d) float64, m
+
+        Returns
+        -------
+        (n,) float64, m
+        """
+        return (position_m - self.point_m) @ self.normal
+
+
+@dataclass(frozen=True)
+class Block:
+    """A solid rectangle (2D) or cuboid (3D) in any orientation."""
+
+    name: str
+    centre_m: Array
+    """(d,) float64, m."""
+    half_size_m: Array
+    """(d,) float64, m: half lengths along the block's own axes."""
+    axes: Array
+    """(d, d) float64: the block's orthonormal axes, one a row."""
+
+    def local(self, position_m: Array) -> Array:
+        """Coordinates of points in the block's own axes, origin at its centre.
+
+        Parameters
+        ----------
+        position_m : (n, d) float64, m
+
+        Returns
+        -------
+        (n, d) float64, m
+        """
+        return (position_m - self.centre_m) @ self.axes.T
+
+    def distance_m(self, position_m: Array) -> Array:
+        """Signed distance of points from the block's surface, negative inside.
+
+        Parameters
+        ----------
+        position_m : (n, d) float64, m
+
+        Returns
+        -------
+        (n,) float64, m
+        """
+        excess = np.abs(self.local(position_m)) - self.half_size_m
+        outside = np.linalg.norm(np.maximum(excess, 0.0), axis=1)
+        inside = np.minimum(excess.max(axis=1), 0.0)
+        return outside + inside
+
+    def corners(self) -> Array:
+        """Corners of the block, (2^d, d) float64, m."""
+        d = len(self.centre_m)
+        signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * d, indexing="ij")).reshape(d, -1).T
+        return self.centre_m + (signs * self.half_size_m) @ self.axes
+
+
+@dataclass(frozen=True)
+class Bore:
+    """The cavity of a tube: a straight prism from its mouth inwards.
+
+    In 2D the section is an interval; in 3D a convex polygon, counter-clockwise in the plane of
+    ``basis``.
+    """
+
+    name: str
+    mouth_m: Array
+    """(d,) float64, m: centre of the mouth."""
+    axis: Array
+    """(d,) float64: unit vector from the mouth into the tube."""
+    length_m: float
+    basis: Array
+    """(d - 1, d) float64: orthonormal directions across the axis."""
+    section_m: Array
+    """(2, 1) float64, m in 2D: the interval's ends; (k, 2) float64, m in 3D: the vertices."""
+
+    @property
+    def section_measure(self) -> float:
+        """Width (m) of the section in 2D, its area (m2) in 3D."""
+        s = self.section_m
+        if s.shape[1] == 1:
+            return float(s[1, 0] - s[0, 0])
+        x, y = s[:, 0], s[:, 1]
+        return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+    @property
+    def measure(self) -> float:
+        """Area (m2) of the bore in 2D, its volume (m3) in 3D."""
+        return self.section_measure * self.length_m
+
+    def local(self, position_m: Array) -> tuple[Array, Array]:
+        """Depth behind the mouth and coordinates across the axis.
+
+        Parameters
+        ----------
+        position_m : (n, d) float64, m
+
+        Returns
+        -------
+        depth_m : (n,) float64, m
+            Positive inside the tube.
+        across_m : (n, d - 1) float64, m
+        """
+        relative = position_m - self.mouth_m
+        return relative @ self.axis, relative @ self.basis.T
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that the sand can touch, and the cavities it should fill."""
+
+    dimension: int
+    walls: tuple[Wall, ...]
+    blocks: tuple[Block, ...]
+    bores: tuple[Bore, ...]
+
+    def clearance_m(self, position_m: Array) -> Array:
+        """Distance of points from the nearest wall or block, negative where inside one.
+
+        Parameters
+        ----------
+        position_m : (n, d) float64, m
+
+        Returns
+        -------
+        (n,) float64, m
+        """
+        surfaces: tuple[Wall | Block, ...] = (*self.walls, *self.blocks)
+        return np.min([s.distance_m(position_m) for s in surfaces], axis=0)

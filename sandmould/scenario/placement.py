@@ -1,0 +1,168 @@
+"""Where the grains of a layer start: at random, without overlap, in a loose column.
+
+A layer is planned before the run in its own frame, height 0 at its lowest point. The deck lifts
+it to the drop height over the bed that it finds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from sandmould.scenario.geometry import Array
+from sandmould.scenario.scenario import Scenario
+
+LOOSE_FRACTION = {2: 0.45, 3: 0.25}
+"""Solid fraction of the falling column: random sequential addition jams at 0.547 in 2D (Feder
+1980) and 0.38 in 3D, and becomes slow well before."""
+NOMINAL_FRACTION = {2: 0.80, 3: 0.58}
+"""Solid fraction of a filled bed that turns heights into grains; argued in docs/choices.md."""
+WALL_GAP = 0.05
+"""Gap kept from side walls, over the radius."""
+
+
+@dataclass(frozen=True)
+class PlannedLayer:
+    """Grains of one layer before it is dropped."""
+
+    class_number: NDArray[np.int64]
+    """(n,) int64: size class, starting at 1."""
+    radius_m: Array
+    """(n,) float64, m."""
+    position_m: Array
+    """(n, d) float64, m; the vertical counts from the layer's own lowest point."""
+
+    @property
+    def height_m(self) -> float:
+        """Height of the loose column."""
+        return float((self.position_m[:, -1] + self.radius_m).max())
+
+
+def _nominal_fraction(s: Scenario) -> float:
+    return s.fill.nominal_solid_fraction or NOMINAL_FRACTION[s.dimension]
+
+
+def _mean_grain_measure(s: Scenario) -> float:
+    return sum(
+        c.count_fraction * s.sand.grain_measure(c.diameter_m, s.dimension)
+        for c in s.sand.classes(s.dimension)
+    )
+
+
+def plan_counts(s: Scenario) -> list[int]:
+    """Number of grains of each layer, from its height, mass or count.
+
+    A height counts over the whole floor: obstacles only lift the bed.
+    """
+    mean_measure = _mean_grain_measure(s)
+    mean_mass = sum(
+        c.count_fraction * s.sand.grain_mass_kg(c.diameter_m, s.dimension)
+        for c in s.sand.classes(s.dimension)
+    )
+    counts = []
+    for layer in s.fill.each_layer():
+        if layer.count is not None:
+            counts.append(layer.count)
+        elif layer.mass_kg is not None:
+            counts.append(round(layer.mass_kg / mean_mass))
+        else:
+            solid = (layer.height_m or 0.0) * s.floor_measure * _nominal_fraction(s)
+            counts.append(round(solid / mean_measure))
+    return counts
+
+
+def predicted_bed_height_m(s: Scenario, counts: list[int]) -> float:
+    """Height of the filled bed, obstacles and empty bores included."""
+    solid = sum(counts) * _mean_grain_measure(s) / _nominal_fraction(s)
+    displaced = sum(float(np.prod(2 * b.half_size_m)) for b in s.scene.blocks)
+    displaced += sum(bore.measure for bore in s.scene.bores)
+    return (solid + displaced) / s.floor_measure
+
+
+def _draw_classes(s: Scenario, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Draw size classes so that each has its exact share, rounded, in random order."""
+    classes = s.sand.classes(s.dimension)
+    share = np.cumsum([c.count_fraction for c in classes])
+    # Stratified: the k-th grain takes the class at quantile (k + u) / n.
+    quantile = (np.arange(count) + rng.random(count)) / count
+    return rng.permutation(1 + np.searchsorted(share[:-1], quantile, side="right")).astype(np.int64)
+
+
+def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
+    """Place one layer's grains by random sequential addition, largest first.
+
+    Parameters
+    ----------
+    s : Scenario
+    number : int
+        Layer number, starting at 1; with the seed it fixes the draw.
+    count : int
+
+    Returns
+    -------
+    PlannedLayer
+    """
+    rng = np.random.default_rng([s.seed, number])
+    drawn = np.sort(_draw_classes(s, count, rng))[::-1]
+    diameters = {c.number: c.diameter_m for c in s.sand.classes(s.dimension)}
+    radius = np.array([diameters[c] for c in drawn]) / 2
+    size = np.array([s.box.width_m, s.box.depth_m])[: s.dimension - 1]
+    solid = sum(s.sand.grain_measure(2 * r, s.dimension) for r in radius)
+    height = solid / s.floor_measure / LOOSE_FRACTION[s.dimension]
+    height = max(height, 2.2 * radius[0])
+    while (position := _add_sequentially(radius, size, height, rng)) is None:
+        height *= 1.15
+    order = np.argsort(position[:, -1], kind="stable")
+    position[:, -1] -= (position[:, -1] - radius).min()
+    return PlannedLayer(drawn[order], radius[order], position[order])
+
+
+def _add_sequentially(
+    radius: Array, size_m: Array, height_m: float, rng: np.random.Generator
+) -> Array | None:
+    """Add grains in batches of one radius; None when a batch finds no room."""
+    d = len(size_m) + 1
+    placed = np.empty((0, d))
+    for r in np.unique(radius)[::-1]:
+        placed_radius = radius[: len(placed)]
+        tree = cKDTree(placed) if len(placed) else None
+        wanted = int((radius == r).sum())
+        own = np.empty((0, d))
+        low = np.append(np.full(d - 1, r * (1 + WALL_GAP)), r)
+        high = np.append(size_m - r * (1 + WALL_GAP), height_m - r)
+        for _ in range(400):
+            missing = wanted - len(own)
+            if missing == 0:
+                break
+            tried = rng.uniform(low, high, size=(2 * missing + 8, d))
+            if tree is not None:
+                tried = tried[_free_of(tree, placed_radius, tried, r)]
+            own = _free_of_each_other(np.vstack([own, tried]), 2 * r, len(own))[:wanted]
+        if len(own) < wanted:
+            return None
+        placed = np.vstack([placed, own])
+    return placed
+
+
+def _free_of(tree: cKDTree, placed_radius: Array, tried: Array, radius: float) -> NDArray[np.bool_]:
+    """Which trial grains touch none of the placed ones."""
+    free = np.ones(len(tried), dtype=bool)
+    pairs = cKDTree(tried).sparse_distance_matrix(
+        tree, placed_radius.max() + radius, output_type="coo_matrix"
+    )
+    hit = pairs.data < placed_radius[pairs.col] + radius
+    free[pairs.row[hit]] = False
+    return free
+
+
+def _free_of_each_other(points: Array, distance_m: float, keep_first: int) -> Array:
+    """Drop, of points nearer than a distance, the later one."""
+    pairs = cKDTree(points).query_pairs(distance_m, output_type="ndarray")
+    later = np.unique(pairs.max(axis=1)) if len(pairs) else np.empty(0, dtype=int)
+    keep = np.ones(len(points), dtype=bool)
+    keep[later] = False
+    keep[:keep_first] = True
+    return points[keep]

@@ -1,0 +1,258 @@
+"""Read scenarios and materials from YAML, keeping where every value came from."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from sandmould.scenario.bad_input import BadInputError, Problem
+
+Tree = dict[str, Any]
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML whose 7e4 is a number and whose repeated keys are refused."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)([eE][-+]?\d+)?$"),
+    list("-+0123456789."),
+)
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:int", re.compile(r"^[-+]?\d[\d_]*$"), list("-+0123456789")
+)
+# The first match wins in PyYAML: plain integers must be asked before floats.
+for _resolvers in _Loader.yaml_implicit_resolvers.values():
+    _resolvers.sort(key=lambda item: not item[0].endswith(":int"))
+
+
+def _mapping(loader: _Loader, node: yaml.MappingNode) -> Tree:
+    keys = [loader.construct_object(k) for k, _ in node.value]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"key {key!r} stands twice", node.start_mark
+            )
+    loader.flatten_mapping(node)
+    return {
+        loader.construct_object(k, deep=True): loader.construct_object(v, deep=True)
+        for k, v in node.value
+    }
+
+
+_Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
+
+
+def read_yaml(path: Path, shown: str) -> Tree:
+    """Read one YAML file that must hold a mapping.
+
+    Parameters
+    ----------
+    path : Path
+    shown : str
+        The file's name in messages.
+
+    Raises
+    ------
+    BadInputError
+        When the file is missing, is no YAML or holds no mapping.
+    """
+    try:
+        tree = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8 text"
+        raise BadInputError(
+            [Problem("file", str(path), f"a readable YAML file ({reason})")]
+        ) from error
+    except (yaml.YAMLError, ValueError) as error:
+        text = " ".join(str(error).split())
+        raise BadInputError([Problem("file", text, "YAML text", shown)]) from error
+    if not isinstance(tree, dict) or not all(isinstance(k, str) for k in tree):
+        raise BadInputError([Problem("file", tree, "a mapping of keys to values", shown)])
+    return tree
+
+
+@dataclass
+class Origin:
+    """Where each value of a tree came from, by key path."""
+
+    file: dict[str, str] = field(default_factory=dict)
+    source: dict[str, str] = field(default_factory=dict)
+
+    def file_of(self, key: str) -> str:
+        """File that gave a key, or the nearest key above it."""
+        return _nearest(self.file, key) or ""
+
+    def source_of(self, key: str) -> str | None:
+        """Source of a key's value, or None where the types' default stands."""
+        return self.source.get(key)
+
+
+def _nearest(table: Mapping[str, str], key: str) -> str | None:
+    parts = key.split(".")
+    for n in range(len(parts), 0, -1):
+        found = table.get(".".join(parts[:n]))
+        if found is not None:
+            return found
+    return table.get("")
+
+
+def _is_sourced(value: Any) -> bool:
+    return isinstance(value, dict) and {"value", "source"} <= set(value) <= {
+        "value",
+        "unit",
+        "source",
+    }
+
+
+def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -> Tree:
+    """Lay one tree over another: mappings merge, lists and values replace.
+
+    Parameters
+    ----------
+    base, extra : dict
+        A leaf may be written ``{value: ..., unit: ..., source: ...}``.
+    origin : Origin
+        Updated with the file and source of every leaf of ``extra``.
+    file : str
+        Name of the file that ``extra`` came from.
+    above : str
+        Key path of ``base``.
+    """
+    merged = dict(base)
+    for name, value in extra.items():
+        key = f"{above}.{name}" if above else str(name)
+        if isinstance(value, dict) and not _is_sourced(value):
+            below = merged.get(name)
+            origin.file[key] = file
+            merged[name] = merge(below if isinstance(below, dict) else {}, value, origin, file, key)
+        else:
+            for table in (origin.file, origin.source):
+                for old in [k for k in table if k == key or k.startswith(key + ".")]:
+                    del table[old]
+            merged[name] = _unwrap(value, origin, file, key)
+    return merged
+
+
+def _unwrap(value: Any, origin: Origin, file: str, key: str) -> Any:
+    origin.file[key] = file
+    if _is_sourced(value):
+        origin.source[key] = str(value["source"])
+        return value["value"]
+    if isinstance(value, dict):
+        return {n: _unwrap(v, origin, file, f"{key}.{n}") for n, v in value.items()}
+    if isinstance(value, list):
+        return [_unwrap(v, origin, file, f"{key}.{i}") for i, v in enumerate(value)]
+    origin.source[key] = file
+    return value
+
+
+def validated(model: type[ModelT], tree: Tree, origin: Origin, above: str = "") -> ModelT:
+    """Turn a tree into a typed model, or say what is wrong with each value.
+
+    Raises
+    ------
+    BadInputError
+        With file, key, value and what is valid of every misfit.
+    """
+    try:
+        return model.model_validate(tree)
+    except ValidationError as error:
+        found = [_problem(model, item, origin, above) for item in error.errors()]
+        raise BadInputError(found) from None
+
+
+def _problem(model: type[BaseModel], item: Any, origin: Origin, above: str) -> Problem:
+    # Tags of unions stand in pydantic's location though the file has no such key.
+    tags = {"plate", "tube", "polygon"}
+    parts = [str(p) for p in item["loc"]]
+    parts = [
+        p
+        for i, p in enumerate(parts)
+        if not (p in tags and i and parts[i - 1].isdigit())
+        and not p.startswith(
+            (
+                "literal[",
+                "tuple[",
+                "function-",
+                "list[",
+                "constrained-",
+                "float",
+                "int",
+                "str",
+                "Range",
+                "bool",
+            )
+        )
+    ]
+    key = ".".join(([above] if above else []) + parts) or "file"
+    value = item.get("input")
+    kind, context = item["type"], item.get("ctx", {})
+    if kind == "missing":
+        value = None
+    return Problem(key, value, _valid(model, kind, context, item, parts), origin.file_of(key))
+
+
+def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: list[str]) -> str:
+    if kind == "extra_forbidden":
+        known = known_keys(model, parts[:-1])
+        near = difflib.get_close_matches(parts[-1], known, n=1, cutoff=0.5)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        return f"one of the keys {', '.join(sorted(known)) or '(none)'}{hint}"
+    words = {
+        "missing": "a value: this key must be given",
+        "greater_than": f"a number greater than {context.get('gt')}",
+        "greater_than_equal": f"a number of at least {context.get('ge')}",
+        "less_than": f"a number less than {context.get('lt')}",
+        "less_than_equal": f"a number of at most {context.get('le')}",
+        "finite_number": "a finite number",
+        "float_type": "a number",
+        "float_parsing": "a number",
+        "int_type": "a whole number",
+        "int_parsing": "a whole number",
+        "int_from_float": "a whole number",
+        "bool_type": "true or false",
+        "bool_parsing": "true or false",
+        "string_type": "text",
+        "tuple_type": "a list",
+        "list_type": "a list",
+        "dict_type": "a mapping",
+        "model_type": "a mapping of keys to values",
+        "model_attributes_type": "a mapping of keys to values",
+        "too_short": f"a list of at least {context.get('min_length')} entries",
+        "too_long": f"a list of at most {context.get('max_length')} entries",
+        "literal_error": f"one of {context.get('expected')}",
+        "union_tag_invalid": f"a kind among {context.get('expected_tags')}",
+        "union_tag_not_found": "a mapping with a kind: plate, tube or polygon",
+        "string_pattern_mismatch": f"text of the pattern {context.get('pattern')}",
+    }
+    return words.get(kind, str(item["msg"]))
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)
+
+
+def known_keys(model: type[BaseModel], parts: list[str]) -> list[str]:
+    """Keys that a model has at a path, list positions skipped."""
+    here = [model]
+    for part in (p for p in parts if not p.isdigit()):
+        here = [
+            inner
+            for outer in here
+            if part in outer.model_fields
+            for inner in _models_in(outer.model_fields[part].annotation)
+        ]
+    return sorted({name for m in here for name in m.model_fields})

@@ -1,0 +1,120 @@
+"""A whole scene of sand: what is filled, shaken, recorded, and by which engine."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Literal
+
+from pydantic import Field
+
+from sandmould.scenario.box import Box, Obstacle, build_scene
+from sandmould.scenario.contact import BackgroundDamping, Contact
+from sandmould.scenario.fill import Fill
+from sandmould.scenario.geometry import Scene
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.sand import ARGUED, Sand
+from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
+from sandmould.scenario.vibration import VibrationStage
+
+
+class Engine(Section):
+    """Which engine computes the scene, and with how many ranks."""
+
+    name: Literal["lammps", "liggghts", "reference"] = quantity(
+        "lammps", "Engine that computes the scene.", source=ARGUED
+    )
+    ranks: int = quantity(1, "MPI ranks of one run.", source=ARGUED, ge=1, le=4096)
+
+
+class Record(Section):
+    """What a run writes down, and how often."""
+
+    series_every_s: float = quantity(
+        0.01, "Interval of the time series and the guards.", unit="s", source=ARGUED, gt=0, le=100
+    )
+    snapshot_every_s: float = quantity(
+        0.05, "Interval of snapshots of all grains.", unit="s", source=ARGUED, gt=0, le=100
+    )
+    load_every_steps: int = quantity(
+        20, "Steps between samples of the wall loads.", source=ARGUED, ge=1, le=100000
+    )
+    checkpoint_every_wall_s: float = quantity(
+        60.0, "Wall time between checkpoints.", unit="s", source=ARGUED, gt=0, le=86400
+    )
+
+
+class Guard(Section):
+    """When a run is stopped because its numbers cannot be trusted."""
+
+    largest_overlap_fraction: float = quantity(
+        0.5, "Largest overlap over the smaller radius.", source=ARGUED, gt=0, le=2
+    )
+    kinetic_energy_factor: float = quantity(
+        5.0,
+        "Kinetic energy over the most that the fall and the vibration can give.",
+        source=ARGUED,
+        gt=1,
+        le=1e6,
+    )
+    wall_limit_s: float | None = quantity(
+        None, "Wall time after which the run stops with a checkpoint.", unit="s",
+        source="user", gt=0,
+    )  # fmt: skip
+
+
+class Scenario(Section):
+    """One scene of sand, complete."""
+
+    dimension: Literal[2, 3] = quantity(2, "Discs (2) or spheres (3).", source=ARGUED)
+    gravity_m_s2: float = quantity(
+        9.80665, "Gravity, downwards.", unit="m/s2", source="CGPM 1901", ge=0, le=1000
+    )
+    box: Box = Field(Box(), description="The moulding box.")
+    obstacles: tuple[Obstacle, ...] = Field(
+        (), description="Plates, tubes and polygons in the box."
+    )
+    sand: Sand = Field(Sand(), description="The sand.")
+    contact: Contact = Field(Contact(), description="Contact laws.")
+    background_damping: BackgroundDamping = Field(
+        BackgroundDamping(), description="Damping of free grains."
+    )
+    fill: Fill = Field(Fill(), description="How the sand is filled in.")
+    vibration: tuple[VibrationStage, ...] = Field(
+        (), description="Stages of vibration after the fill, in order."
+    )
+    frame: Literal["box", "laboratory"] = quantity(
+        "box",
+        "Frame of the computation: grains under a body force, eq. (58), or moving walls, eq. (57).",
+        source="Rojek 2004, section 3.9",
+    )
+    engine: Engine = Field(Engine(), description="The engine.")
+    time_step: TimeStep = Field(TimeStep(), description="The time step.")
+    record: Record = Field(Record(), description="What is recorded.")
+    guard: Guard = Field(Guard(), description="When a run is stopped.")
+    seed: int = quantity(1, "Seed of all that is drawn.", source="user", ge=0, le=2**31 - 1)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """Geometry of the box and the obstacles."""
+        return build_scene(self.box, self.obstacles, self.dimension)
+
+    @property
+    def critical_step(self) -> CriticalStep:
+        """Critical time step, eqs. (40)-(54)."""
+        return critical_step(self.sand, self.contact, self.dimension, self.time_step.coordination)
+
+    @property
+    def step_s(self) -> float:
+        """The time step: the user's own, or the asked fraction of the critical one."""
+        own = self.time_step.step_s
+        return self.time_step.fraction * self.critical_step.step_s if own is None else own
+
+    @property
+    def vertical(self) -> int:
+        """Index of the vertical axis: the last one."""
+        return self.dimension - 1
+
+    @property
+    def floor_measure(self) -> float:
+        """Width (m) of the floor in 2D, its area (m2) in 3D."""
+        return self.box.width_m * (1.0 if self.dimension == 2 else self.box.depth_m)

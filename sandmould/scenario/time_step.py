@@ -1,0 +1,96 @@
+"""The critical time step of a bed of springs and dashpots, eqs. (40)-(54)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sandmould.scenario.contact import Contact, ContactLaw
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.sand import ARGUED, Sand
+
+
+class TimeStep(Section):
+    """How the time step is chosen."""
+
+    fraction: float = quantity(0.5, "Time step over the critical one.", source=ARGUED, gt=0, le=1)
+    coordination: float | None = quantity(
+        None,
+        "Contacts a grain can have; 6 in 2D and 12 in 3D (densest equal grains) unless given.",
+        source=ARGUED,
+        ge=1,
+        le=30,
+    )
+    step_s: float | None = quantity(
+        None, "A time step of the user's own, at most the critical one.", unit="s",
+        source="user", gt=0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class CriticalStep:
+    """The smallest critical step of all grains, and what sets it."""
+
+    step_s: float
+    cause: str
+
+
+def _damped(omega_rad_s: float, damping_ratio: float) -> float:
+    """Critical step of one mode, eq. (42)."""
+    return 2 / omega_rad_s * (math.sqrt(1 + damping_ratio**2) - damping_ratio)
+
+
+def _modes(
+    law: ContactLaw, mass_kg: float, contacts: float, inertia_factor: float, pair_masses: int
+) -> tuple[float, float]:
+    """Critical steps of the stiffest normal and rotational mode of equal grains.
+
+    With n contacts a grain the highest normal mode of a lattice has omega^2 = n k_n / m, its
+    share of critical damping is zeta omega / omega_pair with omega_pair^2 = 2 k_n / m (k_n / m at
+    a wall); the highest rotational one has omega^2 = 2 n k_T / (I / r^2) (n k_T at a wall), and
+    no damping, eqs. (50)-(54).
+    """
+    omega_n = math.sqrt(contacts * law.normal_stiffness_n_m / mass_kg)
+    omega_pair = math.sqrt(pair_masses * law.normal_stiffness_n_m / mass_kg)
+    inertia_kg = inertia_factor * mass_kg
+    omega_r = math.sqrt(pair_masses * contacts * law.tangential_stiffness_n_m / inertia_kg)
+    return _damped(omega_n, law.damping_ratio * omega_n / omega_pair), 2 / omega_r
+
+
+def critical_step(
+    sand: Sand, contact: Contact, dimension: int, coordination: float | None = None
+) -> CriticalStep:
+    """Critical time step of a scene, set by its smallest grains.
+
+    Parameters
+    ----------
+    sand : Sand
+    contact : Contact
+    dimension : int
+    coordination : float, optional
+        Contacts a grain; 6 in 2D and 12 in 3D by default.
+
+    Returns
+    -------
+    CriticalStep
+
+    Notes
+    -----
+    The paper's (51) is the case of one contact with a fixed body. The smallest class stands for
+    all, since omega goes as 1/sqrt(m).
+    """
+    contacts = coordination or (6.0 if dimension == 2 else 12.0)
+    inertia_factor = 0.5 if dimension == 2 else 0.4
+    smallest = sand.classes(dimension)[0].diameter_m
+    mass = sand.grain_mass_kg(smallest, dimension)
+    grain_n, grain_r = _modes(contact.grain_grain, mass, contacts, inertia_factor, 2)
+    # At most `dimension` walls meet in a corner.
+    wall_n, wall_r = _modes(contact.grain_wall, mass, dimension, inertia_factor, 1)
+    steps = {
+        "normal grain-grain contact": grain_n,
+        "rotation at grain-grain contacts": grain_r,
+        "normal grain-wall contact": wall_n,
+        "rotation at grain-wall contacts": wall_r,
+    }
+    cause = min(steps, key=lambda name: steps[name])
+    return CriticalStep(steps[cause], cause)
