@@ -62,9 +62,12 @@ def free_part(position_m: Array, radius_m: Array, scene: Scene) -> Array:
     ValueError
         When a wall of a 3D scene is oblique.
     """
-    margin_m = 2.0 * radius_m.max(initial=0.0)
-    low_m = position_m.min(axis=0, initial=np.inf) - margin_m
-    high_m = position_m.max(axis=0, initial=-np.inf) + margin_m
+    if len(position_m) == 0:
+        return np.zeros(0)
+    # beyond every disc, so that this bound stands for none
+    margin_m = 2.0 * float(radius_m.max())
+    low_m = position_m.min(axis=0) - margin_m
+    high_m = position_m.max(axis=0) + margin_m
     if scene.dimension == 2:
         box_m = _box_polygon(scene.walls, low_m, high_m)
         part = disc_polygon_m2(position_m, radius_m, box_m)
@@ -103,11 +106,8 @@ def free_measure_between(scene: Scene, edges_m: Array) -> Array:
         for block in scene.blocks:
             below = below - _polygon_below_m2(_block_polygon(block, scene.walls), edges_m)
     else:
-        section_m = box_section(scene)
-        floor_m, lid_m = _levels(scene.walls)
-        box = _Prism(np.zeros(3), np.eye(3), section_m, floor_m, lid_m)
-        level = np.clip(edges_m, floor_m, lid_m)
-        below = abs(polygon_area_m2(box.section_m)) * (level - level[0])
+        level = np.clip(edges_m, *box_levels_m(scene.walls))
+        below = abs(polygon_area_m2(box_section(scene))) * (level - level[0])
         for block in scene.blocks:
             below = below - _block_prism(block, scene.walls).below_m3(edges_m)
     return np.maximum(np.diff(below), 0.0)
@@ -137,10 +137,33 @@ def box_section(scene: Scene, low_m: float = 0.0, high_m: float = 0.0) -> Array:
     if scene.dimension == 2:
         lowest[1], highest[1] = low_m, high_m
     polygon_m = _box_polygon(scene.walls, lowest, highest)
-    sides_m = polygon_m[:, : 3 - scene.dimension + 1] if scene.dimension == 2 else polygon_m
-    if len(polygon_m) and np.abs(sides_m).max() >= far_m:
+    # in 2D the second column is the height, which the caller bounds
+    across_m = polygon_m[:, : scene.dimension - 1]
+    if np.abs(across_m).max(initial=0.0) >= far_m:
         raise ValueError("the walls leave the box open at a side, so it has no section")
     return polygon_m
+
+
+def box_levels_m(walls: tuple[Wall, ...]) -> tuple[float, float]:
+    """Heights of floor and lid of a 3D box, infinite where there is none.
+
+    Parameters
+    ----------
+    walls : tuple of Wall
+
+    Returns
+    -------
+    floor_m, lid_m : float, m
+
+    Raises
+    ------
+    ValueError
+        When a wall is oblique.
+    """
+    level = [wall for wall in walls if _is_level(wall)]
+    floors_m = [float(wall.point_m[2]) for wall in level if wall.normal[2] > 0.0]
+    lids_m = [float(wall.point_m[2]) for wall in level if wall.normal[2] < 0.0]
+    return max(floors_m, default=-np.inf), min(lids_m, default=np.inf)
 
 
 def _box_polygon(walls: tuple[Wall, ...], low_m: Array, high_m: Array) -> Array:
@@ -166,17 +189,9 @@ def _is_level(wall: Wall) -> bool:
     return slope > 0.5
 
 
-def _levels(walls: tuple[Wall, ...]) -> tuple[float, float]:
-    """Heights of floor and lid of a 3D box, infinite where there is none."""
-    level = [wall for wall in walls if _is_level(wall)]
-    floors_m = [float(wall.point_m[2]) for wall in level if wall.normal[2] > 0.0]
-    lids_m = [float(wall.point_m[2]) for wall in level if wall.normal[2] < 0.0]
-    return max(floors_m, default=-np.inf), min(lids_m, default=np.inf)
-
-
 def _box_prism(walls: tuple[Wall, ...], low_m: Array, high_m: Array) -> _Prism:
     """Box of a 3D scene, bounded where it is open."""
-    floor_m, lid_m = _levels(walls)
+    floor_m, lid_m = box_levels_m(walls)
     section_m = _box_polygon(walls, low_m[:2], high_m[:2])
     bottom_m, top_m = max(floor_m, float(low_m[2])), min(lid_m, float(high_m[2]))
     return _Prism(np.zeros(3), np.eye(3), section_m, bottom_m, top_m)
@@ -202,7 +217,7 @@ def _block_prism(block: Block, walls: tuple[Wall, ...]) -> _Prism:
         first, second = (i for i in range(3) if i != upright)
         section_m = _rectangle(block.centre_m[:2], sides_m[first, :2], sides_m[second, :2])
         half_m, z_m = float(block.half_size_m[upright]), float(block.centre_m[2])
-        floor_m, lid_m = _levels(walls)
+        floor_m, lid_m = box_levels_m(walls)
         low_m, high_m = max(z_m - half_m, floor_m), min(z_m + half_m, lid_m)
         return _Prism(np.zeros(3), np.eye(3), _within(section_m, walls), low_m, high_m)
     a, b, c = block.half_size_m

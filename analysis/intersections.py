@@ -6,7 +6,7 @@ import numpy as np
 
 from sandmould.scenario.geometry import Array
 
-_NODES = 8
+_NODES = 12
 """Gauss points an interval; see :func:`sphere_prism_m3` for the error this leaves."""
 _CHUNK = 20_000
 """Spheres integrated together, which bounds the memory of the slices."""
@@ -131,6 +131,22 @@ def cut_polygon(polygon_m: Array, point_m: Array, normal: Array) -> Array:
     return both[np.stack([side > 0.0, crossed], axis=1).ravel()]
 
 
+def depth_in_polygon_m(point_m: Array, polygon_m: Array) -> Array:
+    """Distance of points from the nearest edge line of a convex polygon, positive inside it.
+
+    Parameters
+    ----------
+    point_m : (n, 2) float64, m
+    polygon_m : (k, 2) float64, m
+        In either sense of rotation.
+
+    Returns
+    -------
+    (n,) float64, m
+    """
+    return _inside_m(point_m, *_edges(polygon_m)).min(axis=1)
+
+
 def disc_polygon_m2(centre_m: Array, radius_m: Array, polygon_m: Array) -> Array:
     """Area common to discs and one convex polygon, exact.
 
@@ -204,7 +220,7 @@ def sphere_prism_m3(
     Spheres wholly inside, wholly outside or cut by one face only are exact. The others are
     integrated over slices (disc and polygon, exact) by Gauss-Legendre quadrature between the
     heights at which a slice first meets an edge or a corner; the error left is below 1e-6 of the
-    sphere's volume.
+    common part.
 
     Parameters
     ----------
@@ -226,9 +242,7 @@ def sphere_prism_m3(
     if len(start_m) < 3:
         return volume
     z = centre_m[:, 2]
-    inside_m = np.column_stack(
-        [_inside_m(centre_m[:, :2], start_m, along), z - low_m, high_m - z]
-    )
+    inside_m = np.column_stack([_inside_m(centre_m[:, :2], start_m, along), z - low_m, high_m - z])
     nearest_m = inside_m.min(axis=1)
     met = nearest_m > -radius_m
     faces = np.sum(np.abs(inside_m) < radius_m[:, None], axis=1)
@@ -266,4 +280,5 @@ def _slices_m3(
     centres = np.repeat(centre_m[which, :2], _NODES, axis=0)
     area = disc_polygon_m2(centres, ring.ravel(), vertex_m).reshape(t.shape)
     share = np.sum(area * (0.5 * weight * 6.0 * x * (1.0 - x)), axis=1) * w[:, 0]
-    return np.bincount(which, weights=share, minlength=len(radius_m))
+    volume = np.bincount(which, weights=share, minlength=len(radius_m))
+    return volume.astype(np.float64)

@@ -1,1 +1,1 @@
-"""One interface, several engines: sessions, outcomes, snapshots and the driver that runs a scenario."""
+"""One interface, several engines: sessions, outcomes, snapshots and the driver of a run."""

@@ -23,7 +23,9 @@ class Problem:
         shown = repr(self.value)
         if len(shown) > 120:
             shown = shown[:117] + "..."
-        return f"{where}{self.key} = {shown} cannot be used: valid is {self.valid}."
+        # An unknown key is the user's text and may hold line breaks.
+        key = self.key if self.key.isprintable() else repr(self.key)
+        return f"{where}{key} = {shown} cannot be used: valid is {self.valid}."
 
 
 class BadInputError(Exception):

@@ -50,10 +50,11 @@ class Tube(Section):
         unit="m",
         source="user",
         gt=0,
+        le=100,
     )
-    length_m: float = quantity(..., "Inner length.", unit="m", source="user", gt=0)
+    length_m: float = quantity(..., "Inner length.", unit="m", source="user", gt=0, le=100)
     wall_thickness_m: float = quantity(
-        0.003, "Thickness of the tube's wall.", unit="m", source=ARGUED, gt=0
+        0.003, "Thickness of the tube's wall.", unit="m", source=ARGUED, gt=0, le=100
     )
     left_end_x_m: float = quantity(..., "x of the tube's left end.", unit="m", source="user", ge=0)
     axis_height_m: float = quantity(..., "Height of the axis.", unit="m", source="user", gt=0)

@@ -15,10 +15,15 @@ class ContactLaw(Section):
     """Linear springs, damping as a share of critical, Coulomb friction, rolling moment."""
 
     normal_stiffness_n_m: float = quantity(
-        7e4, "Normal spring k_n of a contact, eq. (16).", unit="N/m", source=PAPER, gt=0
+        7e4, "Normal spring k_n of a contact, eq. (16).", unit="N/m", source=PAPER, gt=0, le=1e12
     )
     tangential_stiffness_n_m: float = quantity(
-        7e4, "Tangential spring k_T of a contact, eq. (25).", unit="N/m", source=PAPER, gt=0
+        7e4,
+        "Tangential spring k_T of a contact, eq. (25).",
+        unit="N/m",
+        source=PAPER,
+        gt=0,
+        le=1e12,
     )
     friction: float = quantity(0.8, "Coulomb coefficient mu, eq. (26).", source=PAPER, ge=0, le=10)
     damping_ratio: float = quantity(
@@ -38,6 +43,7 @@ class ContactLaw(Section):
         unit="N/m",
         source=ARGUED,
         gt=0,
+        le=1e12,
     )
 
     @property

@@ -82,6 +82,11 @@ def predicted_bed_height_m(s: Scenario, counts: list[int]) -> float:
     return (solid + displaced) / s.floor_measure
 
 
+def loose_height_m(s: Scenario, count: int) -> float:
+    """Height of the falling column of a layer, before it is placed."""
+    return count * _mean_grain_measure(s) / s.floor_measure / LOOSE_FRACTION[s.dimension]
+
+
 def _draw_classes(s: Scenario, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
     """Draw size classes so that each has its exact share, rounded, in random order."""
     classes = s.sand.classes(s.dimension)
@@ -110,9 +115,7 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     diameters = {c.number: c.diameter_m for c in s.sand.classes(s.dimension)}
     radius = np.array([diameters[c] for c in drawn]) / 2
     size = np.array([s.box.width_m, s.box.depth_m])[: s.dimension - 1]
-    solid = sum(s.sand.grain_measure(2 * r, s.dimension) for r in radius)
-    height = solid / s.floor_measure / LOOSE_FRACTION[s.dimension]
-    height = max(height, 2.2 * radius[0])
+    height = max(loose_height_m(s, count), 2.2 * radius[0])
     while (position := _add_sequentially(radius, size, height, rng)) is None:
         height *= 1.15
     order = np.argsort(position[:, -1], kind="stable")

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 
@@ -36,12 +38,15 @@ for _resolvers in _Loader.yaml_implicit_resolvers.values():
 
 
 def _mapping(loader: _Loader, node: yaml.MappingNode) -> Tree:
-    keys = [loader.construct_object(k) for k, _ in node.value]
+    keys = [loader.construct_object(k, deep=True) for k, _ in node.value]
     for key in keys:
-        if keys.count(key) > 1:
-            raise yaml.constructor.ConstructorError(
-                None, None, f"key {key!r} stands twice", node.start_mark
-            )
+        if not isinstance(key, str):
+            fault = f"key {key!r} is no text: put it in quotes"
+        elif keys.count(key) > 1:
+            fault = f"key {key!r} stands twice"
+        else:
+            continue
+        raise yaml.constructor.ConstructorError(None, None, fault, node.start_mark)
     loader.flatten_mapping(node)
     return {
         loader.construct_object(k, deep=True): loader.construct_object(v, deep=True)
@@ -70,15 +75,22 @@ def read_yaml(path: Path, shown: str) -> Tree:
         tree = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise BadInputError(
-            [Problem("file", str(path), f"a readable YAML file ({reason})")]
-        ) from error
-    except (yaml.YAMLError, ValueError) as error:
-        text = " ".join(str(error).split())
-        raise BadInputError([Problem("file", text, "YAML text", shown)]) from error
-    if not isinstance(tree, dict) or not all(isinstance(k, str) for k in tree):
+        raise BadInputError([Problem("file", reason, "a readable YAML file", shown)]) from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise BadInputError([Problem("file", _fault(error), "YAML text", shown)]) from error
+    if not isinstance(tree, dict):
         raise BadInputError([Problem("file", tree, "a mapping of keys to values", shown)])
     return tree
+
+
+def _fault(error: Exception) -> str:
+    """What a parser found, with its line, in one line of text."""
+    mark = getattr(error, "problem_mark", None)
+    if isinstance(error, RecursionError):
+        return "nested too deeply"
+    if mark is None:
+        return " ".join(str(error).split())
+    return f"line {mark.line + 1}: {getattr(error, 'problem', None)}"
 
 
 @dataclass
@@ -93,8 +105,12 @@ class Origin:
         return _nearest(self.file, key) or ""
 
     def source_of(self, key: str) -> str | None:
-        """Source of a key's value, or None where the types' default stands."""
-        return self.source.get(key)
+        """Source of a key's value, or None where the types' default stands.
+
+        That of a list of numbers is the one of its first entry.
+        """
+        first = self.source.get(f"{key}.0") or self.source.get(f"{key}.0.0")
+        return _nearest(self.source, key) or first
 
 
 def _nearest(table: Mapping[str, str], key: str) -> str | None:
@@ -131,14 +147,17 @@ def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -
     merged = dict(base)
     for name, value in extra.items():
         key = f"{above}.{name}" if above else str(name)
-        if isinstance(value, dict) and not _is_sourced(value):
-            below = merged.get(name)
-            origin.file[key] = file
-            merged[name] = merge(below if isinstance(below, dict) else {}, value, origin, file, key)
-        else:
+        below = merged.get(name)
+        lays_over = isinstance(value, dict) and not _is_sourced(value)
+        if not (lays_over and isinstance(below, dict)):
             for table in (origin.file, origin.source):
                 for old in [k for k in table if k == key or k.startswith(key + ".")]:
                     del table[old]
+            below = {}
+        if lays_over:
+            origin.file[key] = file
+            merged[name] = merge(below, value, origin, file, key)
+        else:
             merged[name] = _unwrap(value, origin, file, key)
     return merged
 
@@ -165,40 +184,39 @@ def validated(model: type[ModelT], tree: Tree, origin: Origin, above: str = "") 
         With file, key, value and what is valid of every misfit.
     """
     try:
-        return model.model_validate(tree)
+        # JSON's strict mode takes lists for tuples, but neither "50" nor true for a number.
+        return model.model_validate_json(json.dumps(tree, default=str), strict=True)
     except ValidationError as error:
-        found = [_problem(model, item, origin, above) for item in error.errors()]
-        raise BadInputError(found) from None
+        found: dict[str, Problem] = {}
+        for item in error.errors():
+            one = _problem(model, tree, item, origin, above)
+            before = found.get(one.key)
+            # Each branch of a union that fits nowhere has its own finding.
+            valid = f"{before.valid} or {one.valid}" if before else one.valid
+            found[one.key] = replace(one, valid=valid)
+        raise BadInputError(list(found.values())) from None
 
 
-def _problem(model: type[BaseModel], item: Any, origin: Origin, above: str) -> Problem:
-    # Tags of unions stand in pydantic's location though the file has no such key.
-    tags = {"plate", "tube", "polygon"}
-    parts = [str(p) for p in item["loc"]]
-    parts = [
-        p
-        for i, p in enumerate(parts)
-        if not (p in tags and i and parts[i - 1].isdigit())
-        and not p.startswith(
-            (
-                "literal[",
-                "tuple[",
-                "function-",
-                "list[",
-                "constrained-",
-                "float",
-                "int",
-                "str",
-                "Range",
-                "bool",
-            )
-        )
-    ]
-    key = ".".join(([above] if above else []) + parts) or "file"
-    value = item.get("input")
+def _key_parts(tree: Any, location: tuple[int | str, ...], is_missing: bool) -> list[str]:
+    """Key path of a finding: pydantic's location without the names of union branches."""
+    parts = []
+    for n, part in enumerate(location):
+        if isinstance(tree, dict) and part in tree:
+            tree = tree[str(part)]
+        elif isinstance(tree, list | tuple) and isinstance(part, int) and part < len(tree):
+            tree = tree[part]
+        elif not (is_missing and n == len(location) - 1):
+            continue
+        parts.append(str(part))
+    return parts
+
+
+def _problem(model: type[BaseModel], tree: Tree, item: Any, origin: Origin, above: str) -> Problem:
     kind, context = item["type"], item.get("ctx", {})
-    if kind == "missing":
-        value = None
+    is_missing = kind == "missing"
+    parts = _key_parts(tree, item["loc"], is_missing)
+    key = ".".join(([above] if above else []) + parts) or "file"
+    value = None if is_missing else item.get("input")
     return Problem(key, value, _valid(model, kind, context, item, parts), origin.file_of(key))
 
 
@@ -245,14 +263,25 @@ def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield from _models_in(part)
 
 
-def known_keys(model: type[BaseModel], parts: list[str]) -> list[str]:
-    """Keys that a model has at a path, list positions skipped."""
+def models_at(model: type[BaseModel], parts: list[str]) -> list[type[BaseModel]]:
+    """Models that can stand at a path, list positions skipped."""
     here = [model]
-    for part in (p for p in parts if not p.isdigit()):
+    for part in (p for p in parts if not p.isdecimal()):
         here = [
             inner
             for outer in here
             if part in outer.model_fields
             for inner in _models_in(outer.model_fields[part].annotation)
         ]
-    return sorted({name for m in here for name in m.model_fields})
+    return here
+
+
+def known_keys(model: type[BaseModel], parts: list[str]) -> list[str]:
+    """Keys that a model has at a path, list positions skipped."""
+    return sorted({name for m in models_at(model, parts) for name in m.model_fields})
+
+
+def fields_at(model: type[BaseModel], key: str) -> list[FieldInfo]:
+    """Declarations that a key path can mean: several where kinds of obstacles share a key."""
+    *parents, last = [p for p in key.split(".") if not p.isdecimal()] or [""]
+    return [m.model_fields[last] for m in models_at(model, parents) if last in m.model_fields]

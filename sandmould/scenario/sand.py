@@ -19,7 +19,7 @@ ARGUED = "argued default, docs/choices.md"
 class SievePoint(Section):
     """One sieve: the share of the sand's mass that passes its opening."""
 
-    opening_m: float = quantity(..., "Sieve opening.", unit="m", source="user", gt=0, le=0.1)
+    opening_m: float = quantity(..., "Sieve opening.", unit="m", source="user", ge=1e-6, le=0.1)
     passing_fraction: float = quantity(
         ..., "Mass fraction finer than the opening.", source="user", ge=0, le=1
     )
@@ -52,7 +52,7 @@ class Sand(Section):
     """Grains: material density, sizes and, in 2D, the thickness of the discs."""
 
     density_kg_m3: float = quantity(
-        2400.0, "Density of the grains' material.", unit="kg/m3", source=PAPER, gt=0, le=30000
+        2400.0, "Density of the grains' material.", unit="kg/m3", source=PAPER, ge=1, le=30000
     )
     sieve: tuple[SievePoint, ...] = Field(
         DEFAULT_SIEVE,
@@ -61,19 +61,19 @@ class Sand(Section):
         json_schema_extra={"unit": "m, 1", "source": ARGUED},
     )
     size_scale: float = quantity(
-        4.0, "Size of a modelled grain over a real one.", source=PAPER, gt=0, le=100
+        4.0, "Size of a modelled grain over a real one.", source=PAPER, ge=0.01, le=100
     )
     size_classes: int = quantity(
         5, "Number of diameters that stand for the sieve curve.", source=ARGUED, ge=1, le=20
     )
     disc_thickness_m: float = quantity(
-        0.1, "Length of a disc across the plane, 2D only.", unit="m", source=ARGUED, gt=0, le=10
+        0.1, "Length of a disc across the plane, 2D only.", unit="m", source=ARGUED, ge=1e-6, le=10
     )
 
     @model_validator(mode="after")
     def _curve_rises(self) -> Sand:
         for a, b in pairwise(self.sieve):
-            if b.opening_m <= a.opening_m or b.passing_fraction < a.passing_fraction:
+            if b.opening_m <= a.opening_m * (1 + 1e-9) or b.passing_fraction < a.passing_fraction:
                 raise PydanticCustomError("sieve", "a sieve curve that rises, finest opening first")
         if self.sieve[0].passing_fraction != 0 or self.sieve[-1].passing_fraction != 1:
             raise PydanticCustomError("sieve", "a sieve curve from passing 0 to passing 1")

@@ -13,7 +13,9 @@ from sandmould.scenario.sand import ARGUED, Sand
 class TimeStep(Section):
     """How the time step is chosen."""
 
-    fraction: float = quantity(0.5, "Time step over the critical one.", source=ARGUED, gt=0, le=1)
+    fraction: float = quantity(
+        0.5, "Time step over the critical one.", source=ARGUED, ge=1e-3, le=1
+    )
     coordination: float | None = quantity(
         None,
         "Contacts a grain can have; 6 in 2D and 12 in 3D (densest equal grains) unless given.",
@@ -23,7 +25,7 @@ class TimeStep(Section):
     )
     step_s: float | None = quantity(
         None, "A time step of the user's own, at most the critical one.", unit="s",
-        source="user", gt=0,
+        source="user", ge=1e-12,
     )  # fmt: skip
 
 

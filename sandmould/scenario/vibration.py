@@ -27,7 +27,9 @@ class VibrationStage(Section):
     direction: Literal["vertical", "horizontal"] | tuple[float, ...] = quantity(
         "vertical", "Direction of the box motion: a word or a vector.", source=TUBE_PAPER
     )
-    frequency_hz: float = quantity(50.0, "Frequency.", unit="Hz", source=TUBE_PAPER, gt=0, le=10000)
+    frequency_hz: float = quantity(
+        50.0, "Frequency.", unit="Hz", source=TUBE_PAPER, ge=0.1, le=10000
+    )
     hold: Literal["acceleration", "velocity", "displacement"] = quantity(
         "acceleration", "Which amplitude stays the same when the frequency changes.", source=ARGUED
     )
@@ -45,7 +47,7 @@ class VibrationStage(Section):
         "Frequency at which a given amplitude of another kind than the held one applies.",
         unit="Hz",
         source=ARGUED,
-        gt=0,
+        ge=0.1,
         le=10000,
     )
     duration_s: float = quantity(

@@ -1,0 +1,92 @@
+"""Contacts of the grains with one another, the walls and the blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.neighbours import near_pairs
+from sandmould.scenario.geometry import Array, Block, Scene, Wall
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Number of contacts of the grains and the deepest of them."""
+
+    count: NDArray[np.int64]
+    """(n,) int64: contacts of each grain with grains, walls and blocks."""
+    grain_grain: int
+    """Pairs of grains in contact."""
+    grain_wall: int
+    """Contacts of grains with walls and blocks."""
+    mean_coordination: float
+    """Mean of ``count`` over all grains; NaN without grains."""
+    mean_coordination_bearing: float
+    """Mean of ``count`` over the bearing grains; NaN when there is none."""
+    bearing_fraction: float
+    """Share of the grains that bear: two or more contacts in 2D, three or more in 3D."""
+    largest_overlap_fraction: float
+    """Deepest overlap over the smaller radius, walls and blocks included; 0 without overlap."""
+
+
+def contacts(
+    position_m: Array, radius_m: Array, scene: Scene | None = None, tolerance_m: float = 0.0
+) -> Contacts:
+    """Count the contacts: overlaps deeper than minus the tolerance.
+
+    A grain with fewer than two contacts in 2D, or three in 3D, cannot be held by friction: it is a
+    rattler and left out of ``mean_coordination_bearing``. The test is made once, so a grain held
+    only by rattlers still counts as bearing.
+
+    Parameters
+    ----------
+    position_m : (n, d) float64, m
+    radius_m : (n,) float64, m
+    scene : Scene, optional
+        Walls and blocks; without it only contacts between grains are counted.
+    tolerance_m : float, m, optional
+        Largest gap that still counts as contact.
+
+    Returns
+    -------
+    Contacts
+    """
+    n, dimension = position_m.shape
+    count = np.zeros(n, dtype=np.int64)
+    grain_grain = grain_wall = 0
+    deepest = 0.0
+    for first, second, distance_m in near_pairs(
+        position_m, 2.0 * float(radius_m.max(initial=0.0)) + max(tolerance_m, 0.0)
+    ):
+        a, b = radius_m[first], radius_m[second]
+        overlap_m = a + b - distance_m
+        touch = overlap_m > -tolerance_m
+        count += np.bincount(first[touch], minlength=n) + np.bincount(second[touch], minlength=n)
+        grain_grain += int(touch.sum())
+        deepest = max(deepest, float((overlap_m / np.minimum(a, b)).max(initial=0.0)))
+    surfaces: tuple[Wall | Block, ...] = ()
+    if scene is not None:
+        surfaces = (*scene.walls, *scene.blocks)
+    for surface in surfaces:
+        overlap_m = radius_m - surface.distance_m(position_m)
+        touch = overlap_m > -tolerance_m
+        count += touch
+        grain_wall += int(touch.sum())
+        deepest = max(deepest, float((overlap_m / radius_m).max(initial=0.0)))
+    bearing = count >= dimension
+    return Contacts(
+        count=count,
+        grain_grain=grain_grain,
+        grain_wall=grain_wall,
+        mean_coordination=_mean(count),
+        mean_coordination_bearing=_mean(count[bearing]),
+        bearing_fraction=_mean(bearing),
+        largest_overlap_fraction=deepest,
+    )
+
+
+def _mean(values: NDArray[np.int64] | NDArray[np.bool_]) -> float:
+    """Mean, NaN of nothing."""
+    return float(values.mean()) if len(values) else float("nan")

@@ -1,0 +1,100 @@
+"""Snapshots written for ParaView and OVITO."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.geometry import Array
+
+_COLUMNS = "id type x y z vx vy vz omegax omegay omegaz radius layer"
+
+
+def to_vtk(snapshot: Snapshot, path: Path) -> None:
+    """Write the grains as points with their data, for ParaView (.vtu).
+
+    Each grain is a vertex cell with ``id``, ``layer``, ``radius_m``, ``velocity_m_s``,
+    ``spin_rad_s`` and, the same for all, ``time_s`` and ``vibration_time_s``: meshio writes no
+    field data, where a time would belong. Points of 2D lie at z = 0.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    path : Path
+        Appears only when complete.
+    """
+    n = len(snapshot.id)
+    mesh = meshio.Mesh(
+        _in_space(snapshot.position_m),
+        [("vertex", np.arange(n)[:, None])],
+        point_data={
+            "id": snapshot.id,
+            "layer": snapshot.layer,
+            "radius_m": snapshot.radius_m,
+            "velocity_m_s": _in_space(snapshot.velocity_m_s),
+            "spin_rad_s": snapshot.spin_rad_s,
+            "time_s": np.full(n, snapshot.time_s),
+            "vibration_time_s": np.full(n, snapshot.vibration_time_s),
+        },
+    )
+    partial = _partial(path)
+    mesh.write(partial, file_format="vtu")
+    os.replace(partial, path)
+
+
+def to_ovito(snapshot: Snapshot, path: Path) -> None:
+    """Write the grains as a LAMMPS text dump of one frame, which OVITO opens.
+
+    The type is the layer, so that OVITO colours layers at once. The time step, a whole number, is
+    the simulated time in microseconds. The box just holds the grains.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    path : Path
+        Appears only when complete.
+    """
+    position_m, radius_m = _in_space(snapshot.position_m), snapshot.radius_m[:, None]
+    low_m = (position_m - radius_m).min(axis=0, initial=np.inf)
+    high_m = (position_m + radius_m).max(axis=0, initial=-np.inf)
+    header = [
+        "ITEM: TIMESTEP",
+        str(round(snapshot.time_s * 1e6)),
+        "ITEM: TIME",
+        f"{snapshot.time_s:.16g}",
+        "ITEM: NUMBER OF ATOMS",
+        str(len(snapshot.id)),
+        "ITEM: BOX BOUNDS ff ff ff",
+        *(f"{low:.16g} {high:.16g}" for low, high in zip(low_m, high_m, strict=True)),
+        f"ITEM: ATOMS {_COLUMNS}",
+    ]
+    table = np.column_stack(
+        [
+            snapshot.id,
+            snapshot.layer,
+            position_m,
+            _in_space(snapshot.velocity_m_s),
+            snapshot.spin_rad_s,
+            radius_m,
+            snapshot.layer,
+        ]
+    )
+    # ten digits: less than a nanometre on a metre of box
+    formats = ["%d", "%d", *["%.10g"] * 10, "%d"]
+    partial = _partial(path)
+    np.savetxt(partial, table, fmt=formats, header="\n".join(header), comments="")
+    os.replace(partial, path)
+
+
+def _partial(path: Path) -> Path:
+    """Temporary name beside the file's own."""
+    return path.with_name(path.name + ".partial")
+
+
+def _in_space(vector: Array) -> Array:
+    """Vectors of 2D with a third component of zero."""
+    return np.pad(vector, ((0, 0), (0, 3 - vector.shape[1])))

@@ -1,0 +1,152 @@
+"""Share of the free space that is sand, over the height of the box, and the bed's surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.coordination import contacts
+from analysis.free_space import box_section, free_measure_between
+from analysis.intersections import disc_segment_m2, sphere_cap_m3
+from sandmould.scenario.geometry import Array, Scene
+
+
+@dataclass(frozen=True)
+class SolidFractionProfile:
+    """Sand and free space in slabs of the box, from the bottom up."""
+
+    edges_m: Array
+    """(m + 1,) float64, m: heights between the slabs."""
+    sand_measure: Array
+    """(m,) float64, m2 in 2D or m3 in 3D."""
+    free_measure: Array
+    """(m,) float64, m2 in 2D or m3 in 3D: the box without its blocks."""
+    solid_fraction: Array
+    """(m,) float64: sand over free space; NaN where there is no free space."""
+
+    @property
+    def height_m(self) -> Array:
+        """Middle of each slab, (m,) float64, m."""
+        return 0.5 * (self.edges_m[1:] + self.edges_m[:-1])
+
+
+def solid_fraction_profile(
+    position_m: Array, radius_m: Array, scene: Scene, edges_m: Array
+) -> SolidFractionProfile:
+    """Solid fraction of each slab between successive heights.
+
+    A grain cut by the plane between two slabs counts in both with its exact parts; an overlap of
+    two grains counts twice. Above the bed's surface the fraction falls to zero: nothing corrects
+    for it.
+
+    Parameters
+    ----------
+    position_m : (n, d) float64, m
+    radius_m : (n,) float64, m
+    scene : Scene
+        Its walls must close the box on every side; in 3D they must be upright or level.
+    edges_m : (m + 1,) float64, m
+        Rising heights.
+
+    Returns
+    -------
+    SolidFractionProfile
+
+    Raises
+    ------
+    ValueError
+        When the heights do not rise, the box is open at a side, or a wall of 3D is oblique.
+    """
+    edges_m = np.asarray(edges_m, dtype=np.float64)
+    if len(edges_m) < 2 or np.any(np.diff(edges_m) <= 0.0):
+        raise ValueError("edges_m must hold two or more rising heights")
+    below = np.array([_sand_below(position_m, radius_m, float(h)) for h in edges_m])
+    sand = np.diff(below)
+    free = free_measure_between(scene, edges_m)
+    some = free > 0.0
+    fraction = np.where(some, sand / np.where(some, free, 1.0), np.nan)
+    return SolidFractionProfile(edges_m, sand, free, fraction)
+
+
+def mean_solid_fraction(
+    position_m: Array, radius_m: Array, scene: Scene, low_m: float, high_m: float
+) -> float:
+    """Solid fraction of the box between two heights; see :func:`solid_fraction_profile`.
+
+    Parameters
+    ----------
+    position_m : (n, d) float64, m
+    radius_m : (n,) float64, m
+    scene : Scene
+    low_m, high_m : float, m
+
+    Raises
+    ------
+    ValueError
+        As :func:`solid_fraction_profile`.
+    """
+    edges_m = np.array([low_m, high_m])
+    profile = solid_fraction_profile(position_m, radius_m, scene, edges_m)
+    return float(profile.solid_fraction[0])
+
+
+def bed_surface_height_m(
+    position_m: Array, radius_m: Array, scene: Scene, column_width_m: float | None = None
+) -> float:
+    """Height of the bed's surface: the mean over columns of the highest grain top.
+
+    Two things make it robust. A grain in flight, with no other grain, wall or block within half
+    the largest radius, is left out (a dense stream still falling is not told apart). And columns
+    weigh alike, so a heap in one counts by its width. Columns without sand are left out: the
+    height is that of the surface where there is sand. It lies above the mean of all surface
+    grains' tops, the more so the wider the columns.
+
+    Parameters
+    ----------
+    position_m : (n, d) float64, m
+    radius_m : (n,) float64, m
+    scene : Scene
+        Its walls must close the box on every side; in 3D they must be upright or level.
+    column_width_m : float, m, optional
+        Four times the largest radius unless given; stretched to a whole number of columns.
+
+    Returns
+    -------
+    float, m
+        NaN when there is no sand.
+
+    Raises
+    ------
+    ValueError
+        When the box is open at a side, or a wall of a 3D scene is oblique.
+    """
+    if len(position_m) == 0:
+        return float("nan")
+    largest_m = float(radius_m.max())
+    settled = contacts(position_m, radius_m, scene, tolerance_m=0.5 * largest_m).count > 0
+    across_m, top_m = position_m[settled, :-1], (position_m[:, -1] + radius_m)[settled]
+    if len(top_m) == 0:
+        return float("nan")
+    section_m = box_section(scene, *_span(position_m[:, -1], largest_m))[:, : across_m.shape[1]]
+    low_m, extent_m = section_m.min(axis=0), np.ptp(section_m, axis=0)
+    width_m = 4.0 * largest_m if column_width_m is None else column_width_m
+    columns = np.maximum(1, np.floor(extent_m / width_m * (1.0 + 1e-12))).astype(np.int64)
+    place = np.floor((across_m - low_m) / extent_m * columns).astype(np.int64)
+    place = np.clip(place, 0, columns - 1)
+    column = np.ravel_multi_index(tuple(place.T), tuple(columns.tolist()))
+    highest_m = np.full(int(columns.prod()), -np.inf)
+    np.maximum.at(highest_m, column, top_m)
+    return float(highest_m[np.isfinite(highest_m)].mean())
+
+
+def _span(height_m: Array, margin_m: float) -> tuple[float, float]:
+    """Heights that hold all grains."""
+    return float(height_m.min()) - margin_m, float(height_m.max()) + margin_m
+
+
+def _sand_below(position_m: Array, radius_m: Array, height_m: float) -> float:
+    """Area (m2) or volume (m3) of the grains' parts under a height."""
+    above_m = position_m[:, -1] - height_m
+    part = disc_segment_m2 if position_m.shape[1] == 2 else sphere_cap_m3
+    return float(part(above_m, radius_m).sum())

@@ -1,0 +1,78 @@
+"""Checkpoints on disk: two in turn, each whole or not there at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Where a run stood when a checkpoint was written."""
+
+    scenario_hash: str
+    stage: str
+    steps: int
+    snapshots: int
+    """Snapshots written so far."""
+    series_bytes: int
+    loads_bytes: int
+    """Sizes of the tables: what came after is written again."""
+    cost: dict[str, Any]
+    """The cost row so far."""
+
+
+def _digest(folder: Path) -> dict[str, str]:
+    return {
+        p.name: hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in sorted(folder.iterdir())
+        if not p.name.startswith("mark.json")
+    }
+
+
+def seal(folder: Path, mark: Mark) -> None:
+    """Close a checkpoint folder: the mark with the files' hashes comes last."""
+    partial = folder / "mark.json.partial"
+    text = json.dumps({"mark": asdict(mark), "sha256": _digest(folder)})
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, folder / "mark.json")
+
+
+def next_folder(work: Path) -> Path:
+    """Give an empty folder for the next checkpoint, keeping the newest sealed one."""
+    newest = newest_checkpoint(work)[0]
+    other = "b" if newest is not None and newest[0].name == "checkpoint_a" else "a"
+    folder = work / f"checkpoint_{other}"
+    if folder.exists():
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True)
+    return folder
+
+
+def newest_checkpoint(work: Path) -> tuple[tuple[Path, Mark] | None, list[str]]:
+    """Find the newest whole checkpoint.
+
+    Returns
+    -------
+    newest : (folder, mark) or None
+    damaged : list of str
+        One sentence for each checkpoint that cannot be used.
+    """
+    whole: list[tuple[Path, Mark]] = []
+    damaged: list[str] = []
+    for folder in (work / "checkpoint_a", work / "checkpoint_b"):
+        if not folder.is_dir():
+            continue
+        try:
+            sealed = json.loads((folder / "mark.json").read_text(encoding="utf-8"))
+            if sealed["sha256"] != _digest(folder):
+                raise ValueError("its files do not match their hashes")
+            whole.append((folder, Mark(**sealed["mark"])))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            damaged.append(f"checkpoint {folder.name} cannot be used: {error}")
+    return max(whole, key=lambda item: item[1].steps, default=None), damaged

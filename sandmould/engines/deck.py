@@ -1,0 +1,86 @@
+"""Decks: an input script in named blocks, rendered from templates and read back block by block."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from sandmould import ROOT
+
+TEMPLATES = ROOT / "templates"
+_BLOCK = re.compile(r"^#--- block: (\w+) ---.*?\n(.*?)^#--- end: \1 ---$", re.M | re.S)
+_RUN = re.compile(r"^run (\d+)\b[^\n]*$", re.M)
+
+
+def exact(number: float) -> str:
+    """Shortest text that reads back as the same number."""
+    value = float(number)
+    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+
+
+def vector(components: Any) -> str:
+    """Three numbers for an engine that is always in 3D; a missing one is 0."""
+    padded = [*np.asarray(components, dtype=float), 0.0, 0.0][:3]
+    return " ".join(exact(c + 0.0) for c in padded)
+
+
+def environment(dialect: str) -> jinja2.Environment:
+    """Strict Jinja environment of one dialect: a misspelt name is an error, never empty text.
+
+    Snakemake's own template engine has neither a loader nor this strictness.
+    """
+    env = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES / dialect),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    env.filters.update(exact=exact, vector=vector)
+    return env
+
+
+@dataclass(frozen=True)
+class Block:
+    """One named block of a deck."""
+
+    name: str
+    text: str
+
+    @property
+    def run_steps(self) -> int | None:
+        """Steps of the block's one long run, or None where it has none."""
+        steps = [int(m.group(1)) for m in _RUN.finditer(self.text) if int(m.group(1)) > 0]
+        if len(steps) > 1:
+            raise ValueError(f"block {self.name} has {len(steps)} run commands, at most one fits")
+        return steps[0] if steps else None
+
+    def around_run(self) -> tuple[str, str]:
+        """Commands before and after the block's one long run."""
+        for match in _RUN.finditer(self.text):
+            if int(match.group(1)) > 0:
+                return self.text[: match.start()], self.text[match.end() :]
+        return self.text, ""
+
+
+@dataclass(frozen=True)
+class Deck:
+    """A rendered input script."""
+
+    text: str
+
+    @property
+    def blocks(self) -> dict[str, Block]:
+        """Named blocks in order."""
+        return {m.group(1): Block(m.group(1), m.group(2)) for m in _BLOCK.finditer(self.text)}
+
+    @classmethod
+    def read(cls, path: Path) -> Deck:
+        """Read a deck from its file."""
+        return cls(path.read_text(encoding="utf-8"))

@@ -1,0 +1,197 @@
+"""Take a scenario through its program: layers, rest, vibration; record, guard, checkpoint."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+from types import FrameType
+
+from sandmould.engines import checkpoint as checkpoints
+from sandmould.engines.checkpoint import Mark
+from sandmould.engines.choosing import open_session
+from sandmould.engines.guard import Guard
+from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.engines.products import Cost, peak_memory_bytes
+from sandmould.engines.program import Program, Stage
+from sandmould.engines.progress import Progress
+from sandmould.engines.recording import Recorder
+from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.step_counts import StepCounts
+
+
+class Driver:
+    """One run from its newest checkpoint, or from its beginning, to its outcome."""
+
+    def __init__(self, program: Program, folder: Path, name: str, scenario_hash: str) -> None:
+        """Prepare a run.
+
+        Parameters
+        ----------
+        program : Program
+        folder : Path
+            Holds the deck; partial work goes to its ``work`` folder.
+        name : str
+            Short name for the progress line.
+        scenario_hash : str
+            Tells this scenario's checkpoints from those of another.
+        """
+        self._program = program
+        self._scenario = program.scenario
+        self._folder = folder
+        self._work = folder / "work"
+        self._work.mkdir(parents=True, exist_ok=True)
+        self._hash = scenario_hash
+        self._guard = Guard(program.scenario)
+        self._progress = Progress(name, self._work, program.expected_grain_steps)
+        self._snapshot_steps = StepCounts.of(program.scenario).snapshot(program.scenario)
+        self._stop_asked = False
+        self._recorder: Recorder | None = None
+        self.is_root = True
+        """Whether this process writes the products; known once the engine has started."""
+        self.cost = Cost.of(program.scenario)
+
+    def run(self) -> RunOutcome:
+        """Compute to the end, to the wall-time limit or to what stops it.
+
+        A restartable outcome leaves a checkpoint: the same command continues.
+        """
+        signal.signal(signal.SIGTERM, self._ask_to_stop)
+        newest, notes = checkpoints.newest_checkpoint(self._work)
+        if newest is not None and newest[1].scenario_hash != self._hash:
+            notes.append(f"{newest[0].name} belongs to another scenario and was left unused")
+            newest = None
+        mark = newest[1] if newest else None
+        if mark is not None:
+            self.cost = Cost(**mark.cost)
+        session: Session | None = None
+        outcome, detail = Outcome.FINISHED, ""
+        self._begin_clocks()
+        try:
+            session = open_session(
+                self._program,
+                self._folder,
+                self._work / "engine.log",
+                newest[0] if newest else None,
+            )
+            self.is_root = session.is_root
+            if session.is_root:
+                self._recorder = Recorder(self._work, self._scenario.dimension, mark)
+            self._go(session, mark)
+        except EngineStop as stop:
+            outcome, detail = stop.outcome, stop.detail
+        finally:
+            self._end(session)
+        simulated_s = self.cost.steps * self.cost.time_step_s
+        detail = "; ".join([detail, *notes] if detail else notes)
+        return RunOutcome(outcome, detail, simulated_s, self._program.expected_s)
+
+    def _ask_to_stop(self, number: int, frame: FrameType | None) -> None:
+        self._stop_asked = True
+
+    def _begin_clocks(self) -> None:
+        self._earlier = (self.cost.wall_s, self.cost.cpu_s)
+        self._begun, self._cpu_begun = time.monotonic(), time.process_time()
+        self._checkpointed = self._begun
+
+    def _read_clocks(self) -> None:
+        self.cost.wall_s = self._earlier[0] + time.monotonic() - self._begun
+        self.cost.cpu_s = self._earlier[1] + time.process_time() - self._cpu_begun
+        self.cost.peak_memory_bytes = max(self.cost.peak_memory_bytes, peak_memory_bytes())
+
+    def _end(self, session: Session | None) -> None:
+        self._read_clocks()
+        if self._recorder is not None:
+            self._recorder.close()
+        if session is not None:
+            self.cost.version = session.version
+            session.close()
+
+    def _go(self, session: Session, mark: Mark | None) -> None:
+        names = [stage.name for stage in self._program.stages]
+        first = names.index(mark.stage) if mark else 0
+        for number, stage in enumerate(self._program.stages[first:], start=first):
+            if mark is None or number > first:
+                self._begin_stage(session, stage)
+            self._guard.start_stage(stage, session.snapshot())
+            while not session.stage_over:
+                self._window(session)
+            if stage.layer and not session.at_rest:
+                longest = self._scenario.fill.settling.longest_s
+                raise EngineStop(
+                    Outcome.NOT_SETTLED,
+                    f"layer {stage.layer} still moved after fill.settling.longest_s = {longest:g}",
+                )
+            session.end_stage()
+        if session.is_root:
+            self._show(session, last=True)
+
+    def _begin_stage(self, session: Session, stage: Stage) -> None:
+        if stage.layer:
+            session.insert_layer(stage.layer)
+        session.start_stage(stage)
+        if stage.counts_as_vibration and self._recorder is not None:
+            self._recorder.save(session.snapshot())
+        elif stage.counts_as_vibration:
+            session.snapshot()  # all ranks take part in gathering
+
+    def _window(self, session: Session) -> None:
+        before, began = session.steps, time.monotonic()
+        session.advance()
+        cost = self.cost
+        cost.engine_wall_s += time.monotonic() - began
+        cost.grain_steps += session.grains * (session.steps - before)
+        cost.grains, cost.steps = session.grains, session.steps
+        snapshot = session.snapshot()
+        health = self._guard.check(snapshot)
+        cost.largest_overlap_fraction = max(
+            cost.largest_overlap_fraction, health.largest_overlap_fraction
+        )
+        loads = session.surface_loads()
+        if self._recorder is not None:
+            self._recorder.record(snapshot, health, loads)
+            if session.steps % self._snapshot_steps == 0 or session.stage_over:
+                self._recorder.save(snapshot)
+            self._show(session)
+        self._checkpoint_if_due(session)
+
+    def _show(self, session: Session, last: bool = False) -> None:
+        rate = self.cost.grain_steps / max(self.cost.engine_wall_s, 1e-9)
+        self._progress.show(
+            session.stage.name, session.time_s, self.cost.grain_steps, rate, last=last
+        )
+
+    def _checkpoint_if_due(self, session: Session) -> None:
+        if not session.can_checkpoint:
+            return
+        now = time.monotonic()
+        limit_s = self._scenario.guard.wall_limit_s or float("inf")
+        stop = session.share(self._stop_asked or now - self._begun > limit_s)
+        every_s = self._scenario.record.checkpoint_every_wall_s
+        if not session.share(stop or now - self._checkpointed > every_s):
+            return
+        self._checkpointed = now
+        # All ranks write into the one folder that the first has emptied.
+        folder = checkpoints.next_folder(self._work) if session.is_root else self._work
+        folder = session.share(folder)
+        session.write_checkpoint(folder)
+        if self._recorder is not None:
+            self._read_clocks()
+            series_bytes, loads_bytes = self._recorder.sizes()
+            checkpoints.seal(
+                folder,
+                Mark(
+                    self._hash,
+                    session.stage.name,
+                    session.steps,
+                    self._recorder.snapshots,
+                    series_bytes,
+                    loads_bytes,
+                    self.cost.row(),
+                ),
+            )
+        if stop:
+            why = "the system asked" if self._stop_asked else "guard.wall_limit_s came"
+            raise EngineStop(
+                Outcome.OUT_OF_WALL_TIME, f"stopped at {session.time_s:.4g} s because {why}"
+            )

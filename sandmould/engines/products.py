@@ -1,0 +1,81 @@
+"""What a run leaves behind, moved into place last; the outcome after all else."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import resource
+import shutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from sandmould.engines.outcome import RunOutcome
+from sandmould.engines.recording import create_tables
+from sandmould.scenario.scenario import Scenario
+
+
+@dataclass
+class Cost:
+    """The cost row of a run; continued runs add up."""
+
+    engine: str
+    ranks: int
+    time_step_s: float
+    time_step_fraction: float
+    version: str = ""
+    grains: int = 0
+    steps: int = 0
+    grain_steps: float = 0.0
+    wall_s: float = 0.0
+    engine_wall_s: float = 0.0
+    cpu_s: float = 0.0
+    """Of the first rank."""
+    peak_memory_bytes: int = 0
+    """Of the first rank."""
+    largest_overlap_fraction: float = 0.0
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Cost:
+        """Cost of a run that has not begun."""
+        fraction = scenario.step_s / scenario.critical_step.step_s
+        return cls(scenario.engine.name, scenario.engine.ranks, scenario.step_s, fraction)
+
+    def row(self) -> dict[str, Any]:
+        """Columns and values."""
+        return asdict(self)
+
+
+def peak_memory_bytes() -> int:
+    """Largest resident memory of this process so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def finish(
+    folder: Path, dimension: int, outcome: RunOutcome, cost: Cost, provenance: dict[str, Any]
+) -> None:
+    """Move a run's products from its work folder into place.
+
+    A finished run's work folder is removed; any other keeps its last checkpoint there. Products
+    that a broken run never wrote are left as empty tables, so that collection finds them.
+    """
+    work = folder / "work"
+    create_tables(work, dimension)
+    for name in ("series.tsv", "loads.tsv", "snapshots", "engine.log"):
+        target = folder / name
+        if target.is_dir():
+            shutil.rmtree(target)
+        if (work / name).exists():
+            os.replace(work / name, target)
+    rate = cost.grain_steps / cost.engine_wall_s if cost.engine_wall_s > 0 else 0.0
+    row = {**cost.row(), "grain_steps_per_s": rate}
+    with (folder / "cost.tsv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(row), delimiter="\t", lineterminator="\n")
+        writer.writeheader()
+        writer.writerow(row)
+    text = json.dumps(provenance, indent=1) + "\n"
+    (folder / "provenance.json").write_text(text, encoding="utf-8")
+    if outcome.outcome == 0:
+        shutil.rmtree(work)
+    outcome.write(folder / "outcome.json")

@@ -1,0 +1,95 @@
+"""The order of things in a run: layer after layer, each at rest before the next, then vibration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+from sandmould.scenario.placement import (
+    PlannedLayer,
+    loose_height_m,
+    plan_counts,
+    plan_layer,
+)
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.vibration import VibrationStage
+
+REST_AFTER_FALL_S = 0.3
+"""Guess of the time a bed needs to come to rest after the last grain has landed."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One part of a run: a layer falls and settles, or the box vibrates."""
+
+    name: str
+    layer: int = 0
+    """Layer that falls at the start, from 1; 0 in a vibration stage."""
+    vibration: VibrationStage | None = None
+    expected_s: float = 0.0
+    """Duration: exact for vibration, a guess for settling."""
+    counts_as_vibration: bool = False
+    """Whether the stage belongs to the vibration after the fill."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """All stages of a run, and the grains they bring."""
+
+    scenario: Scenario
+    stages: tuple[Stage, ...]
+    counts: tuple[int, ...]
+    """Grains of each layer."""
+
+    @cached_property
+    def layers(self) -> tuple[PlannedLayer, ...]:
+        """Where the grains of each layer start; drawn when first asked for."""
+        return tuple(plan_layer(self.scenario, i + 1, count) for i, count in enumerate(self.counts))
+
+    @property
+    def expected_s(self) -> float:
+        """Expected simulated time of the whole run."""
+        return sum(stage.expected_s for stage in self.stages)
+
+    @property
+    def expected_grain_steps(self) -> float:
+        """Sum over stages of grains present times steps."""
+        total, grains = 0.0, 0
+        for stage in self.stages:
+            grains += self.counts[stage.layer - 1] if stage.layer else 0
+            total += grains * stage.expected_s / self.scenario.step_s
+        return total
+
+
+def _settling_s(scenario: Scenario, count: int) -> float:
+    """Guess of the time a layer needs: the fall of its highest grain, then coming to rest."""
+    fall = loose_height_m(scenario, count) + scenario.fill.drop_height_m
+    guess = math.sqrt(2 * fall / scenario.gravity_m_s2) if scenario.gravity_m_s2 > 0 else math.inf
+    settling = scenario.fill.settling
+    return min(max(guess + REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s)
+
+
+def build_program(scenario: Scenario) -> Program:
+    """Write out the stages of a scenario."""
+    counts = plan_counts(scenario)
+    between = scenario.fill.vibration_between_layers
+    stages: list[Stage] = []
+    for number, count in enumerate(counts, start=1):
+        stages.append(
+            Stage(f"settle_{number}", layer=number, expected_s=_settling_s(scenario, count))
+        )
+        if between is not None and number < len(counts):
+            stages.append(
+                Stage(f"between_{number}", vibration=between, expected_s=between.whole_duration_s)
+            )
+    stages += [
+        Stage(
+            f"vibrate_{number}",
+            vibration=stage,
+            expected_s=stage.whole_duration_s,
+            counts_as_vibration=True,
+        )
+        for number, stage in enumerate(scenario.vibration, start=1)
+    ]
+    return Program(scenario, tuple(stages), tuple(counts))

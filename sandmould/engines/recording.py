@@ -1,0 +1,92 @@
+"""What a run writes while it goes: the time series, the wall loads and the snapshots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TextIO
+
+from sandmould.engines.checkpoint import Mark
+from sandmould.engines.guard import Health
+from sandmould.engines.session import Array
+from sandmould.engines.snapshot import Snapshot
+
+_SERIES = ("time_s", "vibration_time_s", "stage", "grains", "kinetic_energy_j", "rms_speed_m_s",
+           "largest_overlap_fraction")  # fmt: skip
+
+
+class Recorder:
+    """Appends to tables in a work folder; a resumed run cuts them back to its checkpoint."""
+
+    def __init__(self, work: Path, dimension: int, mark: Mark | None = None) -> None:
+        """Open the tables, cut back to what a checkpoint vouches for.
+
+        Parameters
+        ----------
+        work : Path
+        dimension : int
+        mark : Mark, optional
+            The checkpoint that the run continues from.
+        """
+        self.snapshots = mark.snapshots if mark else 0
+        create_tables(work, dimension)
+        self._folder = work / "snapshots"
+        for path in self._folder.iterdir():
+            if not path.stem.isdigit() or int(path.stem) >= self.snapshots:
+                path.unlink()
+        headers = _headers(dimension)
+        sizes = {"series.tsv": mark.series_bytes, "loads.tsv": mark.loads_bytes} if mark else {}
+        self._series, self._loads = (
+            _open(work / name, len("\t".join(columns)) + 1, sizes.get(name))
+            for name, columns in headers.items()
+        )
+
+    def record(self, snapshot: Snapshot, health: Health, loads: Mapping[str, Array] | None) -> None:
+        """Write one row of the series and one row a surface of the loads."""
+        when = (f"{snapshot.time_s:.9g}", f"{snapshot.vibration_time_s:.9g}", snapshot.stage)
+        measured = (health.kinetic_energy_j, health.rms_speed_m_s, health.largest_overlap_fraction)
+        row = (*when, str(len(snapshot.id)), *(f"{x:.6g}" for x in measured))
+        self._series.write("\t".join(row) + "\n")
+        for surface, force in (loads or {}).items():
+            self._loads.write("\t".join((*when, surface, *(f"{x:.9g}" for x in force))) + "\n")
+
+    def save(self, snapshot: Snapshot) -> None:
+        """Write the next snapshot."""
+        snapshot.save(self._folder / f"{self.snapshots:06d}.npz")
+        self.snapshots += 1
+
+    def sizes(self) -> tuple[int, int]:
+        """Flush the tables and give their sizes in bytes."""
+        for file in (self._series, self._loads):
+            file.flush()
+        return self._series.tell(), self._loads.tell()
+
+    def close(self) -> None:
+        """Close the tables."""
+        self._series.close()
+        self._loads.close()
+
+
+def _headers(dimension: int) -> dict[str, tuple[str, ...]]:
+    forces = tuple(f"force_{axis}_n" for axis in "xyz"[:dimension])
+    return {
+        "series.tsv": _SERIES,
+        "loads.tsv": ("time_s", "vibration_time_s", "stage", "surface", *forces),
+    }
+
+
+def create_tables(work: Path, dimension: int) -> None:
+    """Make the tables and the snapshot folder of a run where they are missing."""
+    (work / "snapshots").mkdir(parents=True, exist_ok=True)
+    for name, columns in _headers(dimension).items():
+        if not (work / name).exists():
+            (work / name).write_text("\t".join(columns) + "\n", encoding="utf-8")
+
+
+def _open(path: Path, header_bytes: int, trusted_bytes: int | None) -> TextIO:
+    """Open a table for appending after its trusted part."""
+    size = trusted_bytes or header_bytes
+    file = path.open("r+", encoding="utf-8")
+    file.truncate(size)
+    file.seek(size)
+    return file

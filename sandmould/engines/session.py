@@ -1,0 +1,123 @@
+"""What every engine can be asked; the driver and the coupling know nothing else of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sandmould.engines.outcome import Outcome
+from sandmould.engines.program import Stage
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.bad_input import Problem
+
+Array = NDArray[np.float64]
+Shared = TypeVar("Shared")
+
+
+class EngineStop(Exception):  # noqa: N818 - it is an outcome, not always an error
+    """The engine cannot go on; carries the outcome that fits and what the engine said."""
+
+    def __init__(self, outcome: Outcome, detail: str) -> None:
+        self.outcome = outcome
+        self.detail = detail
+        super().__init__(f"{outcome.label}: {detail}")
+
+
+class RefusedError(Exception):
+    """The engine lacks what was asked, and says so before it starts."""
+
+    def __init__(self, key: str, value: Any, valid: str) -> None:
+        self.problem = Problem(key, value, valid)
+        super().__init__(str(self.problem))
+
+
+class Session(Protocol):
+    """One scenario being computed by one engine."""
+
+    engine: str
+    version: str
+    grains: int
+    """Grains now in the box."""
+    step_s: float
+    stage: Stage
+    stage_over: bool
+    """Whether the stage's time is up or its rest rule met."""
+    at_rest: bool
+    """Whether the settling rule of the stage was met."""
+
+    @property
+    def steps(self) -> int:
+        """Steps since the run began, resumed ones included."""
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time."""
+
+    def insert_layer(self, number: int) -> None:
+        """Drop a planned layer from over the bed."""
+
+    def start_stage(self, stage: Stage) -> None:
+        """Begin to settle or to vibrate."""
+
+    def advance(self) -> None:
+        """Compute up to the next record or the end of the stage.
+
+        Raises
+        ------
+        EngineStop
+            When grains are lost or the engine fails.
+        """
+
+    def end_stage(self) -> None:
+        """Close the stage that is over."""
+
+    def snapshot(self) -> Snapshot:
+        """State of all grains, relative to the box."""
+
+    def surface_loads(self) -> Mapping[str, Array] | None:
+        """Give the mean force of the sand on each wall and block over the last window.
+
+        Returns
+        -------
+        mapping of surface to (d,) float64, N, or None
+            None when the last advance did not end a window.
+        """
+
+    def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
+        """Move a surface to new vertices over the next window, or refuse.
+
+        Raises
+        ------
+        RefusedError
+        """
+
+    def attach_elastic_surface(
+        self, name: str, stiffness: Array, mass: Array, damping: Array
+    ) -> None:
+        """Attach a condensed elastic surface stepped inside the engine, or refuse.
+
+        Raises
+        ------
+        RefusedError
+        """
+
+    def write_checkpoint(self, folder: Path) -> None:
+        """Write all that a continued run needs; only after a full window."""
+
+    @property
+    def can_checkpoint(self) -> bool:
+        """Whether the last advance ended a window, so that no mean is cut."""
+
+    def share(self, value: Shared) -> Shared:
+        """Give the first rank's value to all ranks."""
+
+    @property
+    def is_root(self) -> bool:
+        """Whether this process writes the files."""
+
+    def close(self) -> None:
+        """Free the engine."""

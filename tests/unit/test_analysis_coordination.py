@@ -1,0 +1,76 @@
+"""Contacts of small patches counted by hand."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from analysis.coordination import contacts
+from sandmould.scenario.geometry import Block, Scene, Wall
+
+
+def hexagon():
+    angle = np.arange(6) * np.pi / 3
+    return np.vstack([np.zeros((1, 2)), 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])])
+
+
+def test_hexagonal_patch():
+    got = contacts(hexagon(), np.full(7, 1.01))
+    assert_array_equal(got.count, [6, 3, 3, 3, 3, 3, 3])
+    assert (got.grain_grain, got.grain_wall) == (12, 0)
+    assert got.mean_coordination == pytest.approx(24 / 7)
+    assert got.largest_overlap_fraction == pytest.approx(0.02 / 1.01)
+
+
+def test_tolerance_closes_small_gaps_and_no_larger_ones():
+    apart = np.full(7, 0.99)
+    assert contacts(hexagon(), apart).grain_grain == 0
+    assert contacts(hexagon(), apart).largest_overlap_fraction == 0.0
+    assert contacts(hexagon(), apart, tolerance_m=0.021).grain_grain == 12
+    assert contacts(hexagon(), apart, tolerance_m=0.019).grain_grain == 0
+
+
+def test_rattlers_are_left_out():
+    position = np.vstack([hexagon(), [[3.9, 0.0], [9.0, 9.0]]])  # one hangs on, one flies
+    got = contacts(position, np.full(9, 1.01))
+    assert_array_equal(got.count, [6, 4, 3, 3, 3, 3, 3, 1, 0])
+    assert got.bearing_fraction == pytest.approx(7 / 9)
+    assert got.mean_coordination == pytest.approx(26 / 9)
+    assert got.mean_coordination_bearing == pytest.approx(25 / 7)
+
+
+def test_in_3d_three_contacts_bear():
+    tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(2)
+    got = contacts(tetrahedron, np.full(4, 1.001))
+    assert_array_equal(got.count, [3, 3, 3, 3])
+    assert got.bearing_fraction == 1.0
+    chain = contacts(np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0]], dtype=float), np.full(3, 1.001))
+    assert_array_equal(chain.count, [1, 2, 1])
+    assert chain.bearing_fraction == 0.0
+    assert np.isnan(chain.mean_coordination_bearing)
+
+
+def test_walls_and_blocks():
+    floor = Wall("floor", np.zeros(2), np.array([0.0, 1.0]))
+    side = Wall("side", np.zeros(2), np.array([1.0, 0.0]))
+    block = Block("block", np.array([4.0, 1.0]), np.array([1.0, 1.0]), np.eye(2))
+    scene = Scene(2, (floor, side), (block,), ())
+    position, radius = np.array([[0.9, 0.8], [2.5, 1.0]]), np.array([1.0, 0.5])
+    got = contacts(position, radius, scene)
+    # the corner grain presses on both walls, the small one just touches the block: no contact
+    assert_array_equal(got.count, [2, 0])
+    assert (got.grain_grain, got.grain_wall) == (0, 2)
+    assert got.largest_overlap_fraction == pytest.approx(0.2)
+    pressed = contacts(position + np.full(2, 0.3), radius, scene)
+    assert_array_equal(pressed.count, [0, 1])
+    assert pressed.largest_overlap_fraction == pytest.approx(0.3 / 0.5)
+
+
+def test_overlap_is_taken_over_the_smaller_radius():
+    got = contacts(np.array([[0.0, 0.0], [2.4, 0.0]]), np.array([2.0, 0.5]))
+    assert got.largest_overlap_fraction == pytest.approx(0.1 / 0.5)
+
+
+def test_no_grains():
+    got = contacts(np.zeros((0, 3)), np.zeros(0))
+    assert got.grain_grain == 0
+    assert np.isnan(got.mean_coordination)
