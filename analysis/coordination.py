@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.neighbours import near_pairs
+from sandmould.engines.neighbours import near_pairs
 from sandmould.scenario.geometry import Array, Block, Scene, Wall
 
 

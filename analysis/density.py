@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.free_space import free_part
 from analysis.intersections import disc_lens_m2, sphere_lens_m3
-from analysis.neighbours import near_pairs
+from sandmould.engines.neighbours import near_pairs
 from sandmould.scenario.geometry import Array, Scene
 
 

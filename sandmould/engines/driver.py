@@ -44,7 +44,9 @@ class Driver:
         self._hash = scenario_hash
         self._guard = Guard(program.scenario)
         self._progress = Progress(name, self._work, program.expected_grain_steps)
-        self._snapshot_steps = StepCounts.of(program.scenario).snapshot(program.scenario)
+        counts, record = StepCounts.of(program.scenario), program.scenario.record
+        self._snapshot_steps = counts.windows(record.snapshot_every_s)
+        self._checkpoint_steps = counts.windows(record.checkpoint_every_s)
         self._stop_asked = False
         self._recorder: Recorder | None = None
         self.is_root = True
@@ -92,7 +94,6 @@ class Driver:
     def _begin_clocks(self) -> None:
         self._earlier = (self.cost.wall_s, self.cost.cpu_s)
         self._begun, self._cpu_begun = time.monotonic(), time.process_time()
-        self._checkpointed = self._begun
 
     def _read_clocks(self) -> None:
         self.cost.wall_s = self._earlier[0] + time.monotonic() - self._begun
@@ -164,13 +165,10 @@ class Driver:
     def _checkpoint_if_due(self, session: Session) -> None:
         if not session.can_checkpoint:
             return
-        now = time.monotonic()
         limit_s = self._scenario.guard.wall_limit_s or float("inf")
-        stop = session.share(self._stop_asked or now - self._begun > limit_s)
-        every_s = self._scenario.record.checkpoint_every_wall_s
-        if not session.share(stop or now - self._checkpointed > every_s):
+        stop = session.share(self._stop_asked or time.monotonic() - self._begun > limit_s)
+        if not stop and session.steps % self._checkpoint_steps:
             return
-        self._checkpointed = now
         # All ranks write into the one folder that the first has emptied.
         folder = checkpoints.next_folder(self._work) if session.is_root else self._work
         folder = session.share(folder)

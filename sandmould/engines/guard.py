@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandmould.engines.neighbours import near_pairs
 from sandmould.engines.outcome import Outcome
-from sandmould.engines.overlap import near_pairs
 from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
 from sandmould.engines.snapshot import Snapshot
@@ -38,12 +38,13 @@ def measure_health(scenario: Scenario, snapshot: Snapshot) -> Health:
     energy = 0.5 * float(mass @ (snapshot.velocity_m_s**2).sum(axis=1))
     if not np.isfinite(snapshot.position_m).all():
         return Health(float("nan"), float("nan"), float("nan"))
-    pairs = near_pairs(snapshot.position_m, snapshot.radius_m)
-    smaller = np.minimum(snapshot.radius_m[pairs.first], snapshot.radius_m[pairs.second])
-    at_walls = 1 - scenario.scene.clearance_m(snapshot.position_m) / snapshot.radius_m
-    largest = max(
-        float((pairs.overlap_m / smaller).max(initial=0.0)), float(at_walls.max(initial=0.0)), 0.0
-    )
+    radius, largest = snapshot.radius_m, 0.0
+    for first, second, distance_m in near_pairs(snapshot.position_m, 2 * float(radius.max())):
+        overlap = radius[first] + radius[second] - distance_m
+        smaller = np.minimum(radius[first], radius[second])
+        largest = max(largest, float((overlap / smaller).max(initial=0.0)))
+    at_walls = 1 - scenario.scene.clearance_m(snapshot.position_m) / radius
+    largest = max(largest, float(at_walls.max(initial=0.0)))
     return Health(energy, float(np.sqrt(2 * energy / mass.sum())), largest)
 
 

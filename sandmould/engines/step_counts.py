@@ -29,11 +29,9 @@ class StepCounts:
         """Whole steps that cover a time."""
         return math.ceil(time_s / self.step_s * (1 - 1e-12))
 
-    def snapshot(self, scenario: Scenario) -> int:
-        """Steps between snapshots, a multiple of the window."""
-        return self.window * max(
-            1, round(scenario.record.snapshot_every_s / self.step_s / self.window)
-        )
+    def windows(self, interval_s: float) -> int:
+        """Steps of an interval, rounded to whole windows, at least one."""
+        return self.window * max(1, round(interval_s / self.step_s / self.window))
 
     def vibration(self, stage: VibrationStage) -> int:
         """Steps of a vibration stage, with one at rest at either end."""

@@ -256,11 +256,12 @@ def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: li
     return words.get(kind, str(item["msg"]))
 
 
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models that an annotation names, those inside lists and unions included."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for part in get_args(annotation):
-        yield from _models_in(part)
+        yield from models_in(part)
 
 
 def models_at(model: type[BaseModel], parts: list[str]) -> list[type[BaseModel]]:
@@ -271,7 +272,7 @@ def models_at(model: type[BaseModel], parts: list[str]) -> list[type[BaseModel]]
             inner
             for outer in here
             if part in outer.model_fields
-            for inner in _models_in(outer.model_fields[part].annotation)
+            for inner in models_in(outer.model_fields[part].annotation)
         ]
     return here
 

@@ -38,8 +38,13 @@ class Record(Section):
     load_every_steps: int = quantity(
         20, "Steps between samples of the wall loads.", source=ARGUED, ge=1, le=100000
     )
-    checkpoint_every_wall_s: float = quantity(
-        60.0, "Wall time between checkpoints.", unit="s", source=ARGUED, gt=0, le=86400
+    checkpoint_every_s: float = quantity(
+        0.05,
+        "Interval of checkpoints in simulated time, so that a run does not depend on the clock.",
+        unit="s",
+        source=ARGUED,
+        gt=0,
+        le=100,
     )
 
 

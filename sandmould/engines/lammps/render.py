@@ -154,7 +154,7 @@ def render_deck(
             down="0 -1 0" if scenario.dimension == 2 else "0 0 -1",
             window_steps=counts.window,
             load_steps=counts.load,
-            snapshot_steps=counts.snapshot(scenario),
+            snapshot_steps=counts.windows(scenario.record.snapshot_every_s),
             longest_steps=counts.steps(scenario.fill.settling.longest_s),
             shortest_steps=counts.steps(scenario.fill.settling.shortest_s),
             vibration_steps=counts.vibration,

@@ -108,17 +108,19 @@ class LammpsSession:
         self._stage_start = self._stage_end = 0
         self._vibration_start: int | None = None
         self._ended_window = False
+        self._setup_due = True
         self.grains = 0
         self._folder = folder
         for name in _SETUP:
             if name == "create" and checkpoint is not None:
-                self._send(f"read_restart {checkpoint / 'lammps.restart'}")
+                self.send(f"read_restart {checkpoint / 'lammps.restart'}")
             else:
-                self._send(self._blocks[name].text)
+                self.send(self._blocks[name].text)
         if checkpoint is not None:
             self._take_up(json.loads((checkpoint / "session.json").read_text(encoding="utf-8")))
 
-    def _send(self, commands: str) -> None:
+    def send(self, commands: str) -> None:
+        """Execute commands of LAMMPS; an error becomes the outcome that fits."""
         try:
             self._lmp.commands_string(commands.replace("layers/", f"{self._folder}/layers/"))
         except Exception as error:
@@ -136,7 +138,7 @@ class LammpsSession:
         stages = {stage.name: stage for stage in self._program.stages}
         self.grains = int(self._lmp.get_natoms())
         self.start_stage(stages[state["stage"]])
-        self._send(f"variable stage_start equal {state['stage_start']}")
+        self.send(f"variable stage_start equal {state['stage_start']}")
         self._stage_start = state["stage_start"]
         self._stage_end = self._stage_start + (self._blocks[self.stage.name].run_steps or 0)
         self._vibration_start = state["vibration_start"]
@@ -164,14 +166,15 @@ class LammpsSession:
 
     def insert_layer(self, number: int) -> None:
         """Drop a planned layer from over the bed."""
-        self._send(self._blocks[f"layer_{number}"].text)
+        self.send(self._blocks[f"layer_{number}"].text)
         self.grains = int(self._lmp.get_natoms())
 
     def start_stage(self, stage: Stage) -> None:
         """Begin to settle or to vibrate."""
         self.stage, self.stage_over, self.at_rest = stage, False, False
         block = self._blocks[stage.name]
-        self._send(block.around_run()[0])
+        self.send(block.around_run()[0])
+        self._setup_due = True
         self._stage_start = self.steps
         self._stage_end = self._stage_start + (block.run_steps or 0)
         if stage.counts_as_vibration and self._vibration_start is None:
@@ -181,7 +184,10 @@ class LammpsSession:
         """Compute up to the next multiple of the window, or the end of the stage."""
         now, window = self.steps, self._counts.window
         target = min((now // window + 1) * window, self._stage_end)
-        self._send(f"run {target - now}")
+        # Setup computes forces with whole-step velocities; only without it do windows add up to
+        # the deck's own uncut run, bit for bit.
+        self.send(f"run {target - now} pre {'yes' if self._setup_due else 'no'} post no")
+        self._setup_due = False
         self._ended_window = self.steps % window == 0
         if self._ended_window and self.stage.layer:
             self.at_rest = self._lmp.extract_variable("at_rest") == 1.0
@@ -189,7 +195,7 @@ class LammpsSession:
 
     def end_stage(self) -> None:
         """Close the stage that is over."""
-        self._send(self._blocks[self.stage.name].around_run()[1])
+        self.send(self._blocks[self.stage.name].around_run()[1])
 
     def _gather(self, name: str, kind: int, count: int) -> Any:
         """Per-grain values of all ranks in the order of ids."""
@@ -262,7 +268,8 @@ class LammpsSession:
 
     def write_checkpoint(self, folder: Path) -> None:
         """Write LAMMPS's restart file and where the stage stands."""
-        self._send(f"write_restart {folder / 'lammps.restart'}")
+        self.send(f"write_restart {folder / 'lammps.restart'}")
+        self._setup_due = True
         if not self.is_root:
             return
         state = {

@@ -1,0 +1,94 @@
+"""Measure every snapshot of a run: tube fill, density, contacts, bed, layers."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.coordination import contacts
+from analysis.density import apparent_density
+from analysis.layers import mixing_index
+from analysis.plots import draw_by_layer, draw_scene
+from analysis.solid_fraction import bed_surface_height_m, mean_solid_fraction
+from analysis.tube_fill import tube_fill
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.plan import read_run
+
+
+def snapshot_paths(folder: Path) -> list[Path]:
+    """Snapshots of a run in order of time."""
+    return sorted((folder / "snapshots").glob("*.npz"))
+
+
+def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
+    """One row of ``measures.tsv``; every column carries its unit.
+
+    The solid fraction is taken from the floor to the mean surface of the bed.
+    """
+    scene, position, radius = scenario.scene, snapshot.position_m, snapshot.radius_m
+    row: dict[str, Any] = {
+        "time_s": snapshot.time_s,
+        "vibration_time_s": snapshot.vibration_time_s,
+        "stage": snapshot.stage,
+        "grains": len(radius),
+    }
+    unit = "m2" if scenario.dimension == 2 else "m3"
+    for bore in scene.bores:
+        fill = tube_fill(position, radius, bore)
+        row[f"{bore.name}_fill_fraction"] = fill.fill_fraction
+        row[f"{bore.name}_sand_{unit}"] = fill.sand_measure
+        row[f"{bore.name}_front_depth_m"] = fill.front_depth_m
+        row[f"{bore.name}_grains"] = fill.grains_inside
+    surface = bed_surface_height_m(position, radius, scene)
+    density = apparent_density(position, radius, scenario.sand.density_kg_m3, scene)
+    touching = contacts(position, radius, scene)
+    row |= {
+        "bed_height_m": surface,
+        "solid_fraction": mean_solid_fraction(position, radius, scene, 0.0, surface),
+        "apparent_density_raw_kg_m3": float(np.mean(density.raw_kg_m3)),
+        "apparent_density_corrected_kg_m3": float(np.nanmean(density.corrected_kg_m3)),
+        "coordination": touching.mean_coordination,
+        "coordination_bearing": touching.mean_coordination_bearing,
+        "bearing_fraction": touching.bearing_fraction,
+        "largest_overlap_fraction": touching.largest_overlap_fraction,
+        "layer_mixing_index": mixing_index(position, snapshot.layer),
+    }
+    return row
+
+
+def write_picture(folder: Path, out: Path) -> None:
+    """Draw the last snapshot of a run by layer; the empty scene where there is none."""
+    scenario = read_run(folder / "scenario.yaml").scenario
+    figure = Figure(figsize=(6, 4.5), dpi=150, layout="constrained")
+    ax = figure.add_subplot()
+    draw_scene(scenario.scene, ax, scenario.box.height_m)
+    paths = snapshot_paths(folder)
+    if paths:
+        draw_by_layer(Snapshot.load(paths[-1]), ax)
+    figure.savefig(out)
+
+
+def write_measures(folder: Path, out: Path) -> None:
+    """Measure all snapshots of a run into a table.
+
+    A snapshot that cannot be read leaves a row of gaps that names it, not an error: the run's
+    other rows stay good.
+    """
+    scenario = read_run(folder / "scenario.yaml").scenario
+    rows = []
+    for path in snapshot_paths(folder):
+        try:
+            rows.append(measure_snapshot(scenario, Snapshot.load(path)))
+        except ValueError as error:
+            rows.append({"stage": f"unreadable: {error}"})
+    columns = ["time_s", "vibration_time_s", "stage", "grains"]
+    table = pd.DataFrame(rows) if rows else pd.DataFrame(columns=columns)
+    partial = out.with_name(out.name + ".partial")
+    table.to_csv(partial, sep="\t", index=False, float_format="%.8g")
+    os.replace(partial, out)

@@ -1,0 +1,194 @@
+"""From a study's file to the plan that Snakemake's graph is built of, and its price."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from sandmould import ROOT
+from sandmould.engines.choosing import engine_problem, installed_version, open_session, render
+from sandmould.engines.program import build_program
+from sandmould.engines.session import EngineStop
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.placement import plan_counts
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.expand import Run, expand
+from sandmould.study.opening import OpenStudy, open_study
+from sandmould.study.plan import plan_table, planned_grain_steps, write_plan
+
+DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
+CALIBRATION_GRAINS = 400
+CALIBRATION_WINDOWS = 6
+BASE_MEMORY_MB = 600
+GRAINS_PER_MB = 50
+SLOW_RATE = 1e6
+"""Grain-steps per second of a slow core; benchmarks/ has those measured."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study and its runs."""
+
+    study: OpenStudy
+    runs: tuple[Run, ...]
+
+    @cached_property
+    def _by_name(self) -> dict[str, Run]:
+        return {run.run: run for run in self.runs}
+
+    def ranks(self, name: str) -> int:
+        """MPI ranks of a run."""
+        return self._by_name[name].scenario.engine.ranks
+
+    def memory_mb(self, name: str) -> int:
+        """Memory to ask for: the programs, and a few times the bytes measured a grain."""
+        return BASE_MEMORY_MB + sum(plan_counts(self._by_name[name].scenario)) // GRAINS_PER_MB
+
+    def runtime_min(self, name: str) -> int:
+        """Wall time to ask for: that of a machine a few times slower than any measured."""
+        scenario = self._by_name[name].scenario
+        seconds = planned_grain_steps(scenario) / SLOW_RATE / scenario.engine.ranks
+        return 10 + math.ceil(seconds / 60)
+
+    def labels(self, name: str) -> dict[str, str]:
+        """Labels of a run in Snakemake's own report."""
+        run = self._by_name[name]
+        labels = {key: str(value) for key, value in run.parameters.items()}
+        return labels | {"replicate": str(run.replicate)}
+
+
+def study_path(configfiles: Sequence[Path]) -> Path:
+    """Choose the study's file: the one given with ``--configfile``, else the demo.
+
+    Raises
+    ------
+    BadInputError
+        When several files are given; a second one would be merged over the first unseen.
+    """
+    if len(configfiles) > 1:
+        names = [Path(p).name for p in configfiles]
+        raise BadInputError([Problem("--configfile", names, "one study at a time")])
+    return Path(configfiles[0]) if configfiles else DEFAULT_STUDY
+
+
+def open_plan(path: Path) -> Plan:
+    """Open, validate and expand a study.
+
+    Raises
+    ------
+    BadInputError
+        With one sentence a problem; a missing engine is one of them.
+    """
+    study = open_study(path)
+    runs = expand(study)
+    found: dict[str, Problem] = {}
+    for run in runs:
+        problem = engine_problem(run.scenario)
+        if problem is not None:
+            key = f"scenario.{problem.key}"
+            told = Problem(key, problem.value, problem.valid, study.origin.file_of(key))
+            found[str(told)] = told
+    if found:
+        raise BadInputError(list(found.values()))
+    return Plan(study, tuple(runs))
+
+
+def announce(plan: Plan, results: Path, cores: int) -> None:
+    """Write the plan to disk and print what it will take."""
+    folder = results / plan.study.name
+    write_plan(plan.runs, folder)
+    rates = {}
+    for run in plan.runs:
+        kind = (run.scenario.engine.name, run.scenario.dimension)
+        if kind not in rates:
+            rates[kind] = calibrated_rate(run.scenario, results)
+    slowest = None if None in rates.values() else min(r for r in rates.values() if r is not None)
+    title = plan.study.study.title or plan.study.name
+    text = f"\n{title}\n{plan_table(plan.runs, slowest, cores)}"
+    print(text, file=sys.stderr, flush=True)
+
+
+def calibrated_rate(scenario: Scenario, results: Path) -> float | None:
+    """Grain-steps per second of one core of this machine, measured once and kept.
+
+    Returns
+    -------
+    float or None
+        None when the engine could not run the calibration; the study's own runs will say why.
+    """
+    path = results / "calibration.json"
+    name = scenario.engine.name
+    key = f"{platform.node()} {name} {installed_version(name)} {scenario.dimension}D"
+    known: dict[str, Any] = {}
+    if path.is_file():
+        try:
+            known = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError:
+            known = {}
+    if key not in known:
+        rate = _measure_rate(scenario)
+        if rate is None:
+            return None
+        known[key] = rate
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(known, indent=1), encoding="utf-8")
+    return float(known[key])
+
+
+def main(path: Path) -> int:
+    """Check a study and print its plan; nothing starts."""
+    try:
+        plan = open_plan(path)
+    except BadInputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    announce(plan, Path("results"), os.cpu_count() or 1)
+    return 0
+
+
+def _measure_rate(scenario: Scenario) -> float | None:
+    """Let a few hundred grains of the scene fall and settle, and time the later half.
+
+    Falling grains touch nothing and are too cheap to count; the second half of the expected time
+    has them in contact.
+    """
+    trial = scenario.model_copy(
+        update={
+            "fill": scenario.fill.model_validate({"layers": [{"count": CALIBRATION_GRAINS}]}),
+            "obstacles": (),
+            "vibration": (),
+            "engine": scenario.engine.model_copy(update={"ranks": 1}),
+        }
+    )
+    program = build_program(trial)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        render(program, {}, folder, "calibration", "calibration")
+        try:
+            session = open_session(program, folder, folder / "engine.log")
+            session.insert_layer(1)
+            session.start_stage(program.stages[0])
+            while not session.stage_over and session.time_s < program.expected_s / 2:
+                session.advance()
+            steps, begun = session.steps, time.perf_counter()
+            for _ in range(CALIBRATION_WINDOWS):
+                session.advance()
+            rate = session.grains * (session.steps - steps) / (time.perf_counter() - begun)
+            session.close()
+        except EngineStop:
+            return None
+    return rate
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(Path(sys.argv[1])))

@@ -1,0 +1,77 @@
+# The study as a whole: one table, one report, and a last rule that fails if any run failed.
+
+
+rule collect:
+    input:
+        table=f"{FOLDER}/runs.tsv",
+        outcomes=expand(rules.simulate.output.outcome, run=RUNS),
+        costs=expand(rules.simulate.output.cost, run=RUNS),
+        measures=expand(rules.measure.output.measures, run=RUNS),
+    output:
+        summary=report(
+            f"{FOLDER}/summary.tsv",
+            caption="../report/summary.rst",
+            category="Study",
+            labels={"table": "runs, outcomes and cost"},
+        ),
+        curves=report(
+            f"{FOLDER}/curves.tsv",
+            caption="../report/curves.rst",
+            category="Study",
+            labels={"table": "measures against time"},
+        ),
+    log:
+        f"{FOLDER}/logs/collect.log",
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    message:
+        "Collect the runs of the study"
+    script:
+        "../scripts/collect.py"
+
+
+rule report:
+    input:
+        summary=rules.collect.output.summary,
+        curves=rules.collect.output.curves,
+        templates=REPORT_TEMPLATES,
+    output:
+        html=report(
+            f"{FOLDER}/report.html",
+            caption="../report/findings.rst",
+            category="Study",
+            labels={"table": "findings, pictures, verdict"},
+        ),
+    log:
+        f"{FOLDER}/logs/report.log",
+    threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        study=STUDY.path,
+    message:
+        "Write the report {output.html}"
+    script:
+        "../scripts/report.py"
+
+
+rule check:
+    input:
+        summary=rules.collect.output.summary,
+        # After the report, so that a failed run is shown there before it fails the study.
+        report=rules.report.output.html,
+    output:
+        done=touch(f"{FOLDER}/all_runs_finished"),
+    log:
+        f"{FOLDER}/logs/check.log",
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
+    message:
+        "Check that every run finished"
+    script:
+        "../scripts/check.py"

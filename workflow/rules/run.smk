@@ -1,0 +1,79 @@
+# One run: its deck, its computation, its measures. {run} is the only wildcard.
+
+
+rule render:
+    input:
+        scenario=f"{FOLDER}/runs/{{run}}/scenario.yaml",
+        templates=TEMPLATES,
+    output:
+        deck=f"{FOLDER}/runs/{{run}}/deck.in",
+        layers=directory(f"{FOLDER}/runs/{{run}}/layers"),
+    log:
+        f"{FOLDER}/logs/render_{{run}}.log",
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    message:
+        "Render the deck of {wildcards.run}"
+    script:
+        "../scripts/render.py"
+
+
+rule simulate:
+    input:
+        scenario=rules.render.input.scenario,
+        deck=rules.render.output.deck,
+        layers=rules.render.output.layers,
+    output:
+        outcome=f"{FOLDER}/runs/{{run}}/outcome.json",
+        provenance=f"{FOLDER}/runs/{{run}}/provenance.json",
+        cost=f"{FOLDER}/runs/{{run}}/cost.tsv",
+        series=f"{FOLDER}/runs/{{run}}/series.tsv",
+        loads=f"{FOLDER}/runs/{{run}}/loads.tsv",
+        snapshots=directory(f"{FOLDER}/runs/{{run}}/snapshots"),
+    log:
+        f"{FOLDER}/logs/simulate_{{run}}.log",
+    benchmark:
+        f"{FOLDER}/logs/simulate_{{run}}.benchmark.tsv"
+    threads: ranks_of
+    resources:
+        tasks=ranks_of,
+        mpi="mpiexec",
+        mem_mb=memory_mb_of,
+        runtime=runtime_min_of,
+    message:
+        "Fill and vibrate {wildcards.run}"
+    script:
+        "../scripts/simulate.py"
+
+
+rule measure:
+    input:
+        scenario=rules.render.input.scenario,
+        snapshots=rules.simulate.output.snapshots,
+    output:
+        measures=report(
+            f"{FOLDER}/runs/{{run}}/measures.tsv",
+            caption="../report/measures.rst",
+            category="Runs",
+            subcategory="Measures",
+            labels=labels_of,
+        ),
+        picture=report(
+            f"{FOLDER}/runs/{{run}}/final.png",
+            caption="../report/picture.rst",
+            category="Runs",
+            subcategory="Final state",
+            labels=labels_of,
+        ),
+    log:
+        f"{FOLDER}/logs/measure_{{run}}.log",
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    message:
+        "Measure tube fill, density and contacts of {wildcards.run}"
+    script:
+        "../scripts/measure.py"

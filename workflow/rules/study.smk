@@ -1,0 +1,40 @@
+# The study is validated and expanded before Snakemake builds its graph: bad input ends here, in
+# one sentence a problem.
+import os
+import sys
+
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.planning import announce, open_plan, study_path
+
+try:
+    PLAN = open_plan(study_path(workflow.configfiles))
+except BadInputError as error:
+    sys.exit(str(error))
+if workflow.is_main_process and "--lint" not in sys.argv:
+    announce(PLAN, Path("results"), workflow._cores or os.cpu_count())
+
+STUDY = PLAN.study
+FOLDER = f"results/{STUDY.name}"
+RUNS = [run.run for run in PLAN.runs]
+TEMPLATES = sorted(str(p) for p in Path("templates/lammps").glob("*.j2"))
+REPORT_TEMPLATES = sorted(str(p) for p in Path("templates/report").iterdir())
+
+
+def ranks_of(wildcards):
+    return PLAN.ranks(wildcards.run)
+
+
+def memory_mb_of(wildcards):
+    return PLAN.memory_mb(wildcards.run)
+
+
+def runtime_min_of(wildcards, attempt):
+    return attempt * PLAN.runtime_min(wildcards.run)
+
+
+def labels_of(wildcards):
+    return PLAN.labels(wildcards.run)
+
+
+wildcard_constraints:
+    run="|".join(RUNS),

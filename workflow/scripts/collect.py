@@ -1,0 +1,9 @@
+"""Collect all runs of a study into two tables."""
+
+from pathlib import Path
+
+from sandmould.study.collect import collect
+from sandmould.study.job_log import to_log
+
+with to_log(snakemake.log[0]):
+    collect(Path(snakemake.input.table).parent)

@@ -1,0 +1,9 @@
+"""Render the deck of one run."""
+
+from pathlib import Path
+
+from sandmould.study.job_log import to_log
+from sandmould.study.simulate import render_run
+
+with to_log(snakemake.log[0]):
+    render_run(Path(snakemake.input.scenario).parent)

@@ -1,0 +1,9 @@
+"""Write the report of a study."""
+
+from pathlib import Path
+
+from sandmould.study.job_log import to_log
+from sandmould.study.report import write_report
+
+with to_log(snakemake.log[0]):
+    write_report(Path(snakemake.input.summary).parent, Path(snakemake.output.html))

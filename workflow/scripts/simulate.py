@@ -1,0 +1,7 @@
+"""Compute one run in a process of its own."""
+
+from pathlib import Path
+
+from sandmould.study.simulate import launch
+
+launch(Path(snakemake.input.scenario).parent, Path(snakemake.log[0]), snakemake.resources.mpi)
