@@ -52,3 +52,8 @@ def open_lammps(
 def small_scene() -> Scenario:
     """Give the small tube scene as it is."""
     return tube_scene()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the switch that rewrites golden decks."""
+    parser.addoption("--refresh-golden", action="store_true", help="rewrite the golden decks")

@@ -40,6 +40,9 @@ def _obstacles(s: Scenario) -> Iterator[Problem]:
             yield from _tube(s, obstacle, key)
         elif s.dimension == 3:
             yield Problem(f"{key}.kind", "polygon", "plate or tube in 3D")
+        elif not _in_box(s, np.array(obstacle.vertices_m)):
+            vertices = [list(v) for v in obstacle.vertices_m]
+            yield Problem(f"{key}.vertices_m", vertices, f"a polygon inside the box, {_size(s)}")
 
 
 def _plate(s: Scenario, plate: Plate, key: str) -> Iterator[Problem]:
@@ -55,7 +58,13 @@ def _plate(s: Scenario, plate: Plate, key: str) -> Iterator[Problem]:
 
 
 def _tube(s: Scenario, tube: Tube, key: str) -> Iterator[Problem]:
-    if tube.right_end_x_m > s.box.width_m * (1 + 1e-9):
+    if tube.left_end_x_m >= s.box.width_m:
+        yield Problem(
+            f"{key}.left_end_x_m",
+            tube.left_end_x_m,
+            f"less than box.width_m, {s.box.width_m:g} m",
+        )
+    elif tube.right_end_x_m > s.box.width_m * (1 + 1e-9):
         yield Problem(
             f"{key}.length_m",
             tube.length_m,

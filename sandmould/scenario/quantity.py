@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.fields import FieldInfo
 
 
 class Section(BaseModel):
@@ -37,3 +39,35 @@ def quantity(default: Any, description: str, *, unit: str = "1", source: str, **
         json_schema_extra={"unit": unit, "source": source},
         **limits,
     )
+
+
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models that an annotation names, those inside lists and unions included."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from models_in(part)
+
+
+def models_at(model: type[BaseModel], parts: list[str]) -> list[type[BaseModel]]:
+    """Models that can stand at a path, list positions skipped."""
+    here = [model]
+    for part in (p for p in parts if not p.isdecimal()):
+        here = [
+            inner
+            for outer in here
+            if part in outer.model_fields
+            for inner in models_in(outer.model_fields[part].annotation)
+        ]
+    return here
+
+
+def known_keys(model: type[BaseModel], parts: list[str]) -> list[str]:
+    """Keys that a model has at a path, list positions skipped."""
+    return sorted({name for m in models_at(model, parts) for name in m.model_fields})
+
+
+def fields_at(model: type[BaseModel], key: str) -> list[FieldInfo]:
+    """Declarations that a key path can mean: several where kinds of obstacles share a key."""
+    *parents, last = [p for p in key.split(".") if not p.isdecimal()] or [""]
+    return [m.model_fields[last] for m in models_at(model, parents) if last in m.model_fields]

@@ -5,16 +5,16 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
 
 from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.quantity import known_keys
 
 Tree = dict[str, Any]
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -187,14 +187,28 @@ def validated(model: type[ModelT], tree: Tree, origin: Origin, above: str = "") 
         # JSON's strict mode takes lists for tuples, but neither "50" nor true for a number.
         return model.model_validate_json(json.dumps(tree, default=str), strict=True)
     except ValidationError as error:
+        findings = [(item, _problem(model, tree, item, origin, above)) for item in error.errors()]
         found: dict[str, Problem] = {}
-        for item in error.errors():
-            one = _problem(model, tree, item, origin, above)
+        for item, one in findings:
+            if _is_beside_the_point(item, one.key, findings):
+                continue
             before = found.get(one.key)
             # Each branch of a union that fits nowhere has its own finding.
             valid = f"{before.valid} or {one.valid}" if before else one.valid
             found[one.key] = replace(one, valid=valid)
         raise BadInputError(list(found.values())) from None
+
+
+def _is_beside_the_point(item: Any, key: str, findings: list[tuple[Any, Problem]]) -> bool:
+    """Whether a finding only follows from others."""
+    if item["type"] == "too_short":
+        # Entries that are wrong themselves are missing from pydantic's count.
+        return bool(len(item["input"]) >= item["ctx"]["min_length"])
+    # A union's other branch got further: into the value, or to a model's own rule (no url).
+    return item["type"] in ("tuple_type", "model_type", "literal_error") and any(
+        p.key.startswith(f"{key}.") or (p.key == key and "url" not in other)
+        for other, p in findings
+    )
 
 
 def _key_parts(tree: Any, location: tuple[int | str, ...], is_missing: bool) -> list[str]:
@@ -226,12 +240,14 @@ def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: li
         near = difflib.get_close_matches(parts[-1], known, n=1, cutoff=0.5)
         hint = f" (did you mean {near[0]}?)" if near else ""
         return f"one of the keys {', '.join(sorted(known)) or '(none)'}{hint}"
+    limit = next((context[k] for k in ("gt", "ge", "lt", "le") if k in context), None)
+    limit = f"{limit:g}" if isinstance(limit, float) else limit
     words = {
         "missing": "a value: this key must be given",
-        "greater_than": f"a number greater than {context.get('gt')}",
-        "greater_than_equal": f"a number of at least {context.get('ge')}",
-        "less_than": f"a number less than {context.get('lt')}",
-        "less_than_equal": f"a number of at most {context.get('le')}",
+        "greater_than": f"a number greater than {limit}",
+        "greater_than_equal": f"a number of at least {limit}",
+        "less_than": f"a number less than {limit}",
+        "less_than_equal": f"a number of at most {limit}",
         "finite_number": "a finite number",
         "float_type": "a number",
         "float_parsing": "a number",
@@ -254,35 +270,3 @@ def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: li
         "string_pattern_mismatch": f"text of the pattern {context.get('pattern')}",
     }
     return words.get(kind, str(item["msg"]))
-
-
-def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Models that an annotation names, those inside lists and unions included."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from models_in(part)
-
-
-def models_at(model: type[BaseModel], parts: list[str]) -> list[type[BaseModel]]:
-    """Models that can stand at a path, list positions skipped."""
-    here = [model]
-    for part in (p for p in parts if not p.isdecimal()):
-        here = [
-            inner
-            for outer in here
-            if part in outer.model_fields
-            for inner in models_in(outer.model_fields[part].annotation)
-        ]
-    return here
-
-
-def known_keys(model: type[BaseModel], parts: list[str]) -> list[str]:
-    """Keys that a model has at a path, list positions skipped."""
-    return sorted({name for m in models_at(model, parts) for name in m.model_fields})
-
-
-def fields_at(model: type[BaseModel], key: str) -> list[FieldInfo]:
-    """Declarations that a key path can mean: several where kinds of obstacles share a key."""
-    *parents, last = [p for p in key.split(".") if not p.isdecimal()] or [""]
-    return [m.model_fields[last] for m in models_at(model, parents) if last in m.model_fields]

@@ -81,7 +81,7 @@ def snapshots(run: Run, fill: float, grains: int, count: int) -> list[Snapshot]:
         found.append(
             Snapshot(
                 time_s=FILLING_S + shaken_s,
-                vibration_time_s=shaken_s,
+                vibration_time_s=shaken_s if shaken_s >= 0 else -1.0,
                 stage="settle" if shaken_s < 0 else "vibrate",
                 id=np.arange(1, grains + 1)[here],
                 layer=layer[here],

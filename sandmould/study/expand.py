@@ -1,0 +1,263 @@
+"""Expand a study to its runs: every point of the sweep, checked, with every replicate."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sandmould.scenario import checks
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.quantity import Section, fields_at
+from sandmould.scenario.reading import Origin, Tree, merge, validated
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.opening import OpenStudy
+from sandmould.study.sweep import Point, points, value_at
+
+MOST_PROBLEMS = 10
+"""Problems told at once; the first few are those that teach."""
+ROOT_KEY = "scenario"
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a study, with all that its jobs need."""
+
+    study: str
+    run: str
+    """Short label, replicate and six digits of the hash of the resolved scenario."""
+    parameters: dict[str, Any]
+    """Value of each swept key, by key path."""
+    replicate: int
+    """Number of the replicate, from 1; a block, see ``replicate_seed``."""
+    scenario: Scenario
+    sources: dict[str, str]
+    """Where each leaf of the scenario came from, by key path."""
+
+    @property
+    def seed(self) -> int:
+        """The scenario's seed."""
+        return self.scenario.seed
+
+
+def replicate_seed(seed: int, replicate: int) -> int:
+    """Seed of a replicate, the same one at every point of the sweep.
+
+    Replicates are therefore blocks: runs of one replicate share their draws, and two points are
+    compared in pairs, which takes the spread between fillings out of their difference.
+    """
+    word = np.random.SeedSequence([seed, replicate]).generate_state(1)[0]
+    return int(word) & 0x7FFFFFFF
+
+
+def expand(study: OpenStudy) -> list[Run]:
+    """List the runs of a study.
+
+    Parameters
+    ----------
+    study : OpenStudy
+
+    Returns
+    -------
+    list of Run
+        Points in the order of the sweep, the replicates of a point together.
+
+    Raises
+    ------
+    BadInputError
+        When a point cannot be run; a value that came with the sweep is named at its swept key.
+    """
+    base = study.study.scenario.model_dump(mode="json")
+    found: dict[str, Problem] = {}
+    runs: dict[str, Run] = {}
+    for point in points(study.study.sweep, study.study.scenario.seed):
+        at_point = _AtPoint(study, base, point)
+        for problem in at_point.problems:
+            found[str(problem)] = problem
+        if len(found) >= MOST_PROBLEMS:
+            break
+        if found:
+            continue
+        for run in at_point.runs():
+            if run.run in runs:
+                twice = Problem("sweep", point, "points that differ", study.file)
+                found[str(twice)] = twice
+                break
+            runs[run.run] = run
+    if found:
+        raise BadInputError(list(found.values())[:MOST_PROBLEMS])
+    return list(runs.values())
+
+
+class _AtPoint:
+    """The scenario of one point of a sweep."""
+
+    def __init__(self, study: OpenStudy, base: Tree, point: Point) -> None:
+        self.study, self.base, self.point = study, base, point
+        self.origin = Origin(dict(study.origin.file), dict(study.origin.source))
+        try:
+            self.scenario = self._scenario(point, self.origin)
+        except BadInputError as error:
+            self.problems = [self._at_swept_key(p) for p in error.problems]
+        else:
+            self.problems = [self._told(p) for p in self._misfits(self.scenario)]
+
+    def _scenario(self, point: Point, origin: Origin) -> Scenario:
+        tree = self.base
+        for key, value in point.items():
+            tree = _put(tree, key.split("."), value, origin, f"sweep of {self.study.file}")
+        return validated(Scenario, tree, origin, ROOT_KEY)
+
+    def _misfits(self, scenario: Scenario) -> list[Problem]:
+        """What is wrong with a well-typed scenario of this study, keys from the study's root."""
+        found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in checks.problems(scenario)]
+        at = self.study.study.objective.at_vibration_s
+        lasts = sum(stage.whole_duration_s for stage in scenario.vibration)
+        if at is not None and at > lasts:
+            valid = f"at most {lasts:g} s, the end of the vibration"
+            found.append(Problem("objective.at_vibration_s", at, valid))
+        return found
+
+    def _told(self, problem: Problem) -> Problem:
+        """A misfit told at the key that the user has to change."""
+        if not self.point or problem in self._misfits(self.study.study.scenario):
+            return replace(problem, file=self.study.origin.file_of(problem.key))
+        if any(_holds(key, problem.key) for key in self.point):
+            return self._at_swept_key(problem)
+        guilty = {k: v for k, v in self.point.items() if self._alone_fails(k, v, problem.key)}
+        blamed = guilty or self.point
+        key, value = next(iter(blamed.items())) if len(blamed) == 1 else ("", dict(blamed))
+        valid = f"one with which {problem.key}, here {problem.value}, is {problem.valid}"
+        return Problem(self._file_key(key), value, valid, self.study.file)
+
+    def _alone_fails(self, key: str, value: Any, problem_key: str) -> bool:
+        """Whether one swept value, laid over the base alone, gives the same misfit."""
+        try:
+            scenario = self._scenario({key: value}, Origin())
+        except BadInputError:
+            return True
+        return any(p.key == problem_key for p in self._misfits(scenario))
+
+    def _at_swept_key(self, problem: Problem) -> Problem:
+        """A problem moved from the scenario's key to the sweep that gave its value."""
+        for key, value in self.point.items():
+            if _holds(key, problem.key) or f"{ROOT_KEY}.{key}".startswith(f"{problem.key}."):
+                # Below a swept section the problem's own value says more than the section.
+                below = problem.key.removeprefix(f"{ROOT_KEY}.{key}")
+                inner = below if below.startswith(".") else ""
+                shown = problem.value if inner else value
+                return Problem(self._file_key(key) + inner, shown, problem.valid, self.study.file)
+        return problem
+
+    def _file_key(self, key: str) -> str:
+        """Where a swept key stands in the file; an empty one stands for all."""
+        sweep = self.study.study.sweep
+        place = "sweep.keys"
+        if sweep.design == "list":
+            place = f"sweep.points.{list(sweep.points).index(self.point)}"
+        return f"{place}.{key}".rstrip(".")
+
+    def runs(self) -> Iterator[Run]:
+        """The replicates of this point."""
+        dump = self.scenario.model_dump(mode="json")
+        parameters = {key: value_at(dump, key) for key in self.point}
+        sources = dict(_sources(self.scenario, self.origin))
+        own = self.scenario.seed
+        for replicate in range(1, self.study.study.replicates + 1):
+            seed = replicate_seed(own, replicate)
+            scenario = self.scenario.model_copy(update={"seed": seed})
+            yield Run(
+                self.study.name,
+                f"{_label(parameters)}_r{replicate}_{scenario_hash(scenario)[:6]}",
+                parameters,
+                replicate,
+                scenario,
+                {**sources, "seed": f"replicate {replicate} of seed {own} ({sources['seed']})"},
+            )
+
+
+def _holds(swept: str, problem_key: str) -> bool:
+    """Whether a problem lies at a swept key or below it."""
+    return f"{problem_key}.".startswith(f"{ROOT_KEY}.{swept}.")
+
+
+def _put(tree: Any, parts: list[str], value: Any, origin: Origin, source: str) -> Any:
+    """A copy of a tree with one value laid in, as a file would: mappings in sections merge."""
+
+    def below(node: Any, left: list[str], above: str) -> Any:
+        name, *rest = left
+        if not rest:
+            section = node if isinstance(node, dict) else {}
+            laid = merge(section, {name: value}, origin, source, above)
+            return laid if isinstance(node, dict) else _with(node, name, laid[name])
+        inner = node[name] if isinstance(node, dict) else node[int(name)]
+        return _with(node, name, below(inner, rest, f"{above}.{name}"))
+
+    return below(tree, parts, ROOT_KEY)
+
+
+def _with(node: Any, name: str, value: Any) -> Any:
+    if isinstance(node, dict):
+        return {**node, name: value}
+    return [value if i == int(name) else item for i, item in enumerate(node)]
+
+
+def _sources(section: Section, origin: Origin, above: str = "", group: str | None = None) -> (
+    Iterator[tuple[str, str]]
+):  # fmt: skip
+    """Source of every leaf: what a file states, the file's name, or the default's own source."""
+    for name, field in type(section).model_fields.items():
+        value, key = getattr(section, name), f"{above}{name}"
+        extra = field.json_schema_extra
+        # The source of a whole curve holds for its points.
+        declared = group or (str(extra["source"]) if isinstance(extra, dict) else None)
+        if isinstance(value, Section):
+            yield from _sources(value, origin, f"{key}.", declared)
+        elif isinstance(value, tuple) and value and isinstance(value[0], Section):
+            for i, item in enumerate(value):
+                yield from _sources(item, origin, f"{key}.{i}.", declared)
+        else:
+            stated = origin.source_of(f"{ROOT_KEY}.{key}")
+            # What the user alone can give has no source while it is not given.
+            yield key, stated or (declared if declared not in (None, "user") else "default")
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """Hash of everything that a scenario says, whatever the order of its keys."""
+    text = json.dumps(scenario.model_dump(mode="json"), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _label(parameters: Point) -> str:
+    """Names and values of at most three swept keys, in letters that any file system takes."""
+    keys = sorted(parameters)
+    last = [key.rsplit(".", 1)[-1] for key in keys]
+    words = []
+    for key, name in list(zip(keys, last, strict=True))[:3]:
+        parent = key.split(".")[-2] + "_" if last.count(name) > 1 and "." in key else ""
+        value = parameters[key]
+        words.append(_letters(parent + name.removesuffix(_unit_suffix(key)))[:16])
+        if isinstance(value, int | float):
+            words.append(f"{value:.4g}".replace("-", "m").replace(".", "p").replace("+", ""))
+        elif isinstance(value, str):
+            words.append(_letters(value)[:12])
+    return "_".join(words) or "base"
+
+
+def _letters(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+
+
+def _unit_suffix(key: str) -> str:
+    """Unit of a key as its name ends with it, such as ``_kg_m3``."""
+    for field in fields_at(Scenario, key):
+        extra = field.json_schema_extra
+        if isinstance(extra, dict):
+            unit = str(extra["unit"]).lower()
+            return "_" + unit.replace("1/", "per_").replace("/", "_")
+    return ""

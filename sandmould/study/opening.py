@@ -1,0 +1,179 @@
+"""Open a study: follow what it is based on, lay the files over each other, check the whole."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from sandmould import ROOT
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.quantity import fields_at
+from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
+from sandmould.scenario.scenario import Scenario
+from sandmould.study import sweep
+from sandmould.study.study import NAME, Material, Study
+
+STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
+MATERIALS = (ROOT / "config" / "materials",)
+
+
+@dataclass(frozen=True)
+class OpenStudy:
+    """A study that was read whole and found sound."""
+
+    name: str
+    """Stem of its file; its results lie in ``results/<name>``."""
+    path: Path
+    study: Study
+    tree: Tree
+    """The merged files below the study, the scenario with all its defaults."""
+    origin: Origin
+    """File and source of each value, by key path from the study's root."""
+
+    @property
+    def file(self) -> str:
+        """Name of the study's file in messages."""
+        return shown_name(self.path)
+
+
+@dataclass(frozen=True)
+class _File:
+    path: Path
+    shown: str
+    tree: Tree
+
+
+def shown_name(path: Path) -> str:
+    """A file's name in messages: seen from here, else from the repository, else as given."""
+    for folder in (Path.cwd(), ROOT):
+        if path.is_absolute() and path.is_relative_to(folder):
+            return str(path.relative_to(folder))
+    return str(path)
+
+
+def open_study(path: Path) -> OpenStudy:
+    """Read a study with all that it is based on, and check it.
+
+    Parameters
+    ----------
+    path : Path
+        Its stem is the study's name.
+
+    Returns
+    -------
+    OpenStudy
+
+    Raises
+    ------
+    BadInputError
+        With one line a problem, each naming the file that holds the bad value.
+    """
+    shown = shown_name(path)
+    if not re.fullmatch(NAME, path.stem):
+        valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
+        raise BadInputError([Problem("file name", path.name, valid, shown)])
+    files = _files(path)
+    found = [p for f in files for p in _wrong_units(Study, f)]
+    origin = Origin(file={"": shown})
+    tree: Tree = {"scenario": Scenario().model_dump(mode="json")}
+    material = _material(files)
+    if material is not None:
+        found += _wrong_units(Material, material)
+        # By itself first, so that a message has the key as the material's file has it.
+        alone = Origin(file={"": material.shown})
+        validated(Material, merge({}, material.tree, alone, material.shown), alone)
+        tree = merge(tree, {"scenario": material.tree}, origin, material.shown)
+    for file in files:
+        if "sweep" in file.tree:
+            tree.pop("sweep", None)
+        tree = merge(tree, file.tree, origin, file.shown)
+    if tree.get("kind") in ("solidification", "flow"):
+        valid = "sand; solidification and flow come with their own solvers"
+        raise BadInputError([Problem("kind", tree["kind"], valid, origin.file_of("kind"))])
+    if found:
+        raise BadInputError(found)
+    study = validated(Study, tree, origin)
+    base = study.scenario.model_dump(mode="json")
+    found = sweep.problems(study.sweep, base, study.replicates)
+    if found:
+        raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found])
+    return OpenStudy(path.stem, path, study, tree, origin)
+
+
+def _files(path: Path) -> list[_File]:
+    """The study's file and all it is based on, the deepest base first."""
+    files = [_read(path)]
+    while (name := files[0].tree.get("based_on")) is not None:
+        above = files[0]
+        folders = (above.path.parent, *STUDIES)
+        seen = [f.path.resolve() for f in files]
+        places = _places(name, folders)
+        new = [p for p in places if p.resolve() not in seen]
+        if not new:
+            if places:
+                chain = " on ".join(f.path.stem for f in reversed(files))
+                valid = f"a study that does not lead back here ({chain} on {name})"
+            else:
+                valid = f"the name of a study or scenario: {_candidates(folders)}"
+            raise BadInputError([Problem("based_on", name, valid, above.shown)])
+        files.insert(0, _read(new[0]))
+    return files
+
+
+def _material(files: list[_File]) -> _File | None:
+    """The material that the last file to name one names."""
+    stated = [f for f in files if "material" in f.tree]
+    if not stated or (name := stated[-1].tree["material"]) is None:
+        return None
+    folders = (stated[-1].path.parent, *MATERIALS)
+    places = _places(name, folders)
+    if not places:
+        valid = f"the name of a material: {_candidates(MATERIALS)}"
+        raise BadInputError([Problem("material", name, valid, stated[-1].shown)])
+    return _read(places[0])
+
+
+def _read(path: Path) -> _File:
+    shown = shown_name(path)
+    return _File(path, shown, read_yaml(path, shown))
+
+
+def _places(name: Any, folders: tuple[Path, ...]) -> list[Path]:
+    """Files of a name; none when the name is no name at all."""
+    if not isinstance(name, str) or not re.fullmatch(NAME, name):
+        return []
+    return [p for folder in folders if (p := folder / f"{name}.yaml").is_file()]
+
+
+def _candidates(folders: tuple[Path, ...]) -> str:
+    return ", ".join(sorted({p.stem for folder in folders for p in folder.glob("*.yaml")}))
+
+
+def _wrong_units(model: type[BaseModel], file: _File) -> list[Problem]:
+    """Units that contradict the key's own."""
+    return [
+        Problem(f"{key}.unit", unit, f"the unit of the key, {' or '.join(declared)}", file.shown)
+        for key, unit in _units(file.tree)
+        if (declared := _declared_units(model, key)) and str(unit) not in declared
+    ]
+
+
+def _units(tree: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Every unit that a file states, with the key path it stands at."""
+    if isinstance(tree, dict) and {"value", "unit"} <= set(tree):
+        yield key, tree["unit"]
+    elif isinstance(tree, dict | list):
+        for name, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
+            yield from _units(value, f"{key}.{name}" if key else str(name))
+
+
+def _declared_units(model: type[BaseModel], key: str) -> list[str]:
+    # The values of a swept key have its unit.
+    path = re.sub(r"^sweep\.(keys|points\.\d+)\.", "scenario.", key)
+    extras = [f.json_schema_extra for f in fields_at(model, path)]
+    return sorted({str(e["unit"]) for e in extras if isinstance(e, dict) and "unit" in e})

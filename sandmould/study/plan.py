@@ -1,0 +1,195 @@
+"""The plan of a study on disk, and what its runs will cost, before anything starts."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from sandmould.scenario.placement import loose_height_m, plan_counts
+from sandmould.scenario.quantity import Section
+from sandmould.scenario.reading import Origin, read_yaml, validated
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.expand import Run
+
+REST_S = 0.3
+"""Time that fallen sand takes to come to rest; the plan's guess, the run measures it."""
+SHOWN_POINTS = 20
+# libyaml writes a thousand scenarios in seconds where pure Python takes half a minute.
+_Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+
+
+class _RunFile(Section):
+    """What ``scenario.yaml`` holds."""
+
+    study: str
+    run: str
+    parameters: dict[str, Any]
+    replicate: int
+    scenario: Scenario
+    sources: dict[str, str]
+
+
+def write_plan(runs: Sequence[Run], folder: Path) -> None:
+    """Write ``runs.tsv`` and ``runs/<run>/scenario.yaml``, files that would not change left alone.
+
+    Rows keep the place they had in an earlier round; new ones are appended. Folders of runs that
+    are no longer listed stay, since they may hold results.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        All runs of the study, those of earlier rounds included.
+    folder : Path
+        ``results/<study>``.
+    """
+    for run in runs:
+        _write(folder / "runs" / run.run / "scenario.yaml", _scenario_text(run))
+    table = folder / "runs.tsv"
+    earlier = table.read_text(encoding="utf-8").splitlines()[1:] if table.is_file() else []
+    place = {line.split("\t", 1)[0]: n for n, line in enumerate(earlier)}
+    ordered = sorted(runs, key=lambda run: place.get(run.run, len(place)))
+    _write(table, _table_text(ordered))
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file unless it says so already: Snakemake reruns what depends on newer files."""
+    if path.is_file() and path.read_text(encoding="utf-8") == text:
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, path)
+
+
+def _scenario_text(run: Run) -> str:
+    file = _RunFile(**{name: getattr(run, name) for name in _RunFile.model_fields})
+    tree = file.model_dump(mode="json")
+    text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+    return f"# Written by the plan of the study; change the study instead.\n{text}"
+
+
+def _table_text(runs: Sequence[Run]) -> str:
+    keys = list(dict.fromkeys(key for run in runs for key in run.parameters))
+    rows = [["run", *keys, "replicate", "seed"]]
+    for run in runs:
+        values = [_cell(run.parameters.get(key)) for key in keys]
+        rows.append([run.run, *values, str(run.replicate), str(run.seed)])
+    return "".join("\t".join(row) + "\n" for row in rows)
+
+
+def _cell(value: Any) -> str:
+    """A value as text of one line; whole numbers without a decimal point."""
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def read_run(path: Path) -> Run:
+    """Read a run back from its ``scenario.yaml``.
+
+    Raises
+    ------
+    BadInputError
+        When the file is missing or was changed into something that is no run.
+    """
+    shown = str(path)
+    file = validated(_RunFile, read_yaml(path, shown), Origin({"": shown}))
+    return Run(**{name: getattr(file, name) for name in _RunFile.model_fields})
+
+
+def planned_phases(scenario: Scenario) -> list[tuple[int, float]]:
+    """Grains in the box and duration of each phase: every layer's fall, every stage.
+
+    A layer falls from the top of its loose column, sqrt(2 h/g), and rests ``REST_S`` later.
+
+    Returns
+    -------
+    list of (int, float)
+        Number of grains; duration, s.
+    """
+    settling, between = scenario.fill.settling, scenario.fill.vibration_between_layers
+    phases: list[tuple[int, float]] = []
+    grains = 0
+    counts = plan_counts(scenario)
+    for i, count in enumerate(counts):
+        grains += count
+        fall_m = scenario.fill.drop_height_m + loose_height_m(scenario, count)
+        g = scenario.gravity_m_s2
+        settles_s = math.sqrt(2 * fall_m / g) + REST_S if g > 0 else math.inf
+        phases.append((grains, min(settles_s, settling.longest_s)))
+        if between is not None and i + 1 < len(counts):
+            phases.append((grains, between.whole_duration_s))
+    phases += [(grains, stage.whole_duration_s) for stage in scenario.vibration]
+    return phases
+
+
+def planned_steps(scenario: Scenario) -> int:
+    """Time steps of a run: its fill, estimated, and its vibration."""
+    return sum(math.ceil(duration / scenario.step_s) for _, duration in planned_phases(scenario))
+
+
+def planned_grain_steps(scenario: Scenario) -> int:
+    """Steps times grains in the box at the time: what a run costs."""
+    step_s = scenario.step_s
+    return sum(n * math.ceil(duration / step_s) for n, duration in planned_phases(scenario))
+
+
+def plan_table(runs: Sequence[Run], rate_grain_steps_per_s: float | None, cores: int) -> str:
+    """What the runs of a study will take, as text.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    rate_grain_steps_per_s : float or None
+        Speed of one core, from the calibration; None before it.
+    cores : int
+        Cores that share the runs.
+    """
+    points: dict[str, list[Run]] = {}
+    for run in runs:
+        points.setdefault(json.dumps(run.parameters), []).append(run)
+    rows = [["point", "runs", "grains", "time step", "steps", "grain-steps", "wall time a run"]]
+    work = core_s = longest_s = 0.0
+    for alike in points.values():
+        scenario = alike[0].scenario
+        one = planned_grain_steps(scenario)
+        one_s = one / rate_grain_steps_per_s if rate_grain_steps_per_s else math.nan
+        work += one * len(alike)
+        core_s += one_s * len(alike)
+        longest_s = max(longest_s, one_s / scenario.engine.ranks)
+        if len(rows) <= SHOWN_POINTS:
+            rows.append(
+                [
+                    alike[0].run.rsplit("_r", 1)[0],
+                    str(len(alike)),
+                    f"{sum(plan_counts(scenario)):,}",
+                    f"{scenario.step_s:.3g} s",
+                    f"{planned_steps(scenario):,}",
+                    f"{one:.3g}",
+                    _duration(one_s / scenario.engine.ranks),
+                ]
+            )
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows]
+    if len(points) > SHOWN_POINTS:
+        lines.append(f"... and {len(points) - SHOWN_POINTS} more points")
+    # No schedule is shorter than its longest run.
+    whole = _duration(max(core_s / cores, longest_s))
+    lines.append(f"{len(runs)} runs, {work:.3g} grain-steps, wall time on {cores} cores: {whole}")
+    return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _duration(seconds: float) -> str:
+    """A duration in the unit that one would say it in."""
+    if math.isnan(seconds):
+        return "unknown until calibrated"
+    for unit, length in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2 * length:
+            return f"{seconds / length:.1f} {unit}"
+    return f"{seconds:.0f} s"

@@ -1,0 +1,156 @@
+"""The report of a study: one HTML file that opens offline."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from sandmould import ROOT
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.animation import BUDGET_BYTES
+from sandmould.study.collect import STUDY_FILE, Collected, gather, read_provenance, read_study
+from sandmould.study.plan import read_run
+from sandmould.study.report_chart import NARROW, SMALL, WIDE, lay_out
+from sandmould.study.report_curves import objective_charts, runs_of
+from sandmould.study.report_method import Row, provenance_rows, sand_method, statistics_method
+from sandmould.study.report_sand import sand_pages, shown_runs
+from sandmould.study.report_tables import data_files, key_numbers, runs_table, settings_table
+from sandmould.study.report_words import name_of, number
+from sandmould.study.study import Study
+from sandmould.study.verdict import Verdict, judge, sand_notes
+
+TEMPLATES = ROOT / "templates" / "report"
+LIMIT_BYTES = 15_000_000
+
+
+def write_report(study_folder: Path, out: Path) -> None:
+    """Write the report of a study, under 15 MB and without a single outside address.
+
+    Parameters
+    ----------
+    study_folder : Path
+        ``results/<study>``; runs may be missing, unfinished or broken.
+    out : Path
+        The HTML file; links to the data lead from its folder.
+
+    Raises
+    ------
+    OSError, ValueError
+        When ``runs.tsv`` cannot be read, or no run has a readable scenario.
+    """
+    study = read_study(study_folder)
+    collected = gather(study_folder, study.objective.at_vibration_s)
+    page = _page(study_folder, out.absolute().parent, study, collected)
+    for budget in (BUDGET_BYTES, BUDGET_BYTES // 4, BUDGET_BYTES // 20):
+        text = _render(page, budget)
+        if len(text.encode("utf-8")) < LIMIT_BYTES:
+            break
+    partial = out.with_name(out.name + ".partial")
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, out)
+
+
+@dataclass(frozen=True)
+class _Page:
+    """What the report is made from."""
+
+    study_folder: Path
+    href: str
+    study: Study
+    collected: Collected
+    verdict: Verdict
+    scenario: Scenario
+    """Of the run that is shown."""
+    by_setting: dict[str, Scenario]
+
+
+def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
+    objective, summary, keys = study.objective, collected.summary, collected.keys
+    scenarios = _scenarios(study_folder, [str(r) for r in summary["run"]])
+    if not scenarios:
+        raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
+    any_scenario = next(iter(scenarios.values()))
+    stage = any_scenario.vibration[0] if any_scenario.vibration else None
+    notes = sand_notes(keys, stage, _deepest_overlap_fraction(summary))
+    if not (study_folder / STUDY_FILE).exists():
+        notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
+    verdict = judge(summary, keys, objective.measure, objective.better, notes)
+    shown = next(iter(shown_runs(study_folder, summary, verdict).values()), "")
+    by_setting = {
+        setting.label: scenarios[run]
+        for setting in verdict.settings
+        for run in reversed(runs_of(summary, setting)["run"].tolist())
+        if run in scenarios
+    }
+    relative = os.path.relpath(study_folder.absolute(), home)
+    href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
+    scenario = scenarios.get(shown, any_scenario)
+    return _Page(study_folder, href, study, collected, verdict, scenario, by_setting)
+
+
+def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
+    column = "largest_overlap_fraction"
+    found = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
+    return float(found) if found > 0 else 0.0
+
+
+def _scenarios(study_folder: Path, runs: Sequence[str]) -> dict[str, Scenario]:
+    """Scenario of each run whose file can be read."""
+    found = {}
+    for run in runs:
+        try:
+            found[run] = read_run(study_folder / "runs" / run / "scenario.yaml").scenario
+        except (BadInputError, OSError):
+            continue
+    return found
+
+
+def _render(page: _Page, film_budget_bytes: int) -> str:
+    summary, keys, verdict = page.collected.summary, page.collected.keys, page.verdict
+    objective = page.study.objective
+    provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
+    method: tuple[Row, ...] = (
+        *sand_method(page.scenario, keys, summary),
+        statistics_method(objective.measure, objective.at_vibration_s, objective.better),
+    )
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number
+    return environment.get_template("sand.html").render(
+        title=page.study.title or page.study_folder.name,
+        study_name=page.study_folder.name,
+        verdict=verdict,
+        measure_name=name_of(verdict.measure),
+        keys=keys,
+        key_numbers=key_numbers(summary, verdict),
+        objective_charts=[_both_sizes(c) for c in objective_charts(summary, verdict, keys)],
+        settings=settings_table(verdict, page.by_setting),
+        runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
+        method=method,
+        provenance=provenance_rows(provenance),
+        files=data_files(page.study_folder, page.href),
+        pages=sand_pages(
+            page.study_folder, page.scenario, page.collected, verdict, film_budget_bytes
+        ),
+        both_sizes=_both_sizes,
+        half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
+        dimension=page.scenario.dimension,
+    )
+
+
+def _both_sizes(chart: Any) -> tuple[Any, Any]:
+    """A chart laid out for a wide page and for a phone."""
+    return lay_out(chart, WIDE), lay_out(chart, NARROW)

@@ -1,0 +1,302 @@
+"""Line and dot charts laid out in pixels, for the report's inline SVG.
+
+Drawn here and not by matplotlib: the page's own fonts and colours then hold in the light and in the
+dark, and the same chart can be laid out once for a wide page and once for a phone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+WIDE = (880, 400)
+NARROW = (350, 330)
+SMALL = (430, 300)
+_CHARACTER = 7.4
+_BOLD = 8.3
+"""Widths of a character of 13 px, generously."""
+_LINE = 15.0
+
+
+@dataclass(frozen=True)
+class Tint:
+    """A colour for a light and one for a dark page."""
+
+    light: str
+    dark: str
+
+
+PLAIN = Tint("#444444", "#cccccc")
+_OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D00")
+
+
+def tints(n: int, ordered: bool) -> tuple[Tint, ...]:
+    """Colours of n settings, told apart with any colour vision.
+
+    Parameters
+    ----------
+    n : int
+    ordered : bool
+        Whether the settings have an order, which a run from dark to bright then shows.
+    """
+    if not ordered:
+        return tuple(Tint(c, c) for c in (_OKABE_ITO * (n // len(_OKABE_ITO) + 1))[:n])
+    steps = np.linspace(0.0, 1.0, n) if n > 1 else np.array([0.5])
+    viridis = colormaps["viridis"]
+    # neither end may sink into its page
+    return tuple(
+        Tint(to_hex(viridis(0.74 * s)), to_hex(viridis(0.38 + 0.6 * s))) for s in steps.tolist()
+    )
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve; the label stands at its right end."""
+
+    xy: NDArray[np.float64]
+    """(k, 2) float64, in the units of the axes; NaN breaks the curve."""
+    tint: Tint = PLAIN
+    thick: bool = False
+    label: str = ""
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point; a mean has its interval."""
+
+    x: float
+    y: float
+    kind: str
+    """``run``, ``mean`` or ``failed``; a failed run stands at the foot of the chart."""
+    tint: Tint = PLAIN
+    half_width: float = math.nan
+    title: str = ""
+    shift_px: float = 0.0
+    """Sideways, to keep points of one setting apart."""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """What a chart shows, in the units of its axes."""
+
+    x_title: str
+    y_title: str
+    alt: str
+    lines: tuple[Line, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    x_ticks: tuple[float, ...] = ()
+    """Where the x axis is marked; round numbers unless given."""
+    rows: tuple[str, ...] = ()
+    """Names of settings that have no scale: y counts them from the top and the intervals lie."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Values from low to high on pixels from start to end."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def at(self, value: float) -> float:
+        """Pixel of a value."""
+        return self.start + (value - self.low) / (self.high - self.low) * (self.end - self.start)
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A mark of an axis in pixels."""
+
+    at: float
+    text: str
+
+
+@dataclass(frozen=True)
+class LaidLine:
+    """A curve in pixels."""
+
+    line: Line
+    path: str
+    end: tuple[float, float]
+    label_y: float
+
+
+@dataclass(frozen=True)
+class LaidMark:
+    """A point in pixels with the ends of its interval."""
+
+    mark: Mark
+    x: float
+    y: float
+    interval: tuple[float, float, float, float] | None
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A chart in pixels, as ``chart.svg`` draws it."""
+
+    chart: Chart
+    width: float
+    height: float
+    left: float
+    x: Axis
+    y: Axis
+    x_ticks: tuple[Tick, ...]
+    y_ticks: tuple[Tick, ...]
+    rows: tuple[Tick, ...]
+    lines: tuple[LaidLine, ...]
+    marks: tuple[LaidMark, ...]
+
+
+def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
+    """Place a chart on a drawing of so many pixels.
+
+    Parameters
+    ----------
+    chart : Chart
+    size : (int, int), px
+        Width and height; rows of settings make the drawing as high as they need.
+
+    Returns
+    -------
+    Laid
+    """
+    width, height = float(size[0]), float(size[1])
+    if chart.rows:
+        height = 66.0 + 42.0 * len(chart.rows)
+    y_low, y_high = _range(_ys(chart))
+    y_ticks = () if chart.rows else _round_ticks(y_low, y_high, max(3, int(height / 55)))
+    y_text = [_text(t, y_ticks) for t in y_ticks]
+    margin = 14.0 if chart.rows else 12.0 + _CHARACTER * max(map(len, y_text), default=1)
+    label = max((len(line.label) for line in chart.lines), default=0)
+    x_low, x_high = _range(_xs(chart), tight=not chart.marks)
+    beside = 30.0 if any(m.shift_px for m in chart.marks) else 0.0
+    x = Axis(x_low, x_high, margin + beside, width - (12.0 + _BOLD * label if label else 16.0))
+    foot = height - 44.0
+    y = Axis(-0.7, len(chart.rows) - 0.3, 10.0, foot) if chart.rows else None
+    y = y or Axis(y_low, y_high, foot, 34.0)
+    x_ticks = chart.x_ticks or _round_ticks(x_low, x_high, max(4, int(width / 80)))
+    return Laid(
+        chart=chart,
+        width=width,
+        height=height,
+        left=margin,
+        x=x,
+        y=y,
+        x_ticks=_not_touching([Tick(x.at(t), _text(t, x_ticks)) for t in x_ticks]),
+        y_ticks=tuple(Tick(y.at(t), s) for t, s in zip(y_ticks, y_text, strict=True)),
+        rows=tuple(Tick(y.at(i), name) for i, name in enumerate(chart.rows)),
+        lines=_laid_lines(chart.lines, x, y),
+        marks=tuple(_laid_mark(m, x, y, bool(chart.rows)) for m in chart.marks),
+    )
+
+
+def _xs(chart: Chart) -> list[float]:
+    """All values along x, ends of lying intervals included."""
+    xs = [v for line in chart.lines for v in line.xy[:, 0].tolist()] + list(chart.x_ticks)
+    for mark in chart.marks:
+        reach = mark.half_width if chart.rows and math.isfinite(mark.half_width) else 0.0
+        xs += [mark.x - reach, mark.x + reach]
+    return xs
+
+
+def _ys(chart: Chart) -> list[float]:
+    """All values along y, ends of standing intervals included."""
+    ys = [v for line in chart.lines for v in line.xy[:, 1].tolist()]
+    for mark in chart.marks:
+        reach = mark.half_width if math.isfinite(mark.half_width) else 0.0
+        ys += [mark.y - reach, mark.y + reach]
+    return ys
+
+
+def _range(values: Sequence[float], tight: bool = False) -> tuple[float, float]:
+    """Ends of an axis round its values, with a margin unless tight; never of no length."""
+    finite = [v for v in values if math.isfinite(v)]
+    if not finite:
+        return 0.0, 1.0
+    low, high = min(finite), max(finite)
+    if high - low <= 1e-9 * max(abs(low), abs(high)):
+        low, high = low - (0.05 * abs(low) or 0.5), high + (0.05 * abs(high) or 0.5)
+    margin = 0.0 if tight else 0.06 * (high - low)
+    return low - margin, high + margin
+
+
+def _round_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
+    ticks = np.asarray(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
+    return tuple(t for t in ticks.tolist() if low - 1e-12 <= t <= high + 1e-12)
+
+
+def _text(value: float, ticks: Sequence[float]) -> str:
+    """A tick's number with the decimals that its neighbours need."""
+    largest = max(map(abs, ticks), default=1.0)
+    if largest >= 1e5 or 0 < largest < 1e-3:
+        return f"{value:.3g}"
+    for places in range(5):
+        if all(abs(round(t, places) - t) <= 1e-6 * largest for t in ticks):
+            return f"{round(value, places) + 0.0:.{places}f}"
+    return f"{value:.4g}"
+
+
+def _not_touching(ticks: Sequence[Tick]) -> tuple[Tick, ...]:
+    """Ticks without the texts that would run into the one before."""
+    shown: list[Tick] = []
+    free_from = -math.inf
+    for tick in sorted(ticks, key=lambda t: t.at):
+        half = _CHARACTER * len(tick.text) / 2 + 3
+        fits = tick.at - half >= free_from
+        shown.append(tick if fits else Tick(tick.at, ""))
+        free_from = tick.at + half if fits else free_from
+    return tuple(shown)
+
+
+def _laid_lines(lines: Sequence[Line], x: Axis, y: Axis) -> tuple[LaidLine, ...]:
+    laid = []
+    for line in lines:
+        finite = line.xy[np.isfinite(line.xy).all(axis=1)]
+        if not len(finite):
+            continue
+        pixels = [(x.at(u), y.at(v)) for u, v in finite.tolist()]
+        path = "M" + "L".join(f"{u:.1f},{v:.1f}" for u, v in pixels)
+        laid.append((line, path, pixels[-1]))
+    labelled = [(i, end[1]) for i, (line, _, end) in enumerate(laid) if line.label]
+    heights = dict(_spread(labelled, y.end, y.start))
+    return tuple(
+        LaidLine(line, path, end, heights.get(i, end[1]))
+        for i, (line, path, end) in enumerate(laid)
+    )
+
+
+def _spread(
+    labels: Sequence[tuple[int, float]], top: float, foot: float
+) -> list[tuple[int, float]]:
+    """Move labels apart by a line each: down from the top, then up again from the foot."""
+    placed: list[tuple[int, float]] = []
+    for i, at in sorted(labels, key=lambda item: item[1]):
+        above = placed[-1][1] + _LINE if placed else top
+        placed.append((i, max(at, above)))
+    limit = foot
+    for place in range(len(placed) - 1, -1, -1):
+        i, at = placed[place]
+        placed[place] = (i, min(at, limit))
+        limit = placed[place][1] - _LINE
+    return placed
+
+
+def _laid_mark(mark: Mark, x: Axis, y: Axis, lying: bool) -> LaidMark:
+    if mark.kind == "failed":
+        return LaidMark(mark, x.at(mark.x) + mark.shift_px, y.start - 8.0, None)
+    u, v, reach = x.at(mark.x), y.at(mark.y), mark.half_width
+    if not math.isfinite(reach):
+        return LaidMark(mark, u + mark.shift_px, v, None)
+    if lying:
+        return LaidMark(mark, u, v, (x.at(mark.x - reach), v, x.at(mark.x + reach), v))
+    return LaidMark(mark, u, v, (u, y.at(mark.y - reach), u, y.at(mark.y + reach)))

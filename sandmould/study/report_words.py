@@ -1,0 +1,135 @@
+"""Names and numbers as a person reads them: units from key suffixes, settings, times, sizes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+# Longest first: _m_s2 must be found before _m_s, and that before _s.
+_UNITS = (
+    ("_kg_m3", "kg/m³"), ("_m_s2", "m/s²"), ("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_n_m", "N/m"),
+    ("_per_s", "1/s"), ("_fraction", ""), ("_bytes", "bytes"), ("_deg", "°"), ("_hz", "Hz"),
+    ("_pa", "Pa"), ("_kg", "kg"), ("_m3", "m³"), ("_m2", "m²"), ("_g", "g"), ("_m", "m"),
+    ("_s", "s"), ("_n", "N"), ("_j", "J"),
+)  # fmt: skip
+_NAMES = {
+    "coordination": "coordination number",
+    "solid_fraction": "solid fraction",
+    "bed_height_m": "bed height",
+    "apparent_density_raw_kg_m3": "apparent density, as eq. (55) prints it",
+    "apparent_density_corrected_kg_m3": "apparent density, corrected for walls",
+}
+
+
+def unit_of(key: str) -> str:
+    """Unit that a key's suffix states; empty for a pure number."""
+    return next((unit for suffix, unit in _UNITS if key.endswith(suffix)), "")
+
+
+def name_of(key: str) -> str:
+    """Last part of a key path in words, without its unit.
+
+    Examples
+    --------
+    >>> name_of("vibration.0.frequency_hz")
+    'frequency'
+    """
+    last = key.rsplit(".", 1)[-1]
+    if last in _NAMES:
+        return _NAMES[last]
+    if last.endswith("_fill_fraction"):
+        return f"fill of the {last.removesuffix('_fill_fraction').replace('_', ' ')}"
+    suffix = next((s for s, _ in _UNITS if last.endswith(s)), "")
+    if suffix == "_fraction":
+        suffix = ""
+    return last.removesuffix(suffix).replace("_", " ")
+
+
+def titled(key: str) -> str:
+    """Name with its unit, as an axis or a table shows it."""
+    unit = unit_of(key)
+    return f"{name_of(key)}, {unit}" if unit else name_of(key)
+
+
+def number(value: Any, digits: int = 3) -> str:
+    """A number with so many significant digits, without an exponent where it can be helped."""
+    try:
+        x = float(value)
+    except (TypeError, ValueError):
+        return str(value)
+    if not math.isfinite(x):
+        return "–"
+    if x == 0:
+        return "0"
+    size = math.floor(math.log10(abs(x)))
+    if not -4 <= size < 7:
+        return f"{x:.{digits - 1}e}".replace("-", "−")
+    places = max(0, digits - 1 - size)
+    text = f"{x:,.{places}f}".replace(",", "\u202f").replace("-", "−")
+    return text.rstrip("0").rstrip(".") if "." in text and float(x).is_integer() else text
+
+
+def with_margin(mean: float, half_width: float) -> str:
+    """A mean with its half width, both to the second digit of the half width."""
+    if not math.isfinite(half_width) or half_width <= 0:
+        return number(mean)
+    places = max(0, 1 - math.floor(math.log10(half_width)))
+    return f"{mean:.{places}f} ± {half_width:.{places}f}".replace("-", "−")
+
+
+def shown_scale(key: str) -> tuple[float, str]:
+    """Factor by which a measure is shown, and its name with the unit then: lengths in mm."""
+    if unit_of(key) == "m":
+        return 1e3, f"{name_of(key)}, mm"
+    return 1.0, titled(key)
+
+
+def value_text(key: str, value: Any) -> str:
+    """A swept value with its unit."""
+    if isinstance(value, float | int) and not isinstance(value, bool):
+        text = f"{value:.6g}"
+    else:
+        text = str(value)
+    unit = unit_of(key)
+    return f"{text} {unit}" if unit else text
+
+
+def setting_text(values: Mapping[str, Any]) -> str:
+    """A combination of swept values: ``65 Hz``, or ``frequency 65 Hz, friction 0.8``."""
+    if not values:
+        return "the one setting"
+    if len(values) == 1:
+        ((key, value),) = values.items()
+        text = value_text(key, value)
+        return text if unit_of(key) else f"{name_of(key)} {text}"
+    return ", ".join(f"{name_of(k)} {value_text(k, v)}" for k, v in values.items())
+
+
+def seconds(value_s: float) -> str:
+    """A duration in the unit that suits it."""
+    if not math.isfinite(value_s):
+        return "–"
+    if value_s < 120:
+        return f"{number(value_s)} s"
+    if value_s < 7200:
+        return f"{number(value_s / 60)} min"
+    return f"{number(value_s / 3600)} h"
+
+
+def size(value_bytes: float) -> str:
+    """A number of bytes in the unit that suits it."""
+    if not math.isfinite(value_bytes):
+        return "–"
+    return next(
+        f"{number(value_bytes / 10**power)} {unit}"
+        for power, unit in ((9, "GB"), (6, "MB"), (3, "kB"), (0, "B"))
+        if value_bytes >= 10**power or power == 0
+    )
+
+
+def listed(items: list[str]) -> str:
+    """Items as a sentence lists them: ``a, b and c``."""
+    if len(items) < 2:
+        return "".join(items)
+    return f"{', '.join(items[:-1])} and {items[-1]}"

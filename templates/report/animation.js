@@ -1,0 +1,200 @@
+// Films of the runs: unpacks what sandmould/study/animation.py packed, and draws it.
+{
+  const byId = (id) => document.getElementById(id);
+  const canvas = byId("film-canvas"), slider = byId("film-slider"), play = byId("film-play");
+  const time = byId("film-time"), choice = byId("film-run"), cut = byId("film-cut");
+  const scene = JSON.parse(byId("film-scene").textContent);
+  const measure = JSON.parse(byId("film-measure").textContent);
+  const stored = [...document.querySelectorAll("script.film")];
+  const ABSENT = 65535, FRAMES_PER_S = 20, MARGIN_PX = 8;
+  const films = [];
+  let film = null, timer = null;
+
+  async function unpack(packed) {
+    const bytes = Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const raw = new Uint8Array(await new Response(stream).arrayBuffer());
+    const n = packed.grains, frames = packed.time_s.length, d = packed.dimension;
+    const all = d * frames * n;
+    const place = new Uint16Array(all);
+    for (let axis = 0, at = 0; axis < d; axis++) {
+      for (let frame = 0; frame < frames; frame++) {
+        for (let grain = 0; grain < n; grain++, at++) {
+          const folded = raw[at] | (raw[all + at] << 8);
+          const change = (folded >>> 1) ^ -(folded & 1);
+          place[at] = (frame ? place[at - n] : 0) + change;
+        }
+      }
+    }
+    const radius_m = new Float64Array(n), start = 2 * all;
+    for (let grain = 0; grain < n; grain++) {
+      const share = raw[start + grain] | (raw[start + n + grain] << 8);
+      radius_m[grain] = (share / 65535) * packed.largest_radius_m;
+    }
+    const layer = raw.subarray(start + 2 * n, start + 3 * n);
+    const at = (axis, frame) => place.subarray((axis * frames + frame) * n, (axis * frames + frame + 1) * n);
+    return { ...packed, data: null, frames, at, radius_m, layer };
+  }
+
+  // px per m and the turned-over vertical of the canvas
+  function view() {
+    const width = canvas.clientWidth, ratio = window.devicePixelRatio || 1;
+    const scale = (width - 2 * MARGIN_PX) / scene.width_m;
+    const height = scale * scene.height_m + 2 * MARGIN_PX;
+    canvas.style.height = `${height}px`;
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    const pen = canvas.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.fillStyle = "#fff";
+    pen.fillRect(0, 0, width, height);
+    return { pen, scale, x: (m) => MARGIN_PX + scale * m, y: (m) => height - MARGIN_PX - scale * m };
+  }
+
+  function trace(v, points) {
+    v.pen.beginPath();
+    points.forEach(([x, y], i) => (i ? v.pen.lineTo(v.x(x), v.y(y)) : v.pen.moveTo(v.x(x), v.y(y))));
+  }
+
+  function drawScene(v) {
+    v.pen.lineWidth = 1.2;
+    v.pen.strokeStyle = "#404040";
+    v.pen.fillStyle = "#cccccc";
+    for (const solid of scene.solids) { trace(v, solid); v.pen.closePath(); v.pen.fill(); v.pen.stroke(); }
+    v.pen.lineWidth = 2;
+    for (const wall of scene.walls) { trace(v, wall); v.pen.stroke(); }
+    v.pen.lineWidth = 1;
+    v.pen.setLineDash([5, 4]);
+    for (const bore of scene.bores) { trace(v, bore); v.pen.closePath(); v.pen.stroke(); }
+    v.pen.setLineDash([]);
+  }
+
+  const colour = (layer) => scene.layer_colours[(layer - 1) % scene.layer_colours.length];
+
+  function drawDiscs(v, x, y) {
+    const path = new Map();
+    for (let i = 0; i < film.grains; i++) {
+      if (x[i] === ABSENT) continue;
+      const key = film.layer[i];
+      if (!path.has(key)) path.set(key, new Path2D());
+      const u = v.x(film.origin_m[0] + film.quantum_m * x[i]);
+      const w = v.y(film.origin_m[1] + film.quantum_m * y[i]);
+      const r = v.scale * film.radius_m[i];
+      path.get(key).moveTo(u + r, w);
+      path.get(key).arc(u, w, r, 0, 2 * Math.PI);
+    }
+    v.pen.lineWidth = 0.6;
+    v.pen.strokeStyle = "#0008";
+    for (const [layer, discs] of path) {
+      v.pen.fillStyle = colour(layer);
+      v.pen.fill(discs);
+      if (v.scale * film.largest_radius_m > 2.5) v.pen.stroke(discs);
+    }
+  }
+
+  // far grains first, near ones over them; cut open, the tube hides what lies behind it
+  function drawSpheres(v, frame) {
+    const [x, y, z] = [0, 1, 2].map((axis) => film.at(axis, frame));
+    const metres = (axis, value) => film.origin_m[axis] + film.quantum_m * value;
+    const inside = (i) => scene.tubes.some((t) => metres(0, x[i]) > t.x_m[0] && metres(0, x[i]) < t.x_m[1]
+      && Math.hypot(metres(1, y[i]) - t.axis_m[0], metres(2, z[i]) - t.axis_m[1]) < t.radius_m);
+    const order = [];
+    for (let i = 0; i < film.grains; i++) {
+      if (x[i] !== ABSENT && !(cut.checked && metres(1, y[i]) < scene.cut_m)) order.push(i);
+    }
+    order.sort((a, b) => y[b] - y[a]);
+    const drawGrain = (i) => {
+      v.pen.beginPath();
+      v.pen.arc(v.x(metres(0, x[i])), v.y(metres(2, z[i])), v.scale * film.radius_m[i], 0, 2 * Math.PI);
+      v.pen.fillStyle = colour(film.layer[i]);
+      v.pen.fill();
+      v.pen.lineWidth = 0.6;
+      v.pen.strokeStyle = "#0008";
+      v.pen.stroke();
+    };
+    if (!cut.checked) {
+      drawScene(v);
+      order.forEach(drawGrain);
+      return;
+    }
+    order.filter((i) => !inside(i)).forEach(drawGrain);
+    v.pen.fillStyle = "#eeeeee";
+    for (const bore of scene.bores) { trace(v, bore); v.pen.closePath(); v.pen.fill(); }
+    drawScene(v);
+    order.filter(inside).forEach(drawGrain);
+  }
+
+  function draw() {
+    const frame = Number(slider.value), v = view();
+    if (film.dimension === 2) {
+      drawDiscs(v, film.at(0, frame), film.at(1, frame));
+      drawScene(v);
+    } else {
+      drawSpheres(v, frame);
+    }
+    const shaken = film.vibration_time_s[frame], value = film.reading[frame];
+    const total = film.vibration_time_s[film.frames - 1];
+    const clock = shaken < 0 ? `filling, ${film.time_s[frame].toFixed(2)} s`
+      : `vibration, ${shaken.toFixed(2)} of ${total.toFixed(2)} s`;
+    time.textContent = value === null ? clock : `${clock} · ${measure} ${value.toFixed(3)}`;
+    slider.setAttribute("aria-valuetext", clock);
+  }
+
+  function pause() {
+    clearInterval(timer);
+    timer = null;
+    play.textContent = "Play";
+  }
+
+  function start() {
+    if (Number(slider.value) >= film.frames - 1) slider.value = 0;
+    play.textContent = "Pause";
+    timer = setInterval(() => {
+      slider.value = Number(slider.value) + 1;
+      draw();
+      if (Number(slider.value) >= film.frames - 1) pause();
+    }, 1000 / FRAMES_PER_S);
+  }
+
+  function phases() {
+    const filling = film.vibration_time_s.filter((t) => t < 0).length;
+    byId("film-phases").innerHTML = "";
+    for (const [name, frames] of [["filling", filling], ["vibration", film.frames - filling]]) {
+      if (!frames) continue;
+      const part = document.createElement("span");
+      part.textContent = name;
+      part.style.flexGrow = frames;
+      part.style.flexBasis = 0;
+      if (name === "vibration") part.className = "shaken";
+      byId("film-phases").append(part);
+    }
+  }
+
+  // another run is shown at the moment nearest to the one before
+  async function show(number) {
+    pause();
+    // vibration time is below zero all the while the box is filled
+    const moment = (it, frame) => (it.vibration_time_s[frame] < 0 ? it.time_s[frame] - 1e6 : it.vibration_time_s[frame]);
+    const now = film && moment(film, Number(slider.value));
+    try {
+      films[number] = films[number] || (await unpack(JSON.parse(stored[number].textContent)));
+    } catch (error) {
+      time.textContent = `This browser cannot unpack the film (${error.message}).`;
+      return;
+    }
+    film = films[number];
+    slider.max = film.frames - 1;
+    const gaps = film.time_s.map((t, frame) => Math.abs(moment(film, frame) - now));
+    const start = film.vibration_time_s.findIndex((t) => t >= 0);
+    slider.value = now === null ? Math.max(start, 0) : gaps.indexOf(Math.min(...gaps));
+    phases();
+    draw();
+  }
+
+  play.addEventListener("click", () => (timer === null ? start() : pause()));
+  slider.addEventListener("input", () => { pause(); draw(); });
+  choice.addEventListener("change", () => show(Number(choice.value)));
+  if (cut) cut.addEventListener("change", draw);
+  new ResizeObserver(() => film && draw()).observe(canvas.parentElement);
+  show(0);
+}

@@ -1,0 +1,112 @@
+"""Rendered decks against golden files; ``pytest tests/decks --refresh-golden`` rewrites them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import jinja2
+import pytest
+
+from sandmould import ROOT
+from sandmould.engines.deck import Block, Deck, environment, exact
+from sandmould.engines.lammps.render import layer_data, render_deck
+from sandmould.engines.program import build_program
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.expand import expand
+from sandmould.study.opening import open_study
+from tests.conftest import tube_scene
+
+GOLDEN = Path(__file__).parent / "golden"
+STUDIES = ("tube_demo", "tube_3d_small")
+VARIANTS: dict[str, dict[str, object]] = {
+    "laboratory_viscous_elastic": {
+        "frame": "laboratory",
+        "background_damping": {
+            "form": "viscous",
+            "viscous_translation_per_s": 2.0,
+            "viscous_rotation_per_s": 3.0,
+        },
+        "contact": {"no_tension": "elastic"},
+        "vibration": [
+            {"acceleration_g": 1.0, "duration_s": 0.1, "ramp_s": 0.02, "direction": "horizontal"}
+        ],
+    },
+    "plate_turned_no_rolling": {
+        "obstacles": [
+            {"kind": "plate", "centre_m": [0.04, 0.03], "size_m": [0.03, 0.004], "angle_deg": 30}
+        ],
+        "background_damping": {"form": "none"},
+        "contact": {
+            "grain_grain": {"rolling_arm_fraction": 0.0},
+            "grain_wall": {"rolling_arm_fraction": 0.0},
+        },
+        "fill": {
+            "layers": [{"count": 40, "repeat": 2}],
+            "vibration_between_layers": {"displacement_m": 1e-4, "hold": "displacement"},
+        },
+    },
+}
+
+
+def deck_of(name: str) -> Deck:
+    """Render the first run of a shipped study, or a variant of the small scene."""
+    if name in VARIANTS:
+        program = build_program(tube_scene(**VARIANTS[name]))
+        return render_deck(program, {}, "test", "golden")
+    run = expand(open_study(ROOT / "config" / "studies" / f"{name}.yaml"))[0]
+    return render_deck(build_program(run.scenario), run.sources, run.run, run.study)
+
+
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS])
+def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) -> None:
+    path = GOLDEN / f"{name}.in"
+    text = deck_of(name).text
+    if request.config.getoption("--refresh-golden"):
+        path.write_text(text, encoding="utf-8")
+    assert text == path.read_text(encoding="utf-8"), "pytest tests/decks --refresh-golden, and look"
+
+
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS])
+def test_every_number_has_its_unit_and_source(name: str) -> None:
+    for line in deck_of(name).text.splitlines():
+        if re.match(r"variable \w+ (index|equal) -?[\d.]", line) and "0.0  #" not in line:
+            assert re.search(r"  # [^,]+, \S", line), line
+
+
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS])
+def test_background_damping_comes_after_every_other_force(name: str) -> None:
+    text = deck_of(name).text
+    fixes = re.findall(r"^fix (\w+) all (\S+)", text, re.M)
+    order = [style for _, style in fixes]
+    damping = [i for i, s in enumerate(order) if s in ("damping/cundall", "viscous")]
+    forces = [i for i, s in enumerate(order) if s in ("gravity", "wall/gran/region", "enforce2d")]
+    assert forces
+    assert all(d > max(forces) for d in damping)
+
+
+def test_a_misspelt_name_in_a_template_is_an_error() -> None:
+    template = environment("lammps").from_string("{{ scenario.densty }}")
+    with pytest.raises(jinja2.UndefinedError):
+        template.render(scenario=Scenario())
+
+
+def test_numbers_read_back_exactly() -> None:
+    for number in (0.1, 1 / 3, 7e4, 2.0, -1e-20, 123456789.123456789):
+        assert float(exact(number)) == number
+    assert exact(70000.0) == "70000"
+
+
+def test_a_block_with_two_runs_is_refused() -> None:
+    with pytest.raises(ValueError, match="2 run commands"):
+        _ = Block("twice", "run 10\nrun 20\n").run_steps
+
+
+def test_layer_file_holds_every_grain_with_its_diameter() -> None:
+    program = build_program(tube_scene())
+    layer = program.layers[0]
+    lines = layer_data(program.scenario, layer, 1).splitlines()
+    rows = [line.split() for line in lines[lines.index("Atoms # sphere") + 2 :]]
+    assert len(rows) == len(layer.radius_m) == 60
+    assert [float(r[2]) / 2 for r in rows] == pytest.approx(layer.radius_m)
+    assert [int(r[0]) for r in rows] == list(range(1, 61))

@@ -1,0 +1,244 @@
+"""The report's page: whole, offline, honest in its first sentence, with whatever runs there are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from report_study import FAILED, PLANTED, write_study
+
+from sandmould.study import figures
+from sandmould.study.report import LIMIT_BYTES, write_report
+
+_VOID = {"meta", "link", "img", "input", "line", "circle", "path", "br"}
+
+
+class Page(HTMLParser):
+    """Tags with their attributes, and the text of chosen classes."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, Any]]] = []
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in _VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in _VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] not in ("script", "style"):
+            self.words.append(data)
+
+    def of(self, tag: str) -> list[dict[str, Any]]:
+        return [attrs for name, attrs in self.tags if name == tag]
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+def report(folder: Path) -> str:
+    out = folder / "report.html"
+    write_report(folder, out)
+    assert out.stat().st_size < LIMIT_BYTES
+    assert not list(folder.glob("*.partial"))
+    return out.read_text(encoding="utf-8")
+
+
+def first_sentence(text: str) -> str:
+    found = re.search(r'<p class="first">(.*?)</p>', text, re.S)
+    assert found is not None
+    return found.group(1)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_pictures() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "_PANEL_PX", 60)
+        yield
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_study(tmp_path_factory.mktemp("results") / "tube")
+
+
+@pytest.fixture(scope="module")
+def text(study: Path) -> str:
+    return report(study)
+
+
+def test_opens_offline_and_is_whole(text: str, study: Path) -> None:
+    page = Page(text)
+    assert page.open == []
+    for tag, attrs in page.tags:
+        for name in ("src", "href", "srcset", "data", "action", "poster"):
+            value = str(attrs.get(name, ""))
+            assert not re.match(r"(\w+:)?//", value), (tag, value[:80])
+    assert not re.search(r"@import|url\(|fetch\(|XMLHttpRequest|importScripts", text)
+    links = [a["href"] for a in page.of("a") if not a["href"].startswith("#")]
+    assert len(links) >= 9 + 3
+    assert all((study / link).exists() for link in links)
+
+
+def test_every_picture_is_told(text: str) -> None:
+    page = Page(text)
+    assert all(len(img["alt"]) > 20 for img in page.of("img"))
+    assert all(len(svg["aria-label"]) > 40 for svg in page.of("svg") if "chart" in svg["class"])
+    figures = len(page.of("figure"))
+    assert figures == len(page.of("figcaption")) >= 8
+    assert re.findall(r"<b>Figure (\d+)\.</b>", text) == [str(n + 1) for n in range(figures)]
+
+
+def test_headings_link_to_sections(text: str) -> None:
+    page = Page(text)
+    targets = {a["href"][1:] for a in page.of("a") if a["href"].startswith("#")}
+    ids = [attrs["id"] for _, attrs in page.tags if "id" in attrs]
+    assert targets <= set(ids)
+    assert len(ids) == len(set(ids))
+
+
+def test_first_sentence_recommends_what_is_resolved(text: str) -> None:
+    assert first_sentence(text).startswith("50 Hz is best: it gives the highest fill of the tube")
+    assert "Recommended among the settings swept: 50 Hz" in Page(text).text
+
+
+def test_failed_run_is_marked_with_its_sentence(text: str) -> None:
+    row = next(r for r in re.findall(r"<tr.*?</tr>", text, re.S) if f">{FAILED}<" in r)
+    assert row.startswith('<tr class="marked">')
+    assert "Grains left the box or passed through a wall." in row
+    assert "3 grains passed through the floor" in row
+    assert "1 of 9 runs did not finish" in Page(text).text
+
+
+def test_method_is_told(text: str) -> None:
+    words = Page(text).text
+    for said in (
+        "lammps 22 Jul 2025, 1 rank",
+        "never allowed to pull",
+        "non-viscous, each component of force by itself",
+        "acceleration held constant while the frequency changes",
+        "6.10 µs, 0.500 of the critical one",
+        "same seed at every setting",
+        "snakemake --configfile config/studies/tube_demo.yaml",
+        "whether the optimum belongs to the sand",
+        "not 1",
+    ):
+        assert said.lower() in words.lower(), said
+
+
+def test_same_study_gives_the_same_page(text: str, study: Path, tmp_path: Path) -> None:
+    write_report(study, study / "again.html")
+    assert (study / "again.html").read_text(encoding="utf-8") == text
+    # links lead from the page's own folder
+    write_report(study, tmp_path / "elsewhere.html")
+    page = Page((tmp_path / "elsewhere.html").read_text(encoding="utf-8"))
+    links = [a["href"] for a in page.of("a") if not a["href"].startswith("#")]
+    assert all((tmp_path / link).exists() for link in links)
+
+
+def test_tie_says_at_once_that_it_is_not_resolved(tmp_path: Path) -> None:
+    text = report(write_study(tmp_path / "tie", dict.fromkeys(PLANTED, 0.4), spread=0.05))
+    assert first_sentence(text).startswith("Not resolved:")
+    assert "Recommended" not in text
+
+
+def test_single_replicates(tmp_path: Path) -> None:
+    text = report(write_study(tmp_path / "once", replicates=1, failed=()))
+    assert first_sentence(text).startswith("Not resolved:")
+
+
+def test_all_failed_still_shows_the_sand(tmp_path: Path) -> None:
+    every = [f"f{f:g}_r{r}" for f in PLANTED for r in (1, 2, 3)]
+    text = report(write_study(tmp_path / "failed", failed=every))
+    assert first_sentence(text).startswith("Not resolved: no run finished")
+    assert 'id="film-canvas"' in text
+    assert text.count('<tr class="marked">') == 9
+
+
+def test_nothing_but_a_plan(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "plan")
+    for file in [*study.glob("runs/*/*.[jt]s*"), *study.glob("runs/*/snapshots/*")]:
+        file.unlink()
+    text = report(study)
+    assert "no outcome written" in text
+    assert 'id="film-canvas"' not in text
+    assert Page(text).open == []
+
+
+def test_broken_files_are_survived(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "broken")
+    (study / "runs" / "f50_r2" / "snapshots" / "000005.npz").write_bytes(b"PK\x03\x04 cut short")
+    (study / "runs" / "f25_r1" / "scenario.yaml").write_text("scenario: [")
+    (study / "runs" / "f25_r2" / "provenance.json").write_text("{")
+    (study / "runs" / "f25_r3" / "measures.tsv").write_text("time_s\n1\n")
+    text = report(study)
+    assert "measures.tsv cannot be read" in text
+
+
+def test_missing_study_file_is_told(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "lost", failed=())
+    (study / "study.yaml").unlink()
+    assert "study.yaml is missing: title and objective are the defaults." in report(study)
+
+
+def test_without_a_tube_its_parts_vanish(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "bare", tube=False)
+    (study / "study.yaml").write_text("title: Packing\nobjective: {measure: solid_fraction}\n")
+    text = report(study)
+    assert "fill of the tube" not in text
+    assert "the sand in the tube comes from" not in text
+    assert "solid fraction" in first_sentence(text)
+
+
+def test_spheres(tmp_path: Path) -> None:
+    text = report(write_study(tmp_path / "spheres", dimension=3, grains=600))
+    assert 'id="film-cut"' in text
+    assert "0.6 in 3D" in text
+
+
+def test_words_of_others_are_escaped(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "sly", failed=())
+    (study / "study.yaml").write_text("title: <script>alert(1)</script> & co\n")
+    outcome = study / "runs" / "f25_r1" / "outcome.json"
+    outcome.write_text(outcome.read_text().replace('"detail": ""', '"detail": "<img src=x>"'))
+    text = report(study)
+    assert "<script>alert" not in text
+    assert "<img src=x>" not in text
+
+
+def test_settings_in_words_and_of_several_keys(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "words")
+    runs = pd.read_csv(study / "runs.tsv", sep="\t")
+    runs.insert(2, "vibration.0.hold", ["acceleration", "velocity", "velocity"] * 3)
+    runs.to_csv(study / "runs.tsv", sep="\t", index=False)
+    text = report(study)
+    assert "frequency 50 Hz, hold velocity" in text
+    assert Page(text).open == []
+
+
+def test_many_drawn_settings(tmp_path: Path) -> None:
+    planted = {20.0 + n: 0.3 + 0.005 * n for n in range(40)}
+    study = write_study(tmp_path / "drawn", planted, replicates=1, failed=(), grains=60, count=5)
+    runs = pd.read_csv(study / "runs.tsv", sep="\t")
+    runs.insert(2, "contact.grain_grain.friction", [0.3 + 0.01 * n for n in range(40)])
+    runs.to_csv(study / "runs.tsv", sep="\t", index=False)
+    text = report(study)
+    assert "against friction" in text
+    assert first_sentence(text).startswith("Not resolved:")

@@ -1,0 +1,112 @@
+"""YAML as users write it, and where every value came from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.quantity import fields_at, known_keys
+from sandmould.scenario.reading import Origin, merge, read_yaml, validated
+from sandmould.scenario.scenario import Scenario
+
+
+def read(folder: Path, text: str) -> dict[str, object]:
+    path = folder / "trial.yaml"
+    path.write_text(text, encoding="utf-8")
+    return read_yaml(path, "trial.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("7e4", 7e4),
+        ("1E-3", 1e-3),
+        ("-.5", -0.5),
+        ("3", 3),
+        ("3.", 3.0),
+        ("1_000", 1000),
+        ("vertical", "vertical"),
+        ("'7e4'", "7e4"),
+        ("null", None),
+        ("true", True),
+    ],
+)
+def test_numbers_are_read_as_engineers_write_them(text: str, value: object, tmp_path: Path) -> None:
+    found = read(tmp_path, f"a: {text}")["a"]
+    assert found == value
+    assert type(found) is type(value)
+
+
+def test_key_that_stands_twice_is_refused_at_any_depth(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="line 2: key 'c' stands twice"):
+        read(tmp_path, "a:\n  b: {c: 1, c: 2}")
+
+
+def test_aliases_can_repeat_a_section(tmp_path: Path) -> None:
+    tree = read(tmp_path, "a: &law {friction: 0.5}\nb: *law")
+    assert tree == {"a": {"friction": 0.5}, "b": {"friction": 0.5}}
+
+
+def test_mappings_merge_and_lists_replace() -> None:
+    origin = Origin()
+    base = merge({}, {"a": {"x": 1, "y": 2}, "l": [1, 2]}, origin, "base")
+    both = merge(base, {"a": {"y": 3}, "l": [4]}, origin, "own")
+    assert both == {"a": {"x": 1, "y": 3}, "l": [4]}
+    assert base == {"a": {"x": 1, "y": 2}, "l": [1, 2]}
+    assert origin.file_of("a.x") == "base"
+    assert origin.file_of("a.y") == origin.file_of("l.0") == "own"
+    assert origin.source_of("l.1") is None
+
+
+def test_sourced_leaf_is_unwrapped_and_its_source_kept() -> None:
+    origin = Origin()
+    leaf = {"value": [1, 2], "unit": "m", "source": "a book"}
+    assert merge({}, {"a": leaf}, origin, "f") == {"a": [1, 2]}
+    assert origin.source_of("a") == origin.source_of("a.1") == "a book"
+    assert origin.file_of("a.1") == "f"
+
+
+def test_section_over_a_value_forgets_where_the_value_came_from() -> None:
+    origin = Origin()
+    base = merge({}, {"a": {"value": None, "source": "a book"}}, origin, "base")
+    assert merge(base, {"a": {"x": 1}}, origin, "own") == {"a": {"x": 1}}
+    assert origin.source_of("a.x") == "own"
+    assert origin.source_of("a.y") is None
+
+
+def told(tree: dict[str, object]) -> list[Problem]:
+    with pytest.raises(BadInputError) as caught:
+        validated(Scenario, tree, Origin({"": "f"}))
+    return list(caught.value.problems)
+
+
+def test_names_of_union_branches_do_not_reach_the_key() -> None:
+    tube = {"kind": "tube", "diameter_m": 0, "length_m": 0.1, "left_end_x_m": 0,
+            "axis_height_m": 0.1, "tubes": 2}  # fmt: skip
+    assert [p.key for p in told({"obstacles": [tube]})] == [
+        "obstacles.0.diameter_m",
+        "obstacles.0.tubes",
+    ]
+
+
+def test_wrong_entry_of_a_list_is_told_once() -> None:
+    (problem,) = told({"vibration": [{"acceleration_g": 1, "direction": [0, "up"]}]})
+    assert problem == Problem("vibration.0.direction.1", "up", "a number", "f")
+
+
+def test_rule_of_a_section_is_told_at_the_section() -> None:
+    (problem,) = told({"fill": {"layers": [{"count": 5, "mass_kg": 1}]}})
+    assert problem.key == "fill.layers.0"
+    assert problem.valid == "exactly one of height_m, mass_kg and count"
+
+
+def test_keys_of_a_path_are_known_from_the_types() -> None:
+    assert known_keys(Scenario, ["box"]) == ["depth_m", "height_m", "width_m"]
+    assert "facets" in known_keys(Scenario, ["obstacles", "0"])
+    assert known_keys(Scenario, ["seed"]) == []
+    (length,) = fields_at(Scenario, "obstacles.0.length_m")
+    assert length.description == "Inner length."
+    assert len(fields_at(Scenario, "obstacles.0.name")) == 3
+    assert fields_at(Scenario, "") == fields_at(Scenario, "0") == []

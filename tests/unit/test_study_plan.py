@@ -1,0 +1,159 @@
+"""The plan on disk and its price."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sandmould import ROOT
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.placement import loose_height_m, plan_counts
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.expand import Run, expand
+from sandmould.study.opening import open_study
+from sandmould.study.plan import (
+    REST_S,
+    plan_table,
+    planned_grain_steps,
+    planned_phases,
+    planned_steps,
+    read_run,
+    write_plan,
+)
+
+
+@pytest.fixture(scope="module")
+def demo() -> list[Run]:
+    return expand(open_study(ROOT / "config" / "studies" / "tube_demo.yaml"))
+
+
+def times(folder: Path) -> dict[str, int]:
+    return {str(p): p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
+
+
+def backdate(folder: Path) -> None:
+    for path in folder.rglob("*"):
+        os.utime(path, (1e9, 1e9))
+
+
+def test_table_has_a_row_a_run(demo: list[Run], tmp_path: Path) -> None:
+    write_plan(demo, tmp_path)
+    text = (tmp_path / "runs.tsv").read_text(encoding="utf-8")
+    assert text.splitlines()[0] == "run\tvibration.0.frequency_hz\treplicate\tseed"
+    assert text.splitlines()[1] == f"{demo[0].run}\t25\t1\t{demo[0].seed}"
+    table = pd.read_csv(tmp_path / "runs.tsv", sep="\t")
+    assert list(table["run"]) == [r.run for r in demo]
+    assert list(table["vibration.0.frequency_hz"]) == [25] * 3 + [50] * 3 + [100] * 3
+    assert not list(tmp_path.rglob("*.partial"))
+
+
+def test_same_plan_again_touches_nothing(demo: list[Run], tmp_path: Path) -> None:
+    write_plan(demo, tmp_path)
+    backdate(tmp_path)
+    before = times(tmp_path)
+    write_plan(demo, tmp_path)
+    assert times(tmp_path) == before
+    assert len(before) == 10
+
+
+def test_later_round_appends_rows_and_leaves_the_old_runs_alone(
+    demo: list[Run], tmp_path: Path
+) -> None:
+    first, later = demo[3:], demo
+    write_plan(first, tmp_path)
+    backdate(tmp_path)
+    before = times(tmp_path / "runs")
+    write_plan(later, tmp_path)
+    rows = pd.read_csv(tmp_path / "runs.tsv", sep="\t")["run"]
+    assert list(rows) == [r.run for r in (*demo[3:], *demo[:3])]
+    assert before.items() <= times(tmp_path / "runs").items()
+    write_plan(demo[:4], tmp_path)
+    rows = pd.read_csv(tmp_path / "runs.tsv", sep="\t")["run"]
+    assert list(rows) == [demo[3].run, *(r.run for r in demo[:3])]
+    assert (tmp_path / "runs" / demo[8].run / "scenario.yaml").is_file()
+
+
+def test_run_reads_back_as_it_was(demo: list[Run], tmp_path: Path) -> None:
+    write_plan(demo, tmp_path)
+    for run in demo:
+        assert read_run(tmp_path / "runs" / run.run / "scenario.yaml") == run
+
+
+def test_damaged_run_file_is_bad_input(demo: list[Run], tmp_path: Path) -> None:
+    write_plan(demo[:1], tmp_path)
+    path = tmp_path / "runs" / demo[0].run / "scenario.yaml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("size_scale: 6.0", "size_scale: big"), encoding="utf-8")
+    with pytest.raises(BadInputError, match=r"scenario\.sand\.size_scale = 'big'"):
+        read_run(path)
+    path.write_text("run: x", encoding="utf-8")
+    with pytest.raises(BadInputError, match="study = None"):
+        read_run(path)
+
+
+def test_phases_are_falls_and_stages() -> None:
+    between = {"acceleration_g": 1.0, "frequency_hz": 40.0, "duration_s": 0.1}
+    scene = Scenario.model_validate(
+        {
+            "fill": {"layers": [{"count": 300}, {"count": 200}],
+                     "vibration_between_layers": between},
+            "vibration": [{"acceleration_g": 1.5, "frequency_hz": 30.0, "duration_s": 0.31}],
+        }
+    )  # fmt: skip
+    falls = [
+        math.sqrt(2 * (0.005 + loose_height_m(scene, count)) / scene.gravity_m_s2)
+        for count in (300, 200)
+    ]
+    assert planned_phases(scene) == [
+        (300, falls[0] + REST_S),
+        (300, 0.1),
+        (500, falls[1] + REST_S),
+        (500, 9 / 30),
+    ]
+    steps = [math.ceil(duration / scene.step_s) for _, duration in planned_phases(scene)]
+    assert planned_steps(scene) == sum(steps)
+    assert planned_grain_steps(scene) == 300 * sum(steps[:2]) + 500 * sum(steps[2:])
+
+
+def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
+    scene = Scenario.model_validate(
+        {"fill": {"layers": [{"count": 300}], "settling": {"longest_s": 0.2}}}
+    )
+    assert planned_phases(scene) == [(300, 0.2)]
+    weightless = scene.model_copy(update={"gravity_m_s2": 0.0})
+    assert planned_phases(weightless) == [(300, 0.2)]
+
+
+def test_price_before_calibration_is_unknown(demo: list[Run]) -> None:
+    text = plan_table(demo, None, 2)
+    assert text.count("unknown until calibrated") == 4
+    assert "9 runs" in text
+
+
+def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
+    total = sum(planned_grain_steps(r.scenario) for r in demo)
+    lines = plan_table(demo, total / 7200, 1).splitlines()
+    grains = sum(plan_counts(demo[0].scenario))
+    assert lines[1].split()[:3] == ["frequency_25", "3", f"{grains:,}"]
+    assert lines[-1].startswith("9 runs, ")
+    assert lines[-1].endswith("wall time on 1 cores: 2.0 h")
+    assert plan_table(demo, total / 7200, 2).endswith("on 2 cores: 60.0 min\n")
+    # On more cores than runs the longest run decides.
+    longest = max(planned_grain_steps(r.scenario) for r in demo)
+    assert plan_table(demo, longest / 60, 99).endswith("on 99 cores: 60 s\n")
+
+
+def test_long_table_is_cut(tmp_path: Path) -> None:
+    path = tmp_path / "many.yaml"
+    path.write_text(
+        "based_on: tube\nsweep: {keys: {vibration.0.frequency_hz: "
+        "{low: 15, high: 100, number: 30}}}",
+        encoding="utf-8",
+    )
+    lines = plan_table(expand(open_study(path)), 1e6, 2).splitlines()
+    assert len(lines) == 23
+    assert lines[-2] == "... and 10 more points"

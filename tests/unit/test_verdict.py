@@ -1,0 +1,191 @@
+"""The verdict: what is planted is found, and no more is claimed than the runs carry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from sandmould.scenario.vibration import VibrationStage
+from sandmould.study.verdict import NOT_TESTED, judge, rank_runs, sand_notes
+
+KEY = "vibration.0.frequency_hz"
+FILL = "tube_fill_fraction"
+
+
+def table(values: Mapping[float, Sequence[float | None]]) -> pd.DataFrame:
+    """A summary with one replicate a value; None is a run that failed."""
+    return pd.DataFrame(
+        [
+            {
+                "run": f"f{f:g}_r{r}",
+                KEY: f,
+                "replicate": r,
+                "seed": 100 + r,
+                "outcome_code": 0 if v is not None else 310,
+                FILL: np.nan if v is None else v,
+            }
+            for f, row in values.items()
+            for r, v in enumerate(row, start=1)
+        ]
+    )
+
+
+WINNER = table({25: [0.30, 0.32, 0.31], 50: [0.60, 0.63, 0.61], 100: [0.40, 0.43, 0.395]})
+
+
+def test_planted_winner_is_resolved() -> None:
+    verdict = judge(WINNER, [KEY], FILL)
+    assert verdict.resolved
+    assert verdict.best is not None
+    assert verdict.runner_up is not None
+    assert (verdict.best.label, verdict.runner_up.label) == ("50 Hz", "100 Hz")
+    assert verdict.sentences[0].startswith("50 Hz is best")
+    assert "3 paired replicates" in verdict.sentences[1]
+    assert verdict.difference == pytest.approx(0.61333 - 0.40833, abs=1e-4)
+
+
+def test_paired_interval_by_hand() -> None:
+    verdict = judge(WINNER, [KEY], FILL)
+    apart = np.array([0.60 - 0.40, 0.63 - 0.43, 0.61 - 0.395])
+    # 95 % over two comparisons: 0.05 / 2 in both tails together
+    reach = stats.t.ppf(1 - 0.0125, 2) * apart.std(ddof=1) / math.sqrt(3)
+    assert verdict.ci == pytest.approx((apart.mean() - reach, apart.mean() + reach))
+    assert verdict.p == pytest.approx(2 * stats.ttest_1samp(apart, 0).pvalue)
+    assert all(c.paired for c in verdict.comparisons)
+
+
+def test_spread_that_replicates_share_is_taken_out() -> None:
+    shared = [0.0, 0.2, 0.4]
+    paired = table(
+        {25: shared, 50: [v + d for v, d in zip(shared, (0.04, 0.05, 0.06), strict=True)]}
+    )
+    assert judge(paired, [KEY], FILL).resolved
+    unlike = paired.assign(seed=range(6))
+    verdict = judge(unlike, [KEY], FILL)
+    assert not verdict.resolved
+    assert not verdict.comparisons[0].paired
+
+
+def test_unpaired_settings_are_compared_by_welch() -> None:
+    summary = table({25: [0.30, 0.32, 0.31, None], 50: [0.40, None, 0.45, 0.41]})
+    verdict = judge(summary, [KEY], FILL)
+    expected = stats.ttest_ind([0.40, 0.45, 0.41], [0.30, 0.32, 0.31], equal_var=False)
+    assert not verdict.comparisons[0].paired
+    assert verdict.p == pytest.approx(expected.pvalue)
+    assert verdict.ci == pytest.approx(tuple(expected.confidence_interval(0.95)))
+    assert "2 of 8 runs did not finish" in verdict.caveats[0]
+
+
+def test_tie_is_not_resolved() -> None:
+    summary = table({25: [0.50, 0.53, 0.48], 50: [0.51, 0.50, 0.52], 100: [0.1, 0.2, 0.15]})
+    verdict = judge(summary, [KEY], FILL)
+    assert not verdict.resolved
+    assert verdict.sentences[0].startswith("Not resolved:")
+    assert "cannot be told apart from 25 Hz at 95 %" in verdict.sentences[0]
+    assert verdict.ci[0] < 0 < verdict.ci[1]
+
+
+def test_noise_alone_is_seldom_resolved() -> None:
+    rng = np.random.default_rng(3)
+    tries = [
+        judge(table({f: rng.normal(0.5, 0.02, 4).tolist() for f in (25, 50, 75, 100)}), [KEY], FILL)
+        for _ in range(80)
+    ]
+    assert sum(v.resolved for v in tries) <= 6
+
+
+def test_single_replicates_are_not_resolved() -> None:
+    verdict = judge(table({25: [0.1], 50: [0.9]}), [KEY], FILL)
+    assert not verdict.resolved
+    assert verdict.best is not None
+    assert math.isnan(verdict.best.sd)
+    assert math.isnan(verdict.p)
+    assert "two replicates or more" in verdict.sentences[1]
+    assert any("Fewer than 3" in c for c in verdict.caveats)
+
+
+def test_identical_replicates_are_no_replicates() -> None:
+    verdict = judge(table({25: [0.1, 0.1, 0.1], 50: [0.9, 0.9, 0.9]}), [KEY], FILL)
+    assert not verdict.resolved
+    assert any("check that the seed reaches the sand" in c for c in verdict.caveats)
+
+
+def test_setting_too_thin_to_test_does_not_block_but_is_told() -> None:
+    summary = pd.concat([WINNER, table({75: [0.59]})], ignore_index=True)
+    # its mean is the second highest: nothing is resolved against it
+    assert not judge(summary, [KEY], FILL).resolved
+    low = pd.concat([WINNER, table({75: [0.2]})], ignore_index=True)
+    verdict = judge(low, [KEY], FILL)
+    assert verdict.resolved
+    assert any("75 Hz" in c for c in verdict.caveats)
+
+
+def test_all_failed() -> None:
+    verdict = judge(table({25: [None, None], 50: [None, None]}), [KEY], FILL)
+    assert verdict.sentences == (
+        "Not resolved: no run finished with a value of the fill of the tube.",
+    )
+    assert verdict.best is None
+    assert not verdict.resolved
+    assert rank_runs(table({25: [None]}), FILL) == {}
+
+
+def test_measure_that_no_run_has() -> None:
+    assert judge(WINNER, [KEY], "pipe_fill_fraction").best is None
+
+
+def test_one_setting_has_nothing_to_compare_with() -> None:
+    summary = table({50: [0.4, 0.41, 0.42]}).drop(columns=KEY)
+    verdict = judge(summary, [], FILL)
+    assert verdict.sentences[0].startswith("Not resolved: nothing to compare with.")
+    assert verdict.settings[0].n == 3
+    assert verdict.settings[0].ci_half_width == pytest.approx(
+        stats.t.ppf(0.975, 2) * 0.01 / math.sqrt(3)
+    )
+
+
+def test_best_at_the_edge_is_told() -> None:
+    caveats = judge(table({25: [0.9, 0.91], 50: [0.1, 0.12]}), [KEY], FILL).caveats
+    assert any("25 Hz, is the lowest one swept" in c for c in caveats)
+    assert not any("swept" in c for c in judge(WINNER, [KEY], FILL).caveats)
+
+
+def test_smaller_can_be_better() -> None:
+    verdict = judge(WINNER, [KEY], FILL, "smaller")
+    assert verdict.resolved
+    assert verdict.best is not None
+    assert verdict.best.label == "25 Hz"
+    assert verdict.ci[1] < 0
+    assert rank_runs(WINNER, FILL, "smaller") == {
+        "best": "f25_r1", "median": "f100_r1", "worst": "f50_r2",
+    }  # fmt: skip
+
+
+def test_settings_of_several_keys_and_of_words() -> None:
+    second = WINNER.assign(**{"vibration.0.hold": "velocity"})
+    both = pd.concat([WINNER.assign(**{"vibration.0.hold": "acceleration"}), second])
+    verdict = judge(both.reset_index(drop=True), [KEY, "vibration.0.hold"], FILL)
+    assert len(verdict.settings) == 6
+    assert verdict.settings[0].label == "frequency 25 Hz, hold acceleration"
+    assert not verdict.resolved
+
+
+def test_runs_are_ranked() -> None:
+    assert rank_runs(WINNER, FILL) == {"best": "f50_r2", "median": "f100_r1", "worst": "f25_r1"}
+    assert rank_runs(table({25: [0.1]}), FILL) == {"best": "f25_r1"}
+    assert rank_runs(table({25: [0.1, None, 0.2]}), FILL) == {"best": "f25_r3", "worst": "f25_r1"}
+
+
+def test_notes_say_what_was_held_and_what_was_not_tested() -> None:
+    stage = VibrationStage(hold="velocity", velocity_m_s=0.05)
+    notes = sand_notes([KEY], stage)
+    assert "amplitude of velocity was held constant" in notes[0]
+    assert notes[-1] == NOT_TESTED
+    assert sand_notes(["sand.density_kg_m3"], stage, 0.04) == (NOT_TESTED,)
+    assert "overlapped by up to 21 %" in sand_notes([], None, 0.21)[0]
+    assert judge(WINNER, [KEY], FILL, notes=notes).caveats[-1] == NOT_TESTED

@@ -1,0 +1,234 @@
+"""One run from its folder: settling, loads, kill and resume, guards, ranks."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sandmould.engines.driver import Driver
+from sandmould.engines.guard import grain_masses_kg
+from sandmould.engines.lammps.render import write_deck
+from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.engines.products import finish
+from sandmould.engines.program import build_program
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.expand import Run, scenario_hash
+from sandmould.study.plan import write_plan
+from sandmould.study.simulate import RESTARTABLE_EXIT, launch, render_run
+from tests.conftest import open_lammps, tube_scene
+
+
+def run_folder(scenario: Scenario, folder: Path) -> Path:
+    """Plan and render one run, as the workflow does."""
+    run = Run("test", "one", {}, 1, scenario, {})
+    write_plan([run], folder)
+    render_run(folder / "runs" / "one")
+    return folder / "runs" / "one"
+
+
+def simulate(folder: Path) -> int:
+    """Compute a run in a process of its own."""
+    command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
+    return subprocess.run(command, capture_output=True, text=True).returncode
+
+
+def drive(scenario: Scenario, folder: Path) -> RunOutcome:
+    """Compute a run in this process."""
+    program = build_program(scenario)
+    write_deck(program, {}, folder, "test", "test")
+    driver = Driver(program, folder, "test", scenario_hash(scenario))
+    outcome = driver.run()
+    if not outcome.outcome.restartable:
+        finish(folder, scenario.dimension, outcome, driver.cost, {})
+    return outcome
+
+
+def last_snapshot(folder: Path) -> Snapshot:
+    return Snapshot.load(max((folder / "snapshots").glob("*.npz")))
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Compute the small scene without a stop."""
+    folder = run_folder(tube_scene(), tmp_path_factory.mktemp("straight"))
+    assert simulate(folder) == 0
+    return folder
+
+
+def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
+    names = {p.name for p in straight.iterdir()}
+    assert {"outcome.json", "cost.tsv", "series.tsv", "loads.tsv", "provenance.json",
+            "snapshots", "engine.log", "deck.in"} <= names  # fmt: skip
+    assert "work" not in names
+    outcome = RunOutcome.read(straight / "outcome.json")
+    assert outcome.outcome is Outcome.FINISHED
+    cost = pd.read_csv(straight / "cost.tsv", sep="\t").iloc[0]
+    assert cost.grains == 120
+    assert 60 * cost.steps < cost.grain_steps < 120 * cost.steps
+    assert 0 < cost.engine_wall_s < cost.wall_s
+    assert cost.time_step_fraction == pytest.approx(0.5)
+
+
+def test_next_layer_enters_only_after_the_last_met_its_rule(straight: Path) -> None:
+    series = pd.read_csv(straight / "series.tsv", sep="\t")
+    settling = tube_scene().fill.settling
+    for stage, grains in (("settle_1", 60), ("settle_2", 120)):
+        rows = series[series.stage == stage]
+        assert set(rows.grains) == {grains}
+        assert rows.rms_speed_m_s.iloc[-1] < settling.rms_speed_m_s
+        earlier = rows[rows.time_s > rows.time_s.iloc[0] + settling.shortest_s].iloc[:-1]
+        assert (earlier.rms_speed_m_s >= settling.rms_speed_m_s).all()
+
+
+def test_vibration_has_snapshots_at_both_its_ends(straight: Path) -> None:
+    times = [Snapshot.load(p).vibration_time_s for p in sorted((straight / "snapshots").iterdir())]
+    assert 0.0 in times
+    assert times[-1] == pytest.approx(0.06, abs=5 * tube_scene().step_s)
+
+
+def test_weight_of_a_bed_at_rest_is_the_load_on_floor_walls_and_tube(tmp_path: Path) -> None:
+    scene = tube_scene(
+        fill={"layers": [{"count": 100}], "settling": {"rms_speed_m_s": 1e-5, "longest_s": 4.0}},
+        vibration=[],
+    )
+    session = open_lammps(scene, tmp_path)
+    session.insert_layer(1)
+    session.start_stage(session._program.stages[0])
+    while not session.stage_over:
+        session.advance()
+    loads = session.surface_loads()
+    weight = grain_masses_kg(scene, session.snapshot()).sum() * scene.gravity_m_s2
+    session.close()
+    assert session.at_rest
+    assert loads is not None
+    vertical = sum(force[1] for force in loads.values())
+    assert vertical == pytest.approx(-weight, rel=1e-3)
+    assert loads["tube_upper"][1] < 0  # the tube carries a part, pressed down
+    sideways = sum(force[0] for force in loads.values())
+    assert abs(sideways) < 1e-3 * weight
+    assert loads["left"][0] < 0 < loads["right"][0]  # the sand pushes both walls outwards
+
+
+def _state(folder: Path) -> dict[str, Any]:
+    snapshot = last_snapshot(folder)
+    return {"position": snapshot.position_m, "velocity": snapshot.velocity_m_s,
+            "spin": snapshot.spin_rad_s}  # fmt: skip
+
+
+def test_killed_run_resumes_and_ends_as_if_never_stopped(straight: Path, tmp_path: Path) -> None:
+    folder = run_folder(tube_scene(), tmp_path)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sandmould.study.simulate", str(folder)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    deadline = time.monotonic() + 60
+    while not list(folder.glob("work/checkpoint_*/mark.json")):
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (folder / "outcome.json").exists()
+    marks = [json.loads(p.read_text())["mark"] for p in folder.glob("work/checkpoint_*/mark.json")]
+    assert max(m["steps"] for m in marks) > 0
+    assert simulate(folder) == 0
+    for name, values in _state(straight).items():
+        np.testing.assert_array_equal(values, _state(folder)[name])
+    for table in ("series.tsv", "loads.tsv"):
+        assert (folder / table).read_text() == (straight / table).read_text()
+    assert len(list((folder / "snapshots").iterdir())) == len(
+        list((straight / "snapshots").iterdir())
+    )
+    costs = [pd.read_csv(f / "cost.tsv", sep="\t").iloc[0] for f in (straight, folder)]
+    assert costs[0].grain_steps == costs[1].grain_steps
+
+
+def test_damaged_checkpoint_is_told_and_the_run_starts_from_the_one_before(
+    tmp_path: Path,
+) -> None:
+    scene = tube_scene(guard={"wall_limit_s": 0.5})
+    folder = run_folder(scene, tmp_path)
+    assert simulate(folder) == RESTARTABLE_EXIT
+    assert RunOutcome.read(folder / "work" / "outcome.json").outcome is Outcome.OUT_OF_WALL_TIME
+    newest = max(folder.glob("work/checkpoint_*/lammps.restart"), key=lambda p: p.stat().st_mtime)
+    newest.write_bytes(newest.read_bytes()[:1000])
+    program = build_program(tube_scene())
+    outcome = Driver(program, folder, "test", scenario_hash(scene)).run()
+    assert outcome.outcome is Outcome.FINISHED
+    assert "cannot be used" in outcome.detail
+
+
+def test_checkpoint_of_another_scenario_is_left_alone(tmp_path: Path) -> None:
+    folder = run_folder(tube_scene(guard={"wall_limit_s": 0.5}), tmp_path)
+    assert simulate(folder) == RESTARTABLE_EXIT
+    other = Driver(build_program(tube_scene()), folder, "test", "another").run()
+    assert other.outcome is Outcome.FINISHED
+    assert "belongs to another scenario" in other.detail
+
+
+@pytest.mark.parametrize(
+    ("changes", "outcome", "says"),
+    [
+        ({"guard": {"largest_overlap_fraction": 0.01}}, Outcome.OVERLAP_TOO_LARGE, "0.01"),
+        ({"fill": {"layers": [{"count": 60}], "settling": {"longest_s": 0.06}}},
+         Outcome.NOT_SETTLED, "layer 1"),
+        ({"contact": {"grain_wall": {"normal_stiffness_n_m": 5.0}}, "guard":
+          {"largest_overlap_fraction": 2.0}}, Outcome.LOST_GRAINS, "centre in or behind a wall"),
+    ],
+)  # fmt: skip
+def test_guards_end_a_run_with_the_outcome_that_fits(
+    changes: dict[str, Any], outcome: Outcome, says: str, tmp_path: Path
+) -> None:
+    ended = drive(tube_scene(**changes), tmp_path)
+    assert ended.outcome is outcome
+    assert says in ended.detail
+    assert (tmp_path / "outcome.json").exists()
+    assert (tmp_path / "series.tsv").exists()
+
+
+def test_time_step_past_the_critical_one_is_called_unstable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A step that the checks would refuse, so that the guard has something to catch.
+    monkeypatch.setattr(Scenario, "step_s", property(lambda s: 4 * s.critical_step.step_s))
+    ended = drive(tube_scene(guard={"largest_overlap_fraction": 2.0}), tmp_path)
+    assert ended.outcome in (Outcome.UNSTABLE, Outcome.LOST_GRAINS, Outcome.OVERLAP_TOO_LARGE)
+
+
+def test_two_ranks_fill_the_same_bed(straight: Path, tmp_path: Path) -> None:
+    scene = tube_scene(engine={"ranks": 2})
+    folder = run_folder(scene, tmp_path)
+    launch(folder, tmp_path / "log")
+    outcome = RunOutcome.read(folder / "outcome.json")
+    assert outcome.outcome is Outcome.FINISHED, outcome.detail
+    # Sums run in another order, so grains part after a few collisions; the bed as a whole does not.
+    one, two = last_snapshot(straight), last_snapshot(folder)
+    assert len(two.id) == 120
+    assert two.position_m[:, 1].mean() == pytest.approx(one.position_m[:, 1].mean(), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [("no_such_command", "no_such_command"), ('shell "kill -SEGV $PPID"', "status -11")],
+)
+def test_engine_error_and_crash_leave_an_outcome(command: str, says: str, tmp_path: Path) -> None:
+    folder = run_folder(tube_scene(), tmp_path)
+    broken = f"#--- block: header --- broken\n{command}\n#--- end: header ---\n"
+    (folder / "deck.in").write_text(broken)
+    launch(folder, tmp_path / "log")
+    ended = RunOutcome.read(folder / "outcome.json")
+    assert ended.outcome is Outcome.ENGINE_FAILED
+    assert says in ended.detail
+    assert (folder / "series.tsv").exists()

@@ -1,0 +1,142 @@
+"""The workflow as a user runs it: dry runs, one tiny study, a failing run, bad input."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sandmould import ROOT
+from sandmould.engines.outcome import Outcome
+from sandmould.study.expand import expand
+from sandmould.study.opening import open_study
+from sandmould.study.planning import calibrated_rate
+
+SNAKEMAKE = Path(sys.executable).parent / "snakemake"
+STUDIES = sorted((ROOT / "config" / "studies").glob("*.yaml"))
+TINY = """\
+based_on: tube_demo
+scenario:
+  sand: {size_scale: 12, size_classes: 3}
+  vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 0.06}]
+  record: {snapshot_every_s: 0.02}
+"""
+
+
+def snakemake(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run the workflow with its results below a folder."""
+    command = [str(SNAKEMAKE), "--cores", "2", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(scope="session")
+def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Measure the engine's speed once for all tests."""
+    results = tmp_path_factory.mktemp("results")
+    for name in ("tube_demo", "tube_3d_small"):
+        study = open_study(ROOT / "config" / "studies" / f"{name}.yaml")
+        calibrated_rate(expand(study)[0].scenario, results)
+    return results / "calibration.json"
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, calibration: Path) -> Path:
+    """Link the repository's parts into an empty folder, so that results lie there."""
+    for name in ("Snakefile", "workflow", "templates", "config", "profiles"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    (tmp_path / "results").mkdir()
+    shutil.copy(calibration, tmp_path / "results")
+    return tmp_path
+
+
+@pytest.mark.parametrize("study", STUDIES, ids=lambda p: p.stem)
+def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
+    ran = snakemake("-n", "--configfile", str(study), folder=checkout)
+    assert ran.returncode == 0, ran.stderr
+    assert "grain-steps" in ran.stderr
+    assert "wall time on 2 cores" in ran.stderr
+    assert (checkout / "results" / study.stem / "runs.tsv").exists()
+
+
+def test_bare_snakemake_is_the_demo(checkout: Path) -> None:
+    ran = snakemake("-n", folder=checkout)
+    assert ran.returncode == 0, ran.stderr
+    assert (checkout / "results" / "tube_demo" / "runs.tsv").exists()
+
+
+def test_tiny_study_end_to_end(checkout: Path) -> None:
+    study = checkout / "tiny.yaml"
+    sweep = "sweep:\n  keys: {vibration.0.frequency_hz: [50, 100]}\nreplicates: 1\n"
+    study.write_text(TINY + sweep)
+    ran = snakemake("--configfile", str(study), folder=checkout)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "M grain-steps/s" in ran.stderr
+    results = checkout / "results" / "tiny"
+    summary = pd.read_csv(results / "summary.tsv", sep="\t")
+    assert list(summary.outcome) == ["finished", "finished"]
+    assert summary.tube_fill_fraction.between(0.01, 0.9).all()
+    assert summary.solid_fraction.between(0.4, 0.9).all()
+    assert (results / "report.html").stat().st_size < 15e6
+
+    again = snakemake("--configfile", str(study), folder=checkout)
+    assert "Nothing to be done" in again.stdout + again.stderr
+
+    # One more point: only its run is computed, those that finished keep their files.
+    before = {p: p.stat().st_mtime_ns for p in results.glob("runs/*/outcome.json")}
+    study.write_text(TINY + sweep.replace("100]", "100, 75]"))
+    more = snakemake("--configfile", str(study), folder=checkout)
+    assert more.returncode == 0, more.stderr
+    assert all(p.stat().st_mtime_ns == t for p, t in before.items())
+    assert len(list(results.glob("runs/*/outcome.json"))) == 3
+
+    report = snakemake(
+        "--configfile", str(study), "--report", str(checkout / "report.zip"), folder=checkout
+    )
+    assert report.returncode == 0, report.stderr
+    assert (checkout / "report.zip").stat().st_size > 1e5
+
+
+def test_one_failing_run_leaves_the_others_alone_and_fails_the_study(checkout: Path) -> None:
+    study = checkout / "failing.yaml"
+    sweep = "sweep:\n  keys: {guard.largest_overlap_fraction: [0.001, 0.9]}\nreplicates: 1\n"
+    study.write_text(TINY + sweep)
+    ran = snakemake("--configfile", str(study), folder=checkout)
+    assert ran.returncode != 0
+    results = checkout / "results" / "failing"
+    summary = pd.read_csv(results / "summary.tsv", sep="\t").set_index(
+        "guard.largest_overlap_fraction"
+    )
+    assert summary.outcome[0.001] == Outcome.OVERLAP_TOO_LARGE.label
+    assert summary.outcome[0.9] == "finished"
+    assert "overlap" in (results / "report.html").read_text()
+    assert not (results / "all_runs_finished").exists()
+    failed = next(results.glob("runs/*_0p001_*"))
+    assert (failed / "work").is_dir()  # what the failed run had is kept
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("scenario: {sand: {density_kg_m3: -5}}\n", "scenario.sand.density_kg_m3 = -5"),
+        ("scenario: {engine: {name: liggghts}}\n", "scenario.engine.name = 'liggghts'"),
+        (
+            "scenario: {background_damping: {form: nonviscous_isotropic}}\n",
+            "scenario.background_damping.form = 'nonviscous_isotropic'",
+        ),
+    ],
+)
+def test_bad_input_is_one_sentence_and_starts_nothing(
+    text: str, sentence: str, checkout: Path
+) -> None:
+    study = checkout / "bad.yaml"
+    study.write_text("based_on: tube_demo\n" + text)
+    ran = snakemake("--configfile", str(study), folder=checkout)
+    assert ran.returncode != 0
+    said = [line for line in ran.stderr.splitlines() if line and "profile" not in line]
+    assert len(said) == 1, ran.stderr
+    assert said[0].startswith(f"bad.yaml: {sentence} cannot be used: valid is ")
+    assert not (checkout / "results" / "bad").exists()
