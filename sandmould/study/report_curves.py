@@ -202,7 +202,7 @@ def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
         tint = colour[setting.label]
         for place, mark in enumerate(_run_marks(summary, verdict, setting, tint)):
             # side by side to the left of the mean
-            shift_px = -9.0 - min(place * 5.0, 25.0)
+            shift_px = -9.0 - min(place * 3.5, 21.0)
             marks.append(replace(mark, x=x, shift_px=shift_px))
         if setting.n:
             marks.append(_mean_mark(setting, x, factor * setting.mean, tint, factor))

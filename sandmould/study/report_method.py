@@ -66,7 +66,7 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
         Row("Filling", _filling(scenario)),
         *(Row("Vibration", _vibration(s, scenario, keys)) for s in scenario.vibration),
         Row("Time step", _time_step(scenario, summary)),
-        Row("Swept", listed([name_of(k) for k in keys]) or "nothing"),
+        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
         Row("Seeds", _seeds(summary)),
     )
 

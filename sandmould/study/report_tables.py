@@ -120,13 +120,13 @@ def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table
         against = verdict.against(setting)
         is_best = verdict.best is not None and setting.label == verdict.best.label
         interval, p, difference = "–", math.nan, math.nan
-        judged = "best mean" if is_best else "no finished run"
+        judged = "best mean" if is_best else "no run"
         if against is not None:
             difference, p = against.difference, against.p
-            judged = "not judged: too few runs"
+            judged = "too few runs"
             if against.tested:
                 interval = f"{number(against.ci[0], 2)} to {number(against.ci[1], 2)}"
-                judged = "separate" if against.separated else "not told apart"
+                judged = "worse" if against.separated else "undecided"
         rows.append(
             (
                 Cell(setting.label, str(place)),

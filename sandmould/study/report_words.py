@@ -128,8 +128,11 @@ def size(value_bytes: float) -> str:
     )
 
 
-def listed(items: list[str]) -> str:
-    """Items as a sentence lists them: ``a, b and c``."""
+def listed(items: list[str], most: int = 4) -> str:
+    """Items as a sentence lists them: ``a, b and c``; of too many the first, and how many more."""
+    if len(items) > most:
+        items = [*items[: most - 1], f"{len(items) - most + 1} others"]
     if len(items) < 2:
         return "".join(items)
-    return f"{', '.join(items[:-1])} and {items[-1]}"
+    comma = "; " if any("," in item for item in items) else ", "
+    return f"{comma.join(items[:-1])} and {items[-1]}"

@@ -126,6 +126,8 @@ def test_words() -> None:
     assert setting_text({"contact.grain_grain.friction": 0.8}) == "friction 0.8"
     assert setting_text({}) == "the one setting"
     assert listed(["a", "b", "c"]) == "a, b and c"
+    assert listed(list("abcdef")) == "a, b, c and 3 others"
+    assert listed(["x 1, y 2", "x 2, y 2", "z"]) == "x 1, y 2; x 2, y 2 and z"
     assert (seconds(3.5), seconds(600), seconds(86400)) == ("3.50 s", "10 min", "24 h")
     assert (size(2.5e8), size(12)) == ("250 MB", "12 B")
 
