@@ -38,9 +38,7 @@ def tube_scene(**changes: Any) -> Scenario:
     return Scenario.model_validate(merge(TUBE_SCENE, changes, Origin(), "test"))
 
 
-def open_lammps(
-    scenario: Scenario, folder: Path, checkpoint: Path | None = None
-) -> LammpsSession:
+def open_lammps(scenario: Scenario, folder: Path, checkpoint: Path | None = None) -> LammpsSession:
     """Render a scenario into a folder and open LAMMPS on it."""
     program = build_program(scenario)
     write_deck(program, {}, folder, "test", "test")

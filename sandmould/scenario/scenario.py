@@ -35,6 +35,12 @@ class Record(Section):
     snapshot_every_s: float = quantity(
         0.05, "Interval of snapshots of all grains.", unit="s", source=ARGUED, gt=0, le=100
     )
+    export: Literal["none", "moments", "all"] = quantity(
+        "moments",
+        "Snapshots that are also written for ParaView and OVITO: those at 0, 1/8, 1/2 and 1 of "
+        "the vibration, or all.",
+        source=ARGUED,
+    )
     load_every_steps: int = quantity(
         20, "Steps between samples of the wall loads.", source=ARGUED, ge=1, le=100000
     )

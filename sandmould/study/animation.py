@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.engines.snapshot import Snapshot
+from sandmould.study.moments import Moment, list_moments
 
 BUDGET_BYTES = 2_500_000
 _MOST_FRAMES = 240
@@ -24,36 +25,6 @@ _LEVELS = 8191
 """Quanta across the longest side: a tenth of a pixel on a screen."""
 ABSENT = 65535
 """Coordinate of a grain that has not been filled in yet."""
-
-
-@dataclass(frozen=True)
-class Moment:
-    """A snapshot's file and time; its grains are not read yet."""
-
-    path: Path
-    time_s: float
-    vibration_time_s: float
-
-
-def list_moments(run_folder: Path) -> tuple[Moment, ...]:
-    """Readable snapshots of a run in order of time.
-
-    A file cut short by a killed run is passed over.
-    """
-    found = []
-    for path in sorted((run_folder / "snapshots").glob("*.npz")):
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                times = float(data["time_s"]), float(data["vibration_time_s"])
-        except Exception:  # numpy and zipfile raise a dozen kinds on a broken file
-            continue
-        found.append(Moment(path, *times))
-    return tuple(sorted(found, key=lambda m: m.time_s))
-
-
-def nearest(moments: Sequence[Moment], vibration_time_s: float) -> Moment:
-    """The snapshot nearest a time of vibration."""
-    return min(moments, key=lambda m: abs(m.vibration_time_s - vibration_time_s))
 
 
 @dataclass(frozen=True)

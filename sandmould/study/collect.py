@@ -14,10 +14,9 @@ import pandas as pd
 
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.scenario.reading import Origin, read_yaml, validated
+from sandmould.study.plan import STUDY_FILE
 from sandmould.study.study import Study
 
-STUDY_FILE = "study.yaml"
-"""The study as planned, with all that it rests on: its ``model_dump(mode="json")`` as YAML."""
 NO_OUTCOME = "no outcome written"
 _OUTCOME_COLUMNS = ("outcome_code", "outcome", "detail", "simulated_s", "planned_s")
 _PARAMETER_FREE = ("run", "replicate", "seed")

@@ -12,18 +12,15 @@ from matplotlib.figure import Figure
 
 from analysis.coordination import contacts
 from analysis.density import apparent_density
+from analysis.export import to_ovito, to_vtk
 from analysis.layers import mixing_index
 from analysis.plots import draw_by_layer, draw_scene
 from analysis.solid_fraction import bed_surface_height_m, mean_solid_fraction
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.moments import MOMENTS, list_moments, nearest
 from sandmould.study.plan import read_run
-
-
-def snapshot_paths(folder: Path) -> list[Path]:
-    """Snapshots of a run in order of time."""
-    return sorted((folder / "snapshots").glob("*.npz"))
 
 
 def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
@@ -68,10 +65,27 @@ def write_picture(folder: Path, out: Path) -> None:
     figure = Figure(figsize=(6, 4.5), dpi=150, layout="constrained")
     ax = figure.add_subplot()
     draw_scene(scenario.scene, ax, scenario.box.height_m)
-    paths = snapshot_paths(folder)
-    if paths:
-        draw_by_layer(Snapshot.load(paths[-1]), ax)
+    moments = list_moments(folder)
+    if moments:
+        draw_by_layer(Snapshot.load(moments[-1].path), ax)
     figure.savefig(out)
+
+
+def write_exports(folder: Path, out: Path) -> None:
+    """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks."""
+    wanted = read_run(folder / "scenario.yaml").scenario.record.export
+    out.mkdir(exist_ok=True)
+    moments = list_moments(folder)
+    if wanted == "none" or not moments:
+        return
+    last_s = moments[-1].vibration_time_s
+    chosen = (
+        moments if wanted == "all" else {nearest(moments, f * last_s) for f in MOMENTS.values()}
+    )
+    for moment in chosen:
+        snapshot = Snapshot.load(moment.path)
+        to_vtk(snapshot, out / f"{moment.path.stem}.vtu")
+        to_ovito(snapshot, out / f"{moment.path.stem}.dump")
 
 
 def write_measures(folder: Path, out: Path) -> None:
@@ -82,7 +96,7 @@ def write_measures(folder: Path, out: Path) -> None:
     """
     scenario = read_run(folder / "scenario.yaml").scenario
     rows = []
-    for path in snapshot_paths(folder):
+    for path in sorted((folder / "snapshots").glob("*.npz")):
         try:
             rows.append(measure_snapshot(scenario, Snapshot.load(path)))
         except ValueError as error:

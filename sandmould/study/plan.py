@@ -11,14 +11,17 @@ from typing import Any
 
 import yaml
 
-from sandmould.scenario.placement import loose_height_m, plan_counts
+from sandmould.engines.program import build_program
+from sandmould.engines.progress import duration_text
+from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import Run
+from sandmould.study.study import Study
 
-REST_S = 0.3
-"""Time that fallen sand takes to come to rest; the plan's guess, the run measures it."""
+STUDY_FILE = "study.yaml"
+"""The study as planned, with all that it rests on."""
 SHOWN_POINTS = 20
 # libyaml writes a thousand scenarios in seconds where pure Python takes half a minute.
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -55,6 +58,15 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
     place = {line.split("\t", 1)[0]: n for n, line in enumerate(earlier)}
     ordered = sorted(runs, key=lambda run: place.get(run.run, len(place)))
     _write(table, _table_text(ordered))
+
+
+def write_study(study: Study, folder: Path) -> None:
+    """Write the study as planned, with all that it rests on, for its report and the record."""
+    tree = study.model_dump(mode="json")
+    text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+    _write(
+        folder / STUDY_FILE, f"# Written by the plan; change the study's own file instead.\n{text}"
+    )
 
 
 def _write(path: Path, text: str) -> None:
@@ -103,41 +115,15 @@ def read_run(path: Path) -> Run:
     return Run(**{name: getattr(file, name) for name in _RunFile.model_fields})
 
 
-def planned_phases(scenario: Scenario) -> list[tuple[int, float]]:
-    """Grains in the box and duration of each phase: every layer's fall, every stage.
-
-    A layer falls from the top of its loose column, sqrt(2 h/g), and rests ``REST_S`` later.
-
-    Returns
-    -------
-    list of (int, float)
-        Number of grains; duration, s.
-    """
-    settling, between = scenario.fill.settling, scenario.fill.vibration_between_layers
-    phases: list[tuple[int, float]] = []
-    grains = 0
-    counts = plan_counts(scenario)
-    for i, count in enumerate(counts):
-        grains += count
-        fall_m = scenario.fill.drop_height_m + loose_height_m(scenario, count)
-        g = scenario.gravity_m_s2
-        settles_s = math.sqrt(2 * fall_m / g) + REST_S if g > 0 else math.inf
-        phases.append((grains, min(settles_s, settling.longest_s)))
-        if between is not None and i + 1 < len(counts):
-            phases.append((grains, between.whole_duration_s))
-    phases += [(grains, stage.whole_duration_s) for stage in scenario.vibration]
-    return phases
-
-
 def planned_steps(scenario: Scenario) -> int:
     """Time steps of a run: its fill, estimated, and its vibration."""
-    return sum(math.ceil(duration / scenario.step_s) for _, duration in planned_phases(scenario))
+    stages = build_program(scenario).stages
+    return sum(math.ceil(stage.expected_s / scenario.step_s) for stage in stages)
 
 
-def planned_grain_steps(scenario: Scenario) -> int:
+def planned_grain_steps(scenario: Scenario) -> float:
     """Steps times grains in the box at the time: what a run costs."""
-    step_s = scenario.step_s
-    return sum(n * math.ceil(duration / step_s) for n, duration in planned_phases(scenario))
+    return build_program(scenario).expected_grain_steps
 
 
 def plan_table(runs: Sequence[Run], rate_grain_steps_per_s: float | None, cores: int) -> str:
@@ -172,7 +158,7 @@ def plan_table(runs: Sequence[Run], rate_grain_steps_per_s: float | None, cores:
                     f"{scenario.step_s:.3g} s",
                     f"{planned_steps(scenario):,}",
                     f"{one:.3g}",
-                    _duration(one_s / scenario.engine.ranks),
+                    _wall_text(one_s / scenario.engine.ranks),
                 ]
             )
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
@@ -180,16 +166,10 @@ def plan_table(runs: Sequence[Run], rate_grain_steps_per_s: float | None, cores:
     if len(points) > SHOWN_POINTS:
         lines.append(f"... and {len(points) - SHOWN_POINTS} more points")
     # No schedule is shorter than its longest run.
-    whole = _duration(max(core_s / cores, longest_s))
+    whole = _wall_text(max(core_s / cores, longest_s))
     lines.append(f"{len(runs)} runs, {work:.3g} grain-steps, wall time on {cores} cores: {whole}")
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 
-def _duration(seconds: float) -> str:
-    """A duration in the unit that one would say it in."""
-    if math.isnan(seconds):
-        return "unknown until calibrated"
-    for unit, length in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2 * length:
-            return f"{seconds / length:.1f} {unit}"
-    return f"{seconds:.0f} s"
+def _wall_text(seconds: float) -> str:
+    return "unknown until calibrated" if math.isnan(seconds) else duration_text(seconds)

@@ -25,7 +25,7 @@ from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import Run, expand
 from sandmould.study.opening import OpenStudy, open_study
-from sandmould.study.plan import plan_table, planned_grain_steps, write_plan
+from sandmould.study.plan import plan_table, planned_grain_steps, write_plan, write_study
 
 DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
 CALIBRATION_GRAINS = 400
@@ -109,6 +109,7 @@ def announce(plan: Plan, results: Path, cores: int) -> None:
     """Write the plan to disk and print what it will take."""
     folder = results / plan.study.name
     write_plan(plan.runs, folder)
+    write_study(plan.study.study, folder)
     rates = {}
     for run in plan.runs:
         kind = (run.scenario.engine.name, run.scenario.dimension)

@@ -16,8 +16,8 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.animation import BUDGET_BYTES
-from sandmould.study.collect import STUDY_FILE, Collected, gather, read_provenance, read_study
-from sandmould.study.plan import read_run
+from sandmould.study.collect import Collected, gather, read_provenance, read_study
+from sandmould.study.plan import STUDY_FILE, read_run
 from sandmould.study.report_chart import NARROW, SMALL, WIDE, lay_out
 from sandmould.study.report_curves import objective_charts, runs_of
 from sandmould.study.report_method import Row, provenance_rows, sand_method, statistics_method

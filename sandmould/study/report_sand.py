@@ -16,14 +16,14 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.geometry import Bore
 from sandmould.scenario.scenario import Scenario
 from sandmould.study import figures
-from sandmould.study.animation import Film, Moment, list_moments, make_film, nearest
+from sandmould.study.animation import Film, make_film
 from sandmould.study.collect import Collected
+from sandmould.study.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.study.report_chart import Chart
 from sandmould.study.report_curves import best_passage, runs_of, time_chart
 from sandmould.study.report_words import listed, name_of, number, shown_scale
 from sandmould.study.verdict import Verdict, rank_runs
 
-_MOMENTS = (("at its start", 0.0), ("after 1/8", 0.125), ("after 1/2", 0.5), ("at its end", 1.0))
 _SECONDARY = (
     "solid_fraction", "apparent_density_corrected_kg_m3", "coordination", "bed_height_m",
 )  # fmt: skip
@@ -160,7 +160,7 @@ def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Mo
     if not duration_s:
         return [("after filling", moments[-1])]
     chosen: dict[Path, tuple[str, Moment]] = {}
-    for heading, share in _MOMENTS:
+    for heading, share in MOMENTS.items():
         moment = nearest(moments, share * duration_s)
         if abs(moment.vibration_time_s - share * duration_s) <= 0.1 * duration_s:
             chosen.setdefault(moment.path, (heading, moment))

@@ -13,7 +13,7 @@ import pandas as pd
 
 from sandmould.engines.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.collect import STUDY_FILE
+from sandmould.study.plan import STUDY_FILE
 from sandmould.study.report_words import name_of, number, seconds, size, titled, with_margin
 from sandmould.study.verdict import Verdict
 
@@ -108,7 +108,7 @@ def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table
         One scenario a setting, by label, for the drive of the vibrating table.
     """
     shaken = any(s.vibration for s in scenarios.values())
-    drive = ("amplitude, mm", "velocity, mm/s", "acceleration, g") if shaken else ()
+    drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if shaken else ()
     columns = (
         Column("setting", False),
         *map(Column, ("mean ± 95 %", "best minus this", "95 % interval", "p")),
@@ -269,7 +269,7 @@ _FILES = (
     ("summary.tsv", "one row a run: parameters, outcome, final measures, cost"),
     ("curves.tsv", "one row a snapshot: all measures of all runs against time"),
     ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "
-     "snapshots"),
+     "snapshots; exports/ holds some of them for ParaView (.vtu) and OVITO (.dump)"),
 )  # fmt: skip
 
 

@@ -45,6 +45,7 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
         ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True
     )
     return {
+        "command": " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]]),
         "scenario_sha256": scenario_hash(scenario),
         "template_sha256": template_hash(),
         "seed": scenario.seed,
@@ -142,7 +143,7 @@ def _watch(command: list[str], log: TextIO) -> tuple[int, str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        preexec_fn=_die_with_parent,  # noqa: PLW1509
+        preexec_fn=_die_with_parent,
     )
     signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
     assert process.stdout is not None

@@ -264,7 +264,7 @@ def _sentences(
     most = "highest" if better == "larger" else "lowest"
     if resolved:
         return (
-            f"{best.label} is best: it gives the {most} {what}, {mean}, against "
+            f"{_capital(best.label)} is best: it gives the {most} {what}, {mean}, against "
             f"{with_margin(second.mean, second.ci_half_width)} at {second.label}, the runner-up.",
             _difference_sentence(first, best, len(comparisons)),
         )
@@ -272,8 +272,8 @@ def _sentences(
     again = (
         _difference_sentence(first, best, len(comparisons))
         if first.tested
-        else f"{best.label} and {second.label} need two replicates or more, with different values, "
-        "before their difference can be told from chance."
+        else f"{_capital(best.label)} and {second.label} need two replicates or more, with "
+        "different values, before their difference can be told from chance."
     )
     return (
         f"Not resolved: no setting can be recommended for its {what}. The {most} mean, "
@@ -281,6 +281,10 @@ def _sentences(
         f"{listed(like)} at 95 % confidence.",
         again,
     )
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _difference_sentence(first: Comparison, best: Setting, others: int) -> str:

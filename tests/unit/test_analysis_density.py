@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.distance import pdist, squareform
 
-from analysis import neighbours
 from analysis.density import apparent_density
+from sandmould.engines import neighbours
 from sandmould.scenario.geometry import Block, Scene, Wall
 
 RHO = 2400.0

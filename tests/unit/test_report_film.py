@@ -12,7 +12,8 @@ import pytest
 from report_study import write_study
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.study.animation import ABSENT, Film, list_moments, make_film, nearest
+from sandmould.study.animation import ABSENT, Film, make_film
+from sandmould.study.moments import list_moments, nearest
 
 
 def unpack(film: Film) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

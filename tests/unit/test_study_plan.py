@@ -10,16 +10,15 @@ import pandas as pd
 import pytest
 
 from sandmould import ROOT
+from sandmould.engines.program import REST_AFTER_FALL_S, build_program
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import Run, expand
 from sandmould.study.opening import open_study
 from sandmould.study.plan import (
-    REST_S,
     plan_table,
     planned_grain_steps,
-    planned_phases,
     planned_steps,
     read_run,
     write_plan,
@@ -95,7 +94,7 @@ def test_damaged_run_file_is_bad_input(demo: list[Run], tmp_path: Path) -> None:
         read_run(path)
 
 
-def test_phases_are_falls_and_stages() -> None:
+def test_stages_are_falls_and_vibrations() -> None:
     between = {"acceleration_g": 1.0, "frequency_hz": 40.0, "duration_s": 0.1}
     scene = Scenario.model_validate(
         {
@@ -108,24 +107,22 @@ def test_phases_are_falls_and_stages() -> None:
         math.sqrt(2 * (0.005 + loose_height_m(scene, count)) / scene.gravity_m_s2)
         for count in (300, 200)
     ]
-    assert planned_phases(scene) == [
-        (300, falls[0] + REST_S),
-        (300, 0.1),
-        (500, falls[1] + REST_S),
-        (500, 9 / 30),
-    ]
-    steps = [math.ceil(duration / scene.step_s) for _, duration in planned_phases(scene)]
-    assert planned_steps(scene) == sum(steps)
-    assert planned_grain_steps(scene) == 300 * sum(steps[:2]) + 500 * sum(steps[2:])
+    expected = [falls[0] + REST_AFTER_FALL_S, 0.1, falls[1] + REST_AFTER_FALL_S, 9 / 30]
+    stages = build_program(scene).stages
+    assert [stage.name for stage in stages] == ["settle_1", "between_1", "settle_2", "vibrate_1"]
+    assert [stage.expected_s for stage in stages] == pytest.approx(expected)
+    steps = [time / scene.step_s for time in expected]
+    assert planned_steps(scene) == pytest.approx(sum(steps), abs=4)
+    assert planned_grain_steps(scene) == pytest.approx(300 * sum(steps[:2]) + 500 * sum(steps[2:]))
 
 
 def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
     scene = Scenario.model_validate(
         {"fill": {"layers": [{"count": 300}], "settling": {"longest_s": 0.2}}}
     )
-    assert planned_phases(scene) == [(300, 0.2)]
+    assert build_program(scene).expected_s == 0.2
     weightless = scene.model_copy(update={"gravity_m_s2": 0.0})
-    assert planned_phases(weightless) == [(300, 0.2)]
+    assert build_program(weightless).expected_s == 0.2
 
 
 def test_price_before_calibration_is_unknown(demo: list[Run]) -> None:

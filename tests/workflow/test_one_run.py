@@ -15,6 +15,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould import ROOT
+from sandmould.engines.checkpoint import newest_checkpoint
 from sandmould.engines.driver import Driver
 from sandmould.engines.guard import grain_masses_kg
 from sandmould.engines.lammps.render import write_deck
@@ -23,7 +25,8 @@ from sandmould.engines.products import finish
 from sandmould.engines.program import build_program
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import Run, scenario_hash
+from sandmould.study.expand import Run, expand, scenario_hash
+from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
 from sandmould.study.simulate import RESTARTABLE_EXIT, launch, render_run
 from tests.conftest import open_lammps, tube_scene
@@ -232,3 +235,19 @@ def test_engine_error_and_crash_leave_an_outcome(command: str, says: str, tmp_pa
     assert ended.outcome is Outcome.ENGINE_FAILED
     assert says in ended.detail
     assert (folder / "series.tsv").exists()
+
+
+def test_paper_size_tube_starts_stops_and_resumes(tmp_path: Path) -> None:
+    run = expand(open_study(ROOT / "config" / "studies" / "tube_paper.yaml"))[0]
+    assert sum(build_program(run.scenario).counts) == 64_000
+    guard = run.scenario.guard.model_copy(update={"wall_limit_s": 0.1})
+    folder = run_folder(run.scenario.model_copy(update={"guard": guard}), tmp_path)
+    steps = []
+    for _ in range(2):
+        assert simulate(folder) == RESTARTABLE_EXIT
+        newest, damaged = newest_checkpoint(folder / "work")
+        assert newest is not None
+        assert not damaged
+        steps.append(newest[1].steps)
+    assert 0 < steps[0] < steps[1]
+    assert newest[1].cost["grains"] == 8000

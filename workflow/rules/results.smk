@@ -3,6 +3,7 @@
 
 rule collect:
     input:
+        study=f"{FOLDER}/study.yaml",
         table=f"{FOLDER}/runs.tsv",
         outcomes=expand(rules.simulate.output.outcome, run=RUNS),
         costs=expand(rules.simulate.output.cost, run=RUNS),
@@ -22,6 +23,8 @@ rule collect:
         ),
     log:
         f"{FOLDER}/logs/collect.log",
+    conda:
+        "../envs/sandmould.yaml"
     threads: 1
     resources:
         mem_mb=2000,
@@ -46,12 +49,12 @@ rule report:
         ),
     log:
         f"{FOLDER}/logs/report.log",
+    conda:
+        "../envs/sandmould.yaml"
     threads: 1
     resources:
         mem_mb=4000,
         runtime=30,
-    params:
-        study=STUDY.path,
     message:
         "Write the report {output.html}"
     script:
@@ -67,6 +70,8 @@ rule check:
         done=touch(f"{FOLDER}/all_runs_finished"),
     log:
         f"{FOLDER}/logs/check.log",
+    conda:
+        "../envs/sandmould.yaml"
     threads: 1
     resources:
         mem_mb=500,

