@@ -11,7 +11,7 @@ import yaml
 
 from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.program import build_program
-from tests.conftest import open_lammps, tube_scene
+from tests.scenes import open_lammps, tube_scene
 
 LMP = Path(sys.executable).parent / "lmp"
 

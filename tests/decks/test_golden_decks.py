@@ -15,7 +15,7 @@ from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import expand
 from sandmould.study.opening import open_study
-from tests.conftest import tube_scene
+from tests.scenes import tube_scene
 
 GOLDEN = Path(__file__).parent / "golden"
 STUDIES = ("tube_demo", "tube_3d_small")

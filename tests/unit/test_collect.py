@@ -8,7 +8,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import yaml
-from report_study import DURATION_S, FAILED, FILLING_S, KEY, PLANTED, scenario, write_study
 
 from sandmould.study.collect import (
     NO_OUTCOME,
@@ -19,6 +18,15 @@ from sandmould.study.collect import (
     read_study,
 )
 from sandmould.study.study import Objective, Study
+from tests.unit.report_study import (
+    DURATION_S,
+    FAILED,
+    FILLING_S,
+    KEY,
+    PLANTED,
+    scenario,
+    write_study,
+)
 
 
 @pytest.fixture

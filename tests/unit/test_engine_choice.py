@@ -14,7 +14,7 @@ from sandmould.engines.choosing import engine_problem
 from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
-from tests.conftest import tube_scene
+from tests.scenes import tube_scene
 
 DEBIAN_LAMMPS = Path("/usr/bin/lmp")
 

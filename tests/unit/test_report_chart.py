@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from sandmould.study.report_chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
-from sandmould.study.report_words import (
+from sandmould.study.report.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
+from sandmould.study.report.words import (
     listed,
     name_of,
     number,

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_study import write_study
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.study.animation import ABSENT, Film, make_film
 from sandmould.study.moments import list_moments, nearest
+from sandmould.study.report.animation import ABSENT, Film, make_film
+from tests.unit.report_study import write_study
 
 
 def unpack(film: Film) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,10 +10,10 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from report_study import FAILED, PLANTED, write_study
 
-from sandmould.study import figures
-from sandmould.study.report import LIMIT_BYTES, write_report
+from sandmould.study.report import figures
+from sandmould.study.report.page import LIMIT_BYTES, write_report
+from tests.unit.report_study import FAILED, PLANTED, write_study
 
 _VOID = {"meta", "link", "img", "input", "line", "circle", "path", "br"}
 

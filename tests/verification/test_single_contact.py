@@ -13,7 +13,7 @@ from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
 from sandmould.scenario.scenario import Scenario
-from tests.conftest import open_lammps
+from tests.scenes import open_lammps
 
 RADIUS_M = 0.002
 

@@ -29,7 +29,7 @@ from sandmould.study.expand import Run, expand, scenario_hash
 from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
 from sandmould.study.simulate import RESTARTABLE_EXIT, launch, render_run
-from tests.conftest import open_lammps, tube_scene
+from tests.scenes import open_lammps, tube_scene
 
 
 def run_folder(scenario: Scenario, folder: Path) -> Path:
@@ -251,3 +251,48 @@ def test_paper_size_tube_starts_stops_and_resumes(tmp_path: Path) -> None:
         steps.append(newest[1].steps)
     assert 0 < steps[0] < steps[1]
     assert newest[1].cost["grains"] == 8000
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"frame": "laboratory"},
+        {
+            "dimension": 3,
+            "box": {"depth_m": 0.06},
+            "time_step": {"fraction": 0.9},
+            "fill": {"layers": [{"count": 60}], "settling": {"rms_speed_m_s": 0.3}},
+        },
+    ],
+    ids=["box", "laboratory", "3D with turned facets"],
+)
+def test_restored_session_equals_the_one_that_wrote_the_checkpoint(
+    changes: dict[str, Any], tmp_path: Path
+) -> None:
+    scene = tube_scene(**changes)
+    session = open_lammps(scene, tmp_path)
+    session.insert_layer(1)
+    session.start_stage(session._program.stages[0])
+    while not session.stage_over:
+        session.advance()
+    session.end_stage()
+    session.start_stage(session._program.stages[-1])
+    while not session.can_checkpoint:
+        session.advance()
+    session.write_checkpoint(tmp_path)
+    restored = open_lammps(scene, tmp_path, checkpoint=tmp_path)
+    steps = session.steps
+    while session.steps < steps + 1000 and not session.stage_over:
+        session.advance()
+        restored.advance()
+    one, two = session.snapshot(), restored.snapshot()
+    loads = session.surface_loads(), restored.surface_loads()
+    session.close()
+    restored.close()
+    assert one.time_s == two.time_s
+    assert one.vibration_time_s == two.vibration_time_s
+    for name in ("position_m", "velocity_m_s", "spin_rad_s"):
+        np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=0, atol=1e-9)
+    for surface, force in (loads[0] or {}).items():
+        np.testing.assert_allclose(force, (loads[1] or {})[surface], atol=1e-6)

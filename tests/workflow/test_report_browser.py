@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
-from sandmould.study.report import write_report
-
-sys.path.append(str(Path(__file__).parents[1] / "unit"))
-from report_study import write_study
+from sandmould.study.report.page import write_report
+from tests.unit.report_study import write_study
 
 pytestmark = pytest.mark.browser
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from sandmould.engines.outcome import Outcome
 from sandmould.study.collect import Collected
-from sandmould.study.report_chart import PLAIN, Chart, Line, Mark, Tint, tints
-from sandmould.study.report_settings import Setting
-from sandmould.study.report_words import name_of, number, shown_scale, titled, with_margin
+from sandmould.study.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
+from sandmould.study.report.settings import Setting
+from sandmould.study.report.words import name_of, number, shown_scale, titled, with_margin
 from sandmould.study.verdict import Verdict, finished_values
 
 _POINTS = 12_000

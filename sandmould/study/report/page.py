@@ -15,15 +15,15 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.animation import BUDGET_BYTES
 from sandmould.study.collect import Collected, gather, read_provenance, read_study
 from sandmould.study.plan import STUDY_FILE, read_run
-from sandmould.study.report_chart import NARROW, SMALL, WIDE, lay_out
-from sandmould.study.report_curves import objective_charts, runs_of
-from sandmould.study.report_method import Row, provenance_rows, sand_method, statistics_method
-from sandmould.study.report_sand import sand_pages, shown_runs
-from sandmould.study.report_tables import data_files, key_numbers, runs_table, settings_table
-from sandmould.study.report_words import name_of, number
+from sandmould.study.report.animation import BUDGET_BYTES
+from sandmould.study.report.chart import NARROW, SMALL, WIDE, lay_out
+from sandmould.study.report.curves import objective_charts, runs_of
+from sandmould.study.report.method import Row, provenance_rows, sand_method, statistics_method
+from sandmould.study.report.sand import sand_pages, shown_runs
+from sandmould.study.report.tables import data_files, key_numbers, runs_table, settings_table
+from sandmould.study.report.words import name_of, number
 from sandmould.study.study import Study
 from sandmould.study.verdict import Verdict, judge, sand_notes
 

@@ -15,13 +15,13 @@ from analysis.plots import LAYER_COLOURS
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.geometry import Bore
 from sandmould.scenario.scenario import Scenario
-from sandmould.study import figures
-from sandmould.study.animation import Film, make_film
 from sandmould.study.collect import Collected
 from sandmould.study.moments import MOMENTS, Moment, list_moments, nearest
-from sandmould.study.report_chart import Chart
-from sandmould.study.report_curves import best_passage, runs_of, time_chart
-from sandmould.study.report_words import listed, name_of, number, shown_scale
+from sandmould.study.report import figures
+from sandmould.study.report.animation import Film, make_film
+from sandmould.study.report.chart import Chart
+from sandmould.study.report.curves import best_passage, runs_of, time_chart
+from sandmould.study.report.words import listed, name_of, number, shown_scale
 from sandmould.study.verdict import Verdict, rank_runs
 
 _SECONDARY = (
