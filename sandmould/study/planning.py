@@ -9,7 +9,7 @@ import platform
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -69,17 +69,21 @@ class Plan:
         return labels | {"replicate": str(run.replicate)}
 
 
-def study_path(configfiles: Sequence[Path]) -> Path:
+def study_path(configfiles: Sequence[Path], overrides: Mapping[str, Any]) -> Path:
     """Choose the study's file: the one given with ``--configfile``, else the demo.
 
     Raises
     ------
     BadInputError
-        When several files are given; a second one would be merged over the first unseen.
+        When several files are given, or single values with ``--config``: Snakemake would merge
+        them unseen, and no record would name them.
     """
     if len(configfiles) > 1:
         names = [Path(p).name for p in configfiles]
         raise BadInputError([Problem("--configfile", names, "one study at a time")])
+    if overrides:
+        valid = "no value: write a study based_on this one and give it with --configfile"
+        raise BadInputError([Problem("--config", dict(overrides), valid)])
     return Path(configfiles[0]) if configfiles else DEFAULT_STUDY
 
 
@@ -105,8 +109,8 @@ def open_plan(path: Path) -> Plan:
     return Plan(study, tuple(runs))
 
 
-def announce(plan: Plan, results: Path, cores: int) -> None:
-    """Write the plan to disk and print what it will take."""
+def announce(plan: Plan, results: Path, cores: int) -> str:
+    """Write the plan to disk and say what it will take."""
     folder = results / plan.study.name
     write_plan(plan.runs, folder)
     write_study(plan.study.study, folder)
@@ -117,8 +121,7 @@ def announce(plan: Plan, results: Path, cores: int) -> None:
             rates[kind] = calibrated_rate(run.scenario, results)
     slowest = None if None in rates.values() else min(r for r in rates.values() if r is not None)
     title = plan.study.study.title or plan.study.name
-    text = f"\n{title}\n{plan_table(plan.runs, slowest, cores)}"
-    print(text, file=sys.stderr, flush=True)
+    return f"\n{title}\n{plan_table(plan.runs, slowest, cores)}"
 
 
 def calibrated_rate(scenario: Scenario, results: Path) -> float | None:
@@ -155,7 +158,7 @@ def main(path: Path) -> int:
     except BadInputError as error:
         print(error, file=sys.stderr)
         return 1
-    announce(plan, Path("results"), os.cpu_count() or 1)
+    print(announce(plan, Path("results"), os.cpu_count() or 1))
     return 0
 
 

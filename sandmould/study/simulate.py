@@ -6,12 +6,15 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import ctypes
+import fcntl
 import os
 import platform
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import Any, TextIO
@@ -115,6 +118,7 @@ def launch(folder: Path, log: Path, mpi: str = "mpiexec") -> None:
     SystemExit
         When the run stopped early and the same command continues it.
     """
+    _die_with_parent()
     run = read_run(folder / "scenario.yaml")
     command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
     ranks = run.scenario.engine.ranks
@@ -123,7 +127,7 @@ def launch(folder: Path, log: Path, mpi: str = "mpiexec") -> None:
         own = Path(sys.executable).parent / launcher[0]
         command = [str(own) if own.exists() else launcher[0], *launcher[1:], "-n", str(ranks),
                    *command]  # fmt: skip
-    with log.open("a", encoding="utf-8") as log_file:
+    with log.open("a", encoding="utf-8") as log_file, _only_one(folder):
         status, tail = _watch(command, log_file)
     if status == 0:
         return
@@ -133,6 +137,18 @@ def launch(folder: Path, log: Path, mpi: str = "mpiexec") -> None:
         raise SystemExit(f"{run.run} was killed: the same command continues from its checkpoint.")
     detail = f"the process ended with status {status}: {tail}"
     _write_crash(folder, run.scenario, detail)
+
+
+@contextlib.contextmanager
+def _only_one(folder: Path) -> Iterator[None]:
+    """Keep a second process, such as that of a second snakemake, out of a run's folder."""
+    (folder / "work").mkdir(exist_ok=True)
+    with (folder / "lock").open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise SystemExit(f"{folder} is being computed by another process.") from error
+        yield
 
 
 def _watch(command: list[str], log: TextIO) -> tuple[int, str]:
@@ -161,7 +177,6 @@ def _write_crash(folder: Path, scenario: Scenario, detail: str) -> None:
     """Write the outcome that a crashed process could not."""
     program = build_program(scenario)
     outcome = RunOutcome(Outcome.ENGINE_FAILED, detail, 0.0, program.expected_s)
-    (folder / "work").mkdir(exist_ok=True)
     finish(folder, scenario.dimension, outcome, Cost.of(scenario), provenance(scenario))
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from sandmould.engines.outcome import Outcome
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.report.settings import (
+from sandmould.study.settings import (
     Comparison,
     Setting,
     by_block,
@@ -20,7 +20,7 @@ from sandmould.study.report.settings import (
     group_settings,
     setting_of,
 )
-from sandmould.study.report.words import listed, name_of, number, value_text, with_margin
+from sandmould.study.words import listed, name_of, number, value_text, with_margin
 
 Better = Literal["larger", "smaller"]
 _FEW = 3

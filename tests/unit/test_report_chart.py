@@ -9,7 +9,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from sandmould.study.report.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
-from sandmould.study.report.words import (
+from sandmould.study.words import (
     listed,
     name_of,
     number,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import signal
@@ -296,3 +297,12 @@ def test_restored_session_equals_the_one_that_wrote_the_checkpoint(
         np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=0, atol=1e-9)
     for surface, force in (loads[0] or {}).items():
         np.testing.assert_allclose(force, (loads[1] or {})[surface], atol=1e-6)
+
+
+def test_a_second_process_keeps_out_of_a_run(tmp_path: Path) -> None:
+    folder = run_folder(tube_scene(), tmp_path)
+    with (folder / "lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        with pytest.raises(SystemExit, match="another process"):
+            launch(folder, tmp_path / "log")
+    assert not (folder / "outcome.json").exists()

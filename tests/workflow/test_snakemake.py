@@ -62,6 +62,17 @@ def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
     assert (checkout / "results" / study.stem / "runs.tsv").exists()
 
 
+def test_single_values_and_second_files_are_refused(checkout: Path) -> None:
+    ran = snakemake("-n", "--config", "density=3", folder=checkout)
+    assert ran.returncode != 0
+    assert "--config = {'density': 3} cannot be used: valid is no value" in ran.stderr
+    files = [str(path) for path in STUDIES[:2]]
+    ran = snakemake("-n", "--configfile", *files, folder=checkout)
+    assert ran.returncode != 0
+    assert "valid is one study at a time" in ran.stderr
+    assert not list((checkout / "results").glob("*/"))
+
+
 def test_bare_snakemake_is_the_demo(checkout: Path) -> None:
     ran = snakemake("-n", folder=checkout)
     assert ran.returncode == 0, ran.stderr
@@ -98,6 +109,21 @@ def test_tiny_study_end_to_end(checkout: Path) -> None:
     )
     assert report.returncode == 0, report.stderr
     assert (checkout / "report.zip").stat().st_size > 1e5
+
+
+def test_small_tube_in_3d(checkout: Path) -> None:
+    study = str(ROOT / "config" / "studies" / "tube_3d_small.yaml")
+    ran = snakemake("--configfile", study, folder=checkout)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    results = checkout / "results" / "tube_3d_small"
+    summary = pd.read_csv(results / "summary.tsv", sep="\t").iloc[0]
+    assert summary.grains == 2000
+    assert 0.02 < summary.tube_fill_fraction < 0.7
+    # Spheres poured and shaken a little lie between loose and dense random packing, less what
+    # walls a few diameters apart cost.
+    assert 0.4 < summary.solid_fraction < 0.66
+    exports = sorted(p.suffix for p in results.glob("runs/*/exports/*"))
+    assert exports.count(".vtu") == exports.count(".dump") >= 3
 
 
 def test_one_failing_run_leaves_the_others_alone_and_fails_the_study(checkout: Path) -> None:

@@ -7,11 +7,11 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.planning import announce, open_plan, study_path
 
 try:
-    PLAN = open_plan(study_path(workflow.configfiles))
+    PLAN = open_plan(study_path(workflow.configfiles, workflow.config_settings.config))
 except BadInputError as error:
     sys.exit(str(error))
 if workflow.is_main_process and "--lint" not in sys.argv:
-    announce(PLAN, Path("results"), workflow._cores or os.cpu_count())
+    print(announce(PLAN, Path("results"), workflow._cores or os.cpu_count()), file=sys.stderr)
 
 STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"

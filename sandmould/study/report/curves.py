@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from sandmould.engines.outcome import Outcome
 from sandmould.study.collect import Collected
 from sandmould.study.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
-from sandmould.study.report.settings import Setting
-from sandmould.study.report.words import name_of, number, shown_scale, titled, with_margin
+from sandmould.study.settings import Setting
 from sandmould.study.verdict import Verdict, finished_values
+from sandmould.study.words import name_of, number, shown_scale, titled, with_margin
 
 _POINTS = 12_000
 """Points of all curves of one chart; more would only make the page heavy."""

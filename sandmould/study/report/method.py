@@ -11,7 +11,7 @@ import pandas as pd
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.report.words import listed, name_of, number, seconds
+from sandmould.study.words import listed, name_of, number, seconds
 
 _NO_TENSION = {
     "total": "the total normal force, spring and dashpot together, is never allowed to pull",

@@ -23,9 +23,9 @@ from sandmould.study.report.curves import objective_charts, runs_of
 from sandmould.study.report.method import Row, provenance_rows, sand_method, statistics_method
 from sandmould.study.report.sand import sand_pages, shown_runs
 from sandmould.study.report.tables import data_files, key_numbers, runs_table, settings_table
-from sandmould.study.report.words import name_of, number
 from sandmould.study.study import Study
 from sandmould.study.verdict import Verdict, judge, sand_notes
+from sandmould.study.words import name_of, number
 
 TEMPLATES = ROOT / "templates" / "report"
 LIMIT_BYTES = 15_000_000

@@ -21,8 +21,8 @@ from sandmould.study.report import figures
 from sandmould.study.report.animation import Film, make_film
 from sandmould.study.report.chart import Chart
 from sandmould.study.report.curves import best_passage, runs_of, time_chart
-from sandmould.study.report.words import listed, name_of, number, shown_scale
 from sandmould.study.verdict import Verdict, rank_runs
+from sandmould.study.words import listed, name_of, number, shown_scale
 
 _SECONDARY = (
     "solid_fraction", "apparent_density_corrected_kg_m3", "coordination", "bed_height_m",

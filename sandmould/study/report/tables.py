@@ -14,8 +14,8 @@ import pandas as pd
 from sandmould.engines.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan import STUDY_FILE
-from sandmould.study.report.words import name_of, number, seconds, size, titled, with_margin
 from sandmould.study.verdict import Verdict
+from sandmould.study.words import name_of, number, seconds, size, titled, with_margin
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from sandmould.study.report.words import setting_text
+from sandmould.study.words import setting_text
 
 CONFIDENCE = 0.95
 
