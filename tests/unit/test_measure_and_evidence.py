@@ -1,0 +1,103 @@
+"""Tables and exports of a run, and whether committed results still stand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pandas as pd
+import pytest
+
+from sandmould import ROOT
+from sandmould.engines.snapshot import Snapshot
+from sandmould.study import evidence
+from sandmould.study.expand import Run, expand
+from sandmould.study.measure import write_exports, write_measures, write_picture
+from sandmould.study.opening import open_study
+from sandmould.study.plan import write_plan
+from tests.scenes import tube_scene
+
+R = 0.002
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Write a run of three snapshots: one grain moves from the box into the tube."""
+    write_plan([Run("test", "one", {}, 1, tube_scene(), {})], tmp_path)
+    folder = tmp_path / "runs" / "one"
+    (folder / "snapshots").mkdir()
+    for i, x in enumerate((0.02, 0.05, 0.06)):
+        Snapshot(
+            0.1 * i, 0.1 * i, "vibrate_1", np.array([1, 2]), np.array([1, 1]),
+            np.array([[x, 0.02], [0.01, R]]), np.zeros((2, 2)), np.zeros((2, 3)), np.full(2, R),
+        ).save(folder / "snapshots" / f"{i:06d}.npz")  # fmt: skip
+    return folder
+
+
+def test_measures_have_a_row_a_snapshot_and_gaps_for_broken_ones(folder: Path) -> None:
+    broken = folder / "snapshots" / "000003.npz"
+    broken.write_bytes((folder / "snapshots" / "000000.npz").read_bytes()[:200])
+    write_measures(folder, folder / "measures.tsv")
+    table = pd.read_csv(folder / "measures.tsv", sep="\t")
+    bore = 0.02 * 0.03
+    grain = np.pi * R**2
+    fill = list(table.tube_fill_fraction)
+    assert fill[:3] == pytest.approx([0, grain / 2 / bore, grain / bore])
+    assert np.isnan(fill[3])
+    assert "000003.npz" in table.stage[3]
+
+
+def test_exports_are_read_back_by_meshio_and_hold_the_moments(folder: Path) -> None:
+    write_exports(folder, folder / "exports")
+    names = sorted(p.name for p in (folder / "exports").iterdir())
+    assert names == ["000000.dump", "000000.vtu", "000001.dump", "000001.vtu", "000002.dump",
+                     "000002.vtu"]  # fmt: skip
+    mesh = meshio.read(folder / "exports" / "000002.vtu")
+    assert mesh.points[0] == pytest.approx([0.06, 0.02, 0.0])
+
+
+def test_picture_of_a_run_without_snapshots_shows_the_scene(folder: Path) -> None:
+    for path in (folder / "snapshots").iterdir():
+        path.unlink()
+    write_picture(folder, folder / "final.png")
+    write_exports(folder, folder / "exports")
+    write_measures(folder, folder / "measures.tsv")
+    assert (folder / "final.png").stat().st_size > 1000
+    assert list(pd.read_csv(folder / "measures.tsv", sep="\t").columns)
+
+
+def test_record_is_stale_when_its_study_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = "config/studies/tube_demo.yaml"
+    digest = evidence.study_hash(expand(open_study(ROOT / study)))
+    for name, kept in (
+        ("good", {"study": study, "study_sha256": digest}),
+        ("old", {"study": study, "study_sha256": "0" * 64}),
+        ("gone", {"study": "config/studies/no_such.yaml", "study_sha256": digest}),
+    ):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "record.json").write_text(json.dumps(kept))
+    monkeypatch.setattr(evidence, "RECORDS", tmp_path)
+    told = dict(evidence.stale_records())
+    assert told["good"] == ""
+    assert "changed" in told["old"]
+    assert "gone" in told["gone"]
+
+
+def test_unfinished_study_is_not_recorded(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="run the study first"):
+        evidence.record(ROOT / "config" / "studies" / "tube_demo.yaml", tmp_path)
+
+
+def test_committed_records_are_whole() -> None:
+    paths = sorted((ROOT / "docs" / "results").glob("*/record.json"))
+    assert paths
+    for path in paths:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        assert {"command", "commit", "versions", "machine", "study_sha256"} <= set(kept)
+        assert "dirty" not in kept["commit"]
+        summary = pd.read_csv(path.with_name("summary.tsv"), sep="\t")
+        assert (summary.outcome == "finished").all()
