@@ -9,7 +9,6 @@ the cores were in a sweep that took SECONDS in all.
 from __future__ import annotations
 
 import json
-import platform
 import subprocess
 import sys
 import tempfile
@@ -103,7 +102,6 @@ def main(arguments: list[str]) -> None:
         kept["sweep"] = sweep_busy(Path(folder), float(seconds), int(cores))
     else:
         kept["one_run"] = one_run()
-    kept["machine"] = platform.platform()
     OUT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(kept, indent=1))
 

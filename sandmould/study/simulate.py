@@ -56,7 +56,7 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
         "versions": {p: metadata.version(p) for p in packages}
         | {"python": platform.python_version()},
         "machine": {
-            "system": platform.platform(),
+            "system": f"{platform.system()} {platform.machine()}",
             "processor": _processor(),
             "cores": os.cpu_count(),
         },
@@ -117,6 +117,11 @@ def launch(folder: Path, log: Path, mpi: str = "mpiexec") -> None:
     ------
     SystemExit
         When the run stopped early and the same command continues it.
+
+    Notes
+    -----
+    A run whose outcome is already there is left as it is: Snakemake removes the outcome of a run
+    that must be computed again.
     """
     _die_with_parent()
     run = read_run(folder / "scenario.yaml")
@@ -128,6 +133,8 @@ def launch(folder: Path, log: Path, mpi: str = "mpiexec") -> None:
         command = [str(own) if own.exists() else launcher[0], *launcher[1:], "-n", str(ranks),
                    *command]  # fmt: skip
     with log.open("a", encoding="utf-8") as log_file, _only_one(folder):
+        if (folder / "outcome.json").exists():
+            return  # finished meanwhile by a process that outlived its own snakemake
         status, tail = _watch(command, log_file)
     if status == 0:
         return
@@ -141,13 +148,17 @@ def launch(folder: Path, log: Path, mpi: str = "mpiexec") -> None:
 
 @contextlib.contextmanager
 def _only_one(folder: Path) -> Iterator[None]:
-    """Keep a second process, such as that of a second snakemake, out of a run's folder."""
+    """Wait for any other process that computes in a run's folder.
+
+    One can outlive a killed snakemake; the next snakemake then finds what it finished.
+    """
     (folder / "work").mkdir(exist_ok=True)
     with (folder / "lock").open("w") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise SystemExit(f"{folder} is being computed by another process.") from error
+        except OSError:
+            print(f"{folder}: waiting for the process that computes it already", file=sys.stderr)
+            fcntl.flock(file, fcntl.LOCK_EX)
         yield
 
 

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from sandmould.engines.products import finish
 from sandmould.engines.program import build_program
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
+from sandmould.study import simulate as simulate_module
 from sandmould.study.expand import Run, expand, scenario_hash
 from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
@@ -299,10 +301,18 @@ def test_restored_session_equals_the_one_that_wrote_the_checkpoint(
         np.testing.assert_allclose(force, (loads[1] or {})[surface], atol=1e-6)
 
 
-def test_a_second_process_keeps_out_of_a_run(tmp_path: Path) -> None:
+def test_a_second_process_waits_for_the_first_and_takes_its_outcome(tmp_path: Path) -> None:
     folder = run_folder(tube_scene(), tmp_path)
+    kept = RunOutcome(Outcome.FINISHED, "by the first", 1.0, 1.0)
     with (folder / "lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        with pytest.raises(SystemExit, match="another process"):
-            launch(folder, tmp_path / "log")
-    assert not (folder / "outcome.json").exists()
+
+        def finish_and_release() -> None:
+            kept.write(folder / "outcome.json")
+            file.close()
+
+        threading.Timer(0.5, finish_and_release).start()
+        with simulate_module._only_one(folder):
+            assert RunOutcome.read(folder / "outcome.json").detail == "by the first"
+    launch(folder, tmp_path / "log")
+    assert RunOutcome.read(folder / "outcome.json").detail == "by the first"

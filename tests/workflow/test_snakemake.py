@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pandas as pd
@@ -109,6 +112,28 @@ def test_tiny_study_end_to_end(checkout: Path) -> None:
     )
     assert report.returncode == 0, report.stderr
     assert (checkout / "report.zip").stat().st_size > 1e5
+
+
+def test_killed_snakemake_is_taken_up_by_the_next(checkout: Path) -> None:
+    study = checkout / "killed.yaml"
+    study.write_text(TINY + "replicates: 2\nsweep: {}\n")
+    command = [str(SNAKEMAKE), "--cores", "2", "--configfile", str(study)]
+    process = subprocess.Popen(
+        command, cwd=checkout, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    results = checkout / "results" / "killed"
+    deadline = time.monotonic() + 120
+    while not list(results.glob("runs/*/work/checkpoint_*/mark.json")):
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    ran = snakemake("--configfile", str(study), folder=checkout)
+    assert ran.returncode == 0, ran.stderr
+    summary = pd.read_csv(results / "summary.tsv", sep="\t")
+    assert list(summary.outcome) == ["finished", "finished"]
+    assert not list(results.glob("runs/*/work/checkpoint*"))
 
 
 def test_small_tube_in_3d(checkout: Path) -> None:
