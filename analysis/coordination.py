@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.neighbours import near_pairs
+from sandmould.engines.neighbours import touching_pairs
 from sandmould.scenario.geometry import Array, Block, Scene, Wall
 
 
@@ -57,15 +57,12 @@ def contacts(
     count = np.zeros(n, dtype=np.int64)
     grain_grain = grain_wall = 0
     deepest = 0.0
-    for first, second, distance_m in near_pairs(
-        position_m, 2.0 * float(radius_m.max(initial=0.0)) + max(tolerance_m, 0.0)
-    ):
-        a, b = radius_m[first], radius_m[second]
-        overlap_m = a + b - distance_m
+    for first, second, overlap_m in touching_pairs(position_m, radius_m, max(tolerance_m, 0.0)):
         touch = overlap_m > -tolerance_m
         count += np.bincount(first[touch], minlength=n) + np.bincount(second[touch], minlength=n)
         grain_grain += int(touch.sum())
-        deepest = max(deepest, float((overlap_m / np.minimum(a, b)).max(initial=0.0)))
+        smaller_m = np.minimum(radius_m[first], radius_m[second])
+        deepest = max(deepest, float((overlap_m / smaller_m).max(initial=0.0)))
     surfaces: tuple[Wall | Block, ...] = ()
     if scene is not None:
         surfaces = (*scene.walls, *scene.blocks)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sandmould.engines.neighbours import near_pairs
+from sandmould.engines.neighbours import touching_pairs
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
@@ -39,10 +39,9 @@ def measure_health(scenario: Scenario, snapshot: Snapshot) -> Health:
     if not np.isfinite(snapshot.position_m).all():
         return Health(float("nan"), float("nan"), float("nan"))
     radius, largest = snapshot.radius_m, 0.0
-    for first, second, distance_m in near_pairs(snapshot.position_m, 2 * float(radius.max())):
-        overlap = radius[first] + radius[second] - distance_m
+    for first, second, overlap_m in touching_pairs(snapshot.position_m, radius):
         smaller = np.minimum(radius[first], radius[second])
-        largest = max(largest, float((overlap / smaller).max(initial=0.0)))
+        largest = max(largest, float((overlap_m / smaller).max(initial=0.0)))
     at_walls = 1 - scenario.scene.clearance_m(snapshot.position_m) / radius
     largest = max(largest, float(at_walls.max(initial=0.0)))
     return Health(energy, float(np.sqrt(2 * energy / mass.sum())), largest)

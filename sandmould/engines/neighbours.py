@@ -47,5 +47,31 @@ def near_pairs(
         # pairs come as (lower, higher); those wholly ahead belong to a later portion
         pairs = pairs[pairs[:, 0] < own]
         first, second = pairs[:, 0], pairs[:, 1]
-        distance_m = np.linalg.norm(local_m[first] - local_m[second], axis=1)
+        apart_m = local_m[first] - local_m[second]
+        distance_m = np.sqrt(np.einsum("ij,ij->i", apart_m, apart_m))
         yield order[start + first], order[start + second], distance_m
+
+
+def touching_pairs(
+    position_m: Array, radius_m: Array, gap_m: float = 0.0
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Array]]:
+    """Give every pair of grains whose surfaces are nearer than a gap, once, in a few portions.
+
+    Parameters
+    ----------
+    position_m : (n, d) float64, m
+    radius_m : (n,) float64, m
+    gap_m : float, m
+
+    Yields
+    ------
+    first, second : (p,) int64
+        Indices of the grains of each pair.
+    overlap_m : (p,) float64, m
+        r1 + r2 - distance; negative across a gap.
+    """
+    reach_m = 2 * float(radius_m.max(initial=0.0)) + gap_m
+    for first, second, distance_m in near_pairs(position_m, reach_m):
+        overlap_m = radius_m[first] + radius_m[second] - distance_m
+        keep = overlap_m > -gap_m
+        yield first[keep], second[keep], overlap_m[keep]

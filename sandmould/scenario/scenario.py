@@ -45,7 +45,7 @@ class Record(Section):
         20, "Steps between samples of the wall loads.", source=ARGUED, ge=1, le=100000
     )
     checkpoint_every_s: float = quantity(
-        0.05,
+        0.1,
         "Interval of checkpoints in simulated time, so that a run does not depend on the clock.",
         unit="s",
         source=ARGUED,

@@ -74,3 +74,17 @@ def test_no_grains():
     got = contacts(np.zeros((0, 3)), np.zeros(0))
     assert got.grain_grain == 0
     assert np.isnan(got.mean_coordination)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_contacts_of_mixed_sizes_equal_a_search_of_all_pairs(dimension: int) -> None:
+    rng = np.random.default_rng(5)
+    radius = rng.choice([0.5, 0.9, 1.0, 2.25], size=300)
+    position = rng.uniform(0, 14 if dimension == 2 else 8, size=(300, dimension))
+    distance = np.linalg.norm(position[:, None] - position[None], axis=2)
+    overlap = radius[:, None] + radius[None] - distance
+    np.fill_diagonal(overlap, -1)
+    found = contacts(position, radius)
+    np.testing.assert_array_equal(found.count, (overlap > 0).sum(axis=1))
+    share = overlap / np.minimum(radius[:, None], radius[None])
+    assert found.largest_overlap_fraction == pytest.approx(share.max())
