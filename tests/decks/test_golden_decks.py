@@ -55,7 +55,7 @@ def deck_of(name: str) -> Deck:
         program = build_program(tube_scene(**VARIANTS[name]))
         return render_deck(program, {}, "test", "golden")
     run = expand(open_study(ROOT / "config" / "studies" / f"{name}.yaml"))[0]
-    return render_deck(build_program(run.scenario), run.sources, run.run, run.study)
+    return render_deck(build_program(run.scenario), run.sources, "first", run.study)
 
 
 @pytest.mark.parametrize("name", [*STUDIES, *VARIANTS])
