@@ -131,10 +131,9 @@ class Driver:
         if stage.layer:
             session.insert_layer(stage.layer)
         session.start_stage(stage)
+        snapshot = session.snapshot()  # all ranks take part in gathering
         if stage.counts_as_vibration and self._recorder is not None:
-            self._recorder.save(session.snapshot())
-        elif stage.counts_as_vibration:
-            session.snapshot()  # all ranks take part in gathering
+            self._recorder.save(snapshot)
 
     def _window(self, session: Session) -> None:
         before, began = session.steps, time.monotonic()

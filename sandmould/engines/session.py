@@ -63,8 +63,13 @@ class Session(Protocol):
     def start_stage(self, stage: Stage) -> None:
         """Begin to settle or to vibrate."""
 
-    def advance(self) -> None:
-        """Compute up to the next record or the end of the stage.
+    def advance(self, duration_s: float | None = None) -> None:
+        """Compute for a duration, or up to the next record, not past the end of the stage.
+
+        Parameters
+        ----------
+        duration_s : float, optional
+            Rounded up to whole steps.
 
         Raises
         ------

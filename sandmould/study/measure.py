@@ -15,7 +15,11 @@ from analysis.density import apparent_density
 from analysis.export import to_ovito, to_vtk
 from analysis.layers import mixing_index
 from analysis.plots import draw_by_layer, draw_scene
-from analysis.solid_fraction import bed_surface_height_m, mean_solid_fraction
+from analysis.solid_fraction import (
+    bed_surface_height_m,
+    mean_solid_fraction,
+    solid_fraction_profile,
+)
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
@@ -86,6 +90,28 @@ def write_exports(folder: Path, out: Path) -> None:
         snapshot = Snapshot.load(moment.path)
         to_vtk(snapshot, out / f"{moment.path.stem}.vtu")
         to_ovito(snapshot, out / f"{moment.path.stem}.dump")
+
+
+def write_profile(folder: Path, out: Path) -> None:
+    """Write the solid fraction against height at the moments of the vibration.
+
+    Slabs are as high as the largest grain; where a slab lies above the bed it holds little.
+    """
+    scenario = read_run(folder / "scenario.yaml").scenario
+    slab_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
+    edges_m = np.arange(0.0, scenario.box.height_m + slab_m / 2, slab_m)
+    moments = list_moments(folder)
+    rows = []
+    for heading, share in MOMENTS.items() if moments else ():
+        moment = nearest(moments, share * moments[-1].vibration_time_s)
+        snapshot = Snapshot.load(moment.path)
+        profile = solid_fraction_profile(
+            snapshot.position_m, snapshot.radius_m, scenario.scene, edges_m
+        )
+        for height_m, fraction in zip(profile.height_m, profile.solid_fraction, strict=True):
+            rows.append((heading, moment.vibration_time_s, height_m, fraction))
+    columns = ["moment", "vibration_time_s", "height_m", "solid_fraction"]
+    pd.DataFrame(rows, columns=columns).to_csv(out, sep="\t", index=False, float_format="%.6g")
 
 
 def write_measures(folder: Path, out: Path) -> None:

@@ -14,7 +14,7 @@ from sandmould import ROOT
 from sandmould.engines.snapshot import Snapshot
 from sandmould.study import evidence
 from sandmould.study.expand import Run, expand
-from sandmould.study.measure import write_exports, write_measures, write_picture
+from sandmould.study.measure import write_exports, write_measures, write_picture, write_profile
 from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
 from tests.scenes import tube_scene
@@ -56,6 +56,19 @@ def test_exports_are_read_back_by_meshio_and_hold_the_moments(folder: Path) -> N
                      "000002.vtu"]  # fmt: skip
     mesh = meshio.read(folder / "exports" / "000002.vtu")
     assert mesh.points[0] == pytest.approx([0.06, 0.02, 0.0])
+
+
+def test_profile_sums_to_the_sand_in_the_box(folder: Path) -> None:
+    write_profile(folder, folder / "profile.tsv")
+    table = pd.read_csv(folder / "profile.tsv", sep="\t")
+    assert list(dict.fromkeys(table.moment)) == [
+        "at its start", "after 1/8", "after 1/2", "at its end"
+    ]  # fmt: skip
+    last = table[table.moment == "at its end"]
+    slab = last.height_m.diff().iloc[1]
+    # The tube's plates leave less than the box's width free in their slabs: those are left out.
+    below = last[last.height_m < 0.012 - slab / 2]
+    assert (below.solid_fraction * slab * 0.08).sum() == pytest.approx(np.pi * R**2, rel=1e-4)
 
 
 def test_picture_of_a_run_without_snapshots_shows_the_scene(folder: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+import math
 import os
 import signal
 import subprocess
@@ -25,6 +26,7 @@ from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.products import finish
 from sandmould.engines.program import build_program
+from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.study import simulate as simulate_module
@@ -316,3 +318,25 @@ def test_a_second_process_waits_for_the_first_and_takes_its_outcome(tmp_path: Pa
             assert RunOutcome.read(folder / "outcome.json").detail == "by the first"
     launch(folder, tmp_path / "log")
     assert RunOutcome.read(folder / "outcome.json").detail == "by the first"
+
+
+def test_session_advances_by_a_duration_in_a_folder_with_spaces(tmp_path: Path) -> None:
+    folder = tmp_path / "a study of ours"
+    folder.mkdir()
+    scene = tube_scene(fill={"layers": [{"count": 20}]})
+    session = open_lammps(scene, folder)
+    session.insert_layer(1)
+    session.start_stage(session._program.stages[0])
+    session.advance(0.0123)
+    steps = session.steps
+    session.advance()
+    session.write_checkpoint(folder)
+    restored = open_lammps(scene, folder, checkpoint=folder)
+    assert steps == math.ceil(0.0123 / scene.step_s)
+    assert session.steps == restored.steps > steps
+    with pytest.raises(RefusedError, match="a rigid surface on engine lammps"):
+        session.move_surface("floor", np.zeros((2, 2)), 0.01)
+    with pytest.raises(RefusedError, match="a rigid surface on engine lammps"):
+        session.attach_elastic_surface("floor", np.eye(2), np.ones(2), np.ones(2))
+    session.close()
+    restored.close()

@@ -64,6 +64,7 @@ rule measure:
             subcategory="Measures",
             labels=labels_of,
         ),
+        profile=f"{FOLDER}/runs/{{run}}/profile.tsv",
         exports=directory(f"{FOLDER}/runs/{{run}}/exports"),
         picture=report(
             f"{FOLDER}/runs/{{run}}/final.png",

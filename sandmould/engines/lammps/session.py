@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -113,7 +114,7 @@ class LammpsSession:
         self._folder = folder
         for name in _SETUP:
             if name == "create" and checkpoint is not None:
-                self.send(f"read_restart {checkpoint / 'lammps.restart'}")
+                self.send(f'read_restart "{checkpoint}/lammps.restart"')
             else:
                 self.send(self._blocks[name].text)
         if checkpoint is not None:
@@ -122,7 +123,7 @@ class LammpsSession:
     def send(self, commands: str) -> None:
         """Execute commands of LAMMPS; an error becomes the outcome that fits."""
         try:
-            self._lmp.commands_string(commands.replace("layers/", f"{self._folder}/layers/"))
+            self._lmp.commands_string(commands)
         except Exception as error:
             raise self._stop(str(error)) from error
 
@@ -166,7 +167,9 @@ class LammpsSession:
 
     def insert_layer(self, number: int) -> None:
         """Drop a planned layer from over the bed."""
-        self.send(self._blocks[f"layer_{number}"].text)
+        text = self._blocks[f"layer_{number}"].text
+        # The deck names its layers from its own folder; this process may stand elsewhere.
+        self.send(re.sub(r"^read_data (\S+)", rf'read_data "{self._folder}/\1"', text, flags=re.M))
         self.grains = int(self._lmp.get_natoms())
 
     def start_stage(self, stage: Stage) -> None:
@@ -180,10 +183,11 @@ class LammpsSession:
         if stage.counts_as_vibration and self._vibration_start is None:
             self._vibration_start = self._stage_start
 
-    def advance(self) -> None:
-        """Compute up to the next multiple of the window, or the end of the stage."""
+    def advance(self, duration_s: float | None = None) -> None:
+        """Compute for a duration or up to the next record, not past the end of the stage."""
         now, window = self.steps, self._counts.window
-        target = min((now // window + 1) * window, self._stage_end)
+        ahead = window - now % window if duration_s is None else self._counts.steps(duration_s)
+        target = min(now + ahead, self._stage_end)
         # Setup computes forces with whole-step velocities; only without it do windows add up to
         # the deck's own uncut run, bit for bit.
         self.send(f"run {target - now} pre {'yes' if self._setup_due else 'no'} post no")
@@ -268,7 +272,7 @@ class LammpsSession:
 
     def write_checkpoint(self, folder: Path) -> None:
         """Write LAMMPS's restart file and where the stage stands."""
-        self.send(f"write_restart {folder / 'lammps.restart'}")
+        self.send(f'write_restart "{folder}/lammps.restart"')
         self._setup_due = True
         if not self.is_root:
             return
