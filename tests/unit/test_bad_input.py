@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.expand import expand
 from sandmould.study.opening import open_study
@@ -21,6 +22,9 @@ def refused(folder: Path, text: str | bytes, monkeypatch: pytest.MonkeyPatch) ->
     return str(caught.value)
 
 
+SHIPPED = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
+NAMES = ", ".join(sorted({"trial", *(p.stem for f in SHIPPED for p in f.glob("*.yaml"))}))
+"""What a study can be based on, as the messages list it."""
 CASES: dict[str, tuple[str | bytes, str]] = {
     "wrong type": (
         'based_on: tube\nscenario: {sand: {density_kg_m3: "heavy"}}',
@@ -147,12 +151,12 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "missing base": (
         "based_on: tuba",
         "trial.yaml: based_on = 'tuba' cannot be used: valid is the name of a study or scenario: "
-        "trial, tube, tube_3d_small, tube_demo, tube_frequency, tube_paper.",
+        f"{NAMES}.",
     ),
     "base that is no name": (
         "based_on: [tube]",
         "trial.yaml: based_on = ['tube'] cannot be used: valid is the name of a study or "
-        "scenario: trial, tube, tube_3d_small, tube_demo, tube_frequency, tube_paper.",
+        f"scenario: {NAMES}.",
     ),
     "based on itself": (
         "based_on: trial",
