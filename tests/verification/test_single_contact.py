@@ -56,7 +56,7 @@ def exact_restitution(damping_ratio: float, no_tension: str) -> float:
 
     Elastic part alone clipped: the contact ends where the overlap does, half a period after the
     first touch. Total force clipped: it ends where the force first vanishes (Schwager and
-    Poeschel 2007, eq. (20)), which tends to exp(-2) at critical damping.
+    Poeschel 2007), which tends to exp(-2) at critical damping.
     """
     z = damping_ratio
     if z == 1.0:
