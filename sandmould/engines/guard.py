@@ -23,6 +23,8 @@ class Health:
     rms_speed_m_s: float
     largest_overlap_fraction: float
     """Over the smaller radius, walls included."""
+    clearance_m: np.ndarray
+    """(n,) float64, m: distance of the centres from the nearest wall or block."""
 
 
 def grain_masses_kg(scenario: Scenario, snapshot: Snapshot) -> np.ndarray:
@@ -37,14 +39,14 @@ def measure_health(scenario: Scenario, snapshot: Snapshot) -> Health:
     mass = grain_masses_kg(scenario, snapshot)
     energy = 0.5 * float(mass @ (snapshot.velocity_m_s**2).sum(axis=1))
     if not np.isfinite(snapshot.position_m).all():
-        return Health(float("nan"), float("nan"), float("nan"))
+        return Health(float("nan"), float("nan"), float("nan"), np.full(len(mass), np.nan))
     radius, largest = snapshot.radius_m, 0.0
     for first, second, overlap_m in touching_pairs(snapshot.position_m, radius):
         smaller = np.minimum(radius[first], radius[second])
         largest = max(largest, float((overlap_m / smaller).max(initial=0.0)))
-    at_walls = 1 - scenario.scene.clearance_m(snapshot.position_m) / radius
-    largest = max(largest, float(at_walls.max(initial=0.0)))
-    return Health(energy, float(np.sqrt(2 * energy / mass.sum())), largest)
+    clearance = scenario.scene.clearance_m(snapshot.position_m)
+    largest = max(largest, float((1 - clearance / radius).max(initial=0.0)))
+    return Health(energy, float(np.sqrt(2 * energy / mass.sum())), largest, clearance)
 
 
 class Guard:
@@ -87,7 +89,7 @@ class Guard:
                 f"kinetic energy {health.kinetic_energy_j:.4g} J exceeds the bound "
                 f"{self._energy_bound_j:.4g} J {at}",
             )
-        clearance = self._scenario.scene.clearance_m(snapshot.position_m)
+        clearance = health.clearance_m
         if (clearance < 0).any():
             i = int(clearance.argmin())
             place = ", ".join(f"{x:.4g}" for x in snapshot.position_m[i])

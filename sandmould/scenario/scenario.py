@@ -30,7 +30,12 @@ class Record(Section):
     """What a run writes down, and how often."""
 
     series_every_s: float = quantity(
-        0.01, "Interval of the time series and the guards.", unit="s", source=ARGUED, gt=0, le=100
+        0.02,
+        "Interval of the time series, the guards and the rest rule; loads are means over it.",
+        unit="s",
+        source=ARGUED,
+        gt=0,
+        le=100,
     )
     snapshot_every_s: float = quantity(
         0.05, "Interval of snapshots of all grains.", unit="s", source=ARGUED, gt=0, le=100

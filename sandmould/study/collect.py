@@ -59,30 +59,6 @@ def collect(study_folder: Path) -> None:
         os.replace(partial, study_folder / name)
 
 
-def failed_runs(summary: Path) -> None:
-    """Fail loudly when a run of the study failed.
-
-    Parameters
-    ----------
-    summary : Path
-        ``summary.tsv`` of the study.
-
-    Raises
-    ------
-    SystemExit
-        Naming each run that did not finish, with its outcome and what was said of it.
-    """
-    table = pd.read_csv(summary, sep="\t", dtype={"run": str, "detail": str})
-    failed = table[table["outcome_code"] != int(Outcome.FINISHED)]
-    if len(failed):
-        lines = [
-            f"  {run}: {outcome}. {detail if isinstance(detail, str) else ''}".rstrip()
-            for run, outcome, detail in failed[["run", "outcome", "detail"]].itertuples(index=False)
-        ]
-        said = "\n".join([f"{len(failed)} of {len(table)} runs did not finish:", *lines])
-        raise SystemExit(said)
-
-
 def read_study(study_folder: Path) -> Study:
     """The study as planned, from its folder; one with the defaults where none was written."""
     path = study_folder / STUDY_FILE

@@ -1,23 +1,17 @@
-"""One run from its folder: a process of its own, so that an outcome is written whatever happens.
+"""One run from its folder: ``python -m sandmould.study.simulate FOLDER``.
 
-``python -m sandmould.study.simulate FOLDER`` computes; ``launch`` starts and watches it.
+``sandmould.study.launch`` starts and watches it as a process of its own.
 """
 
 from __future__ import annotations
 
-import collections
-import contextlib
-import ctypes
-import fcntl
 import os
 import platform
-import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from sandmould import ROOT
 from sandmould.engines.choosing import render
@@ -28,11 +22,8 @@ from sandmould.engines.products import Cost, finish
 from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import scenario_hash
+from sandmould.study.launch import RESTARTABLE_EXIT
 from sandmould.study.plan import read_run
-
-RESTARTABLE_EXIT = 75
-"""Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
-_PR_SET_PDEATHSIG = 1
 
 
 def render_run(folder: Path) -> None:
@@ -95,101 +86,21 @@ def simulate(folder: Path) -> int:
     return 0
 
 
-def _die_with_parent() -> None:
-    """Ask Linux to end this process softly when the one that started it is killed."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-
-
-def launch(folder: Path, log: Path, mpi: str = "mpiexec") -> None:
-    """Run ``simulate`` as a process of its own, under MPI where the scenario asks for ranks.
-
-    Parameters
-    ----------
-    folder : Path
-        Holds ``scenario.yaml`` and the deck.
-    log : Path
-        Takes all that the process prints, which also goes to the terminal.
-    mpi : str
-        Command that starts ranks, such as ``srun --mpi=pmix``.
-
-    Raises
-    ------
-    SystemExit
-        When the run stopped early and the same command continues it.
-
-    Notes
-    -----
-    A run whose outcome is already there is left as it is: Snakemake removes the outcome of a run
-    that must be computed again.
-    """
-    _die_with_parent()
-    run = read_run(folder / "scenario.yaml")
-    command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
-    ranks = run.scenario.engine.ranks
-    if ranks > 1:
-        launcher = mpi.split()
-        own = Path(sys.executable).parent / launcher[0]
-        command = [str(own) if own.exists() else launcher[0], *launcher[1:], "-n", str(ranks),
-                   *command]  # fmt: skip
-    with log.open("a", encoding="utf-8") as log_file, _only_one(folder):
-        if (folder / "outcome.json").exists():
-            return  # finished meanwhile by a process that outlived its own snakemake
-        status, tail = _watch(command, log_file)
-    if status == 0:
-        return
-    if status == RESTARTABLE_EXIT:
-        raise SystemExit(f"{run.run} stopped early with a checkpoint: the same command continues.")
-    if status < 0 and -status in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT):
-        raise SystemExit(f"{run.run} was killed: the same command continues from its checkpoint.")
-    detail = f"the process ended with status {status}: {tail}"
-    _write_crash(folder, run.scenario, detail)
-
-
-@contextlib.contextmanager
-def _only_one(folder: Path) -> Iterator[None]:
-    """Wait for any other process that computes in a run's folder.
-
-    One can outlive a killed snakemake; the next snakemake then finds what it finished.
-    """
-    (folder / "work").mkdir(exist_ok=True)
-    with (folder / "lock").open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            print(f"{folder}: waiting for the process that computes it already", file=sys.stderr)
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-
-
-def _watch(command: list[str], log: TextIO) -> tuple[int, str]:
-    """Run a command, pass on what it prints, and keep its last words."""
-    words: collections.deque[str] = collections.deque(maxlen=3)
-    process = subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        preexec_fn=_die_with_parent,
-    )
-    signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
-    assert process.stdout is not None
-    for line in process.stdout:
-        log.write(line)
-        log.flush()
-        sys.stderr.write(line)
-        sys.stderr.flush()
-        if line.strip():
-            words.append(line.strip())
-    return process.wait(), " / ".join(words)
-
-
-def _write_crash(folder: Path, scenario: Scenario, detail: str) -> None:
+def write_crash(folder: Path, detail: str) -> None:
     """Write the outcome that a crashed process could not."""
-    program = build_program(scenario)
-    outcome = RunOutcome(Outcome.ENGINE_FAILED, detail, 0.0, program.expected_s)
+    scenario = read_run(folder / "scenario.yaml").scenario
+    planned_s = build_program(scenario).expected_s
+    outcome = RunOutcome(Outcome.ENGINE_FAILED, detail, 0.0, planned_s)
     finish(folder, scenario.dimension, outcome, Cost.of(scenario), provenance(scenario))
 
 
+def main(folder: Path, crash: str | None = None) -> int:
+    """Compute a run, or write down how another process of it crashed."""
+    if crash is None:
+        return simulate(folder)
+    write_crash(folder, crash)
+    return 0
+
+
 if __name__ == "__main__":
-    raise SystemExit(simulate(Path(sys.argv[1])))
+    raise SystemExit(main(Path(sys.argv[1]), *sys.argv[2:]))

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould.study.check import failed_runs
 from sandmould.study.collect import (
     NO_OUTCOME,
     collect,
-    failed_runs,
     gather,
     read_provenance,
     read_study,

@@ -29,11 +29,11 @@ from sandmould.engines.program import build_program
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study import simulate as simulate_module
 from sandmould.study.expand import Run, expand, scenario_hash
+from sandmould.study.launch import RESTARTABLE_EXIT, _only_one, launch
 from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
-from sandmould.study.simulate import RESTARTABLE_EXIT, launch, render_run
+from sandmould.study.simulate import render_run
 from tests.scenes import open_lammps, tube_scene
 
 
@@ -218,7 +218,7 @@ def test_time_step_past_the_critical_one_is_called_unstable(
 def test_two_ranks_fill_the_same_bed(straight: Path, tmp_path: Path) -> None:
     scene = tube_scene(engine={"ranks": 2})
     folder = run_folder(scene, tmp_path)
-    launch(folder, tmp_path / "log")
+    launch(folder, tmp_path / "log", ranks=2)
     outcome = RunOutcome.read(folder / "outcome.json")
     assert outcome.outcome is Outcome.FINISHED, outcome.detail
     # Sums run in another order, so grains part after a few collisions; the bed as a whole does not.
@@ -314,7 +314,7 @@ def test_a_second_process_waits_for_the_first_and_takes_its_outcome(tmp_path: Pa
             file.close()
 
         threading.Timer(0.5, finish_and_release).start()
-        with simulate_module._only_one(folder):
+        with _only_one(folder):
             assert RunOutcome.read(folder / "outcome.json").detail == "by the first"
     launch(folder, tmp_path / "log")
     assert RunOutcome.read(folder / "outcome.json").detail == "by the first"

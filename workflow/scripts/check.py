@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sandmould.study.collect import failed_runs
+from sandmould.study.check import failed_runs
 from sandmould.study.job_log import to_log
 
 with to_log(snakemake.log[0]):

@@ -2,6 +2,11 @@
 
 from pathlib import Path
 
-from sandmould.study.simulate import launch
+from sandmould.study.launch import launch
 
-launch(Path(snakemake.input.scenario).parent, Path(snakemake.log[0]), snakemake.resources.mpi)
+launch(
+    Path(snakemake.input.scenario).parent,
+    Path(snakemake.log[0]),
+    snakemake.resources.tasks,
+    snakemake.resources.mpi,
+)

@@ -1,0 +1,114 @@
+"""Start a run as a process of its own and watch it, so that an outcome is written whatever happens.
+
+Only the standard library is imported here: every run pays for this process once more.
+"""
+
+from __future__ import annotations
+
+import collections
+import contextlib
+import ctypes
+import fcntl
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+RESTARTABLE_EXIT = 75
+"""Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
+_PR_SET_PDEATHSIG = 1
+_ASKED_TO_END = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+
+
+def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> None:
+    """Compute a run in a process of its own, under MPI where it has several ranks.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``scenario.yaml`` and the deck.
+    log : Path
+        Takes all that the process prints, which also goes to the terminal.
+    ranks : int
+        MPI ranks.
+    mpi : str
+        Command that starts ranks, such as ``srun --mpi=pmix``.
+
+    Raises
+    ------
+    SystemExit
+        When the run stopped early and the same command continues it.
+
+    Notes
+    -----
+    A run whose outcome is already there is left as it is: Snakemake removes the outcome of a run
+    that must be computed again.
+    """
+    _die_with_parent()
+    command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
+    with log.open("a", encoding="utf-8") as log_file, _only_one(folder):
+        if (folder / "outcome.json").exists():
+            return  # finished meanwhile by a process that outlived its own snakemake
+        status, tail = _watch(_under_mpi(command, ranks, mpi), log_file)
+        if status == 0:
+            return
+        if status == RESTARTABLE_EXIT:
+            raise SystemExit(f"{folder} stopped early: the same command continues it.")
+        if -status in _ASKED_TO_END:
+            raise SystemExit(f"{folder} was killed: the same command continues it.")
+        subprocess.run([*command, f"the process ended with status {status}: {tail}"], check=True)
+
+
+def _under_mpi(command: list[str], ranks: int, mpi: str) -> list[str]:
+    """Put the command that starts ranks in front, that of our own environment if it has it."""
+    if ranks == 1:
+        return command
+    launcher, *options = mpi.split()
+    own = Path(sys.executable).parent / launcher
+    return [str(own) if own.exists() else launcher, *options, "-n", str(ranks), *command]
+
+
+def _die_with_parent() -> None:
+    """Ask Linux to end this process softly when the one that started it is killed."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+@contextlib.contextmanager
+def _only_one(folder: Path) -> Iterator[None]:
+    """Wait for any other process that computes in a run's folder.
+
+    One can outlive a killed snakemake; the next snakemake then finds what it finished.
+    """
+    (folder / "work").mkdir(exist_ok=True)
+    with (folder / "lock").open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            print(f"{folder}: waiting for the process that computes it already", file=sys.stderr)
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def _watch(command: list[str], log: TextIO) -> tuple[int, str]:
+    """Run a command, pass on what it prints, and keep its last words."""
+    words: collections.deque[str] = collections.deque(maxlen=3)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        preexec_fn=_die_with_parent,
+    )
+    signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
+    assert process.stdout is not None
+    for line in process.stdout:
+        log.write(line)
+        log.flush()
+        sys.stderr.write(line)
+        sys.stderr.flush()
+        if line.strip():
+            words.append(line.strip())
+    return process.wait(), " / ".join(words)
