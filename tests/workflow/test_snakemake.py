@@ -144,9 +144,9 @@ def test_small_tube_in_3d(checkout: Path) -> None:
     summary = pd.read_csv(results / "summary.tsv", sep="\t").iloc[0]
     assert summary.grains == 2000
     assert 0.02 < summary.tube_fill_fraction < 0.7
-    # Spheres poured and shaken a little lie between loose and dense random packing, less what
-    # walls a few diameters apart cost.
-    assert 0.4 < summary.solid_fraction < 0.66
+    # Below dense random packing, 0.64; walls a few diameters apart and the hollow under the tube
+    # take up to a third of loose random packing, 0.55.
+    assert 0.36 < summary.solid_fraction < 0.64
     exports = sorted(p.suffix for p in results.glob("runs/*/exports/*"))
     assert exports.count(".vtu") == exports.count(".dump") >= 3
 
