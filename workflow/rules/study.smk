@@ -11,7 +11,10 @@ try:
 except BadInputError as error:
     sys.exit(str(error))
 if workflow.is_main_process and "--lint" not in sys.argv:
-    print(announce(PLAN, Path("results"), workflow._cores or os.cpu_count()), file=sys.stderr)
+    print(
+        announce(PLAN, Path("results"), workflow._cores or os.cpu_count()),
+        file=sys.stderr,
+    )
 
 STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"
