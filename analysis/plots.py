@@ -136,42 +136,6 @@ def draw_by_layer(snapshot: Snapshot, ax: Axes, cut_m: float | None = None) -> A
     return ax
 
 
-def draw_by_density(
-    snapshot: Snapshot,
-    apparent_density_kg_m3: Array,
-    ax: Axes,
-    limits: tuple[float, float] | None = None,
-    cut_m: float | None = None,
-) -> Axes:
-    """Draw the grains coloured by their apparent density, with a colour bar in kg/m3.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    apparent_density_kg_m3 : (n,) float64, kg/m3
-        Raw or corrected, from :func:`analysis.density.apparent_density`.
-    ax : Axes
-    limits : (float, float), kg/m3, optional
-        The 2nd and 98th percentile unless given: a few loose grains would dim all others.
-    cut_m : float, m, optional
-        As in :func:`draw_grains`.
-
-    Returns
-    -------
-    Axes
-    """
-    if limits is None:
-        finite = apparent_density_kg_m3[np.isfinite(apparent_density_kg_m3)]
-        if len(finite):
-            limits = (float(np.percentile(finite, 2.0)), float(np.percentile(finite, 98.0)))
-    draw_grains(snapshot, ax, apparent_density_kg_m3, limits=limits, cut_m=cut_m)
-    beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
-    ax.figure.colorbar(
-        ax.collections[-1], cax=beside, extend="both", label="apparent density, kg/m³"
-    )
-    return ax
-
-
 def _collection(
     snapshot: Snapshot, ax: Axes, cut_m: float | None
 ) -> tuple[EllipseCollection, NDArray[np.bool_]]:

@@ -38,7 +38,6 @@ class RefusedError(Exception):
 class Session(Protocol):
     """One scenario being computed by one engine."""
 
-    engine: str
     version: str
     grains: int
     """Grains now in the box."""

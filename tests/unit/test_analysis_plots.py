@@ -117,21 +117,11 @@ def test_by_layer(ax):
     assert legend.get_title().get_text() == "layer"
 
 
-def test_by_density(ax):
-    plots.draw_by_density(THREE, np.array([1500.0, 1600.0, 1700.0]), ax, limits=(1400.0, 1800.0))
-    assert grains(ax).get_clim() == (1400.0, 1800.0)
-    (bar,) = ax.child_axes
-    assert "kg/m³" in bar.get_ylabel()
-    other = Figure().subplots()
-    plots.draw_by_density(THREE, np.array([1500.0, 1600.0, np.nan]), other)
-    assert grains(other).get_clim() == pytest.approx((1502.0, 1598.0))
-
-
 def test_all_renders_without_a_window(tmp_path):
     figure = Figure()
     ax = figure.subplots()
     plots.draw_scene(box([0.1]), ax, 0.05)
-    plots.draw_by_density(THREE, np.array([1.0, 2.0, 3.0]), ax)
+    plots.draw_grains(THREE, ax, np.array([1.0, 2.0, 3.0]))
     empty = snapshot(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=np.int64))
     plots.draw_by_layer(empty, figure.subplots())
     figure.savefig(tmp_path / "look.png", dpi=40)

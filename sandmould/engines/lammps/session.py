@@ -63,8 +63,6 @@ def _library() -> tuple[Any, Any]:
 class LammpsSession:
     """See ``sandmould.engines.session.Session``."""
 
-    engine = "lammps"
-
     def __init__(
         self, program: Program, deck: Deck, folder: Path, log: Path, checkpoint: Path | None = None
     ) -> None:
