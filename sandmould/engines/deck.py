@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,6 +45,14 @@ def environment(dialect: str) -> jinja2.Environment:
     )
     env.filters.update(exact=exact, vector=vector)
     return env
+
+
+def dialect_hash(dialect: str) -> str:
+    """Hash of all templates of one dialect."""
+    digest = hashlib.sha256()
+    for path in sorted((TEMPLATES / dialect).glob("*.j2")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from types import FrameType
 
 from sandmould.engines import checkpoint as checkpoints
 from sandmould.engines.checkpoint import Mark
-from sandmould.engines.choosing import open_session
+from sandmould.engines.choosing import engine_of
 from sandmould.engines.guard import Guard
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.products import Cost, peak_memory_bytes
@@ -70,7 +70,7 @@ class Driver:
         outcome, detail = Outcome.FINISHED, ""
         self._begin_clocks()
         try:
-            session = open_session(
+            session = engine_of(self._scenario).open_session(
                 self._program,
                 self._folder,
                 self._work / "engine.log",

@@ -59,6 +59,18 @@ class Session(Protocol):
     def insert_layer(self, number: int) -> None:
         """Drop a planned layer from over the bed."""
 
+    def set_state(self, position_m: Array, velocity_m_s: Array, spin_rad_s: Array) -> None:
+        """Place all grains now in the box exactly, without contact history.
+
+        Meant for verification: a stage must be started after it.
+
+        Parameters
+        ----------
+        position_m, velocity_m_s : (n, d) float64, m and m/s
+            In the order of ids.
+        spin_rad_s : (n, 3) float64, rad/s
+        """
+
     def start_stage(self, stage: Stage) -> None:
         """Begin to settle or to vibrate."""
 

@@ -88,8 +88,9 @@ class Sand(Section):
         opening = np.log([p.opening_m * self.size_scale for p in self.sieve])
         passing = np.array([p.passing_fraction for p in self.sieve])
         edges = np.linspace(opening[0], opening[-1], self.size_classes + 1)
-        mass = np.diff(np.interp(edges, opening, passing))
-        diameter = np.exp((edges[1:] + edges[:-1]) / 2)
+        mass = np.diff(np.interp(edges, opening, passing)).round(12)
+        # Logarithms differ in their last digit between processors; decks must not.
+        diameter = np.array([float(f"{d:.12g}") for d in np.exp((edges[1:] + edges[:-1]) / 2)])
         keep = mass > 0
         mass, diameter = mass[keep], diameter[keep]
         count = mass / diameter**dimension

@@ -17,7 +17,7 @@ from typing import Any
 import pandas as pd
 
 from sandmould import ROOT
-from sandmould.engines.lammps.render import template_hash
+from sandmould.engines.choosing import engine_of
 from sandmould.study.expand import Run, expand, scenario_hash
 from sandmould.study.opening import open_study
 from sandmould.study.plan import planned_grain_steps
@@ -31,7 +31,9 @@ after a few collisions, so only means are compared, with margins of a few times 
 
 def study_hash(runs: list[Run]) -> str:
     """Hash of all scenarios of a study and of the templates that turn them into decks."""
-    digest = hashlib.sha256(template_hash().encode())
+    engines = {run.scenario.engine.name: engine_of(run.scenario) for run in runs}
+    hashes = [engines[name].template_hash() for name in sorted(engines)]
+    digest = hashlib.sha256("".join(hashes).encode())
     for text in sorted(scenario_hash(run.scenario) for run in runs):
         digest.update(text.encode())
     return digest.hexdigest()

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
-from sandmould.engines.choosing import engine_problem, installed_version, open_session, render
+from sandmould.engines.choosing import engine_of, engine_problem
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from sandmould.scenario.bad_input import BadInputError, Problem
@@ -133,8 +133,8 @@ def calibrated_rate(scenario: Scenario, results: Path) -> float | None:
         None when the engine could not run the calibration; the study's own runs will say why.
     """
     path = results / "calibration.json"
-    name = scenario.engine.name
-    key = f"{platform.node()} {name} {installed_version(name)} {scenario.dimension}D"
+    version = engine_of(scenario).installed_version()
+    key = f"{platform.node()} {scenario.engine.name} {version} {scenario.dimension}D"
     known: dict[str, Any] = {}
     if path.is_file():
         try:
@@ -179,9 +179,10 @@ def _measure_rate(scenario: Scenario) -> float | None:
     program = build_program(trial)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        render(program, {}, folder, "calibration", "calibration")
+        engine = engine_of(trial)
+        engine.write_deck(program, {}, folder, "calibration", "calibration")
         try:
-            session = open_session(program, folder, folder / "engine.log")
+            session = engine.open_session(program, folder, folder / "engine.log")
             session.insert_layer(1)
             session.start_stage(program.stages[0])
             begun, rest_s = time.perf_counter(), program.expected_s / 2

