@@ -24,7 +24,8 @@ class Health:
     largest_overlap_fraction: float
     """Over the smaller radius, walls included."""
     clearance_m: np.ndarray
-    """(n,) float64, m: distance of the centres from the nearest wall or block."""
+    """(n,) float64, m: distance of the centres from the nearest wall or solid, exact up
+    to the largest radius."""
 
 
 def grain_masses_kg(scenario: Scenario, snapshot: Snapshot) -> np.ndarray:
@@ -44,7 +45,9 @@ def measure_health(scenario: Scenario, snapshot: Snapshot) -> Health:
     for first, second, overlap_m in touching_pairs(snapshot.position_m, radius):
         smaller = np.minimum(radius[first], radius[second])
         largest = max(largest, float((overlap_m / smaller).max(initial=0.0)))
-    clearance = scenario.scene.clearance_m(snapshot.position_m)
+    # beyond the largest grain's reach nothing can overlap, and meshes need not be searched
+    reach_m = float(radius.max(initial=0.0))
+    clearance = scenario.scene.clearance_m(snapshot.position_m, reach_m)
     largest = max(largest, float((1 - clearance / radius).max(initial=0.0)))
     return Health(energy, float(np.sqrt(2 * energy / mass.sum())), largest, clearance)
 

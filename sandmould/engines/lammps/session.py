@@ -37,6 +37,10 @@ def refuse(scenario: Scenario) -> None:
         if obstacle.kind == "polygon":
             # Its regions lose contacts at the corners of anything but a block.
             raise RefusedError(f"obstacles.{i}.kind", "polygon", "plate or tube on engine lammps")
+    if scenario.dimension == 3 and scenario.contact.rolling_axes == "all":
+        raise RefusedError("contact.rolling_axes", "all", "tangent on engine lammps in 3D")
+    if scenario.time_step.rotational_inertia == "scaled":
+        raise RefusedError("time_step.rotational_inertia", "scaled", "physical on engine lammps")
     form = scenario.background_damping.form
     if form == "nonviscous_isotropic":
         raise RefusedError(

@@ -1,0 +1,212 @@
+"""Contact search in two stages, section 3.6: a grid sorts the grains, a list keeps near pairs.
+
+The grid is the first stage, in place of the paper's quadtree: sizes differ by less than a decade,
+and a counting sort is the cheapest there is. Grains are stored in the order of its cells, so that
+neighbours are near in memory. The second stage runs over the list of pairs at every step.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sandmould.dem.grains import Floats, Grains, Ints
+from sandmould.dem.vectors import OPTIONS, dot, like, load, load_spin, plus, store, times
+
+
+class Pairs(NamedTuple):
+    """Pairs of grains nearer than the skin; the first of a pair is the one stored earlier."""
+
+    start: Ints
+    """(n + 1,) int64: pairs of grain i are start[i] to start[i + 1]."""
+    other: NDArray[np.uint32]
+    """(p,) uint32: the second grain."""
+    touching: NDArray[np.uint8]
+    """(p,) uint8: whether the pair touched at the last step."""
+    friction: Floats
+    """(p, s) float64, N: friction on the first grain, as a tangent."""
+    rolling: Floats
+    """(p, s) float64, N m: rolling moment on the first grain."""
+
+    @classmethod
+    def none(cls, dimension: int) -> Pairs:
+        """No pair yet."""
+        history = np.zeros((0, 1 if dimension == 2 else 3))
+        start = np.zeros(1, dtype=np.int64)
+        return cls(start, np.zeros(0, np.uint32), np.zeros(0, np.uint8), history, history.copy())
+
+
+class Grid(NamedTuple):
+    """A grid over a region; grains beyond it belong to its outermost cells."""
+
+    low: Floats
+    """(d,) float64, m."""
+    counts: Ints
+    """(3,) int64: cells along the fastest, middle and slowest axis; 1 where there is none."""
+    axes: Ints
+    """(d,) int64: axis of space that is the fastest, middle, slowest; the longest last."""
+    size: float
+    """Edge of a cell, m."""
+
+
+def make_grid(low: Floats, high: Floats, size: float, grains: int) -> Grid:
+    """Lay a grid over a region, with a few cells a grain at most however wide the region is.
+
+    Parameters
+    ----------
+    low, high : (d,) float64, m
+    size : float, m
+        Least edge of a cell: the reach of the pairs to be found.
+    grains : int
+    """
+    span = np.maximum(high - low, size)
+    size = max(size, float(np.prod(span) / (4 * grains + 64)) ** (1 / len(span)))
+    axes = np.argsort(span, kind="stable")
+    counts = np.ones(3, dtype=np.int64)
+    counts[: len(span)] = np.maximum(1, span[axes] // size)
+    return Grid(np.ascontiguousarray(low), counts, axes, size)
+
+
+@njit(**OPTIONS)
+def sort_into_cells(position: Floats, grid: Grid) -> tuple[Ints, Ints]:
+    """Sort grains by cells.
+
+    Parameters
+    ----------
+    position : (n, d) float64, m
+        Finite.
+    grid : Grid
+
+    Returns
+    -------
+    order : (n,) int64
+        Grains in the order of their cells.
+    start : (c + 1,) int64
+        Where the grains of each cell begin in that order.
+    """
+    n, d = position.shape
+    cells = grid.counts[0] * grid.counts[1] * grid.counts[2]
+    cell = np.empty(n, dtype=np.int64)
+    start = np.zeros(cells + 1, dtype=np.int64)
+    for i in range(n):
+        number, stride = 0, 1
+        for a in range(d):
+            far = (position[i, grid.axes[a]] - grid.low[grid.axes[a]]) / grid.size
+            number += int(min(max(far, 0.0), grid.counts[a] - 0.5)) * stride
+            stride *= grid.counts[a]
+        cell[i] = number
+        start[number + 1] += 1
+    for c in range(cells):
+        start[c + 1] += start[c]
+    place = start[:-1].copy()
+    order = np.empty(n, dtype=np.int64)
+    for i in range(n):
+        order[place[cell[i]]] = i
+        place[cell[i]] += 1
+    return order, start
+
+
+@njit(**OPTIONS)
+def find_pairs(
+    dim: Any, position: Floats, radius: Floats, skin: float, start: Ints, grid: Grid
+) -> tuple[Ints, NDArray[np.uint32]]:
+    """List the pairs of grains whose surfaces are nearer than the skin.
+
+    Parameters
+    ----------
+    dim : tuple
+        ``PLANE`` or ``SPACE``.
+    position : (n, d) float64, m
+        In the order of the cells.
+    radius : (n,) float64, m
+    skin : float, m
+    start : (c + 1,) int64
+        Of ``sort_into_cells``.
+    grid : Grid
+
+    Returns
+    -------
+    first : (n + 1,) int64
+        Where the pairs of each grain begin.
+    other : (p,) uint32
+    """
+    n = len(position)
+    first = np.zeros(n + 1, dtype=np.int64)
+    other = np.empty(6 * n + 64, dtype=np.uint32)
+    p = 0
+    nx, ny, nz = grid.counts[0], grid.counts[1], grid.counts[2]
+    for cz in range(nz):
+        for cy in range(ny):
+            for cx in range(nx):
+                here = (cz * ny + cy) * nx + cx
+                left, right = max(cx - 1, 0), min(cx + 1, nx - 1)
+                for i in range(start[here], start[here + 1]):
+                    x, reach = load(dim, position, i), radius[i] + skin
+                    # this row from the grain on, then whole rows ahead: three cells each lie
+                    # one after the other in memory
+                    for row in range(5):
+                        if row == 0:
+                            begin, end = i + 1, start[here - cx + right + 1]
+                        else:
+                            y, z = cy + (1, -1, 0, 1)[row - 1], cz + (0, 1, 1, 1)[row - 1]
+                            if y < 0 or y >= ny or z >= nz:
+                                continue
+                            base = (z * ny + y) * nx
+                            begin, end = start[base + left], start[base + right + 1]
+                        if p + end - begin > len(other):
+                            longer = np.empty(2 * (p + end - begin), dtype=np.uint32)
+                            longer[:p] = other[:p]
+                            other = longer
+                        for j in range(begin, end):
+                            apart = plus(load(dim, position, j), -1.0, x)
+                            far = reach + radius[j]
+                            if dot(apart, apart) < far * far:
+                                other[p] = j
+                                p += 1
+                    first[i + 1] = p
+    return first, other[:p].copy()
+
+
+@njit(**OPTIONS)
+def carry_history(dim: Any, old: Pairs, place: Ints, new: Pairs) -> None:
+    """Copy friction and rolling of touching pairs from an old list of pairs into a new one.
+
+    Parameters
+    ----------
+    dim : tuple
+        ``PLANE`` or ``SPACE``.
+    old : Pairs
+    place : (n,) int64
+        Where each grain of the old order is stored now.
+    new : Pairs
+        Written to.
+    """
+    for i in range(len(old.start) - 1):
+        for k in range(old.start[i], old.start[i + 1]):
+            if old.touching[k]:
+                a, b = place[i], place[old.other[k]]
+                swapped = a > b
+                if swapped:
+                    a, b = b, a
+                for q in range(new.start[a], new.start[a + 1]):
+                    if new.other[q] == b:
+                        new.touching[q] = 1
+                        friction = load_spin(dim, old.friction, k)
+                        rolling = load_spin(dim, old.rolling, k)
+                        # what acts on the other grain is opposite; so is the tangent of 2D
+                        turned_round = swapped and len(dim) == 3
+                        store(times(friction, -1.0 if turned_round else 1.0), new.friction, q)
+                        store(times(rolling, -1.0 if swapped else 1.0), new.rolling, q)
+                        break
+
+
+def list_pairs(grains: Grains, start: Ints, grid: Grid, skin: float) -> Pairs:
+    """List near pairs of sorted grains, without history."""
+    d = grains.position.shape[1]
+    first, other = find_pairs(like(d), grains.position, grains.radius, skin, start, grid)
+    history = np.zeros((len(other), grains.spin.shape[1]))
+    touching = np.zeros(len(other), dtype=np.uint8)
+    return Pairs(first, other, touching, history, history.copy())

@@ -1,0 +1,300 @@
+"""The reference solver: grains, surfaces and their laws, advanced in time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+
+from sandmould.dem.broad_phase import Candidates, find_candidates
+from sandmould.dem.grains import Floats, Grains, Ints
+from sandmould.dem.motion import kick
+from sandmould.dem.neighbours import (
+    Pairs,
+    carry_history,
+    list_pairs,
+    make_grid,
+    sort_into_cells,
+)
+from sandmould.dem.pairs import split
+from sandmould.dem.steps import (
+    LIST_IS_OLD,
+    NOT_A_NUMBER,
+    Moving,
+    Scene,
+    Walls,
+    advance,
+    advance_threaded,
+    find_forces,
+)
+from sandmould.dem.surfaces import SurfaceArrays, Surfaces
+from sandmould.dem.vectors import like
+from sandmould.dem.wall_history import WallHistory, new_history
+from sandmould.dem.wall_history import carry_history as carry_wall_history
+
+
+class NotANumberError(ArithmeticError):
+    """A velocity grew beyond all bounds."""
+
+
+class Solver:
+    """Grains among surfaces under section 3 of the paper.
+
+    The state between two calls of ``advance`` is that of the central differences: positions and
+    contact forces at a step, velocities and spins half a step before it.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        surfaces: Surfaces,
+        skin_m: float,
+        threads: int = 1,
+        orientations: bool = False,
+    ) -> None:
+        """Set up a scene without grains.
+
+        Parameters
+        ----------
+        scene : Scene
+        surfaces : Surfaces
+        skin_m : float
+            Pairs nearer than this are listed; the list serves until a grain has gone half of it.
+        threads : int
+            At most numba's own number; results do not depend on it.
+        orientations : bool
+            Whether ``orientation`` is kept: angles (n, 1) in 2D, matrices (n, 9) in 3D.
+        """
+        self.scene = scene
+        self.surfaces = surfaces
+        self.dimension = surfaces.dimension
+        self.steps = 0
+        """Steps done."""
+        self.lists = 0
+        """How often pairs were listed."""
+        self._dim = like(self.dimension)
+        self._skin = skin_m
+        self._threads = min(threads, numba.get_num_threads())
+        self._orientations = orientations
+        self._moving = self._empty()
+
+    def _empty(self) -> Moving:
+        d = self.dimension
+        grains, pairs = Grains.none(d), Pairs.none(d)
+        none = np.zeros(0, dtype=np.int64)
+        candidates = Candidates(none, np.zeros(1, dtype=np.int64), none.copy())
+        chunks = split(grains, pairs)
+        walls = self._walls(chunks.bound, candidates, new_history(self._dim, 0))
+        return Moving(grains, pairs, chunks, walls, self._upright(0), np.zeros((0, d)), np.zeros(1))
+
+    def _upright(self, n: int) -> Floats:
+        """Orientations of grains not turned yet."""
+        if not self._orientations:
+            return np.zeros((0, 1 if self.dimension == 2 else 9))
+        return np.tile(np.zeros(1) if self.dimension == 2 else np.eye(3).ravel(), (n, 1))
+
+    def _walls(self, bound: Ints, candidates: Candidates, history: WallHistory) -> Walls:
+        arrays = self.surfaces.arrays
+        loads = np.zeros((len(bound) - 1, *arrays.vertices.shape))
+        first_row = np.searchsorted(candidates.rows, bound)
+        return Walls(arrays, candidates, history, first_row, loads, arrays.vertices.copy())
+
+    @property
+    def grains(self) -> Grains:
+        """All grains, in the order they are stored in."""
+        return self._moving.grains
+
+    @property
+    def pairs(self) -> Pairs:
+        """Near pairs of grains and their contact history."""
+        return self._moving.pairs
+
+    @property
+    def orientation(self) -> Floats:
+        """Orientations of the grains, eqs. (8) and (12)."""
+        return self._moving.orientation
+
+    def add(self, grains: Grains) -> None:
+        """Add grains that touch nothing; their velocities belong to the time of their positions."""
+        n = len(grains.id)
+        scene = self.scene
+        kick(self._dim, 0, n, grains, scene.gravity, scene.damping, -0.5 * scene.dt)
+        moving = self._moving
+        start = np.concatenate([moving.pairs.start, np.full(n, moving.pairs.start[-1])])
+        self._moving = moving._replace(
+            grains=moving.grains.joined(grains),
+            pairs=moving.pairs._replace(start=start),
+            orientation=np.concatenate([moving.orientation, self._upright(n)]),
+        )
+        self._list(np.zeros(self.dimension))
+
+    def place(self, position_m: Floats, velocity_m_s: Floats, spin_rad_s: Floats) -> None:
+        """Put all grains where and how they are given, in the order of ids, without history.
+
+        Contacts that the places imply are felt from the first step on.
+        """
+        order = np.argsort(self.grains.id)
+        same = self.grains.ordered(order)._replace(
+            position=position_m.copy(),
+            velocity=velocity_m_s.copy(),
+            spin=spin_rad_s.copy(),
+            force=np.zeros_like(position_m),
+            moment=np.zeros_like(spin_rad_s),
+        )
+        self._moving = self._empty()._replace(grains=same, orientation=self._upright(len(order)))
+        start = np.zeros(len(order) + 1, dtype=np.int64)
+        self._moving = self._moving._replace(pairs=self.pairs._replace(start=start))
+        self._list(np.zeros(self.dimension))
+        find_forces(self._dim, self.scene, self._moving)
+        self._moving.walls.loads[:] = 0.0
+        scene = self.scene
+        kick(self._dim, 0, len(order), self.grains, scene.gravity, scene.damping, -0.5 * scene.dt)
+
+    def _list(self, shift: Floats) -> None:
+        """Sort the grains by place and list what is near what, history carried over."""
+        old = self._moving
+        n = len(old.grains.id)
+        size = 2 * float(old.grains.radius.max()) + self._skin
+        position = old.grains.position
+        grid = make_grid(position.min(axis=0), position.max(axis=0), size, n)
+        order, start = sort_into_cells(position, grid)
+        place = np.empty_like(order)
+        place[order] = np.arange(n)
+        grains = old.grains.ordered(order)
+        pairs = list_pairs(grains, start, grid, self._skin)
+        carry_history(self._dim, old.pairs, place, pairs)
+        chunks = split(grains, pairs)
+        candidates = find_candidates(
+            self._dim,
+            grains.position,
+            grains.radius,
+            self._skin,
+            self.surfaces.arrays,
+            tuple(shift.tolist()),
+        )
+        history = carry_wall_history(
+            self._dim,
+            old.grains.id[old.walls.candidates.rows],
+            old.walls.history,
+            grains.id[candidates.rows],
+        )
+        walls = self._walls(chunks.bound, candidates, history)
+        walls.loads[0] = old.walls.loads.sum(axis=0)
+        orientation = old.orientation[order] if self._orientations else old.orientation
+        self._moving = Moving(
+            grains,
+            pairs,
+            chunks,
+            walls,
+            orientation,
+            grains.position - shift,
+            np.array([0.5 * self._skin]),
+        )
+        self.lists += 1
+
+    def advance(self, displacement_m: Floats) -> None:
+        """Compute as many steps as displacements are given, less two.
+
+        Parameters
+        ----------
+        displacement_m : (steps + 2,) float64, m
+            Of the box along its direction, from one step before now to one step beyond the last.
+
+        Raises
+        ------
+        NotANumberError
+        """
+        steps, done, drifted = len(displacement_m) - 2, 0, False
+        loop = advance
+        if self._threads > 1:
+            loop = advance_threaded
+            numba.set_num_threads(self._threads)
+        while done < steps:
+            more, state = loop(
+                self._dim,
+                steps - done,
+                drifted,
+                self.scene,
+                self._moving,
+                displacement_m[done:],
+                0.5 * self._skin,
+            )
+            done += more
+            self.steps += more
+            if state == NOT_A_NUMBER:
+                raise NotANumberError(self.steps)
+            drifted = state == LIST_IS_OLD
+            if drifted:
+                shift = 0.0 if self.scene.box_frame else displacement_m[done + 2]
+                self._list(shift * np.array(self.scene.direction))
+
+    def whole_step_velocities(self, acceleration_m_s2: float = 0.0) -> tuple[Floats, Floats]:
+        """Velocities and spins at the time of the positions.
+
+        Parameters
+        ----------
+        acceleration_m_s2 : float
+            Of the box along its direction now, zero in the laboratory frame.
+
+        Returns
+        -------
+        velocity : (n, d) float64, m/s
+        spin : (n, s) float64, rad/s
+        """
+        scene = self.scene
+        copied = self.grains._replace(
+            velocity=self.grains.velocity.copy(), spin=self.grains.spin.copy()
+        )
+        body = tuple(
+            g - acceleration_m_s2 * e for g, e in zip(scene.gravity, scene.direction, strict=True)
+        )
+        kick(self._dim, 0, len(copied.id), copied, body, scene.damping, 0.5 * scene.dt)
+        return copied.velocity, copied.spin
+
+    def mean_loads(self, steps: int) -> dict[str, Floats]:
+        """Mean force of the grains on each surface since the last asking, (d,) float64, N."""
+        loads = self._moving.walls.loads
+        mean = self.surfaces.forces(loads.sum(axis=0) / steps)
+        loads[:] = 0.0
+        return mean
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything that a continued run needs to go on bit for bit."""
+        parts: dict[str, Any] = {
+            "grains": self._moving.grains,
+            "pairs": self._moving.pairs,
+            "candidates": self._moving.walls.candidates,
+            "history": self._moving.walls.history,
+            "surfaces": self.surfaces.arrays,
+        }
+        arrays = {
+            f"{name}_{field}": array
+            for name, part in parts.items()
+            for field, array in part._asdict().items()
+        }
+        moving = self._moving
+        return arrays | {
+            "orientation": moving.orientation,
+            "listed": moving.listed,
+            "reach": moving.reach,
+            "listed_vertices": moving.walls.listed,
+            "steps": np.array(self.steps),
+        }
+
+    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from what ``state`` gave, with no loads collected yet."""
+
+        def part(kind: Any, name: str) -> Any:
+            return kind(*(arrays[f"{name}_{field}"] for field in kind._fields))
+
+        self.surfaces.arrays = part(SurfaceArrays, "surfaces")
+        grains, pairs = part(Grains, "grains"), part(Pairs, "pairs")
+        chunks = split(grains, pairs)
+        walls = self._walls(
+            chunks.bound, part(Candidates, "candidates"), part(WallHistory, "history")
+        )._replace(listed=arrays["listed_vertices"])
+        self._moving = Moving(
+            grains, pairs, chunks, walls, arrays["orientation"], arrays["listed"], arrays["reach"]
+        )
+        self.steps = int(arrays["steps"])

@@ -1,0 +1,225 @@
+"""Contacts of grains with surfaces, without bumps or double contacts at joints.
+
+Of all parts within a grain the nearest is touched first. Each contact then covers those that do
+not show in front of its tangent plane, which is all of a convex body, and those whose normals
+hardly differ from its own. An edge that belongs to a nearer part too is no contact either. What is
+left are the contacts of a concave corner.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sandmould.dem.broad_phase import Candidates
+from sandmould.dem.contact_law import Law, contact
+from sandmould.dem.nearest_point import FAR, nearest
+from sandmould.dem.surfaces import SurfaceArrays
+from sandmould.dem.vectors import (
+    OPTIONS,
+    add_to,
+    dot,
+    load,
+    load_spin,
+    no_spin,
+    no_vector,
+    plus,
+    store,
+    times,
+)
+from sandmould.dem.wall_history import WallHistory, recall, slots, swap
+
+ONE_FACE = math.cos(math.radians(10.0))
+"""Contacts with normals nearer than this are one: facets of a curved wall."""
+EDGE_SHOWS = 1e-3
+"""Radii by which an edge must stand out of a face to be touched beside it: meshes are rounded."""
+_MOST = 32
+_WAITS, _COVERED, _SEEN = 0, 1, 2
+
+
+@njit(**OPTIONS)
+def _next(
+    distance: NDArray[np.float64], inside: NDArray[np.bool_], state: NDArray[np.int8], found: int
+) -> int:
+    """Give the nearest part still waiting, or -1; of two equally near the one touched inside."""
+    best, least = -1, FAR
+    for i in range(found):
+        if state[i] == _WAITS and (
+            distance[i] < least or (distance[i] == least and inside[i] and not inside[best])
+        ):
+            best, least = i, distance[i]
+    return best
+
+
+@njit(**OPTIONS)
+def _cover(
+    like: Any,
+    distance: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    inside: NDArray[np.bool_],
+    state: NDArray[np.int8],
+    found: int,
+    kept: int,
+    r: float,
+) -> None:
+    """Rule out all that a contact covers."""
+    n, near = load(like, normal, kept), distance[kept]
+    for i in range(found):
+        if state[i] == _WAITS:
+            cosine = dot(n, load(like, normal, i))
+            in_front = near - distance[i] * cosine
+            if cosine > ONE_FACE or in_front <= (0.0 if inside[i] else EDGE_SHOWS * r):
+                state[i] = _COVERED
+
+
+@njit(**OPTIONS)
+def press_on_surfaces(
+    like: Any,
+    first_row: int,
+    last_row: int,
+    candidates: Candidates,
+    position: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    spin: NDArray[np.float64],
+    radius: NDArray[np.float64],
+    mass: NDArray[np.float64],
+    force: NDArray[np.float64],
+    moment: NDArray[np.float64],
+    arrays: SurfaceArrays,
+    shift: Any,
+    shift_velocity: Any,
+    law: Law,
+    dt: float,
+    keep: bool,
+    history: WallHistory,
+    loads: NDArray[np.float64],
+) -> None:
+    """Add the forces of the surfaces to grains, and their reactions to the loads on vertices.
+
+    Parameters
+    ----------
+    like : tuple of d floats
+    first_row, last_row : int
+        Rows first_row ... last_row - 1 of the candidates: several threads take rows of their own.
+    candidates : Candidates
+    position, velocity : (n, d or 3) float64, m and m/s
+    spin : (n, 1 or 3) float64, rad/s
+    radius, mass : (n,) float64, m and kg
+    force, moment : (n, d or 3) and (n, 1 or 3) float64, N and N m
+        Added to.
+    arrays : SurfaceArrays
+    shift, shift_velocity : tuple of d floats, m and m/s
+        Displacement and velocity of the box.
+    law : Law
+        Of grains against surfaces.
+    dt : float, s
+    keep : bool
+        Whether this step's friction and rolling moments are kept for the next one; without it
+        the forces are those of the memory as it is.
+    history : WallHistory
+        Row by row that of the candidates.
+    loads : (nv, d) float64, N
+        Force of the grains on the vertices, added to, eq. (56).
+    """
+    # Names of their own: taking an array out of a tuple inside the loop counts references.
+    rows, start, part = candidates.rows, candidates.start, candidates.part
+    vertices, vertex_velocity = arrays.vertices, arrays.vertex_velocity
+    planes, shape, corner = arrays.planes, arrays.shape, arrays.corner
+    slots_used, slot_normal = history.used, history.normal
+    slot_friction, slot_rolling = history.friction, history.rolling
+    # Scratch: what one grain touches.
+    d, n_slots = len(like), slots(like)
+    f_distance, f_part = np.empty(_MOST), np.empty(_MOST, dtype=np.int64)
+    f_normal, f_weights = np.empty((_MOST, d)), np.empty((_MOST, d))
+    f_inside, f_state = np.empty(_MOST, dtype=np.bool_), np.empty(_MOST, dtype=np.int8)
+    lapse = dt if keep else 0.0
+    for row in range(first_row, last_row):
+        i = rows[row]
+        r = radius[i]
+        x = plus(load(like, position, i), -1.0, shift)
+        found = 0
+        for k in range(start[row], start[row + 1]):
+            distance, n, weights, inside = nearest(
+                like, vertices, planes, shape, corner, part[k], x, r
+            )
+            if distance >= r:
+                continue
+            c = found
+            if found < _MOST:
+                found += 1
+            else:
+                # Of too many parts the nearest count.
+                c = int(np.argmax(f_distance))
+                if distance >= f_distance[c]:
+                    continue
+            f_distance[c], f_part[c], f_inside[c] = distance, part[k], inside
+            f_state[c] = _WAITS
+            store(n, f_normal, c)
+            store(weights, f_weights, c)
+        old, base = slots_used[row], row * n_slots
+        if found == 0:
+            if keep and old:
+                slots_used[row] = 0
+            continue
+        speed = plus(load(like, velocity, i), -1.0, shift_velocity)
+        w = load_spin(like, spin, i)
+        total, turning = no_vector(like), no_spin(like)
+        contacts = taken = 0
+        while contacts < n_slots:
+            c = _next(f_distance, f_inside, f_state, found) if found > 1 else 0
+            if c < 0:
+                break
+            n, distance, weights = load(like, f_normal, c), f_distance[c], load(like, f_weights, c)
+            f_state[c] = _SEEN
+            if contacts and not f_inside[c]:
+                # The edge of a concave joint is no contact: a nearer part goes on from there.
+                edge = plus(x, distance, n)
+                joined = False
+                for k in range(found):
+                    if k != c and f_state[k] != _WAITS and f_distance[k] <= distance:
+                        gap = nearest(like, vertices, planes, shape, corner, f_part[k], edge, r)[0]
+                        joined = joined or abs(gap) <= EDGE_SHOWS * r
+                if joined:
+                    continue
+            v = times(speed, -1.0)
+            for j in range(d):
+                v = plus(v, weights[j], load(like, vertex_velocity, corner[f_part[c], j]))
+            friction, rolling = no_spin(like), no_spin(like)
+            # Slots before this one are taken: no second contact may have them too.
+            slot = base + taken
+            k = recall(like, slot_normal, slot, base + old, n)
+            if k >= 0:
+                if k > slot:
+                    swap(like, slot_normal, slot_friction, slot_rolling, k, slot)
+                friction = load_spin(like, slot_friction, slot)
+                rolling = load_spin(like, slot_rolling, slot)
+                taken += 1
+            elif keep:
+                if taken < old < n_slots:
+                    swap(like, slot_normal, slot_friction, slot_rolling, base + old, slot)
+                    old += 1
+                taken += 1
+            on_grain, moment_1, _, friction, rolling, _ = contact(
+                n, r - distance, v, w, no_spin(like), max(distance, 0.0), 0.0,
+                mass[i], r, r, law, lapse, friction, rolling,
+            )  # fmt: skip
+            total = plus(total, 1.0, on_grain)
+            turning = plus(turning, 1.0, moment_1)
+            for j in range(d):
+                add_to(on_grain, -weights[j], loads, corner[f_part[c], j])
+            if keep:
+                store(n, slot_normal, slot)
+                store(friction, slot_friction, slot)
+                store(rolling, slot_rolling, slot)
+            contacts += 1
+            if found == 1:
+                break
+            _cover(like, f_distance, f_normal, f_inside, f_state, found, c, r)
+        if keep:
+            slots_used[row] = taken
+        add_to(total, 1.0, force, i)
+        add_to(turning, 1.0, moment, i)

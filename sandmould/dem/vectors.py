@@ -1,0 +1,261 @@
+"""Vectors as tuples in compiled code: two or three components, the same names for both.
+
+A spin has one component in 2D and three in 3D. What lies in the tangent plane of a contact is one
+number in 2D, along t = (-n_y, n_x), and a vector in 3D; the functions on tangents hide that.
+Compiled code picks the version by the length of its first tuple, so neither pays for the other.
+These functions exist in compiled code alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from numba.extending import overload, register_jitable
+
+OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "nogil": True,
+    "fastmath": {"contract", "nsz"},
+    "error_model": "numpy",
+}
+"""How every kernel is compiled: fused multiply-add allowed, no other change of the arithmetic."""
+INLINED = OPTIONS | {"forceinline": True}
+"""For functions called for every contact: their many arguments stay in registers."""
+PLANE = (0.0, 0.0)
+"""Pass as ``like`` for 2D."""
+SPACE = (0.0, 0.0, 0.0)
+"""Pass as ``like`` for 3D."""
+
+
+def like(dimension: int) -> tuple[float, ...]:
+    """Tuple whose length tells compiled code the dimension."""
+    return PLANE if dimension == 2 else SPACE
+
+
+def _by_length(name: str, doc: str, **versions: Callable[..., Any]) -> Any:
+    """Make a function of compiled code out of its versions for one, two or three components."""
+
+    def declared(*args: Any) -> Any:
+        raise TypeError(f"{name} works in compiled code alone")
+
+    declared.__name__, declared.__doc__ = name, doc
+
+    @overload(declared, strict=False)
+    def choose(first: Any, *others: Any) -> Callable[..., Any] | None:
+        return versions.get(("one", "two", "three")[len(first) - 1])
+
+    return declared
+
+
+dot = _by_length(
+    "dot",
+    "Scalar product.",
+    one=lambda a, b: a[0] * b[0],
+    two=lambda a, b: a[0] * b[0] + a[1] * b[1],
+    three=lambda a, b: a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
+)
+plus = _by_length(
+    "plus",
+    "a + s b, called as plus(a, s, b).",
+    one=lambda a, s, b: (a[0] + s * b[0],),
+    two=lambda a, s, b: (a[0] + s * b[0], a[1] + s * b[1]),
+    three=lambda a, s, b: (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]),
+)
+times = _by_length(
+    "times",
+    "s a, called as times(a, s).",
+    one=lambda a, s: (s * a[0],),
+    two=lambda a, s: (s * a[0], s * a[1]),
+    three=lambda a, s: (s * a[0], s * a[1], s * a[2]),
+)
+load = _by_length(
+    "load",
+    "Row i of an array of vectors: load(like, array, i).",
+    two=lambda like, a, i: (a[i, 0], a[i, 1]),
+    three=lambda like, a, i: (a[i, 0], a[i, 1], a[i, 2]),
+)
+load_spin = _by_length(
+    "load_spin",
+    "Row i of an array of spins, moments or tangents: load_spin(like, array, i).\n\n"
+    "In 2D the last component, so that arrays of three serve too.",
+    two=lambda like, a, i: (a[i, a.shape[1] - 1],),
+    three=lambda like, a, i: (a[i, 0], a[i, 1], a[i, 2]),
+)
+no_vector = _by_length(
+    "no_vector",
+    "Vector of zeros: no_vector(like).",
+    two=lambda like: (0.0, 0.0),
+    three=lambda like: (0.0, 0.0, 0.0),
+)
+no_spin = _by_length(
+    "no_spin",
+    "Spin, moment or tangent of zeros: no_spin(like).",
+    two=lambda like: (0.0,),
+    three=lambda like: (0.0, 0.0, 0.0),
+)
+
+
+def _store_1(v: Any, a: Any, i: Any) -> None:
+    a[i, a.shape[1] - 1] = v[0]
+
+
+def _store_2(v: Any, a: Any, i: Any) -> None:
+    a[i, 0] = v[0]
+    a[i, 1] = v[1]
+
+
+def _store_3(v: Any, a: Any, i: Any) -> None:
+    a[i, 0] = v[0]
+    a[i, 1] = v[1]
+    a[i, 2] = v[2]
+
+
+store = _by_length(
+    "store",
+    "Write a vector to row i, a spin in 2D to the last component: store(v, array, i).",
+    one=_store_1,
+    two=_store_2,
+    three=_store_3,
+)
+
+
+def _add_1(v: Any, s: Any, a: Any, i: Any) -> None:
+    a[i, a.shape[1] - 1] += s * v[0]
+
+
+def _add_2(v: Any, s: Any, a: Any, i: Any) -> None:
+    a[i, 0] += s * v[0]
+    a[i, 1] += s * v[1]
+
+
+def _add_3(v: Any, s: Any, a: Any, i: Any) -> None:
+    a[i, 0] += s * v[0]
+    a[i, 1] += s * v[1]
+    a[i, 2] += s * v[2]
+
+
+add_to = _by_length(
+    "add_to",
+    "Add s v to row i, a spin in 2D to the last component: add_to(v, s, array, i).",
+    one=_add_1,
+    two=_add_2,
+    three=_add_3,
+)
+tangent = _by_length(
+    "tangent",
+    "Part of v in the tangent plane of n: tangent(n, v), eq. (22) with its missing factor n.",
+    two=lambda n, v: (n[0] * v[1] - n[1] * v[0],),
+    three=lambda n, v: plus(v, -dot(n, v), n),
+)
+in_space = _by_length(
+    "in_space",
+    "A tangent as a vector: in_space(n, t).",
+    two=lambda n, t: (-n[1] * t[0], n[0] * t[0]),
+    three=lambda n, t: t,
+)
+spin_slip = _by_length(
+    "spin_slip",
+    "Tangent w x n, the velocity at the end of a unit arm along n: spin_slip(n, w).",
+    two=lambda n, w: (w[0],),
+    three=lambda n, w: (
+        w[1] * n[2] - w[2] * n[1],
+        w[2] * n[0] - w[0] * n[2],
+        w[0] * n[1] - w[1] * n[0],
+    ),
+)
+tangent_moment = _by_length(
+    "tangent_moment",
+    "Moment n x t of a tangent force at the end of a unit arm along n: tangent_moment(n, t).",
+    two=lambda n, t: (t[0],),
+    three=lambda n, t: (
+        n[1] * t[2] - n[2] * t[1],
+        n[2] * t[0] - n[0] * t[2],
+        n[0] * t[1] - n[1] * t[0],
+    ),
+)
+
+
+turned = _by_length(
+    "turned",
+    "The tangent t of the last step in the plane of n: turned(n, t).\n\n"
+    "Its length falls by the square of the angle turned in a step, some 1e-9 of it.",
+    two=lambda n, t: t,
+    three=lambda n, t: plus(t, -dot(n, t), n),
+)
+rolling_part = _by_length(
+    "rolling_part",
+    "Part of a relative spin that rolls: rolling_part(n, w, twist).\n\n"
+    "In 3D the spin about n is left out unless twist is resisted too.",
+    two=lambda n, w, twist: w,
+    three=lambda n, w, twist: w if twist else plus(w, -dot(n, w), n),
+)
+turned_moment = _by_length(
+    "turned_moment",
+    "Rolling moment of the step before, turned with the contact: turned_moment(n, m, twist).",
+    two=lambda n, m, twist: m,
+    three=lambda n, m, twist: m if twist else turned(n, m),
+)
+spin_cross = _by_length(
+    "spin_cross",
+    "w x arm as a vector: spin_cross(arm, w).",
+    two=lambda arm, w: (-w[0] * arm[1], w[0] * arm[0]),
+    three=lambda arm, w: (
+        w[1] * arm[2] - w[2] * arm[1],
+        w[2] * arm[0] - w[0] * arm[2],
+        w[0] * arm[1] - w[1] * arm[0],
+    ),
+)
+
+
+@register_jitable
+def _one_component(action: float, rate: float, alpha: float) -> float:
+    return action - alpha * abs(action) * (math.copysign(1.0, rate) if rate != 0.0 else 0.0)
+
+
+damped_by_component = _by_length(
+    "damped_by_component",
+    "(39) and (38) component by component: damped_by_component(action, rate, alpha).",
+    one=lambda a, v, alpha: (_one_component(a[0], v[0], alpha),),
+    two=lambda a, v, alpha: (
+        _one_component(a[0], v[0], alpha),
+        _one_component(a[1], v[1], alpha),
+    ),
+    three=lambda a, v, alpha: (
+        _one_component(a[0], v[0], alpha),
+        _one_component(a[1], v[1], alpha),
+        _one_component(a[2], v[2], alpha),
+    ),
+)
+
+
+def _rotate_1(angle: Any, orientation: Any, i: Any) -> None:
+    orientation[i, 0] += angle[0]
+
+
+def _rotate_3(angle: Any, orientation: Any, i: Any) -> None:
+    size2 = angle[0] ** 2 + angle[1] ** 2 + angle[2] ** 2
+    size = math.sqrt(size2)
+    a = math.sin(size) / size if size > 0.0 else 1.0
+    b = (1.0 - math.cos(size)) / size2 if size > 1e-6 else 0.5
+    c = math.cos(size)
+    for column in range(3):
+        x, y, z = (
+            orientation[i, column],
+            orientation[i, 3 + column],
+            orientation[i, 6 + column],
+        )
+        along = b * (angle[0] * x + angle[1] * y + angle[2] * z)
+        orientation[i, column] = c * x + a * (angle[1] * z - angle[2] * y) + along * angle[0]
+        orientation[i, 3 + column] = c * y + a * (angle[2] * x - angle[0] * z) + along * angle[1]
+        orientation[i, 6 + column] = c * z + a * (angle[0] * y - angle[1] * x) + along * angle[2]
+
+
+rotate = _by_length(
+    "rotate",
+    "Turn row i of orientations by a small rotation: rotate(angle, orientation, i).\n\n"
+    "An angle in 2D, eq. (8); a rotation matrix row by row in 3D, eqs. (10)-(13).",
+    one=_rotate_1,
+    three=_rotate_3,
+)

@@ -1,0 +1,112 @@
+"""What the contacts of a grain with surfaces remember, told apart by their normals.
+
+A grain that crosses a joint touches another facet with nearly the same normal: the friction goes
+on. So the memory belongs to the grain and a direction, not to a facet.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sandmould.dem.vectors import OPTIONS, dot, load, load_spin, no_spin, store
+
+SAME_CONTACT = math.cos(math.radians(30.0))
+"""A contact takes over the memory of one whose normal was nearer than this."""
+
+
+class WallHistory(NamedTuple):
+    """Memory of m grains; slot k of row i lies in row i slots + k of the last three."""
+
+    used: NDArray[np.int64]
+    """(m,) int64: slots in use."""
+    normal: NDArray[np.float64]
+    """(m slots, d) float64: normal from the grain to the surface."""
+    friction: NDArray[np.float64]
+    """(m slots, 1 or 3) float64, N: friction on the grain as a tangent."""
+    rolling: NDArray[np.float64]
+    """(m slots, 1 or 3) float64, N m: rolling moment on the grain."""
+
+
+@njit(**OPTIONS)
+def slots(like: Any) -> int:
+    """Contacts with surfaces that a grain can have: 4 in 2D, 6 in 3D."""
+    return 2 * len(like)
+
+
+@njit(**OPTIONS)
+def recall(like: Any, normal: NDArray[np.float64], first: int, last: int, n: Any) -> int:
+    """Find the slot among first ... last - 1 whose normal is nearest to n, or -1."""
+    best, largest = -1, SAME_CONTACT
+    for k in range(first, last):
+        cosine = dot(n, load(like, normal, k))
+        if cosine > largest:
+            best, largest = k, cosine
+    return best
+
+
+@njit(**OPTIONS)
+def swap(
+    like: Any,
+    normal: NDArray[np.float64],
+    friction: NDArray[np.float64],
+    rolling: NDArray[np.float64],
+    a: int,
+    b: int,
+) -> None:
+    """Exchange two slots."""
+    n, t, m = load(like, normal, a), load_spin(like, friction, a), load_spin(like, rolling, a)
+    store(load(like, normal, b), normal, a)
+    store(load_spin(like, friction, b), friction, a)
+    store(load_spin(like, rolling, b), rolling, a)
+    store(n, normal, b)
+    store(t, friction, b)
+    store(m, rolling, b)
+
+
+@njit(**OPTIONS)
+def new_history(like: Any, m: int) -> WallHistory:
+    """Empty memory of m grains."""
+    rows = m * slots(like)
+    return WallHistory(
+        np.zeros(m, dtype=np.int64),
+        np.zeros((rows, len(like))),
+        np.zeros((rows, len(no_spin(like)))),
+        np.zeros((rows, len(no_spin(like)))),
+    )
+
+
+@njit(**OPTIONS)
+def carry_history(
+    like: Any, old_ids: NDArray[np.int64], old: WallHistory, new_ids: NDArray[np.int64]
+) -> WallHistory:
+    """Memory in the order of new rows.
+
+    Parameters
+    ----------
+    like : tuple of d floats
+    old_ids, new_ids : (m,) int64
+        Which grain, by an identity that outlives sorting, each row stands for; not negative.
+    old : WallHistory
+        In the order of the old rows.
+    """
+    new = new_history(like, len(new_ids))
+    if len(old_ids) == 0:
+        return new
+    row_of = np.full(old_ids.max() + 1, -1, dtype=np.int64)
+    for row in range(len(old_ids)):
+        row_of[old_ids[row]] = row
+    n = slots(like)
+    for row in range(len(new_ids)):
+        found = row_of[new_ids[row]] if new_ids[row] < len(row_of) else -1
+        if found >= 0:
+            new.used[row] = old.used[found]
+            for k in range(old.used[found]):
+                new.normal[row * n + k] = old.normal[found * n + k]
+                new.friction[row * n + k] = old.friction[found * n + k]
+                new.rolling[row * n + k] = old.rolling[found * n + k]
+    return new

@@ -1,0 +1,57 @@
+"""Where the moving box is, in a computation in the laboratory frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sandmould.engines.program import Stage
+from sandmould.scenario.geometry import Array
+from sandmould.scenario.scenario import Scenario
+
+
+def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
+    """Displacement of the box along its direction at some steps of a stage.
+
+    Parameters
+    ----------
+    stage : Stage
+    first : int
+        First step, counted from the stage's beginning.
+    count : int
+    step_s : float
+
+    Returns
+    -------
+    (count,) float64, m
+        The motion starts one step into the stage, as in the decks.
+    """
+    if stage.vibration is None:
+        return np.zeros(count)
+    times = (np.arange(first, first + count) - 1) * step_s
+    return np.array([stage.vibration.displacement_at(t) for t in times.tolist()])
+
+
+def box_motion(scenario: Scenario, stage: Stage, steps: int, step_s: float) -> tuple[Array, Array]:
+    """Displacement (d,) in m and velocity (d,) in m/s of the walls, zero in the box frame.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    stage : Stage
+    steps : int
+        Steps since the stage began.
+    step_s : float
+
+    Notes
+    -----
+    The motion starts one step into the stage, as in the decks; the velocity is that of the
+    discrete motion, half a step to either side.
+    """
+    d = scenario.dimension
+    vibration = stage.vibration
+    if scenario.frame == "box" or vibration is None:
+        return np.zeros(d), np.zeros(d)
+    t = (steps - 1) * step_s
+    direction = np.array(vibration.unit_direction(d))
+    after, before = vibration.displacement_at(t + step_s), vibration.displacement_at(t - step_s)
+    return vibration.displacement_at(t) * direction, (after - before) / (2 * step_s) * direction

@@ -1,0 +1,99 @@
+"""What the decks of all dialects say in the same words: numbers, sizes, the simulation box."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from sandmould.engines.deck import exact
+from sandmould.engines.program import Program, Stage
+from sandmould.scenario.placement import predicted_bed_height_m
+from sandmould.scenario.scenario import Scenario
+
+
+class Lines:
+    """Numbers as lines of a deck: name, value, unit, meaning and source."""
+
+    def __init__(self, scenario: Scenario, sources: Mapping[str, str]) -> None:
+        self.scenario = scenario
+        self.sources = sources
+
+    def source(self, key: str) -> str:
+        """Where a key's value came from, or the keys below or above it."""
+        if key in self.sources:
+            return self.sources[key]
+        below = {v for k, v in self.sources.items() if k.startswith(key + ".")}
+        if below:
+            return " and ".join(sorted(below)[:2])
+        return self.source(key.rsplit(".", 1)[0]) if "." in key else "default"
+
+    def number(self, name: str, value: float, unit: str, meaning: str, source: str) -> str:
+        """One number as a variable of the deck that ``-var`` can override."""
+        return f"variable {name} index {exact(value)}  # {unit}, {meaning}; {source}"
+
+    def value(self, name: str, key: str) -> str:
+        """One key of the scenario as a variable of the deck."""
+        *path, last = key.split(".")
+        section: BaseModel = self.scenario
+        for part in path:
+            section = getattr(section, part)
+        extra = type(section).model_fields[last].json_schema_extra
+        unit = str(extra["unit"]) if isinstance(extra, dict) else "1"
+        meaning = (type(section).model_fields[last].description or "").rstrip(".")
+        return self.number(
+            name, getattr(section, last), "-" if unit == "1" else unit, meaning, self.source(key)
+        )
+
+
+def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, float]]:
+    """Bounds (m) along each axis, with a margin of two largest grains round the moulding box."""
+    margin = 2 * scenario.sand.classes(scenario.dimension)[-1].diameter_m
+    across = [scenario.box.width_m, scenario.box.depth_m][: scenario.dimension - 1]
+    bed = predicted_bed_height_m(scenario, list(program.counts))
+    column = max(layer.height_m for layer in program.layers)
+    # Half a bed more than predicted: a heap may stand higher than an even bed.
+    top = max(1.5 * bed, obstacle_top_m(scenario)) + scenario.fill.drop_height_m + column + margin
+    return [(-margin, size + margin) for size in across] + [(-margin, top)]
+
+
+def obstacle_top_m(scenario: Scenario) -> float:
+    """Height of the highest obstacle, 0 without any."""
+    return max((float(b.corners()[:, -1].max()) for b in scenario.scene.solids), default=0.0)
+
+
+def vibration_key(program: Program, stage: Stage) -> str:
+    """Where in the scenario a stage of vibration stands."""
+    if not stage.counts_as_vibration:
+        return "fill.vibration_between_layers"
+    return f"vibration.{[s for s in program.stages if s.counts_as_vibration].index(stage)}"
+
+
+def size_classes(scenario: Scenario) -> list[dict[str, Any]]:
+    """Size classes with the mass and the moment of inertia of a grain."""
+    d = scenario.dimension
+    rows = []
+    for c in scenario.sand.classes(d):
+        mass = scenario.sand.grain_mass_kg(c.diameter_m, d)
+        inertia = scenario.sand.inertia_factor(d) * mass * (c.diameter_m / 2) ** 2
+        rows.append(
+            {
+                "number": c.number,
+                "diameter_m": c.diameter_m,
+                "mass_fraction": c.mass_fraction,
+                "count_fraction": c.count_fraction,
+                "mass_kg": mass,
+                "inertia_kg_m2": inertia,
+            }
+        )
+    return rows
+
+
+def planned_masses_kg(program: Program, classes: list[dict[str, Any]]) -> list[float]:
+    """Mass of all grains after each layer."""
+    masses = np.array([c["mass_kg"] for c in classes])
+    each = [masses[layer.class_number - 1].sum() for layer in program.layers]
+    planned: list[float] = np.cumsum(each).tolist()
+    return planned

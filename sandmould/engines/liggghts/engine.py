@@ -1,0 +1,53 @@
+"""The LIGGGHTS engine as the rest of the house sees it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sandmould.engines.deck import Deck, dialect_hash
+from sandmould.engines.liggghts import OLDEST_VERSION
+from sandmould.engines.liggghts.process import executable, version_of
+from sandmould.engines.liggghts.refusals import refuse as refuse
+from sandmould.engines.liggghts.render import write_deck as write_deck
+from sandmould.engines.liggghts.session import LiggghtsSession
+from sandmould.engines.program import Program
+
+
+def installed_version() -> int | str:
+    """Version of the LIGGGHTS executable, 0 where there is none."""
+    path = executable()
+    return (version_of(path) or 0) if path else 0
+
+
+def installation_problem() -> str | None:
+    """Say what would be a valid installation where LIGGGHTS is missing or too old."""
+    found = installed_version()
+    if found == 0:
+        return "an installed LIGGGHTS: apt install liggghts"
+    if _numbers(str(found)) < _numbers(OLDEST_VERSION):
+        return f"LIGGGHTS {OLDEST_VERSION} or newer, found {found}"
+    return None
+
+
+def _numbers(version: str) -> list[int]:
+    return [int(part) for part in version.split(".")]
+
+
+def template_hash() -> str:
+    """Hash of all templates of this dialect."""
+    return dialect_hash("liggghts")
+
+
+def open_session(
+    program: Program, folder: Path, log: Path, checkpoint: Path | None = None
+) -> LiggghtsSession:
+    """Open a session on a rendered deck.
+
+    Raises
+    ------
+    EngineStop
+        When LIGGGHTS is missing or fails.
+    RefusedError
+        When LIGGGHTS lacks what the scenario asks for.
+    """
+    return LiggghtsSession(program, Deck.read(folder / "deck.in"), folder, log, checkpoint)

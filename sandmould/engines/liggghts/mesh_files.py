@@ -1,0 +1,145 @@
+"""Walls and obstacles as triangles, in LIGGGHTS's three dimensions.
+
+A scene of discs becomes a plane of spheres, z = 0, and its walls become strips across that plane.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sandmould.scenario.geometry import Array, Block, Wall
+from sandmould.scenario.scenario import Scenario
+
+LONGEST_OVER_WIDE = 20.0
+"""Longest rectangle that is not cut: LIGGGHTS refuses triangles with an angle under 0.06 degrees
+and warns under 0.5."""
+_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+
+
+def surface_triangles(
+    scenario: Scenario, simulation_box: list[tuple[float, float]]
+) -> dict[str, Array]:
+    """Triangulate all walls, blocks and polygons.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    simulation_box : list of (low, high), m
+        One pair for each of three axes; the triangles stay well inside, as LIGGGHTS drops those
+        that leave it.
+
+    Returns
+    -------
+    mapping of surface to (n, 3, 3) float64, m
+        Corners of each triangle, counter-clockwise seen from the sand.
+    """
+    low, high = np.array(simulation_box).T
+    # A quarter of the margin round the moulding box, and all that the box may move.
+    inset = _largest_diameter_m(scenario) / 2 + largest_motion_m(scenario)
+    low, high = low + inset, high - inset
+    scene, span = scenario.scene, (low[2], high[2])
+    surfaces = {wall.name: _wall(wall, low, high) for wall in scene.walls}
+    for block in scene.blocks:
+        surfaces[block.name] = (
+            _prism(_outline(block), span) if scene.dimension == 2 else _cuboid(block)
+        )
+    for obstacle in scenario.obstacles:
+        if obstacle.kind == "polygon":
+            surfaces[obstacle.name] = _prism(np.array(obstacle.vertices_m), span)
+    return surfaces
+
+
+def largest_motion_m(scenario: Scenario) -> float:
+    """How far the walls go in the laboratory frame; in that of the box they stand."""
+    if scenario.frame == "box":
+        return 0.0
+    between = scenario.fill.vibration_between_layers
+    stages = [*scenario.vibration, *([between] if between else [])]
+    return max((stage.amplitude_m for stage in stages), default=0.0)
+
+
+def _largest_diameter_m(scenario: Scenario) -> float:
+    return scenario.sand.classes(scenario.dimension)[-1].diameter_m
+
+
+def _rectangle(corner: Array, first: Array, second: Array) -> Array:
+    """Two triangles, or more where the rectangle is long; the normal is first x second."""
+    if np.linalg.norm(first) < np.linalg.norm(second):
+        corner, first, second = corner + first, second, -first
+    pieces = int(
+        np.ceil(np.linalg.norm(first) / np.linalg.norm(second) / LONGEST_OVER_WIDE * (1 - 1e-9))
+    )
+    step = first / pieces
+    triangles = []
+    for i in range(pieces):
+        a = corner + i * step
+        b, c, d = a + step, a + step + second, a + second
+        triangles += [[a, b, c], [a, c, d]]
+    return np.array(triangles)
+
+
+def _wall(wall: Wall, low: Array, high: Array) -> Array:
+    """The part of an axis-parallel wall between two corners of space."""
+    d = len(wall.normal)
+    normal = np.zeros(3)
+    normal[:d] = wall.normal
+    axis = int(np.abs(normal).argmax())
+    corner = low.copy()
+    corner[axis] = wall.point_m[axis]
+    first, second = ((high - low)[i] * np.eye(3)[i] for i in range(3) if i != axis)
+    if np.cross(first, second) @ normal < 0:
+        first, second = second, first
+    return _rectangle(corner, first, second)
+
+
+def _outline(block: Block) -> Array:
+    """Corners of a rectangle, counter-clockwise, (4, 2) float64, m."""
+    return block.corners()[[0, 2, 3, 1]] if np.linalg.det(block.axes) > 0 else block.corners()[
+        [0, 1, 3, 2]]  # fmt: skip
+
+
+def _prism(outline_m: Array, span_m: tuple[float, float]) -> Array:
+    """Sides of an outline drawn out along z; the ends, out of the grains' reach, are left open."""
+    x, y = outline_m.T
+    area = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+    if area < 0:
+        outline_m = outline_m[::-1]
+    up = np.array([0.0, 0.0, span_m[1] - span_m[0]])
+    foot = np.column_stack([outline_m, np.full(len(outline_m), span_m[0])])
+    sides = [_rectangle(a, b - a, up) for a, b in zip(foot, np.roll(foot, -1, axis=0), strict=True)]
+    return np.concatenate(sides)
+
+
+def _cuboid(block: Block) -> Array:
+    """The six faces of a block."""
+    corners = block.corners()
+    faces = []
+    for face in _FACES:
+        a, b, _, d = corners[list(face)]
+        first, second = b - a, d - a
+        if np.cross(first, second) @ (corners[list(face)].mean(axis=0) - block.centre_m) < 0:
+            first, second = second, first
+        faces.append(_rectangle(a, first, second))
+    return np.concatenate(faces)
+
+
+def write_stl(path: Path, name: str, triangles_m: Array) -> None:
+    """Write triangles as an ASCII STL file, every number exact.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+    triangles_m : (n, 3, 3) float64, m
+    """
+    normals = np.cross(triangles_m[:, 1] - triangles_m[:, 0], triangles_m[:, 2] - triangles_m[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    lines = [f"solid {name}"]
+    for normal, corners in zip(normals.tolist(), triangles_m.tolist(), strict=True):
+        lines.append("facet normal {:.6g} {:.6g} {:.6g}".format(*normal))
+        lines.append(" outer loop")
+        lines += ["  vertex {!r} {!r} {!r}".format(*corner) for corner in corners]
+        lines += [" endloop", "endfacet"]
+    path.write_text("\n".join([*lines, f"endsolid {name}"]) + "\n", encoding="utf-8")

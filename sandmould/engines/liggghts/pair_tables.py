@@ -1,0 +1,111 @@
+"""Coefficients of the contact model for each pair of atom types, from the scenario's laws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from sandmould.engines.deck_lines import Lines
+from sandmould.scenario.contact import Contact, ContactLaw
+
+SizeClass = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class PairTable:
+    """One symmetric table: a row a size class, then one for the walls."""
+
+    name: str
+    property: str
+    """LIGGGHTS's name."""
+    unit: str
+    meaning: str
+    source: str
+    rows: list[list[float]]
+
+
+def damping_per_s(law: ContactLaw, mass_kg: float) -> float:
+    """LIGGGHTS's ``gamman``: it makes the dashpot c = m_eff gamman, and c = 2 zeta sqrt(k m_eff).
+
+    Parameters
+    ----------
+    law : ContactLaw
+    mass_kg : float
+        Effective mass m1 m2/(m1 + m2) of a pair, m1 at a wall.
+    """
+    return 2 * law.damping_ratio * math.sqrt(law.normal_stiffness_n_m / mass_kg)
+
+
+def rolling_friction(law: ContactLaw, first: SizeClass, second: SizeClass) -> float:
+    """Give f = r_min tan(alpha) of eq. (32) over the effective radius r1 r2/(r1 + r2)."""
+    low, high = sorted([first["diameter_m"], second["diameter_m"]])
+    return float(law.rolling_arm_fraction * (1 + low / high))
+
+
+def pair_tables(contact: Contact, classes: list[SizeClass], lines: Lines) -> list[PairTable]:
+    """All tables of a scenario.
+
+    Parameters
+    ----------
+    contact : Contact
+    classes : list of dict
+        As ``sandmould.engines.deck_lines.size_classes`` gives them.
+    lines : Lines
+        Knows the source of each key.
+    """
+    grain, wall = contact.grain_grain, contact.grain_wall
+
+    def table(
+        name: str,
+        liggghts: str,
+        unit: str,
+        meaning: str,
+        key: str,
+        of_pair: Callable[[SizeClass, SizeClass], float],
+        of_wall: Callable[[SizeClass], float],
+    ) -> PairTable:
+        rows = [[of_pair(i, j) for j in classes] + [of_wall(i)] for i in classes]
+        # Walls never meet walls; LIGGGHTS wants a number all the same.
+        rows.append([of_wall(j) for j in classes] + [of_wall(classes[0])])
+        sources = [lines.source(f"contact.{law}.{key}") for law in ("grain_grain", "grain_wall")]
+        source = " and ".join(dict.fromkeys(sources))
+        return PairTable(name, liggghts, unit, meaning, source, rows)
+
+    def constant(key: str) -> dict[str, Any]:
+        pair, at_wall = getattr(grain, key), getattr(wall, key)
+        return {"key": key, "of_pair": lambda i, j: pair, "of_wall": lambda i: at_wall}
+
+    def damping(i: SizeClass, j: SizeClass) -> float:
+        mass = i["mass_kg"] * j["mass_kg"] / (i["mass_kg"] + j["mass_kg"])
+        return damping_per_s(grain, mass)
+
+    tables = [
+        table("k_n", "kn", "N/m", "normal spring", **constant("normal_stiffness_n_m")),
+        table("k_t", "kt", "N/m", "tangential spring", **constant("tangential_stiffness_n_m")),
+        table(
+            "damping_n", "gamman", "1/s", "2 zeta sqrt(k_n/m_eff)", "damping_ratio",
+            damping, lambda i: damping_per_s(wall, i["mass_kg"]),
+        ),
+        table(
+            "damping_t", "gammat", "1/s", "no tangential dashpot", "damping_ratio",
+            lambda i, j: 0.0, lambda i: 0.0,
+        ),
+        table("friction", "coefficientFriction", "-", "Coulomb mu", **constant("friction")),
+    ]  # fmt: skip
+    if rolls(contact):
+        tables.append(
+            table(
+                "rolling", "coefficientRollingFriction", "-",
+                "f over the effective radius, tan(alpha) (1 + r_min/r_max), tan(alpha) at walls",
+                "rolling_arm_fraction", lambda i, j: rolling_friction(grain, i, j),
+                lambda i: wall.rolling_arm_fraction,
+            )
+        )  # fmt: skip
+    return tables
+
+
+def rolls(contact: Contact) -> bool:
+    """Whether any contact has a rolling moment."""
+    return contact.grain_grain.rolling_arm_fraction + contact.grain_wall.rolling_arm_fraction > 0

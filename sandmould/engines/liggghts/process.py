@@ -1,0 +1,173 @@
+"""A conversation with the LIGGGHTS executable: commands go in, what it prints comes out."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import os
+import pty
+import re
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+_PR_SET_PDEATHSIG = 1
+_VERSION = re.compile(r"LIGGGHTS-PUBLIC (\d+(?:\.\d+)+)")
+_LOOK_EVERY_S = 1.0
+"""How often a silent process is looked at, in case it died without closing its terminal."""
+
+
+def executable() -> str | None:
+    """Path of LIGGGHTS: the environment variable LIGGGHTS, or ``liggghts`` on the PATH."""
+    return shutil.which(os.environ.get("LIGGGHTS") or "liggghts")
+
+
+def version_in(text: str) -> str | None:
+    """Version in LIGGGHTS's own first line."""
+    found = _VERSION.search(text)
+    return found.group(1) if found else None
+
+
+@functools.cache
+def version_of(path: str) -> str | None:
+    """Ask an executable for its version."""
+    try:
+        ran = subprocess.run(
+            [path, "-log", "none", "-help"], capture_output=True, text=True, timeout=60,
+            stdin=subprocess.DEVNULL, env=_environment(),
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return version_in(ran.stdout)
+
+
+def _environment() -> dict[str, str]:
+    """Our environment; a single process needs no daemon of Open MPI's beside it."""
+    return {**os.environ, "OMPI_MCA_ess_singleton_isolated": "1"}
+
+
+def _die_with_parent() -> None:
+    """Ask Linux to kill this process with the one that started it."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+class LiggghtsDied(Exception):  # noqa: N818 - the session turns it into an outcome
+    """LIGGGHTS ended; carries its error message or its last words."""
+
+
+class Conversation:
+    """A living LIGGGHTS process that reads commands from a pipe and prints to a terminal.
+
+    To a pipe it would print in blocks, and lose the last one, with its error message, when it
+    aborts.
+    """
+
+    def __init__(self, path: str, folder: Path, log: Path) -> None:
+        """Start LIGGGHTS.
+
+        Parameters
+        ----------
+        path : str
+            The executable.
+        folder : Path
+            Working folder, so that a deck's relative names hold.
+        log : Path
+            LIGGGHTS's own log.
+        """
+        self._screen, theirs = pty.openpty()
+        _keep_line_ends(theirs)
+        self._process = subprocess.Popen(
+            [path, "-log", str(log.absolute())],
+            stdin=subprocess.PIPE,
+            stdout=theirs,
+            stderr=theirs,
+            cwd=folder,
+            env=_environment(),
+            preexec_fn=_die_with_parent,
+        )
+        os.close(theirs)
+        assert self._process.stdin is not None
+        self._pipe = self._process.stdin.fileno()
+        os.set_blocking(self._pipe, False)
+        self._asked = 0
+        self._heard = b""
+
+    def say(self, commands: str) -> str:
+        """Have commands executed and wait for their end.
+
+        Parameters
+        ----------
+        commands : str
+
+        Returns
+        -------
+        str
+            What LIGGGHTS printed meanwhile.
+
+        Raises
+        ------
+        LiggghtsDied
+        """
+        self._asked += 1
+        marker = f"<sandmould {self._asked}>"
+        waiting = f'{commands.rstrip()}\nprint "{marker}"\n'.encode()
+        end = f"{marker}\n".encode()
+        while end not in self._heard:
+            wanted = [self._pipe] if waiting else []
+            readable, writable, _ = select.select([self._screen], wanted, [], _LOOK_EVERY_S)
+            if writable:
+                waiting = self._write(waiting)
+            if readable:
+                self._read()
+            elif self._process.poll() is not None:
+                raise self._died()
+        printed, self._heard = self._heard.split(end, 1)
+        return printed.decode(errors="replace")
+
+    def _write(self, waiting: bytes) -> bytes:
+        try:
+            return waiting[os.write(self._pipe, waiting) :]
+        except BrokenPipeError:
+            return b""  # it is dying; its last words are still to be read
+        except BlockingIOError:
+            return waiting
+
+    def _read(self) -> None:
+        try:
+            heard = os.read(self._screen, 65536)
+        except OSError:  # Linux: the other end of the terminal is closed
+            heard = b""
+        if not heard:
+            raise self._died()
+        self._heard += heard
+
+    def _died(self) -> LiggghtsDied:
+        self._process.kill()
+        status = self._process.wait()
+        lines = [x.strip() for x in self._heard.decode(errors="replace").splitlines() if x.strip()]
+        errors = [x for x in lines if x.startswith("ERROR")]
+        words = errors[0] if errors else " / ".join(lines[-2:])
+        return LiggghtsDied(words or f"nothing, and ended with status {status}")
+
+    def close(self) -> None:
+        """End LIGGGHTS."""
+        with contextlib.suppress(OSError):
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+        self._process.kill()
+        self._process.wait()
+        with contextlib.suppress(OSError):
+            os.close(self._screen)
+
+
+def _keep_line_ends(terminal: int) -> None:
+    """Have a terminal pass on line ends as they are."""
+    attributes = termios.tcgetattr(terminal)
+    attributes[1] &= ~termios.OPOST
+    termios.tcsetattr(terminal, termios.TCSANOW, attributes)

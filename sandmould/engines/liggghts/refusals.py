@@ -1,0 +1,51 @@
+"""What LIGGGHTS cannot do, said before it starts."""
+
+from __future__ import annotations
+
+from sandmould.engines.session import RefusedError
+from sandmould.scenario.scenario import Scenario
+
+_HERE = "on engine liggghts"
+
+
+def refuse(scenario: Scenario) -> None:
+    """Refuse what this engine lacks.
+
+    Raises
+    ------
+    RefusedError
+        With one sentence.
+    """
+    if scenario.engine.ranks > 1:
+        raise RefusedError("engine.ranks", scenario.engine.ranks, f"1 {_HERE}")
+    if scenario.dimension == 2 and scenario.sand.disc_inertia == "disc":
+        # Meshes need three dimensions, where a grain is a sphere.
+        raise RefusedError("sand.disc_inertia", "disc", f"sphere {_HERE}")
+    if scenario.time_step.rotational_inertia == "scaled":
+        raise RefusedError("time_step.rotational_inertia", "scaled", f"physical {_HERE}")
+    _refuse_damping(scenario)
+    _refuse_rolling(scenario)
+
+
+def _refuse_damping(scenario: Scenario) -> None:
+    damping = scenario.background_damping
+    if damping.form not in ("none", "viscous"):
+        raise RefusedError("background_damping.form", damping.form, f"none or viscous {_HERE}")
+    if damping.form == "viscous" and damping.viscous_rotation_per_s > 0:
+        raise RefusedError(
+            "background_damping.viscous_rotation_per_s",
+            damping.viscous_rotation_per_s,
+            f"0 {_HERE}, which damps translation only",
+        )
+
+
+def _refuse_rolling(scenario: Scenario) -> None:
+    for name in ("grain_grain", "grain_wall"):
+        law = getattr(scenario.contact, name)
+        spring = law.tangential_stiffness_n_m
+        if law.rolling_arm_fraction > 0 and law.rolling_stiffness_n_m != spring:
+            raise RefusedError(
+                f"contact.{name}.rolling_stiffness_n_m",
+                law.rolling_stiffness_n_m,
+                f"{spring:g}, the tangential stiffness, {_HERE}",
+            )

@@ -1,0 +1,220 @@
+"""Render a scenario into a LIGGGHTS deck, its meshes and its layers of grains."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sandmould.engines.deck import Deck, environment, exact
+from sandmould.engines.deck_lines import (
+    Lines,
+    obstacle_top_m,
+    planned_masses_kg,
+    simulation_box,
+    size_classes,
+    vibration_key,
+)
+from sandmould.engines.liggghts import OLDEST_VERSION
+from sandmould.engines.liggghts.mesh_files import (
+    largest_motion_m,
+    surface_triangles,
+    write_stl,
+)
+from sandmould.engines.liggghts.pair_tables import pair_tables, rolls
+from sandmould.engines.program import Program, Stage
+from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.geometry import Array
+from sandmould.scenario.placement import PlannedLayer
+from sandmould.scenario.scenario import Scenario
+
+SKIN = 0.15
+"""Neighbour skin over the mean diameter."""
+
+
+def bounds_m(program: Program) -> list[tuple[float, float]]:
+    """Bounds of the simulation box along three axes, with room for walls that move."""
+    scenario = program.scenario
+    bounds = simulation_box(scenario, program)
+    motion = largest_motion_m(scenario)
+    if scenario.dimension == 2:
+        half = 2 * scenario.sand.classes(2)[-1].diameter_m
+        bounds.append((-half, half))
+    return [(low - motion, high + motion) for low, high in bounds]
+
+
+def surface_meshes(program: Program) -> dict[str, Array]:
+    """Triangles of all walls and obstacles, in the order of the deck."""
+    return surface_triangles(program.scenario, bounds_m(program))
+
+
+def _windows(program: Program) -> dict[str, tuple[int, int]]:
+    """Of each settling stage, the steps to its first record and its largest number of windows."""
+    counts = StepCounts.of(program.scenario)
+    longest = counts.steps(program.scenario.fill.settling.longest_s)
+    into_window, found = 0, {}
+    for stage in program.stages:
+        if stage.vibration is not None:
+            into_window = (into_window + counts.vibration(stage.vibration)) % counts.window
+        else:
+            # A bed comes to rest at a record.
+            first = counts.window - into_window
+            found[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.window)))
+            into_window = 0
+    return found
+
+
+def render_deck(
+    program: Program, sources: Mapping[str, str], run: str = "scene", study: str = "none"
+) -> Deck:
+    """Render a scenario's deck.
+
+    Parameters
+    ----------
+    program : Program
+    sources : mapping of str to str
+        Source of each key's value; shown on the value's line.
+    run, study : str
+        Names for the deck's first line.
+    """
+    scenario = program.scenario
+    counts = StepCounts.of(scenario)
+    lines = Lines(scenario, sources)
+    classes = size_classes(scenario)
+    critical = scenario.critical_step
+    windows = _windows(program)
+    mean_diameter = sum(c["diameter_m"] * c["count_fraction"] for c in classes)
+    first_id = [1 + sum(program.counts[:i]) for i in range(len(program.counts))]
+    outlines = [o.vertices_m for o in scenario.obstacles if o.kind == "polygon"]
+    polygon_top = max((y for outline in outlines for _, y in outline), default=0.0)
+
+    def first_window(stage: Stage) -> int:
+        return windows[stage.name][0]
+
+    def settle_windows(stage: Stage) -> int:
+        return windows[stage.name][1]
+
+    text = (
+        environment("liggghts")
+        .get_template("deck.in.j2")
+        .render(
+            run=run,
+            study=study,
+            scenario=scenario,
+            program=program,
+            classes=classes,
+            tables=pair_tables(scenario.contact, classes, lines),
+            rolling=rolls(scenario.contact),
+            twist=scenario.contact.rolling_axes == "all",
+            clip=scenario.contact.no_tension == "total",
+            damping=scenario.background_damping,
+            settling=scenario.fill.settling,
+            critical=critical,
+            step_s=counts.step_s,
+            step_fraction=counts.step_s / critical.step_s,
+            skin=SKIN * mean_diameter,
+            skin_source=f"{SKIN:g} of the mean diameter",
+            simulation_box=bounds_m(program),
+            surfaces=list(surface_meshes(program)),
+            wall_names=[wall.name for wall in scenario.scene.walls],
+            obstacle_top=max(obstacle_top_m(scenario), polygon_top),
+            down="0 -1 0" if scenario.dimension == 2 else "0 0 -1",
+            window_steps=counts.window,
+            load_steps=counts.load,
+            snapshot_steps=counts.windows(scenario.record.snapshot_every_s),
+            shortest_steps=counts.steps(scenario.fill.settling.shortest_s),
+            first_window=first_window,
+            settle_windows=settle_windows,
+            vibration_steps=counts.vibration,
+            vibration_key=lambda stage: vibration_key(program, stage),
+            direction=lambda v: v.unit_direction(scenario.dimension),
+            first_id=first_id,
+            planned_mass=planned_masses_kg(program, classes),
+            oldest_version=OLDEST_VERSION,
+            source=lines.source,
+            number=lines.number,
+            value=lines.value,
+        )
+    )
+    return Deck(text)
+
+
+def atoms_data(
+    scenario: Scenario,
+    title: str,
+    first_id: int,
+    class_number: NDArray[np.int64],
+    position_m: Array,
+    motion: tuple[Array, Array] | None = None,
+) -> str:
+    """Write grains as a LIGGGHTS data file.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    title : str
+    first_id : int
+    class_number : (n,) int64
+    position_m : (n, d) float64, m
+    motion : tuple, optional
+        Velocity (n, d) in m/s and spin (n, 3) in rad/s.
+    """
+    d = scenario.dimension
+    classes = scenario.sand.classes(d)
+    # In 2D a sphere of this density has the mass of a disc, rho pi r^2 b.
+    density = [
+        scenario.sand.grain_mass_kg(c.diameter_m, d) / (math.pi / 6 * c.diameter_m**3)
+        for c in classes
+    ]
+    kinds = [
+        f"{c.number} {exact(c.diameter_m)} {exact(rho)}"
+        for c, rho in zip(classes, density, strict=True)
+    ]
+    flat = " 0" if d == 2 else ""
+    rows = [
+        f"{i} {kinds[c - 1]} " + " ".join(map(repr, p)) + flat
+        for i, (c, p) in enumerate(
+            zip(class_number.tolist(), position_m.tolist(), strict=True), start=first_id
+        )
+    ]
+    text = [f"# {title}", "", f"{len(rows)} atoms", "", "Atoms", "", *rows]
+    if motion is not None:
+        text += ["", "Velocities", ""]
+        text += [
+            f"{i} " + " ".join(map(repr, v)) + flat + " " + " ".join(map(repr, w))
+            for i, (v, w) in enumerate(
+                zip(motion[0].tolist(), motion[1].tolist(), strict=True), start=first_id
+            )
+        ]
+    return "\n".join(text) + "\n"
+
+
+def layer_data(scenario: Scenario, layer: PlannedLayer, number: int, first_id: int) -> str:
+    """Write a layer as a data file; heights count from the layer's lowest point."""
+    title = (
+        f"layer {number}: id, type, diameter (m), density (kg/m3), x, y, z (m); seed"
+        f" {scenario.seed}"
+    )
+    return atoms_data(scenario, title, first_id, layer.class_number, layer.position_m)
+
+
+def write_deck(
+    program: Program, sources: Mapping[str, str], folder: Path, run: str, study: str
+) -> None:
+    """Write ``deck.in`` and ``layers/``; the deck last, so that it stands for all of them."""
+    layers = folder / "layers"
+    layers.mkdir(parents=True, exist_ok=True)
+    first_id = 1
+    for number, layer in enumerate(program.layers, start=1):
+        text = layer_data(program.scenario, layer, number, first_id)
+        (layers / f"layer_{number}.data").write_text(text, encoding="utf-8")
+        first_id += len(layer.radius_m)
+    for name, triangles in surface_meshes(program).items():
+        write_stl(layers / f"{name}.stl", name, triangles)
+    partial = folder / "deck.in.partial"
+    partial.write_text(render_deck(program, sources, run, study).text, encoding="utf-8")
+    os.replace(partial, folder / "deck.in")

@@ -1,0 +1,1 @@
+"""The reference engine: the in-house solver on a scenario."""

@@ -1,0 +1,104 @@
+"""The reference engine as the rest of the house sees it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from sandmould.dem import source_hash
+from sandmould.engines.deck import dialect_hash, environment, exact
+from sandmould.engines.deck_lines import Lines, size_classes
+from sandmould.engines.program import Program
+from sandmould.engines.reference.model import surfaces_of
+from sandmould.engines.reference.session import ReferenceSession
+from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.placement import PlannedLayer
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.time_step import inertia_factor
+
+_LAWS = (("grain", "contact.grain_grain"), ("wall", "contact.grain_wall"))
+_LAW_KEYS = (
+    ("k_n", "normal_stiffness_n_m"),
+    ("k_t", "tangential_stiffness_n_m"),
+    ("friction", "friction"),
+    ("damping_ratio", "damping_ratio"),
+    ("rolling_arm", "rolling_arm_fraction"),
+    ("k_roll", "rolling_stiffness_n_m"),
+)
+
+
+def installed_version() -> str:
+    """Hash of the solver's sources."""
+    return source_hash()
+
+
+def installation_problem() -> None:
+    """Find nothing missing: the solver comes with the house."""
+
+
+def refuse(scenario: Scenario) -> None:
+    """Refuse nothing: every term of the paper is there."""
+
+
+def template_hash() -> str:
+    """Hash of the solver and of the deck's template."""
+    return f"{source_hash()}{dialect_hash('reference')}"
+
+
+def write_deck(
+    program: Program, sources: Mapping[str, str], folder: Path, run: str, study: str
+) -> None:
+    """Write ``deck.in``, which lists what the solver is given, and ``layers/``; the deck last."""
+    scenario = program.scenario
+    lines, counts = Lines(scenario, sources), StepCounts.of(scenario)
+    d, critical = scenario.dimension, scenario.critical_step
+    keys = [("gravity", "gravity_m_s2"), ("density", "sand.density_kg_m3")]
+    keys += [("disc_thickness", "sand.disc_thickness_m")] if d == 2 else []
+    keys += [(f"{law}_{name}", f"{key}.{last}") for law, key in _LAWS for name, last in _LAW_KEYS]
+    text = (
+        environment("reference")
+        .get_template("deck.in.j2")
+        .render(
+            run=run,
+            study=study,
+            scenario=scenario,
+            program=program,
+            kernels=source_hash(),
+            keys=keys,
+            critical=critical,
+            step_s=counts.step_s,
+            step_fraction=counts.step_s / critical.step_s,
+            inertia_factor=inertia_factor(scenario.sand, scenario.contact, scenario.time_step, d),
+            classes=size_classes(scenario),
+            surfaces=surfaces_of(scenario).names,
+            vibration_steps=counts.vibration,
+            source=lines.source,
+            number=lines.number,
+            value=lines.value,
+        )
+    )
+    (folder / "layers").mkdir(parents=True, exist_ok=True)
+    for number, layer in enumerate(program.layers, start=1):
+        _write_layer(layer, folder / "layers" / f"layer_{number}.tsv", d)
+    partial = folder / "deck.in.partial"
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, folder / "deck.in")
+
+
+def _write_layer(layer: PlannedLayer, path: Path, d: int) -> None:
+    """Write a planned layer as a table; heights count from its lowest point."""
+    rows = ["\t".join(["class", "radius_m", *(f"{axis}_m" for axis in "xyz"[:d])])]
+    for number, radius, position in zip(
+        layer.class_number.tolist(), layer.radius_m.tolist(), layer.position_m.tolist(), strict=True
+    ):
+        rows.append("\t".join([str(number), *(exact(x) for x in (radius, *position))]))
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+def open_session(
+    program: Program, folder: Path, log: Path, checkpoint: Path | None = None
+) -> ReferenceSession:
+    """Open a session, afresh or from a checkpoint; the deck is for people alone."""
+    log.write_text(f"reference solver, kernels {source_hash()}\n", encoding="utf-8")
+    return ReferenceSession(program, checkpoint)

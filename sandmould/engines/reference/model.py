@@ -1,0 +1,113 @@
+"""A scenario as the arrays and laws of the reference solver."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sandmould.dem.contact_law import Law
+from sandmould.dem.grains import Grains
+from sandmould.dem.motion import COMPONENTWISE, ISOTROPIC, NONE, VISCOUS, Damping
+from sandmould.dem.solver import Solver
+from sandmould.dem.steps import Scene
+from sandmould.dem.surfaces import Surfaces
+from sandmould.engines.program import Stage
+from sandmould.scenario.contact import ContactLaw
+from sandmould.scenario.placement import PlannedLayer
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.time_step import inertia_factor
+
+SKIN_OVER_DIAMETER = 0.15
+"""Neighbour skin over the mean diameter; within 5 % of the cheapest between 0.08 and 0.25."""
+
+
+def _law(scenario: Scenario, law: ContactLaw) -> Law:
+    return Law(
+        law.normal_stiffness_n_m,
+        law.tangential_stiffness_n_m,
+        law.friction,
+        law.damping_ratio,
+        law.rolling_arm_fraction,
+        law.rolling_stiffness_n_m,
+        scenario.contact.no_tension == "total",
+        scenario.dimension == 3 and scenario.contact.rolling_axes == "all",
+    )
+
+
+def _damping(scenario: Scenario) -> Damping:
+    damping = scenario.background_damping
+    if damping.form == "none":
+        return Damping(NONE, 0.0, 0.0)
+    if damping.form == "viscous":
+        return Damping(VISCOUS, damping.viscous_translation_per_s, damping.viscous_rotation_per_s)
+    form = ISOTROPIC if damping.form == "nonviscous_isotropic" else COMPONENTWISE
+    return Damping(form, damping.nonviscous_translation, damping.nonviscous_rotation)
+
+
+def scene_of(scenario: Scenario, stage: Stage, step_s: float) -> Scene:
+    """What does not change during a stage."""
+    d = scenario.dimension
+    up = (0.0,) * (d - 1) + (1.0,)
+    direction = up if stage.vibration is None else stage.vibration.unit_direction(d)
+    return Scene(
+        _law(scenario, scenario.contact.grain_grain),
+        _law(scenario, scenario.contact.grain_wall),
+        _damping(scenario),
+        (0.0,) * (d - 1) + (-scenario.gravity_m_s2,),
+        direction,
+        scenario.frame == "box",
+        step_s,
+    )
+
+
+def surfaces_of(scenario: Scenario) -> Surfaces:
+    """Walls, blocks, outlines, meshes and round solids as surfaces."""
+    scene = scenario.scene
+    surfaces = Surfaces(scenario.dimension)
+    for wall in scene.walls:
+        surfaces.add_plane(wall.name, wall.point_m, wall.normal)
+    for block in scene.blocks:
+        surfaces.add_facets(block.name, block.corners(), block.facets())
+    for outline in scene.outlines:
+        k = len(outline.vertices_m)
+        ring = np.column_stack([np.arange(k), np.roll(np.arange(k), -1)])
+        surfaces.add_facets(outline.name, outline.vertices_m, ring)
+    for mesh in scene.meshes:
+        surfaces.add_facets(mesh.name, mesh.vertices_m, mesh.triangles)
+    for round_solid in scene.revolved:
+        surfaces.add_revolved(
+            round_solid.name, round_solid.origin_m, round_solid.axis, round_solid.profile_m, True
+        )
+    return surfaces
+
+
+def solver_of(scenario: Scenario, stage: Stage, step_s: float) -> Solver:
+    """Make the solver of a scenario, without grains."""
+    classes = scenario.sand.classes(scenario.dimension)
+    mean_m = sum(c.diameter_m * c.count_fraction for c in classes)
+    return Solver(
+        scene_of(scenario, stage, step_s),
+        surfaces_of(scenario),
+        SKIN_OVER_DIAMETER * mean_m,
+        scenario.engine.ranks,
+    )
+
+
+def grains_of(scenario: Scenario, layer: PlannedLayer, base_m: float, first_id: int) -> Grains:
+    """Grains of a planned layer at rest, its lowest point at a height."""
+    d, n = scenario.dimension, len(layer.radius_m)
+    radius, spins = layer.radius_m, 1 if d == 2 else 3
+    position = layer.position_m.copy()
+    position[:, -1] += base_m
+    mass = scenario.sand.grain_mass_kg(1.0, d) * (2 * radius) ** d
+    factor = inertia_factor(scenario.sand, scenario.contact, scenario.time_step, d)
+    return Grains(
+        first_id + np.arange(n),
+        position,
+        np.zeros((n, d)),
+        np.zeros((n, spins)),
+        radius.copy(),
+        mass,
+        factor * mass * radius**2,
+        np.zeros((n, d)),
+        np.zeros((n, spins)),
+    )
