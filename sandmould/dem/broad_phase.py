@@ -36,16 +36,21 @@ class _Grid(NamedTuple):
 
 
 @njit(**OPTIONS)
+def _span(points: NDArray[np.float64], k: int) -> tuple[float, float]:
+    """Smallest and largest of a coordinate."""
+    low, high = math.inf, -math.inf
+    for i in range(len(points)):
+        low, high = min(low, points[i, k]), max(high, points[i, k])
+    return low, high
+
+
+@njit(**OPTIONS)
 def _bounds(like: Any, points: NDArray[np.float64]) -> Any:
     """Smallest and largest coordinates, three each; in 2D the third is 0."""
-    low, high = [math.inf, math.inf, 0.0], [-math.inf, -math.inf, 0.0]
+    x, y, z = _span(points, 0), _span(points, 1), (0.0, 0.0)
     if len(like) == 3:
-        low[2], high[2] = math.inf, -math.inf
-    for i in range(len(points)):
-        for k in range(len(like)):
-            low[k] = min(low[k], points[i, k])
-            high[k] = max(high[k], points[i, k])
-    return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+        z = _span(points, 2)
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1])
 
 
 @njit(**OPTIONS)
@@ -135,7 +140,8 @@ def _sort_facets(
                 start[cell] += start[cell - 1]
             part = np.empty(start[-1], dtype=np.int64)
     # Filling has moved each start to the next one.
-    start[1:] = start[:-1].copy()
+    for cell in range(len(start) - 1, 0, -1):
+        start[cell] = start[cell - 1]
     start[0] = 0
     return _Grid(low, size, (n_x, n_y, n_z), start, part)
 
@@ -143,7 +149,8 @@ def _sort_facets(
 @njit(**OPTIONS)
 def _longer(array: NDArray[np.int64], filled: int) -> NDArray[np.int64]:
     longer = np.empty(2 * filled + 16, dtype=np.int64)
-    longer[:filled] = array[:filled]
+    for i in range(filled):
+        longer[i] = array[i]
     return longer
 
 
@@ -170,12 +177,15 @@ def find_candidates(
     shift : tuple of d floats, m
         Displacement of the box.
     """
-    vertices, planes, shape, corner = arrays.vertices, arrays.planes, arrays.shape, arrays.corner
+    vertices, shape, corner = arrays.vertices, arrays.shape, arrays.corner
+    planes = arrays.planes[0]
     grains, first_facet = len(radius), len(shape)
     rows, parts = np.empty(16, dtype=np.int64), np.empty(16, dtype=np.int64)
     start = np.zeros(17, dtype=np.int64)
     m = found = 0
-    reach = skin + (radius.max() if grains else 0.0)
+    reach = skin
+    for i in range(grains):
+        reach = max(reach, skin + radius[i])
     low, high = _bounds(like, position)
     facet_low, facet_high = _bounds(like, vertices)
     moved = (shift[0], shift[1], shift[2] if len(like) == 3 else 0.0)

@@ -48,9 +48,9 @@ class Law(NamedTuple):
 
 @njit(**INLINED)
 def limited(action: Any, limit: float) -> Any:
-    """Return mapping (28): the action itself where it is no larger than the limit.
+    """Return mapping, eqs. (26)-(28): an action no larger than the limit stays as it is.
 
-    Without a branch, so that the compiler can compute several contacts side by side.
+    Without a branch: which contacts slip cannot be foretold, and a wrong guess costs more.
     """
     size2, limit2 = dot(action, action), limit * limit + 1e-300
     return times(action, limit / math.sqrt(size2 if size2 > limit2 else limit2))

@@ -9,13 +9,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sandmould.dem.vectors import OPTIONS, dot, load, plus, times
+from sandmould.dem.vectors import INLINED, dot, load, plus, times
 
 FAR = math.inf
 """Distance of whatever lies out of reach."""
 
 
-@njit(forceinline=True, **OPTIONS)
+@njit(**INLINED)
 def _on_segment(
     start_x: float, start_y: float, end_x: float, end_y: float, x: float, y: float, reach: float
 ) -> Any:
@@ -52,12 +52,12 @@ def _on_segment(
     return distance, n_x, n_y, share, False
 
 
-@njit(forceinline=True, **OPTIONS)
+@njit(**INLINED)
 def _share(numerator: float, denominator: float) -> float:
     return numerator / denominator if denominator > 0.0 else 0.0
 
 
-@njit(forceinline=True, **OPTIONS)
+@njit(**INLINED)
 def _on_triangle(a: Any, b: Any, c: Any, x: Any, reach: float) -> Any:
     """Nearest point of a triangle, by the regions of its corners and edges.
 
@@ -116,7 +116,7 @@ def _on_triangle(a: Any, b: Any, c: Any, x: Any, reach: float) -> Any:
     return distance, times(to, 1.0 / distance) if distance > 0.0 else n, weights, False
 
 
-@njit(forceinline=True, **OPTIONS)
+@njit(**INLINED)
 def _across(axis: Any) -> Any:
     """Give some unit vector across an axis."""
     if abs(axis[0]) < 0.6:
@@ -126,7 +126,7 @@ def _across(axis: Any) -> Any:
     return times(v, 1.0 / math.sqrt(dot(v, v)))
 
 
-@njit(forceinline=True, **OPTIONS)
+@njit(**INLINED)
 def _on_revolved(axis: Any, line: Any, origin: Any, x: Any, reach: float) -> Any:
     """Nearest point of one line of a profile of revolution, in the centre's meridian plane."""
     from_origin = plus(x, -1.0, origin)
@@ -140,7 +140,7 @@ def _on_revolved(axis: Any, line: Any, origin: Any, x: Any, reach: float) -> Any
     return distance, plus(times(axis, n_a), n_r, outward), inside
 
 
-@njit(forceinline=True, **OPTIONS)
+@njit(**INLINED)
 def nearest(
     like: Any,
     vertices: NDArray[np.float64],

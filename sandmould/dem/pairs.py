@@ -29,6 +29,9 @@ from sandmould.dem.vectors import (
     times,
 )
 
+CHUNK = 4096
+"""Grains of a chunk, at least."""
+
 
 class Chunks(NamedTuple):
     """Parts of the grains that are computed side by side, and what crosses between them."""
@@ -49,14 +52,13 @@ class Chunks(NamedTuple):
     """(q, s) float64, N m."""
 
 
-def chunk_bounds(grains: int, dimension: int) -> Ints:
-    """Split grains into chunks; how many depends on the scene alone.
+def chunk_bounds(grains: int) -> Ints:
+    """Split grains into chunks of 4 096 or more; how many depends on the scene alone.
 
-    A chunk is large enough that few of its pairs cross: in 2D about 4 000 grains, in 3D 8 000.
+    A chunk fits into a core's own cache, and few of its pairs cross to another.
     """
-    size = 4096 if dimension == 2 else 8192
-    chunks = 1 << max(0, int(math.log2(max(grains, 1) / size))) if grains >= size else 1
-    return np.linspace(0, grains, min(chunks, 64) + 1).astype(np.int64)
+    chunks = max(1, grains // CHUNK)
+    return np.linspace(0, grains, chunks + 1).astype(np.int64)
 
 
 @njit(**OPTIONS)
@@ -77,7 +79,7 @@ def _crossing(bound: Ints, pairs: Pairs) -> tuple[Ints, Ints]:
 def split(grains: Grains, pairs: Pairs) -> Chunks:
     """Make the chunks of a list of pairs."""
     n, d = grains.position.shape
-    bound = chunk_bounds(n, d)
+    bound = chunk_bounds(n)
     first_slot, grain = _crossing(bound, pairs)
     chunk = np.searchsorted(bound, grain, side="right") - 1
     incoming = np.argsort(chunk, kind="stable")

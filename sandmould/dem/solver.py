@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import numba
 import numpy as np
 
+from sandmould.dem.barrier import new_barrier
 from sandmould.dem.broad_phase import Candidates, find_candidates
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.motion import kick
@@ -23,9 +25,9 @@ from sandmould.dem.steps import (
     NOT_A_NUMBER,
     Moving,
     Scene,
+    Team,
     Walls,
     advance,
-    advance_threaded,
     find_forces,
 )
 from sandmould.dem.surfaces import SurfaceArrays, Surfaces
@@ -62,7 +64,7 @@ class Solver:
         skin_m : float
             Pairs nearer than this are listed; the list serves until a grain has gone half of it.
         threads : int
-            At most numba's own number; results do not depend on it.
+            No more are started than there are cores; results do not depend on it.
         orientations : bool
             Whether ``orientation`` is kept: angles (n, 1) in 2D, matrices (n, 9) in 3D.
         """
@@ -75,7 +77,8 @@ class Solver:
         """How often pairs were listed."""
         self._dim = like(self.dimension)
         self._skin = skin_m
-        self._threads = min(threads, numba.get_num_threads())
+        self._threads = min(threads, len(os.sched_getaffinity(0)))
+        self._pool = ThreadPoolExecutor(max(1, self._threads - 1))
         self._orientations = orientations
         self._moving = self._empty()
 
@@ -206,20 +209,8 @@ class Solver:
         NotANumberError
         """
         steps, done, drifted = len(displacement_m) - 2, 0, False
-        loop = advance
-        if self._threads > 1:
-            loop = advance_threaded
-            numba.set_num_threads(self._threads)
         while done < steps:
-            more, state = loop(
-                self._dim,
-                steps - done,
-                drifted,
-                self.scene,
-                self._moving,
-                displacement_m[done:],
-                0.5 * self._skin,
-            )
+            more, state = self._run(steps - done, drifted, displacement_m[done:])
             done += more
             self.steps += more
             if state == NOT_A_NUMBER:
@@ -228,6 +219,33 @@ class Solver:
             if drifted:
                 shift = 0.0 if self.scene.box_frame else displacement_m[done + 2]
                 self._list(shift * np.array(self.scene.direction))
+
+    def _run(self, steps: int, drifted: bool, displacement_m: Floats) -> tuple[int, int]:
+        """Let all threads run the step loop together."""
+        chunks = len(self._moving.chunks.bound) - 1
+        threads = min(self._threads, chunks)
+        team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
+
+        def one(thread: int) -> tuple[int, int]:
+            ended: tuple[int, int] = advance(
+                self._dim,
+                steps,
+                drifted,
+                self.scene,
+                self._moving,
+                displacement_m,
+                0.5 * self._skin,
+                thread,
+                threads,
+                team,
+            )
+            return ended
+
+        others = [self._pool.submit(one, thread) for thread in range(1, threads)]
+        ended = one(0)
+        for other in others:
+            other.result()
+        return ended
 
     def whole_step_velocities(self, acceleration_m_s2: float = 0.0) -> tuple[Floats, Floats]:
         """Velocities and spins at the time of the positions.

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-from numba import njit, prange
-from numba.extending import register_jitable
+from numba import njit
 
+from sandmould.dem.barrier import wait_for_all
 from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Grains, Ints
@@ -17,7 +16,7 @@ from sandmould.dem.neighbours import Pairs
 from sandmould.dem.pairs import Chunks, gather_incoming, press_pairs
 from sandmould.dem.surface_contacts import press_on_surfaces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
-from sandmould.dem.vectors import OPTIONS, dot, load, no_vector, plus, times
+from sandmould.dem.vectors import INLINED, OPTIONS, dot, load, no_vector, plus, times
 from sandmould.dem.wall_history import WallHistory
 
 DONE, LIST_IS_OLD, NOT_A_NUMBER = 0, 1, 2
@@ -67,6 +66,17 @@ class Moving(NamedTuple):
     """(n, d) float64, m: positions relative to the box when pairs were listed."""
     reach: Floats
     """(1,) float64, m: how far any grain can still go before pairs must be listed again."""
+
+
+class Team(NamedTuple):
+    """What the threads of one advance share beside the grains."""
+
+    barrier: Ints
+    """Counters of ``new_barrier``."""
+    speeds2: Floats
+    """(c,) float64, m2/s2: largest squared speed in each chunk."""
+    state: Ints
+    """(1,) int64: why the loop returns."""
 
 
 @njit(**OPTIONS)
@@ -127,57 +137,60 @@ def find_forces(dim: Any, scene: Scene, moving: Moving) -> None:
         gather_incoming(dim, c, moving.chunks, moving.grains)
 
 
-@register_jitable(inline="always")
-def _loop(
-    dim: Any,
-    steps: int,
-    drifted: bool,
-    scene: Scene,
-    moving: Moving,
-    displacement: Floats,
-    half_skin: float,
-) -> tuple[int, int]:
-    grains, chunks, walls = moving.grains, moving.chunks, moving.walls
-    deforming = walls.arrays.steps_left.max() >= 0 if len(walls.arrays.steps_left) else False
-    number = len(chunks.bound) - 1
-    dt = scene.dt
-    speeds2 = np.empty(number)
-    for done in range(steps):
-        before, now, ahead = displacement[done], displacement[done + 1], displacement[done + 2]
-        body = scene.gravity
-        shift, speed = no_vector(dim), no_vector(dim)
-        if scene.box_frame:
-            body = plus(body, -((ahead - now) - (now - before)) / (dt * dt), scene.direction)
-        else:
-            shift = times(scene.direction, ahead)
-            speed = times(scene.direction, (ahead - now) / dt)
-        if not drifted:
-            for c in prange(number):
-                first, last = chunks.bound[c], chunks.bound[c + 1]
-                kick(dim, first, last, grains, body, scene.damping, dt)
-                if len(moving.orientation):
-                    turn(dim, first, last, grains, moving.orientation, dt)
-                speeds2[c] = drift(dim, first, last, grains, dt)
-            fastest2 = speeds2.max()
-            if not fastest2 < math.inf:
-                return done, NOT_A_NUMBER
-            # A bound on the way relative to the box; the true way is only looked at beyond it.
-            moving.reach[0] -= (math.sqrt(fastest2) + math.sqrt(dot(speed, speed))) * dt
-            if moving.reach[0] < 0.0:
-                moving.reach[0] = half_skin - _farthest(dim, grains, moving.listed, shift)
-                if moving.reach[0] < 0.1 * half_skin:
-                    return done, LIST_IS_OLD
-            if deforming:
-                move_vertices(walls.arrays, dt)
-                if farthest_moved(walls.arrays, walls.listed) > 0.9 * half_skin:
-                    return done, LIST_IS_OLD
-        drifted = False
-        for c in prange(number):
-            _press(dim, c, scene, moving, shift, speed, dt)
-        if number > 1:
-            for c in prange(number):
-                gather_incoming(dim, c, chunks, grains)
-    return steps, DONE
+@njit(**INLINED)
+def _box(dim: Any, scene: Scene, displacement: Floats, k: int) -> Any:
+    """Shift (m) and velocity (m/s) of the walls at the time k steps after the first."""
+    if scene.box_frame:
+        return no_vector(dim), no_vector(dim)
+    way = displacement[k + 1] - displacement[k]
+    return times(scene.direction, displacement[k + 1]), times(scene.direction, way / scene.dt)
+
+
+@njit(**OPTIONS)
+def _move(dim: Any, c: int, scene: Scene, moving: Moving, displacement: Floats, k: int) -> float:
+    """Advance the grains of a chunk by step k; gives their largest squared speed, m2/s2."""
+    first, last = moving.chunks.bound[c], moving.chunks.bound[c + 1]
+    body = scene.gravity
+    if scene.box_frame:
+        # The second difference of the walls' own motion: the trajectories of moving walls.
+        ahead = displacement[k + 2] - displacement[k + 1]
+        behind = displacement[k + 1] - displacement[k]
+        body = plus(body, -(ahead - behind) / (scene.dt * scene.dt), scene.direction)
+    kick(dim, first, last, moving.grains, body, scene.damping, scene.dt)
+    if len(moving.orientation):
+        turn(dim, first, last, moving.grains, moving.orientation, scene.dt)
+    return drift(dim, first, last, moving.grains, scene.dt)
+
+
+@njit(**OPTIONS)
+def _finish(
+    dim: Any, c: int, scene: Scene, moving: Moving, displacement: Floats, k: int, goes_on: bool
+) -> float:
+    """Add what earlier chunks put on a chunk, and move it on where another step follows."""
+    gather_incoming(dim, c, moving.chunks, moving.grains)
+    return _move(dim, c, scene, moving, displacement, k) if goes_on else 0.0
+
+
+@njit(**OPTIONS)
+def _state(
+    dim: Any, scene: Scene, moving: Moving, fastest2: float, box: Any, half_skin: float
+) -> int:
+    """Move deforming surfaces and say whether the lists hold after all grains have moved."""
+    if not fastest2 < math.inf:
+        return NOT_A_NUMBER
+    arrays, state = moving.walls.arrays, DONE
+    shift, speed = box
+    # A bound on the way relative to the box; the true way is only looked at beyond it.
+    moving.reach[0] -= (math.sqrt(fastest2) + math.sqrt(dot(speed, speed))) * scene.dt
+    if moving.reach[0] < 0.0:
+        moving.reach[0] = half_skin - _farthest(dim, moving.grains, moving.listed, shift)
+        if moving.reach[0] < 0.1 * half_skin:
+            state = LIST_IS_OLD
+    if len(arrays.steps_left) and arrays.steps_left.max() >= 0:
+        move_vertices(arrays, scene.dt)
+        if farthest_moved(arrays, moving.walls.listed) > 0.9 * half_skin:
+            state = LIST_IS_OLD
+    return state
 
 
 @njit(**OPTIONS)
@@ -189,6 +202,9 @@ def advance(
     moving: Moving,
     displacement: Floats,
     half_skin: float,
+    thread: int,
+    threads: int,
+    team: Team,
 ) -> tuple[int, int]:
     """Compute steps until they are done, pairs must be listed again, or numbers go wrong.
 
@@ -204,6 +220,9 @@ def advance(
     displacement : (steps + 2,) float64, m
         Of the box along its direction, from one step before the first.
     half_skin : float, m
+    thread, threads : int
+        Which of how many threads calls; each computes chunks of its own, and all return alike.
+    team : Team
 
     Returns
     -------
@@ -212,18 +231,32 @@ def advance(
     state : int
         ``DONE``, ``LIST_IS_OLD`` (the next step has drifted) or ``NOT_A_NUMBER``.
     """
-    return _loop(dim, steps, drifted, scene, moving, displacement, half_skin)
-
-
-@njit(parallel=True, **OPTIONS)
-def advance_threaded(
-    dim: Any,
-    steps: int,
-    drifted: bool,
-    scene: Scene,
-    moving: Moving,
-    displacement: Floats,
-    half_skin: float,
-) -> tuple[int, int]:
-    """As ``advance``, chunks shared among numba's threads; the numbers are the same."""
-    return _loop(dim, steps, drifted, scene, moving, displacement, half_skin)
+    chunks = len(moving.chunks.bound) - 1
+    mine = range(thread * chunks // threads, (thread + 1) * chunks // threads)
+    barrier, speeds2, state = team.barrier, team.speeds2, team.state
+    for k in range(1 if drifted else 0, steps + 1):
+        if k == 0:
+            for c in mine:
+                speeds2[c] = _move(dim, c, scene, moving, displacement, 0)
+        else:
+            shift, speed = _box(dim, scene, displacement, k)
+            for c in mine:
+                _press(dim, c, scene, moving, shift, speed, scene.dt)
+                if threads == 1:
+                    # The chunk moves on while it is still in the cache: later chunks neither
+                    # read it nor add to it.
+                    speeds2[c] = _finish(dim, c, scene, moving, displacement, k, k < steps)
+            if threads > 1:
+                wait_for_all(barrier, threads)
+                for c in mine:
+                    speeds2[c] = _finish(dim, c, scene, moving, displacement, k, k < steps)
+        if k == steps:
+            break
+        wait_for_all(barrier, threads)
+        if thread == 0:
+            box = _box(dim, scene, displacement, k + 1)
+            state[0] = _state(dim, scene, moving, speeds2.max(), box, half_skin)
+        wait_for_all(barrier, threads)
+        if state[0] != DONE:
+            return k, state[0]
+    return steps, DONE

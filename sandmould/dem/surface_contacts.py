@@ -128,7 +128,7 @@ def press_on_surfaces(
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     rows, start, part = candidates.rows, candidates.start, candidates.part
     vertices, vertex_velocity = arrays.vertices, arrays.vertex_velocity
-    planes, shape, corner = arrays.planes, arrays.shape, arrays.corner
+    planes, shape, corner = arrays.planes[0], arrays.shape, arrays.corner
     slots_used, slot_normal = history.used, history.normal
     slot_friction, slot_rolling = history.friction, history.rolling
     # Scratch: what one grain touches.

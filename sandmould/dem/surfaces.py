@@ -34,8 +34,8 @@ class SurfaceArrays(NamedTuple):
     """(nv, d) float64, m/s, in the frame of the box."""
     steps_left: Indices
     """(nv,) int64: steps that a vertex still moves with its velocity, or ``STAYS``."""
-    planes: int
-    """Number of planes."""
+    planes: Indices
+    """(1,) int64: number of planes."""
     shape: Array
     """(np, 7) float64 of planes and lines. Unit normal of a plane into the sand, or unit axis of a
     line and its ends in the meridian plane: axial and radial, axial and radial, m."""
@@ -78,7 +78,7 @@ class Surfaces:
             np.empty((0, d)),
             np.empty((0, d)),
             np.empty(0, dtype=np.int64),
-            0,
+            np.zeros(1, dtype=np.int64),
             self._shape_of["plane"],
             self._corner_of["facet"],
         )
@@ -189,7 +189,7 @@ class Surfaces:
             np.concatenate([old.vertices, vertices]),
             np.concatenate([old.vertex_velocity, np.zeros_like(vertices)]),
             np.concatenate([old.steps_left, np.full(len(vertices), STAYS)]),
-            len(self._corner_of["plane"]),
+            np.array([len(self._corner_of["plane"])]),
             np.concatenate([self._shape_of["plane"], self._shape_of["line"]]),
             np.concatenate([self._corner_of[k] for k in ("plane", "line", "facet")]),
         )

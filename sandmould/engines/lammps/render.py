@@ -53,9 +53,28 @@ def _solid(block: Block) -> _Solid:
 
 
 def surfaces(scenario: Scenario) -> list[str]:
-    """Names of all walls and blocks, in the order of the deck."""
+    """Names of all walls and blocks, in the order of the deck: regions of LAMMPS."""
     scene = scenario.scene
     return [wall.name for wall in scene.walls] + [block.name for block in scene.blocks]
+
+
+def pressed(scenario: Scenario) -> list[str]:
+    """Names of the surfaces that only the session's callback can press on."""
+    scene = scenario.scene
+    names = [outline.name for outline in scene.outlines] + [mesh.name for mesh in scene.meshes]
+    return names + [solid.name for solid in scene.revolved]
+
+
+def needs_callback(scenario: Scenario) -> bool:
+    """Whether the deck cannot be computed without the session's callback."""
+    isotropic = scenario.background_damping.form == "nonviscous_isotropic"
+    return isotropic or bool(pressed(scenario))
+
+
+def skin_m(scenario: Scenario) -> float:
+    """Neighbour skin of grains, and of grains near surfaces."""
+    classes = scenario.sand.classes(scenario.dimension)
+    return 0.15 * sum(c.diameter_m * c.count_fraction for c in classes)
 
 
 def render_deck(
@@ -76,7 +95,6 @@ def render_deck(
     lines = Lines(scenario, sources)
     classes = size_classes(scenario)
     critical = scenario.critical_step
-    mean_diameter = sum(c["diameter_m"] * c["count_fraction"] for c in classes)
     text = (
         environment("lammps")
         .get_template("deck.in.j2")
@@ -94,11 +112,13 @@ def render_deck(
             critical=critical,
             step_s=counts.step_s,
             step_fraction=counts.step_s / critical.step_s,
-            skin=0.15 * mean_diameter,
+            skin=skin_m(scenario),
             simulation_box=simulation_box(scenario, program),
             half_slab=HALF_SLAB_M,
             blocks=[_solid(b) for b in scenario.scene.blocks],
             surfaces=surfaces(scenario),
+            pressed=pressed(scenario),
+            needs_callback=needs_callback(scenario),
             obstacle_top=obstacle_top_m(scenario),
             down="0 -1 0" if scenario.dimension == 2 else "0 0 -1",
             window_steps=counts.window,

@@ -7,19 +7,22 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
-from sandmould.engines.lammps.render import surfaces
+from sandmould.engines.lammps.render import needs_callback, skin_m, surfaces
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.session import Array, EngineStop, RefusedError, Shared
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.scenario import Scenario
+
+if TYPE_CHECKING:
+    from sandmould.engines.lammps.surface_kernel import SurfaceKernel
 
 _SETUP = ("header", "box", "create", "contacts", "motion", "walls", "background", "integration",
           "measures")  # fmt: skip
@@ -33,21 +36,14 @@ def refuse(scenario: Scenario) -> None:
     RefusedError
         With one sentence.
     """
-    for i, obstacle in enumerate(scenario.obstacles):
-        if obstacle.kind == "polygon":
-            # Its regions lose contacts at the corners of anything but a block.
-            raise RefusedError(f"obstacles.{i}.kind", "polygon", "plate or tube on engine lammps")
     if scenario.dimension == 3 and scenario.contact.rolling_axes == "all":
         raise RefusedError("contact.rolling_axes", "all", "tangent on engine lammps in 3D")
     if scenario.time_step.rotational_inertia == "scaled":
         raise RefusedError("time_step.rotational_inertia", "scaled", "physical on engine lammps")
-    form = scenario.background_damping.form
-    if form == "nonviscous_isotropic":
-        raise RefusedError(
-            "background_damping.form",
-            form,
-            "none, viscous or nonviscous_componentwise on engine lammps",
-        )
+    if scenario.engine.ranks > 1 and needs_callback(scenario):
+        # The force callback lives in one process.
+        valid = "1 on engine lammps with polygons, round solids, meshes or isotropic damping"
+        raise RefusedError("engine.ranks", scenario.engine.ranks, valid)
 
 
 def _library() -> tuple[Any, Any]:
@@ -119,8 +115,25 @@ class LammpsSession:
                 self.send(f'read_restart "{checkpoint}/lammps.restart"')
             else:
                 self.send(self._blocks[name].text)
+        self._kernel: SurfaceKernel | None = None
+        if needs_callback(self._scenario):
+            self._kernel = self._start_kernel(checkpoint)
         if checkpoint is not None:
             self._take_up(json.loads((checkpoint / "session.json").read_text(encoding="utf-8")))
+
+    def _start_kernel(self, checkpoint: Path | None) -> SurfaceKernel:
+        """Give LAMMPS the compiled functions that its deck asks for."""
+        # Compiled code takes a while to load: only decks that call it wait for it.
+        from sandmould.engines.lammps.surface_kernel import SurfaceKernel
+
+        kernel = SurfaceKernel(self._lmp, self._program, skin_m(self._scenario))
+        if kernel.names:
+            kernel.register("surface_kernel", "press")
+        if self._scenario.background_damping.form == "nonviscous_isotropic":
+            kernel.register("damping", "damp")
+        if checkpoint is not None:
+            kernel.restore(checkpoint / "kernel.npz")
+        return kernel
 
     def send(self, commands: str) -> None:
         """Execute commands of LAMMPS; an error becomes the outcome that fits."""
@@ -181,6 +194,8 @@ class LammpsSession:
             padded[:, : values.shape[1]] = values
             flat = (ctypes.c_double * padded.size)(*padded.ravel())
             self._lmp.scatter_atoms(name, 1, 3, flat)
+        if self._kernel is not None:
+            self._kernel.forget()
         self._setup_due = True
 
     def start_stage(self, stage: Stage) -> None:
@@ -199,6 +214,8 @@ class LammpsSession:
         now, window = self.steps, self._counts.window
         ahead = window - now % window if duration_s is None else self._counts.steps(duration_s)
         target = min(now + ahead, self._stage_end)
+        if self._kernel is not None:
+            self._kernel.show_motion(self.stage, self._stage_start, now, target)
         # Setup computes forces with whole-step velocities; only without it do windows add up to
         # the deck's own uncut run, bit for bit.
         self.send(f"run {target - now} pre {'yes' if self._setup_due else 'no'} post no")
@@ -264,17 +281,26 @@ class LammpsSession:
             self._lmp.extract_fix("loads", LMP_STYLE_GLOBAL, LMP_TYPE_VECTOR, nrow=i)
             for i in range(d * len(self._surfaces))
         ])  # fmt: skip
-        return dict(zip(self._surfaces, values.reshape(-1, d), strict=True))
+        loads = dict(zip(self._surfaces, values.reshape(-1, d), strict=True))
+        return loads | self._kernel.mean_loads() if self._kernel is not None else loads
 
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
-        """Refuse: regions of LAMMPS move as a whole."""
-        raise RefusedError("surface", name, "a rigid surface on engine lammps")
+        """Move the vertices of a polygon or mesh evenly over the next window.
+
+        Raises
+        ------
+        RefusedError
+            For walls, plates and tubes: regions of LAMMPS move as a whole.
+        """
+        if self._kernel is None or name not in self._kernel.names:
+            raise RefusedError("surface", name, "a polygon or a mesh on engine lammps")
+        self._kernel.move(name, vertices_m, window_s)
 
     def attach_elastic_surface(
         self, name: str, stiffness: Array, mass: Array, damping: Array
     ) -> None:
-        """Refuse: regions of LAMMPS are rigid."""
-        raise RefusedError("surface", name, "a rigid surface on engine lammps")
+        """Refuse: surfaces move as they are told."""
+        raise RefusedError("surface", name, "a surface moved by move_surface on engine lammps")
 
     @property
     def can_checkpoint(self) -> bool:
@@ -292,6 +318,8 @@ class LammpsSession:
             "stage_start": self._stage_start,
             "vibration_start": self._vibration_start,
         }
+        if self._kernel is not None:
+            self._kernel.save(folder / "kernel.npz")
         (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
 
     def close(self) -> None:

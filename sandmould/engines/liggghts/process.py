@@ -51,8 +51,13 @@ def _environment() -> dict[str, str]:
     return {**os.environ, "OMPI_MCA_ess_singleton_isolated": "1"}
 
 
-def _die_with_parent() -> None:
-    """Ask Linux to kill this process with the one that started it."""
+def _live_and_die_with_parent() -> None:
+    """Leave signals that ask for an end to the process that started this one, and end with it.
+
+    A batch system signals every process of a job; the parent ends in an orderly way, with a
+    checkpoint, for which it still needs LIGGGHTS.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -89,7 +94,7 @@ class Conversation:
             stderr=theirs,
             cwd=folder,
             env=_environment(),
-            preexec_fn=_die_with_parent,
+            preexec_fn=_live_and_die_with_parent,
         )
         os.close(theirs)
         assert self._process.stdin is not None

@@ -1,0 +1,390 @@
+"""What LAMMPS calls in every step: the surface contacts and the damping (38) of our own solver.
+
+LAMMPS gets the address of a compiled function and of one table. The table lists the addresses and
+shapes of arrays that the session owns, so no Python runs in a step. The grains' own arrays are
+asked of LAMMPS in each call: it moves them when grains are inserted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba import carray, cfunc, njit, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from sandmould.dem.broad_phase import Candidates, find_candidates
+from sandmould.dem.contact_law import Law
+from sandmould.dem.motion import ISOTROPIC, damped
+from sandmould.dem.surface_contacts import press_on_surfaces
+from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
+from sandmould.dem.vectors import OPTIONS, PLANE, SPACE, dot, load, load_spin, plus, store, times
+from sandmould.dem.wall_history import WallHistory, carry_history
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LAST_STEP, ROWS, GRAINS, LISTED, FIRST_SHOWN, LOAD_EVERY, WINDOW, HANDLE, EXTRACT = range(9)
+"""Places in ``Bridge.counts``."""
+ALPHA_TRANSLATION, ALPHA_ROTATION, SKIN, STEP = range(8, 12)
+"""Places in ``Bridge.numbers`` after the law."""
+GRAIN_ARRAYS = (b"v", b"omega", b"f", b"torque", b"radius", b"rmass")
+"""What LAMMPS calls its arrays of grains, in the order of ``Bridge.names``."""
+
+
+class Bridge(NamedTuple):
+    """Arrays that the session owns and the compiled function works on."""
+
+    counts: Ints
+    """(9,) int64: last step done, rows and grains of the list, whether it holds, step of the first
+    displacement, steps between load samples and in a window, addresses of LAMMPS and of its
+    function that gives an array."""
+    names: Ints
+    """(6,) int64: addresses of the names in ``GRAIN_ARRAYS``."""
+    numbers: Floats
+    """(12,) float64: the law, damping (38) and (39), skin (m), step (s)."""
+    direction: Floats
+    """(1, d) float64: unit vector along which the box moves."""
+    displacement: Floats
+    """(k,) float64, m: of the box at successive steps; the last one holds on."""
+    vertices: Floats
+    vertex_velocity: Floats
+    steps_left: Ints
+    planes: Ints
+    shape: Floats
+    corner: Ints
+    """See ``SurfaceArrays``."""
+    listed: Floats
+    """(n, d) float64, m: places in the box when candidates were listed."""
+    listed_vertices: Floats
+    """(nv, d) float64, m."""
+    rows: Ints
+    start: Ints
+    part: Ints
+    """See ``Candidates``; longer than needed."""
+    row_ids: Ints
+    """(n,) int64: ids of the grains of the rows."""
+    used: Ints
+    normal: Floats
+    friction: Floats
+    rolling: Floats
+    """See ``WallHistory``; longer than needed."""
+    loads: Floats
+    """(nv, d) float64, N: sum over the samples of a window."""
+    spare_loads: Floats
+    """(nv, d) float64, N: loads of steps that are no sample; nobody reads them."""
+
+
+def table_of(bridge: Bridge) -> Ints:
+    """Addresses and shapes of the arrays, (fields, 3) int64."""
+    return np.array([[a.ctypes.data, *a.shape, 1][:3] for a in bridge], dtype=np.int64)
+
+
+def _pointer_to(kind: Any) -> Any:
+    @intrinsic
+    def pointer(typing_context: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
+
+        return types.CPointer(kind)(types.int64), generate
+
+    return pointer
+
+
+_to_floats, _to_ints = _pointer_to(types.float64), _pointer_to(types.int64)
+
+
+def _call_extract(typing_context: Any, function: Any, handle: Any, name: Any) -> Any:
+    """Call lammps_extract_atom by its address."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        word = ir.IntType(64)
+        called = builder.inttoptr(args[0], ir.FunctionType(word, [word, word]).as_pointer())
+        return builder.call(called, args[1:])
+
+    return types.int64(types.int64, types.int64, types.int64), generate
+
+
+_extract: Any = intrinsic(_call_extract)
+
+
+@njit(**OPTIONS)
+def _line(table: Ints, k: int) -> Floats:
+    return carray(_to_floats(table[k, 0]), (table[k, 1],))
+
+
+@njit(**OPTIONS)
+def _rows(table: Ints, k: int) -> Floats:
+    return carray(_to_floats(table[k, 0]), (table[k, 1], table[k, 2]))
+
+
+@njit(**OPTIONS)
+def _int_line(table: Ints, k: int) -> Ints:
+    return carray(_to_ints(table[k, 0]), (table[k, 1],))
+
+
+@njit(**OPTIONS)
+def _int_rows(table: Ints, k: int) -> Ints:
+    return carray(_to_ints(table[k, 0]), (table[k, 1], table[k, 2]))
+
+
+@njit(**OPTIONS)
+def _open(table: Ints) -> Bridge:
+    """Make the arrays out of their addresses, in the order of the fields."""
+    return Bridge(
+        _int_line(table, 0),
+        _int_line(table, 1),
+        _line(table, 2),
+        _rows(table, 3),
+        _line(table, 4),
+        _rows(table, 5),
+        _rows(table, 6),
+        _int_line(table, 7),
+        _int_line(table, 8),
+        _rows(table, 9),
+        _int_rows(table, 10),
+        _rows(table, 11),
+        _rows(table, 12),
+        _int_line(table, 13),
+        _int_line(table, 14),
+        _int_line(table, 15),
+        _int_line(table, 16),
+        _int_line(table, 17),
+        _rows(table, 18),
+        _rows(table, 19),
+        _rows(table, 20),
+        _rows(table, 21),
+        _rows(table, 22),
+    )
+
+
+@njit(**OPTIONS)
+def _of_grains(bridge: Bridge, which: int) -> int:
+    """Address of an array of LAMMPS; of one with rows that of its row pointers."""
+    return _extract(bridge.counts[EXTRACT], bridge.counts[HANDLE], bridge.names[which])
+
+
+@njit(**OPTIONS)
+def _vectors_of_grains(bridge: Bridge, which: int, n: int) -> Floats:
+    first_row = carray(_to_ints(_of_grains(bridge, which)), (1,))[0]
+    return carray(_to_floats(first_row), (n, 3))
+
+
+@njit(**OPTIONS)
+def _numbers_of_grains(bridge: Bridge, which: int, n: int) -> Floats:
+    return carray(_to_floats(_of_grains(bridge, which)), (n,))
+
+
+@njit(**OPTIONS)
+def _must_list(
+    dim: Any, bridge: Bridge, arrays: SurfaceArrays, position: Floats, shift: Any
+) -> bool:
+    """Whether a grain may have come near a part that is not in its list."""
+    counts, listed = bridge.counts, bridge.listed
+    if not counts[LISTED] or counts[GRAINS] != len(position):
+        return True
+    left = bridge.numbers[SKIN] - farthest_moved(arrays, bridge.listed_vertices)
+    if left <= 0.0:
+        return True
+    for i in range(len(position)):
+        way = plus(plus(load(dim, position, i), -1.0, shift), -1.0, load(dim, listed, i))
+        if dot(way, way) > left * left:
+            return True
+    return False
+
+
+@njit(**OPTIONS)
+def _copy(source: Ints, target: Ints) -> None:
+    """Copy an array to the front of a longer one."""
+    for i in range(len(source)):
+        target[i] = source[i]
+
+
+@njit(**OPTIONS)
+def _clear(rows: Floats) -> None:
+    for i in range(len(rows)):
+        for k in range(rows.shape[1]):
+            rows[i, k] = 0.0
+
+
+@njit(**OPTIONS)
+def _list(
+    dim: Any,
+    bridge: Bridge,
+    arrays: SurfaceArrays,
+    position: Floats,
+    radius: Floats,
+    ids: Any,
+    shift: Any,
+) -> Ints:
+    """List candidates, the history carried over; give their parts.
+
+    A list too long for its array serves this step alone: it is made again in the next one, until
+    the session gives a longer array.
+    """
+    counts = bridge.counts
+    n, old_rows = len(position), counts[ROWS]
+    found = find_candidates(dim, position, radius, bridge.numbers[SKIN], arrays, shift)
+    rows = len(found.rows)
+    new_ids = np.empty(rows, dtype=np.int64)
+    for k in range(rows):
+        new_ids[k] = ids[found.rows[k]]
+    old = WallHistory(bridge.used, bridge.normal, bridge.friction, bridge.rolling)
+    new = carry_history(dim, bridge.row_ids[:old_rows], old, new_ids)
+    for k in range(len(new.normal)):
+        store(load(dim, new.normal, k), bridge.normal, k)
+        store(load_spin(dim, new.friction, k), bridge.friction, k)
+        store(load_spin(dim, new.rolling, k), bridge.rolling, k)
+    _copy(new.used, bridge.used)
+    _copy(new_ids, bridge.row_ids)
+    _copy(found.rows, bridge.rows)
+    _copy(found.start, bridge.start)
+    counts[ROWS], counts[GRAINS] = rows, n
+    counts[LISTED] = 1 if len(found.part) <= len(bridge.part) else 0
+    if counts[LISTED]:
+        _copy(found.part, bridge.part)
+    for i in range(n):
+        store(plus(load(dim, position, i), -1.0, shift), bridge.listed, i)
+    for i in range(len(arrays.vertices)):
+        store(load(dim, arrays.vertices, i), bridge.listed_vertices, i)
+    return found.part
+
+
+@njit(**OPTIONS)
+def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, added: Floats) -> None:
+    """Press the grains on the surfaces in one step.
+
+    LAMMPS calls once more at the start of a run, for the step that was the last one before: the
+    forces are found anew, but nothing moves on.
+    """
+    counts, numbers, displacement = bridge.counts, bridge.numbers, bridge.displacement
+    n = len(position)
+    _clear(added)
+    arrays = SurfaceArrays(
+        bridge.vertices,
+        bridge.vertex_velocity,
+        bridge.steps_left,
+        bridge.planes,
+        bridge.shape,
+        bridge.corner,
+    )
+    moves_on = step > counts[LAST_STEP]
+    dt = numbers[STEP]
+    if moves_on:
+        move_vertices(arrays, dt)
+        counts[LAST_STEP] = step
+    shown = min(max(step - counts[FIRST_SHOWN], 1), len(displacement) - 1)
+    along = load(dim, bridge.direction, 0)
+    shift = times(along, displacement[shown])
+    shift_velocity = times(along, (displacement[shown] - displacement[shown - 1]) / dt)
+    radius = _numbers_of_grains(bridge, 4, n)
+    part = bridge.part
+    if _must_list(dim, bridge, arrays, position, shift):
+        part = _list(dim, bridge, arrays, position, radius, ids, shift)
+    loads = bridge.spare_loads
+    if moves_on and step % counts[LOAD_EVERY] == 0:
+        loads = bridge.loads
+        if (step - counts[LOAD_EVERY]) % counts[WINDOW] == 0:
+            _clear(loads)
+    law = Law(
+        numbers[0],
+        numbers[1],
+        numbers[2],
+        numbers[3],
+        numbers[4],
+        numbers[5],
+        numbers[6] != 0.0,
+        numbers[7] != 0.0,
+    )
+    press_on_surfaces(
+        dim,
+        0,
+        counts[ROWS],
+        Candidates(bridge.rows, bridge.start, part),
+        position,
+        _vectors_of_grains(bridge, 0, n),
+        _vectors_of_grains(bridge, 1, n),
+        radius,
+        _numbers_of_grains(bridge, 5, n),
+        added,
+        _vectors_of_grains(bridge, 3, n),
+        arrays,
+        shift,
+        shift_velocity,
+        law,
+        dt,
+        moves_on,
+        WallHistory(bridge.used, bridge.normal, bridge.friction, bridge.rolling),
+        loads,
+    )
+
+
+@njit(**OPTIONS)
+def _damp(dim: Any, bridge: Bridge, n: int, added: Floats) -> None:
+    """Isotropic damping of all that acts on the grains so far, eqs. (38) and (39)."""
+    velocity, spin = _vectors_of_grains(bridge, 0, n), _vectors_of_grains(bridge, 1, n)
+    force, moment = _vectors_of_grains(bridge, 2, n), _vectors_of_grains(bridge, 3, n)
+    alpha_t, alpha_r = bridge.numbers[ALPHA_TRANSLATION], bridge.numbers[ALPHA_ROTATION]
+    _clear(added)
+    for i in range(n):
+        acting = load(dim, force, i)
+        after = damped(acting, load(dim, velocity, i), 0.0, ISOTROPIC, alpha_t)
+        store(plus(after, -1.0, acting), added, i)
+        turning = load_spin(dim, moment, i)
+        store(damped(turning, load_spin(dim, spin, i), 0.0, ISOTROPIC, alpha_r), moment, i)
+
+
+_SIGNATURE = types.void(
+    types.CPointer(types.int64),
+    types.int64,
+    types.int32,
+    types.CPointer(types.int32),
+    types.CPointer(types.int64),
+    types.CPointer(types.int64),
+)
+_FIELDS = len(Bridge._fields)
+
+
+def _press_in_plane(table: Any, step: int, n: int, ids: Any, position: Any, added: Any) -> None:
+    if n > 0:
+        x, f = carray(_to_floats(position[0]), (n, 3)), carray(_to_floats(added[0]), (n, 3))
+        _press(PLANE, _open(carray(table, (_FIELDS, 3))), step, carray(ids, (n,)), x, f)
+
+
+def _press_in_space(table: Any, step: int, n: int, ids: Any, position: Any, added: Any) -> None:
+    if n > 0:
+        x, f = carray(_to_floats(position[0]), (n, 3)), carray(_to_floats(added[0]), (n, 3))
+        _press(SPACE, _open(carray(table, (_FIELDS, 3))), step, carray(ids, (n,)), x, f)
+
+
+def _damp_in_plane(table: Any, step: int, n: int, ids: Any, position: Any, added: Any) -> None:
+    if n > 0:
+        f = carray(_to_floats(added[0]), (n, 3))
+        _damp(PLANE, _open(carray(table, (_FIELDS, 3))), n, f)
+
+
+def _damp_in_space(table: Any, step: int, n: int, ids: Any, position: Any, added: Any) -> None:
+    if n > 0:
+        f = carray(_to_floats(added[0]), (n, 3))
+        _damp(SPACE, _open(carray(table, (_FIELDS, 3))), n, f)
+
+
+_COMPILED: dict[tuple[str, int], Any] = {}
+_PLAIN: dict[tuple[str, int], Callable[..., None]] = {
+    ("press", 2): _press_in_plane,
+    ("press", 3): _press_in_space,
+    ("damp", 2): _damp_in_plane,
+    ("damp", 3): _damp_in_space,
+}
+
+
+def address_of(what: str, dimension: int) -> int:
+    """Address of the function that LAMMPS is to call: ``press`` or ``damp``."""
+    key = (what, dimension)
+    if key not in _COMPILED:
+        _COMPILED[key] = cfunc(_SIGNATURE, cache=True)(_PLAIN[key])
+    address: int = _COMPILED[key].address
+    return address

@@ -1,0 +1,185 @@
+"""The session's side of the force callback: its arrays, its memory, what it is told and asked."""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sandmould.dem.surfaces import Surfaces
+from sandmould.dem.vectors import like
+from sandmould.dem.wall_history import new_history
+from sandmould.engines.box_motion import displacements
+from sandmould.engines.lammps.callback import (
+    EXTRACT,
+    FIRST_SHOWN,
+    GRAIN_ARRAYS,
+    HANDLE,
+    LAST_STEP,
+    LISTED,
+    LOAD_EVERY,
+    ROWS,
+    WINDOW,
+    Bridge,
+    address_of,
+    table_of,
+)
+from sandmould.engines.program import Program, Stage
+from sandmould.engines.reference.model import scene_of
+from sandmould.engines.session import Array
+from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.geometry import Scene
+
+_KEPT = ("row_ids", "used", "normal", "friction", "rolling")
+_MOVED = ("vertices", "vertex_velocity", "steps_left")
+
+
+def pressed_surfaces(scene: Scene) -> Surfaces:
+    """Outlines, meshes and round solids: the surfaces that are no regions of LAMMPS."""
+    surfaces = Surfaces(scene.dimension)
+    for outline in scene.outlines:
+        first = np.arange(len(outline.vertices_m))
+        ring = np.column_stack([first, np.roll(first, -1)])
+        surfaces.add_facets(outline.name, outline.vertices_m, ring)
+    for mesh in scene.meshes:
+        surfaces.add_facets(mesh.name, mesh.vertices_m, mesh.triangles)
+    for solid in scene.revolved:
+        surfaces.add_revolved(solid.name, solid.origin_m, solid.axis, solid.profile_m, closed=True)
+    return surfaces
+
+
+class SurfaceKernel:
+    """Surface contacts and isotropic damping inside one instance of LAMMPS."""
+
+    def __init__(self, lmp: Any, program: Program, skin_m: float) -> None:
+        """Prepare the arrays; nothing is called yet.
+
+        Parameters
+        ----------
+        lmp : lammps.lammps
+        program : Program
+        skin_m : float
+            A list of grains near surfaces serves until a grain has gone so far.
+        """
+        scenario = program.scenario
+        self._lmp = lmp
+        self._counts = StepCounts.of(scenario)
+        self._in_box_frame = scenario.frame == "box"
+        self._surfaces = pressed_surfaces(scenario.scene)
+        d, n = scenario.dimension, sum(program.counts)
+        self._dimension = d
+        arrays = self._surfaces.arrays
+        memory = new_history(like(d), n)
+        # The names must live as long as LAMMPS is asked by their addresses.
+        self._names = [ctypes.create_string_buffer(name) for name in GRAIN_ARRAYS]
+        law = scene_of(scenario, program.stages[0], self._counts.step_s).wall_law
+        damping = scenario.background_damping
+        numbers = [
+            *map(float, law),
+            damping.nonviscous_translation,
+            damping.nonviscous_rotation,
+            skin_m,
+            self._counts.step_s,
+        ]
+        self._bridge = Bridge(
+            counts=np.zeros(9, dtype=np.int64),
+            names=np.array([ctypes.addressof(name) for name in self._names], dtype=np.int64),
+            numbers=np.array(numbers),
+            direction=np.zeros((1, d)),
+            displacement=np.zeros(2),
+            **arrays._asdict(),
+            listed=np.zeros((n, d)),
+            listed_vertices=np.zeros_like(arrays.vertices),
+            rows=np.zeros(n, dtype=np.int64),
+            start=np.zeros(n + 1, dtype=np.int64),
+            part=np.zeros(4 * n + 64, dtype=np.int64),
+            row_ids=np.zeros(n, dtype=np.int64),
+            **memory._asdict(),
+            loads=np.zeros_like(arrays.vertices),
+            spare_loads=np.zeros_like(arrays.vertices),
+        )
+        counts = self._bridge.counts
+        counts[LOAD_EVERY], counts[WINDOW] = self._counts.load, self._counts.window
+        counts[HANDLE] = lmp.lmp.value
+        extract = ctypes.cast(lmp.lib.lammps_extract_atom, ctypes.c_void_p)
+        counts[EXTRACT] = extract.value or 0
+        self._table = table_of(self._bridge)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Surfaces that the callback presses on."""
+        return self._surfaces.names
+
+    def register(self, fix: str, what: str) -> None:
+        """Let a ``fix external`` call ``press`` or ``damp``."""
+        kind = ctypes.CFUNCTYPE(
+            None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p
+        )
+        set_callback = ctypes.cast(self._lmp.lib.lammps_set_fix_external_callback, kind)
+        address = address_of(what, self._dimension)
+        set_callback(self._lmp.lmp, fix.encode(), address, self._table.ctypes.data)
+
+    def _replace(self, **arrays: Any) -> None:
+        """Put other arrays in the place of some; the table stays where LAMMPS knows it."""
+        self._bridge = self._bridge._replace(**arrays)
+        self._table[:] = table_of(self._bridge)
+
+    def show_motion(self, stage: Stage, stage_start: int, now: int, target: int) -> None:
+        """Tell how the box moves up to a step, and give a longer list where one was too short.
+
+        Parameters
+        ----------
+        stage : Stage
+        stage_start, now, target : int
+            Steps since the run began.
+        """
+        bridge = self._bridge
+        # Contacts of a step feel the velocity since the step before.
+        count = target - now + 2
+        moved = np.zeros(2)
+        if not self._in_box_frame and stage.vibration is not None:
+            moved = displacements(stage, now - 1 - stage_start, count, self._counts.step_s)
+            bridge.direction[0] = stage.vibration.unit_direction(self._dimension)
+        bridge.counts[FIRST_SHOWN] = now - 1
+        needed = int(bridge.start[bridge.counts[ROWS]])
+        part = bridge.part
+        if needed > len(part):
+            part = np.zeros(2 * needed, dtype=np.int64)
+        self._replace(displacement=moved, part=part)
+
+    def mean_loads(self) -> dict[str, Array]:
+        """Mean force of the grains on each surface over the last window, (d,) float64, N."""
+        samples = self._counts.window // self._counts.load
+        return self._surfaces.forces(self._bridge.loads / samples)
+
+    def move(self, name: str, vertices_m: Array, window_s: float) -> None:
+        """Let a surface move evenly to new vertices from the next step on."""
+        self._surfaces.set_motion(name, vertices_m, window_s, self._counts.step_s)
+
+    def forget(self) -> None:
+        """Drop the memory of all contacts."""
+        self._bridge.used[:] = 0
+
+    def save(self, path: Path) -> None:
+        """Write the memory of the contacts and where the surfaces stand."""
+        bridge = self._bridge
+        rows = bridge.counts[ROWS]
+        slots = len(bridge.normal) // max(len(bridge.used), 1)
+        kept = {
+            name: getattr(bridge, name)[: rows * (1 if name in ("row_ids", "used") else slots)]
+            for name in _KEPT
+        }
+        moved = {name: getattr(bridge, name) for name in _MOVED}
+        np.savez(path, last_step=bridge.counts[LAST_STEP], **kept, **moved)
+
+    def restore(self, path: Path) -> None:
+        """Go on from what was written."""
+        bridge = self._bridge
+        with np.load(path) as saved:
+            for name in (*_KEPT, *_MOVED):
+                getattr(bridge, name)[: len(saved[name])] = saved[name]
+            bridge.counts[LAST_STEP] = int(saved["last_step"])
+            bridge.counts[ROWS] = len(saved["row_ids"])
+        bridge.counts[LISTED] = 0
