@@ -97,7 +97,10 @@ def carry_history(
     new = new_history(like, len(new_ids))
     if len(old_ids) == 0:
         return new
-    row_of = np.full(old_ids.max() + 1, -1, dtype=np.int64)
+    largest = 0
+    for row in range(len(old_ids)):
+        largest = max(largest, old_ids[row])
+    row_of = np.full(largest + 1, -1, dtype=np.int64)
     for row in range(len(old_ids)):
         row_of[old_ids[row]] = row
     n = slots(like)
@@ -106,7 +109,8 @@ def carry_history(
         if found >= 0:
             new.used[row] = old.used[found]
             for k in range(old.used[found]):
-                new.normal[row * n + k] = old.normal[found * n + k]
-                new.friction[row * n + k] = old.friction[found * n + k]
-                new.rolling[row * n + k] = old.rolling[found * n + k]
+                a, b = found * n + k, row * n + k
+                store(load(like, old.normal, a), new.normal, b)
+                store(load_spin(like, old.friction, a), new.friction, b)
+                store(load_spin(like, old.rolling, a), new.rolling, b)
     return new

@@ -28,7 +28,7 @@ def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
     if stage.vibration is None:
         return np.zeros(count)
     times = (np.arange(first, first + count) - 1) * step_s
-    return np.array([stage.vibration.displacement_at(t) for t in times.tolist()])
+    return stage.vibration.displacements_at(times)
 
 
 def box_motion(scenario: Scenario, stage: Stage, steps: int, step_s: float) -> tuple[Array, Array]:

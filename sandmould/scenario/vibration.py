@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
@@ -126,11 +128,16 @@ class VibrationStage(Section):
         length = math.hypot(*vector)
         return tuple(x / length for x in vector)
 
+    def displacements_at(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """s(t) along the direction, m; zero before and after the stage."""
+        end = self.whole_duration_s
+        ramp = np.ones_like(time_s)
+        if self.ramp_s > 0:
+            ramp = np.minimum(1.0, np.minimum(time_s, end - time_s) / self.ramp_s)
+        moving = (time_s > 0) & (time_s < end)
+        wave = self.amplitude_m * ramp * np.sin(self.angular_frequency_rad_s * time_s)
+        return np.where(moving, wave, 0.0)
+
     def displacement_at(self, time_s: float) -> float:
         """s(t) along the direction, m; zero before and after the stage."""
-        if time_s <= 0 or time_s >= self.whole_duration_s:
-            return 0.0
-        ramp = 1.0
-        if self.ramp_s > 0:
-            ramp = min(1.0, time_s / self.ramp_s, (self.whole_duration_s - time_s) / self.ramp_s)
-        return self.amplitude_m * ramp * math.sin(self.angular_frequency_rad_s * time_s)
+        return float(self.displacements_at(np.array(time_s)))

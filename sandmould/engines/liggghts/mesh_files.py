@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from sandmould.scenario.geometry import Array, Block, Wall
+from sandmould.scenario.outline import signed_area_m2
 from sandmould.scenario.scenario import Scenario
 
 LONGEST_OVER_WIDE = 20.0
 """Longest rectangle that is not cut: LIGGGHTS refuses triangles with an angle under 0.06 degrees
 and warns under 0.5."""
-_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 def surface_triangles(
     scenario: Scenario, simulation_box: list[tuple[float, float]]
 ) -> dict[str, Array]:
-    """Triangulate all walls, blocks and polygons.
+    """Triangulate all walls, blocks and outlines, and take meshes as they are.
 
     Parameters
     ----------
@@ -43,11 +43,14 @@ def surface_triangles(
     surfaces = {wall.name: _wall(wall, low, high) for wall in scene.walls}
     for block in scene.blocks:
         surfaces[block.name] = (
-            _prism(_outline(block), span) if scene.dimension == 2 else _cuboid(block)
+            _prism(block.corners()[block.facets()[:, 0]], span)
+            if scene.dimension == 2
+            else _cuboid(block)
         )
-    for obstacle in scenario.obstacles:
-        if obstacle.kind == "polygon":
-            surfaces[obstacle.name] = _prism(np.array(obstacle.vertices_m), span)
+    for outline in scene.outlines:
+        surfaces[outline.name] = _prism(outline.vertices_m, span)
+    for mesh in scene.meshes:
+        surfaces[mesh.name] = mesh.corners_m
     return surfaces
 
 
@@ -94,17 +97,9 @@ def _wall(wall: Wall, low: Array, high: Array) -> Array:
     return _rectangle(corner, first, second)
 
 
-def _outline(block: Block) -> Array:
-    """Corners of a rectangle, counter-clockwise, (4, 2) float64, m."""
-    return block.corners()[[0, 2, 3, 1]] if np.linalg.det(block.axes) > 0 else block.corners()[
-        [0, 1, 3, 2]]  # fmt: skip
-
-
 def _prism(outline_m: Array, span_m: tuple[float, float]) -> Array:
     """Sides of an outline drawn out along z; the ends, out of the grains' reach, are left open."""
-    x, y = outline_m.T
-    area = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
-    if area < 0:
+    if signed_area_m2(outline_m) < 0:
         outline_m = outline_m[::-1]
     up = np.array([0.0, 0.0, span_m[1] - span_m[0]])
     foot = np.column_stack([outline_m, np.full(len(outline_m), span_m[0])])
@@ -114,14 +109,15 @@ def _prism(outline_m: Array, span_m: tuple[float, float]) -> Array:
 
 def _cuboid(block: Block) -> Array:
     """The six faces of a block."""
-    corners = block.corners()
+    edges = 2 * block.half_size_m[:, None] * block.axes
     faces = []
-    for face in _FACES:
-        a, b, _, d = corners[list(face)]
-        first, second = b - a, d - a
-        if np.cross(first, second) @ (corners[list(face)].mean(axis=0) - block.centre_m) < 0:
+    for i in range(3):
+        first, second = edges[(i + 1) % 3], edges[(i + 2) % 3]
+        if np.cross(first, second) @ edges[i] < 0:
             first, second = second, first
-        faces.append(_rectangle(a, first, second))
+        corner = block.centre_m - (first + second) / 2
+        faces.append(_rectangle(corner + edges[i] / 2, first, second))
+        faces.append(_rectangle(corner - edges[i] / 2, second, first))
     return np.concatenate(faces)
 
 

@@ -23,8 +23,19 @@ def refuse(scenario: Scenario) -> None:
         raise RefusedError("sand.disc_inertia", "disc", f"sphere {_HERE}")
     if scenario.time_step.rotational_inertia == "scaled":
         raise RefusedError("time_step.rotational_inertia", "scaled", f"physical {_HERE}")
+    _refuse_round_solids(scenario)
     _refuse_damping(scenario)
     _refuse_rolling(scenario)
+
+
+def _refuse_round_solids(scenario: Scenario) -> None:
+    """Meshes have flat facets; how many would do is for the user to say."""
+    for i, obstacle in enumerate(scenario.obstacles):
+        if obstacle.kind == "cylinder":
+            valid = f"plate, tube, polygon or mesh {_HERE}"
+            raise RefusedError(f"obstacles.{i}.kind", obstacle.kind, valid)
+        if obstacle.kind == "tube" and scenario.dimension == 3 and obstacle.section == "round":
+            raise RefusedError(f"obstacles.{i}.section", obstacle.section, f"facets {_HERE}")
 
 
 def _refuse_damping(scenario: Scenario) -> None:

@@ -89,8 +89,6 @@ def render_deck(
     windows = _windows(program)
     mean_diameter = sum(c["diameter_m"] * c["count_fraction"] for c in classes)
     first_id = [1 + sum(program.counts[:i]) for i in range(len(program.counts))]
-    outlines = [o.vertices_m for o in scenario.obstacles if o.kind == "polygon"]
-    polygon_top = max((y for outline in outlines for _, y in outline), default=0.0)
 
     def first_window(stage: Stage) -> int:
         return windows[stage.name][0]
@@ -121,7 +119,7 @@ def render_deck(
             simulation_box=bounds_m(program),
             surfaces=list(surface_meshes(program)),
             wall_names=[wall.name for wall in scenario.scene.walls],
-            obstacle_top=max(obstacle_top_m(scenario), polygon_top),
+            obstacle_top=obstacle_top_m(scenario),
             down="0 -1 0" if scenario.dimension == 2 else "0 0 -1",
             window_steps=counts.window,
             load_steps=counts.load,

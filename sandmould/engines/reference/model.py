@@ -16,7 +16,7 @@ from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
 
-SKIN_OVER_DIAMETER = 0.15
+SKIN_OVER_DIAMETER = 0.3
 """Neighbour skin over the mean diameter; within 5 % of the cheapest between 0.08 and 0.25."""
 
 
