@@ -1,7 +1,7 @@
 # make demo   the main job on real input: sand flows into a tube at three frequencies
 # make test   lint, types, import contract and all tests
 # The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, decks, schema, lock,
-# results-check, clean.
+# twins (the engines compared, docs/engine_twins.md), results-check, clean.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= $(shell nproc)
@@ -10,7 +10,9 @@ BIN := .venv/bin
 INSTALLED := .venv/installed
 NAME = $(basename $(notdir $(STUDY)))
 
-.PHONY: demo study plan test lint decks schema lock results-check clean
+TWINS := engine_twins damping_forms contact_readings rolling_axes frames
+
+.PHONY: demo study plan twins test lint decks schema lock results-check clean
 
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
@@ -22,6 +24,13 @@ study: $(INSTALLED)
 
 plan: $(INSTALLED)
 	@$(BIN)/python -m sandmould.study.planning $(STUDY)
+
+twins: $(INSTALLED)
+	@for name in $(TWINS); do \
+	  $(MAKE) --no-print-directory study STUDY=config/studies/$$name.yaml \
+	    && $(BIN)/python -m sandmould.study.evidence record config/studies/$$name.yaml || exit 1; \
+	done
+	@$(BIN)/python -m sandmould.study.twins
 
 test: lint
 	$(BIN)/pytest -n 2 --dist loadfile

@@ -1,4 +1,4 @@
-"""Contacts of the grains with one another, the walls and the blocks."""
+"""Contacts of the grains with one another, the walls and the solids."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.engines.neighbours import touching_pairs
-from sandmould.scenario.geometry import Array, Block, Scene, Wall
+from sandmould.scenario.geometry import Array, Scene, Solid, Wall
+from sandmould.scenario.mesh import TriangleMesh
 
 
 @dataclass(frozen=True)
@@ -16,11 +17,11 @@ class Contacts:
     """Number of contacts of the grains and the deepest of them."""
 
     count: NDArray[np.int64]
-    """(n,) int64: contacts of each grain with grains, walls and blocks."""
+    """(n,) int64: contacts of each grain with grains, walls and solids."""
     grain_grain: int
     """Pairs of grains in contact."""
     grain_wall: int
-    """Contacts of grains with walls and blocks."""
+    """Contacts of grains with walls and solids."""
     mean_coordination: float
     """Mean of ``count`` over all grains; NaN without grains."""
     mean_coordination_bearing: float
@@ -28,7 +29,7 @@ class Contacts:
     bearing_fraction: float
     """Share of the grains that bear: two or more contacts in 2D, three or more in 3D."""
     largest_overlap_fraction: float
-    """Deepest overlap over the smaller radius, walls and blocks included; 0 without overlap."""
+    """Deepest overlap over the smaller radius, walls and solids included; 0 without overlap."""
 
 
 def contacts(
@@ -38,14 +39,14 @@ def contacts(
 
     A grain with fewer than two contacts in 2D, or three in 3D, cannot be held by friction: it is a
     rattler and left out of ``mean_coordination_bearing``. The test is made once, so a grain held
-    only by rattlers still counts as bearing.
+    only by rattlers still counts as bearing. A solid counts once, also for a grain in its notch.
 
     Parameters
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
     scene : Scene, optional
-        Walls and blocks; without it only contacts between grains are counted.
+        Walls and solids; without it only contacts between grains are counted.
     tolerance_m : float, m, optional
         Largest gap that still counts as contact.
 
@@ -63,11 +64,16 @@ def contacts(
         grain_grain += int(touch.sum())
         smaller_m = np.minimum(radius_m[first], radius_m[second])
         deepest = max(deepest, float((overlap_m / smaller_m).max(initial=0.0)))
-    surfaces: tuple[Wall | Block, ...] = ()
+    reach_m = float(radius_m.max(initial=0.0)) + max(tolerance_m, 0.0)
+    surfaces: tuple[Wall | Solid, ...] = ()
     if scene is not None:
-        surfaces = (*scene.walls, *scene.blocks)
+        surfaces = (*scene.walls, *scene.solids)
     for surface in surfaces:
-        overlap_m = radius_m - surface.distance_m(position_m)
+        if isinstance(surface, TriangleMesh):
+            distance_m = surface.distance_m(position_m, reach_m)
+        else:
+            distance_m = surface.distance_m(position_m)
+        overlap_m = radius_m - distance_m
         touch = overlap_m > -tolerance_m
         count += touch
         grain_wall += int(touch.sum())

@@ -21,7 +21,7 @@ class ApparentDensity:
     corrected_kg_m3: Array
     """(n,) float64: the same sand over the free part of the control volume; NaN if none is free."""
     free_fraction: Array
-    """(n,) float64: share of the control volume inside the box and outside the blocks."""
+    """(n,) float64: share of the control volume inside the box and outside the solids."""
 
 
 def apparent_density(
@@ -35,7 +35,7 @@ def apparent_density(
 
     Equation (55): density of the grains times the share of the control volume that they take up,
     each counted by its exact common part with it, the grain in the middle included. The pores are
-    what is left. The correction allows for walls and solid blocks only: grains at the free surface
+    what is left. The correction allows for walls and solids only: grains at the free surface
     of the bed still read low, for the air above them counts as pores. An overlap of two grains
     counts twice, as in the paper.
 
@@ -46,7 +46,7 @@ def apparent_density(
     density_kg_m3 : float, kg/m3
         Of the grains' own material.
     scene : Scene, optional
-        Walls and blocks; without it nothing is corrected.
+        Walls and solids; without it nothing is corrected.
     control_radius_m : float, m, optional
         Twice the largest radius, as in the paper, unless given.
 

@@ -1,4 +1,4 @@
-"""Snapshots written for ParaView and OVITO."""
+"""Snapshots, and the solids among the grains, written for ParaView and OVITO."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from pathlib import Path
 
 import meshio
 import numpy as np
+from numpy.typing import NDArray
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.geometry import Array
+from sandmould.scenario.geometry import Array, Block, Scene, Solid
+from sandmould.scenario.outline import Outline
+from sandmould.scenario.revolved import Revolved
 
 _COLUMNS = "id type x y z vx vy vz omegax omegay omegaz radius layer"
 
@@ -44,6 +47,43 @@ def to_vtk(snapshot: Snapshot, path: Path) -> None:
     partial = _partial(path)
     mesh.write(partial, file_format="vtu")
     os.replace(partial, path)
+
+
+def solids_to_vtk(scene: Scene, path: Path) -> None:
+    """Write the surfaces of all solids, for ParaView (.vtu): lines in 2D, triangles in 3D.
+
+    Each cell has the number of its ``solid``, from 0, in the order of ``Scene.solids``. A round
+    solid has 128 sides. Points of 2D lie at z = 0.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : Path
+        Appears only when complete.
+    """
+    points_m, cells, numbers = [np.zeros((0, 3))], [], []
+    for number, solid in enumerate(scene.solids):
+        vertices_m, facets = _surface(solid)
+        cells.append(facets + sum(len(p) for p in points_m))
+        points_m.append(_in_space(vertices_m))
+        numbers.append(np.full(len(facets), number))
+    kind = "line" if scene.dimension == 2 else "triangle"
+    blocks = [(kind, np.concatenate(cells))] if cells else []
+    data = {"solid": [np.concatenate(numbers)]} if cells else {}
+    partial = _partial(path)
+    meshio.Mesh(np.concatenate(points_m), blocks, cell_data=data).write(partial, file_format="vtu")
+    os.replace(partial, path)
+
+
+def _surface(solid: Solid) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices of a solid and the facets between them."""
+    if isinstance(solid, Outline):
+        start = np.arange(len(solid.vertices_m))
+        return solid.vertices_m, np.column_stack([start, np.roll(start, -1)])
+    if isinstance(solid, Block):
+        return solid.corners(), solid.facets()
+    mesh = solid.mesh() if isinstance(solid, Revolved) else solid
+    return mesh.vertices_m, mesh.triangles
 
 
 def to_ovito(snapshot: Snapshot, path: Path) -> None:

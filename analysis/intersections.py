@@ -106,7 +106,10 @@ def polygon_area_m2(polygon_m: Array) -> float:
 
 
 def cut_polygon(polygon_m: Array, point_m: Array, normal: Array) -> Array:
-    """Part of a convex polygon on the normal's side of a line.
+    """Part of a polygon on the normal's side of a line.
+
+    A polygon that is not convex may be left in several pieces: they stay joined along the line by
+    edges that run there and back, which bound no area.
 
     Parameters
     ----------
@@ -176,6 +179,35 @@ def disc_polygon_m2(centre_m: Array, radius_m: Array, polygon_m: Array) -> Array
     area[whole] = np.pi * radius_m[whole] ** 2
     cut = ~whole & (inside_m > -radius_m)
     area[cut] = _green_m2(centre_m[cut], radius_m[cut], start_m, along)
+    return area
+
+
+def disc_outline_m2(centre_m: Array, radius_m: Array, polygon_m: Array) -> Array:
+    """Area common to discs and one polygon that need not be convex, exact.
+
+    Parameters
+    ----------
+    centre_m : (n, 2) float64, m
+    radius_m : (n,) float64, m
+    polygon_m : (k, 2) float64, m
+        In either sense of rotation; edges may run back along one another, as where
+        :func:`cut_polygon` has parted it.
+
+    Returns
+    -------
+    (n,) float64, m2
+    """
+    area = np.zeros(len(centre_m))
+    if len(polygon_m) < 3:
+        return area
+    start_m, along = _edges(polygon_m)
+    if len(start_m) < 3:
+        return area
+    away_m = np.maximum(start_m.min(axis=0) - centre_m, centre_m - start_m.max(axis=0))
+    near = np.flatnonzero(away_m.max(axis=1) < radius_m)
+    for at in range(0, len(near), _CHUNK):
+        part = near[at : at + _CHUNK]
+        area[part] = np.maximum(_green_m2(centre_m[part], radius_m[part], start_m, along), 0.0)
     return area
 
 

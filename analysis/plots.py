@@ -13,9 +13,9 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from analysis.free_space import box_levels_m, box_section
+from analysis.sections import convex_section, solid_sections
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.geometry import Array, Bore, Scene
 
@@ -28,7 +28,7 @@ _MM = 1e3
 
 
 def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = None) -> Axes:
-    """Draw the box, open at the top, its solid blocks, and the bores as broken lines.
+    """Draw the box, open at the top, its solids, and the bores as broken lines.
 
     Parameters
     ----------
@@ -56,12 +56,11 @@ def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = No
     walls.set_capstyle("projecting")
     ax.add_collection(walls)
     plane_m = _middle(scene) if cut_m is None else cut_m
-    for block in scene.blocks:
-        outline_m = _outline(block.corners(), plane_m)
-        if len(outline_m):
+    for solid in scene.solids:
+        for outline_m in solid_sections(solid, plane_m):
             ax.add_patch(Polygon(outline_m * _MM, facecolor="0.8", edgecolor="0.25", zorder=2.5))
     for bore in scene.bores:
-        outline_m = _outline(_bore_corners(bore), plane_m)
+        outline_m = convex_section(_bore_corners(bore), plane_m)
         if len(outline_m):
             ax.add_patch(
                 Polygon(outline_m * _MM, fill=False, edgecolor="0.1", linestyle="--", zorder=4)
@@ -203,30 +202,10 @@ def _box_outline(scene: Scene, height_m: float, cut_m: float | None) -> Array:
     floor_m, lid_m = box_levels_m(scene.walls)
     ends_m = (max(floor_m, lowest_m), min(lid_m, height_m))
     levels = [np.column_stack([plan_m, np.full(len(plan_m), z)]) for z in ends_m]
-    return _outline(np.concatenate(levels), _middle(scene) if cut_m is None else cut_m)
+    return convex_section(np.concatenate(levels), _middle(scene) if cut_m is None else cut_m)
 
 
 def _bore_corners(bore: Bore) -> Array:
     """Corners of the cavity, (m, d) float64, m."""
     mouth_m = bore.mouth_m + bore.section_m @ bore.basis
     return np.concatenate([mouth_m, mouth_m + bore.length_m * bore.axis])
-
-
-def _outline(corners_m: Array, cut_m: float) -> Array:
-    """Polygon of a convex body in the plane shown, (k, 2) float64, m; empty where it misses."""
-    points_m = corners_m
-    if corners_m.shape[1] == 3:
-        # every line between two corners lies inside the body, so its section is their hull
-        one, two = np.triu_indices(len(corners_m), 1)
-        a, b = corners_m[one], corners_m[two]
-        crossed = (a[:, 1] - cut_m) * (b[:, 1] - cut_m) <= 0.0
-        crossed &= a[:, 1] != b[:, 1]
-        a, b = a[crossed], b[crossed]
-        step = (cut_m - a[:, 1]) / (b[:, 1] - a[:, 1])
-        points_m = (a + step[:, None] * (b - a))[:, [0, 2]]
-    if len(points_m) < 3:
-        return np.zeros((0, 2))
-    try:
-        return points_m[ConvexHull(points_m).vertices]
-    except QhullError:
-        return np.zeros((0, 2))

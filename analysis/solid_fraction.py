@@ -21,7 +21,7 @@ class SolidFractionProfile:
     sand_measure: Array
     """(m,) float64, m2 in 2D or m3 in 3D."""
     free_measure: Array
-    """(m,) float64, m2 in 2D or m3 in 3D: the box without its blocks."""
+    """(m,) float64, m2 in 2D or m3 in 3D: the box without its solids."""
     solid_fraction: Array
     """(m,) float64: sand over free space; NaN where there is no free space."""
 
@@ -96,7 +96,7 @@ def bed_surface_height_m(
 ) -> float:
     """Height of the bed's surface: the mean over columns of the highest grain top.
 
-    Two things make it robust. A grain in flight, with no other grain, wall or block within half
+    Two things make it robust. A grain in flight, with no other grain, wall or solid within half
     the largest radius, is left out (a dense stream still falling is not told apart). And columns
     weigh alike, so a heap in one counts by its width. Columns without sand are left out: the
     height is that of the surface where there is sand. It lies above the mean of all surface

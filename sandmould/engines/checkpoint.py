@@ -54,6 +54,16 @@ def next_folder(work: Path) -> Path:
     return folder
 
 
+def set_aside(work: Path, mark: Mark) -> Path:
+    """Move both checkpoints of another scenario out of the work folder, which is swept later."""
+    aside = work.parent / f"checkpoints_of_{mark.scenario_hash[:12]}"
+    aside.mkdir(exist_ok=True)
+    for folder in (work / "checkpoint_a", work / "checkpoint_b"):
+        if folder.is_dir() and not (aside / folder.name).exists():
+            folder.rename(aside / folder.name)
+    return aside
+
+
 def newest_checkpoint(work: Path) -> tuple[tuple[Path, Mark] | None, list[str]]:
     """Find the newest whole checkpoint.
 

@@ -61,7 +61,10 @@ class Driver:
         signal.signal(signal.SIGTERM, self._ask_to_stop)
         newest, notes = checkpoints.newest_checkpoint(self._work)
         if newest is not None and newest[1].scenario_hash != self._hash:
-            notes.append(f"{newest[0].name} belongs to another scenario and was left unused")
+            aside = checkpoints.set_aside(self._work, newest[1])
+            notes.append(
+                f"checkpoints of another scenario were set aside in {aside.name} and left unused"
+            )
             newest = None
         mark = newest[1] if newest else None
         if mark is not None:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+from sandmould import ROOT
 
 
 @dataclass(frozen=True)
@@ -34,3 +37,11 @@ class BadInputError(Exception):
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
         super().__init__("\n".join(str(p) for p in self.problems))
+
+
+def shown_name(path: Path) -> str:
+    """A file's name in messages: seen from here, else from the repository, else as given."""
+    for folder in (Path.cwd(), ROOT):
+        if path.is_absolute() and path.is_relative_to(folder):
+            return str(path.relative_to(folder))
+    return str(path)

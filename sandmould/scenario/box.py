@@ -9,8 +9,12 @@ import numpy as np
 from pydantic import Field
 
 from sandmould.scenario.geometry import Array, Block, Bore, Scene, Wall
+from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.outline import Outline, signed_area_m2
 from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.revolved import Revolved
 from sandmould.scenario.sand import ARGUED
+from sandmould.scenario.solids import Cylinder, SolidMesh, cylinder_solid, mesh_solid
 
 
 class Box(Section):
@@ -40,13 +44,13 @@ class Plate(Section):
 
 
 class Tube(Section):
-    """A straight horizontal tube along x: two plates in 2D, a prism of flat facets in 3D."""
+    """A straight horizontal tube along x: two plates in 2D, flat facets or round in 3D."""
 
     kind: Literal["tube"]
     name: str = quantity("tube", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
     diameter_m: float = quantity(
         ...,
-        "Inner diameter; in 3D that of the circle with the area of the prism's bore.",
+        "Inner diameter; with facets that of the circle with the area of the prism's bore.",
         unit="m",
         source="user",
         gt=0,
@@ -64,9 +68,13 @@ class Tube(Section):
     closed_end: Literal["none", "left", "right"] = quantity(
         "right", "Which end is closed; the mouth is the other one.", source=ARGUED
     )
-    facets: int = quantity(
-        8, "Number of flat facets of the tube in 3D.", source=ARGUED, ge=3, le=64
+    section: Literal["facets", "round"] = quantity(
+        "facets", "Section of the tube in 3D: a regular polygon or a circle.", source=ARGUED
     )
+    facets: int = quantity(
+        8, "Number of flat facets of the tube in 3D, unless it is round.", source=ARGUED,
+        ge=3, le=64,
+    )  # fmt: skip
 
     @property
     def right_end_x_m(self) -> float:
@@ -80,11 +88,15 @@ class Polygon(Section):
     kind: Literal["polygon"]
     name: str = quantity("polygon", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
     vertices_m: tuple[tuple[float, float], ...] = quantity(
-        ..., "Vertices, counter-clockwise.", unit="m", source="user", min_length=3
+        ..., "Vertices in turn, either way round.", unit="m", source="user", min_length=3
     )
 
 
-Obstacle = Annotated[Plate | Tube | Polygon, Field(discriminator="kind")]
+AnyObstacle = Plate | Tube | Polygon | Cylinder | SolidMesh
+Obstacle = Annotated[AnyObstacle, Field(discriminator="kind")]
+ROUND_BORE_SIDES = 64
+"""Sides of the polygon that stands for a round bore in measures. It has the circle's area and lies
+within 1e-3 of its radius from it: a grain at the wall, a fifth as large, loses 3e-6 of its part."""
 
 
 def _turn(angle_deg: float, dimension: int) -> Array:
@@ -108,13 +120,32 @@ def _tube_axis_point(tube: Tube, box: Box, dimension: int) -> Array:
     return np.array([0.0, y, tube.axis_height_m])
 
 
+def polygon_outline(polygon: Polygon) -> Outline:
+    """Geometry of a polygon, counter-clockwise."""
+    vertices_m = np.array(polygon.vertices_m)
+    if signed_area_m2(vertices_m) < 0.0:
+        vertices_m = vertices_m[::-1]
+    return Outline(polygon.name, vertices_m)
+
+
 def facet_apothem_m(tube: Tube) -> float:
     """Distance of a facet from the axis so that the bore has the circle's area.
 
     A regular n-gon with apothem h has the area n h^2 tan(pi/n).
     """
     circle = math.pi / 4 * tube.diameter_m**2
-    return math.sqrt(circle / (tube.facets * math.tan(math.pi / tube.facets)))
+    sides = _bore_sides(tube)
+    return math.sqrt(circle / (sides * math.tan(math.pi / sides)))
+
+
+def _bore_sides(tube: Tube) -> int:
+    return tube.facets if tube.section == "facets" else ROUND_BORE_SIDES
+
+
+def _closing_x_m(tube: Tube, box: Box) -> float | None:
+    """Where a tube needs an end of its own: x of its closed end, unless the box wall closes it."""
+    x = {"left": tube.left_end_x_m, "right": tube.right_end_x_m}.get(tube.closed_end)
+    return None if x is None or x <= 0 or x >= box.width_m else x
 
 
 def tube_blocks(tube: Tube, box: Box, dimension: int) -> list[Block]:
@@ -143,13 +174,29 @@ def tube_blocks(tube: Tube, box: Box, dimension: int) -> list[Block]:
             centre = middle + outward * (apothem + half_wall)
             blocks.append(Block(f"{tube.name}_{i + 1:02d}", centre, half, axes))
         end_half = np.array([half_wall, outer, outer])
-    closing_x = {"left": tube.left_end_x_m, "right": tube.right_end_x_m}.get(tube.closed_end)
-    at_wall = closing_x is not None and (closing_x <= 0 or closing_x >= box.width_m)
-    if closing_x is not None and not at_wall:
+    closing_x = _closing_x_m(tube, box)
+    if closing_x is not None:
         side = -1.0 if tube.closed_end == "left" else 1.0
         centre = axis + np.eye(dimension)[0] * (closing_x + side * half_wall)
         blocks.append(Block(f"{tube.name}_end", centre, end_half, np.eye(dimension)))
     return blocks
+
+
+def tube_wall(tube: Tube, box: Box) -> Revolved:
+    """Geometry of a round tube in 3D: its wall, and an end unless the box wall closes it."""
+    inner_m, length_m, wall_m = tube.diameter_m / 2, tube.length_m, tube.wall_thickness_m
+    outer_m = inner_m + wall_m
+    if _closing_x_m(tube, box) is None:
+        profile = [[0.0, inner_m], [length_m, inner_m], [length_m, outer_m], [0.0, outer_m]]
+    else:
+        # closed on the left and turned round for the other side, which keeps the sense of rotation
+        profile = [[-wall_m, 0.0], [0.0, 0.0], [0.0, inner_m], [length_m, inner_m],
+                   [length_m, outer_m], [-wall_m, outer_m]]  # fmt: skip
+    from_left = tube.closed_end == "left"
+    origin = _tube_axis_point(tube, box, 3)
+    origin[0] = tube.left_end_x_m if from_left else tube.right_end_x_m
+    axis = np.array([1.0 if from_left else -1.0, 0.0, 0.0])
+    return Revolved(tube.name, origin, axis, np.array(profile))
 
 
 def tube_bore(tube: Tube, box: Box, dimension: int) -> Bore:
@@ -161,8 +208,9 @@ def tube_bore(tube: Tube, box: Box, dimension: int) -> Bore:
     if dimension == 2:
         section = np.array([[-tube.diameter_m / 2], [tube.diameter_m / 2]])
     else:
-        corner = facet_apothem_m(tube) / math.cos(math.pi / tube.facets)
-        angles = 2 * math.pi * np.arange(tube.facets) / tube.facets
+        sides = _bore_sides(tube)
+        corner = facet_apothem_m(tube) / math.cos(math.pi / sides)
+        angles = 2 * math.pi * np.arange(sides) / sides
         section = corner * np.column_stack([np.cos(angles), np.sin(angles)])
     return Bore(tube.name, mouth, axis, tube.length_m, np.eye(dimension)[1:], section)
 
@@ -183,14 +231,40 @@ def box_walls(box: Box, dimension: int) -> list[Wall]:
     return walls
 
 
-def build_scene(box: Box, obstacles: tuple[Plate | Tube | Polygon, ...], dimension: int) -> Scene:
-    """Geometry of a box with plates and tubes; outlines of polygons are left to the engine."""
+def build_scene(box: Box, obstacles: tuple[AnyObstacle, ...], dimension: int) -> Scene:
+    """Geometry of a box with all that stands in it.
+
+    Raises
+    ------
+    BadInputError
+        When the file of a mesh bounds no solid.
+    """
     blocks: list[Block] = []
     bores: list[Bore] = []
-    for obstacle in obstacles:
+    outlines: list[Outline] = []
+    meshes: list[TriangleMesh] = []
+    revolved: list[Revolved] = []
+    for i, obstacle in enumerate(obstacles):
         if isinstance(obstacle, Plate):
             blocks += plate_blocks(obstacle, dimension)
         elif isinstance(obstacle, Tube):
-            blocks += tube_blocks(obstacle, box, dimension)
             bores.append(tube_bore(obstacle, box, dimension))
-    return Scene(dimension, tuple(box_walls(box, dimension)), tuple(blocks), tuple(bores))
+            if dimension == 3 and obstacle.section == "round":
+                revolved.append(tube_wall(obstacle, box))
+            else:
+                blocks += tube_blocks(obstacle, box, dimension)
+        elif isinstance(obstacle, Polygon):
+            outlines.append(polygon_outline(obstacle))
+        elif isinstance(obstacle, Cylinder):
+            revolved.append(cylinder_solid(obstacle))
+        else:
+            meshes.append(mesh_solid(obstacle, f"obstacles.{i}"))
+    return Scene(
+        dimension,
+        tuple(box_walls(box, dimension)),
+        tuple(blocks),
+        tuple(bores),
+        tuple(outlines),
+        tuple(meshes),
+        tuple(revolved),
+    )

@@ -6,10 +6,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandmould.scenario.bad_input import Problem
-from sandmould.scenario.box import Plate, Tube, plate_blocks, tube_blocks
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_blocks, tube_wall
+from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import Cylinder, SolidMesh, cylinder_solid, mesh_solid
+
+KINDS = {2: ("plate", "tube", "polygon"), 3: ("plate", "tube", "cylinder", "mesh")}
+"""Kinds of obstacles that a dimension has."""
 
 
 def problems(scenario: Scenario) -> list[Problem]:
@@ -34,15 +39,22 @@ def _obstacles(s: Scenario) -> Iterator[Problem]:
         key = f"obstacles.{i}"
         if names.index(obstacle.name) != i:
             yield Problem(f"{key}.name", obstacle.name, "a name no other obstacle has")
-        if isinstance(obstacle, Plate):
+        kinds = KINDS[s.dimension]
+        if obstacle.kind not in kinds:
+            valid = f"{', '.join(kinds[:-1])} or {kinds[-1]} in {s.dimension}D"
+            yield Problem(f"{key}.kind", obstacle.kind, valid)
+        elif isinstance(obstacle, Plate):
             yield from _plate(s, obstacle, key)
         elif isinstance(obstacle, Tube):
             yield from _tube(s, obstacle, key)
-        elif s.dimension == 3:
-            yield Problem(f"{key}.kind", "polygon", "plate or tube in 3D")
-        elif not _in_box(s, np.array(obstacle.vertices_m)):
-            vertices = [list(v) for v in obstacle.vertices_m]
-            yield Problem(f"{key}.vertices_m", vertices, f"a polygon inside the box, {_size(s)}")
+        elif isinstance(obstacle, Polygon):
+            yield from _polygon(s, obstacle, key)
+        elif isinstance(obstacle, Cylinder):
+            if not _in_box(s, cylinder_solid(obstacle).corners()):
+                valid = f"a cylinder inside the box, {_size(s)}"
+                yield Problem(f"{key}.centre_m", list(obstacle.centre_m), valid)
+        else:
+            yield from _mesh(s, obstacle, key)
 
 
 def _plate(s: Scenario, plate: Plate, key: str) -> Iterator[Problem]:
@@ -70,7 +82,7 @@ def _tube(s: Scenario, tube: Tube, key: str) -> Iterator[Problem]:
             tube.length_m,
             f"at most {s.box.width_m - tube.left_end_x_m:.6g}, so that the tube ends in the box",
         )
-    elif not _in_box(s, np.vstack([b.corners() for b in tube_blocks(tube, s.box, s.dimension)])):
+    elif not _in_box(s, _tube_corners(s, tube)):
         yield Problem(
             f"{key}.axis_height_m", tube.axis_height_m, f"a tube inside the box, {_size(s)}"
         )
@@ -83,11 +95,40 @@ def _tube(s: Scenario, tube: Tube, key: str) -> Iterator[Problem]:
         )
 
 
-def _in_box(s: Scenario, corners: np.ndarray) -> bool:
+def _tube_corners(s: Scenario, tube: Tube) -> np.ndarray:
+    if s.dimension == 3 and tube.section == "round":
+        return tube_wall(tube, s.box).corners()
+    return np.vstack([b.corners() for b in tube_blocks(tube, s.box, s.dimension)])
+
+
+def _polygon(s: Scenario, polygon: Polygon, key: str) -> Iterator[Problem]:
+    vertices_m = np.array(polygon.vertices_m)
+    valid = outline_fault(vertices_m)
+    if valid is None and not _in_box(s, vertices_m):
+        valid = f"a polygon inside the box, {_size(s)}"
+    if valid is not None:
+        yield Problem(f"{key}.vertices_m", [list(v) for v in polygon.vertices_m], valid)
+
+
+def _mesh(s: Scenario, solid: SolidMesh, key: str) -> Iterator[Problem]:
+    try:
+        corners_m = mesh_solid(solid, key).corners()
+    except BadInputError as error:
+        yield from error.problems
+        return
+    # a face on the wall may stand out by the round-off of its file's seven digits
+    if not _in_box(s, corners_m, slack=1e-6):
+        ends_m = (corners_m.min(axis=0).tolist(), corners_m.max(axis=0).tolist())
+        low, high = (f"({', '.join(f'{x:.4g}' for x in end)})" for end in ends_m)
+        valid = f"one that puts the mesh, now from {low} to {high} m, inside the box, {_size(s)}"
+        yield Problem(f"{key}.position_m", list(solid.position_m), valid)
+
+
+def _in_box(s: Scenario, corners: np.ndarray, slack: float = 1e-9) -> bool:
     size = [s.box.width_m, s.box.depth_m, s.box.height_m] if s.dimension == 3 else [
         s.box.width_m, s.box.height_m]  # fmt: skip
-    slack = 1e-9 * max(size)
-    return bool((corners >= -slack).all() and (corners <= np.array(size) + slack).all())
+    slack_m = slack * max(size)
+    return bool((corners >= -slack_m).all() and (corners <= np.array(size) + slack_m).all())
 
 
 def _size(s: Scenario) -> str:

@@ -75,6 +75,12 @@ class Contact(Section):
         "What eq. (18) keeps from pulling: the total normal force, or its elastic part alone.",
         source=ARGUED,
     )
+    rolling_axes: Literal["tangent", "all"] = quantity(
+        "tangent",
+        "Relative spins that the rolling moment resists in 3D: those that roll, or, as eq. (31) "
+        "reads, twist about the normal too.",
+        source=ARGUED,
+    )
 
 
 class BackgroundDamping(Section):

@@ -1,4 +1,4 @@
-"""The scene as flat walls, oriented solid blocks and the bores of tubes.
+"""The scene: flat walls, solids of every kind and the bores of tubes.
 
 The vertical axis is the last one: y in 2D, z in 3D. Everything here is in the frame of the
 moulding box, at rest.
@@ -10,6 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.outline import Outline
+from sandmould.scenario.revolved import Revolved
 
 Array = NDArray[np.float64]
 
@@ -36,6 +40,10 @@ class Wall:
         (n,) float64, m
         """
         return (position_m - self.point_m) @ self.normal
+
+
+_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+"""Corners of each face of a cuboid, counter-clockwise seen from outside."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +92,20 @@ class Block:
         d = len(self.centre_m)
         signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * d, indexing="ij")).reshape(d, -1).T
         return self.centre_m + (signs * self.half_size_m) @ self.axes
+
+    def facets(self) -> NDArray[np.int64]:
+        """Corners of each side, (4, 2) int64 in 2D, or of each of its triangles, (12, 3) in 3D."""
+        if len(self.centre_m) == 2:
+            return np.array([[0, 2], [2, 3], [3, 1], [1, 0]])
+        return np.array([half for a, b, c, d in _FACES for half in ((a, b, c), (a, c, d))])
+
+    @property
+    def measure(self) -> float:
+        """Area (m2) of the block in 2D, its volume (m3) in 3D."""
+        return float(np.prod(2.0 * self.half_size_m))
+
+
+Solid = Block | Outline | TriangleMesh | Revolved
 
 
 @dataclass(frozen=True)
@@ -144,17 +166,36 @@ class Scene:
     walls: tuple[Wall, ...]
     blocks: tuple[Block, ...]
     bores: tuple[Bore, ...]
+    outlines: tuple[Outline, ...] = ()
+    """Solids of 2D other than rectangles."""
+    meshes: tuple[TriangleMesh, ...] = ()
+    """Solids of 3D given by triangles."""
+    revolved: tuple[Revolved, ...] = ()
+    """Round solids of 3D."""
 
-    def clearance_m(self, position_m: Array) -> Array:
-        """Distance of points from the nearest wall or block, negative where inside one.
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """All that fills space: every block, outline, mesh and round solid."""
+        return (*self.blocks, *self.outlines, *self.meshes, *self.revolved)
+
+    def clearance_m(self, position_m: Array, reach_m: float = np.inf) -> Array:
+        """Distance of points from the nearest wall or solid, negative where inside one.
 
         Parameters
         ----------
         position_m : (n, d) float64, m
+        reach_m : float, m, optional
+            Distances beyond it need not be exact: they are never below it, nor above the true
+            ones. It saves time at meshes.
 
         Returns
         -------
         (n,) float64, m
         """
-        surfaces: tuple[Wall | Block, ...] = (*self.walls, *self.blocks)
-        return np.min([s.distance_m(position_m) for s in surfaces], axis=0)
+        found = [wall.distance_m(position_m) for wall in self.walls]
+        for solid in self.solids:
+            if isinstance(solid, TriangleMesh):
+                found.append(solid.distance_m(position_m, reach_m))
+            else:
+                found.append(solid.distance_m(position_m))
+        return np.min(found, axis=0)

@@ -76,10 +76,10 @@ def plan_counts(s: Scenario) -> list[int]:
 
 def predicted_bed_height_m(s: Scenario, counts: list[int]) -> float:
     """Height of the filled bed, obstacles and empty bores included."""
-    solid = sum(counts) * _mean_grain_measure(s) / _nominal_fraction(s)
-    displaced = sum(float(np.prod(2 * b.half_size_m)) for b in s.scene.blocks)
+    sand = sum(counts) * _mean_grain_measure(s) / _nominal_fraction(s)
+    displaced = sum(solid.measure for solid in s.scene.solids)
     displaced += sum(bore.measure for bore in s.scene.bores)
-    return (solid + displaced) / s.floor_measure
+    return (sand + displaced) / s.floor_measure
 
 
 def loose_height_m(s: Scenario, count: int) -> float:

@@ -266,7 +266,7 @@ def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: li
         "too_long": f"a list of at most {context.get('max_length')} entries",
         "literal_error": f"one of {context.get('expected')}",
         "union_tag_invalid": f"a kind among {context.get('expected_tags')}",
-        "union_tag_not_found": "a mapping with a kind: plate, tube or polygon",
+        "union_tag_not_found": "a mapping with a kind: plate, tube, polygon, cylinder or mesh",
         "string_pattern_mismatch": f"text of the pattern {context.get('pattern')}",
     }
     return words.get(kind, str(item["msg"]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -69,6 +70,10 @@ class Sand(Section):
     disc_thickness_m: float = quantity(
         0.1, "Length of a disc across the plane, 2D only.", unit="m", source=ARGUED, ge=1e-6, le=10
     )
+    disc_inertia: Literal["disc", "sphere"] = quantity(
+        "disc", "Whose moment of inertia a disc has, 1/2 m r^2 or 2/5 m r^2, 2D only.",
+        source="Rojek 2004, section 3.1",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _curve_rises(self) -> Sand:
@@ -103,6 +108,10 @@ class Sand(Section):
     def grain_measure(self, diameter_m: float, dimension: int) -> float:
         """Area (m2) of a disc or volume (m3) of a sphere."""
         return math.pi / 4 * diameter_m**2 if dimension == 2 else math.pi / 6 * diameter_m**3
+
+    def inertia_factor(self, dimension: int) -> float:
+        """Moment of inertia of a grain over m r^2."""
+        return 0.5 if dimension == 2 and self.disc_inertia == "disc" else 0.4
 
     def grain_mass_kg(self, diameter_m: float, dimension: int) -> float:
         """Mass of a grain: rho pi r^2 b for a disc, rho 4/3 pi r^3 for a sphere."""

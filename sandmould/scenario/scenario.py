@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal, Self
 
 from pydantic import Field
 
@@ -23,7 +24,9 @@ class Engine(Section):
     name: Literal["lammps", "liggghts", "reference"] = quantity(
         "lammps", "Engine that computes the scene.", source=ARGUED
     )
-    ranks: int = quantity(1, "MPI ranks of one run.", source=ARGUED, ge=1, le=4096)
+    ranks: int = quantity(
+        1, "MPI ranks of one run, or threads of the reference engine.", source=ARGUED, ge=1, le=4096
+    )
 
 
 class Record(Section):
@@ -87,7 +90,7 @@ class Scenario(Section):
     )
     box: Box = Field(Box(), description="The moulding box.")
     obstacles: tuple[Obstacle, ...] = Field(
-        (), description="Plates, tubes and polygons in the box."
+        (), description="Plates, tubes, polygons, cylinders and meshes in the box."
     )
     sand: Sand = Field(Sand(), description="The sand.")
     contact: Contact = Field(Contact(), description="Contact laws.")
@@ -114,10 +117,18 @@ class Scenario(Section):
         """Geometry of the box and the obstacles."""
         return build_scene(self.box, self.obstacles, self.dimension)
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Copy the scenario with some sections replaced, and the geometry that goes with them."""
+        copied = super().model_copy(update=update, deep=deep)
+        if update is not None and not {"dimension", "box", "obstacles"}.isdisjoint(update):
+            # pydantic copies cached properties as they are
+            copied.__dict__.pop("scene", None)
+        return copied
+
     @property
     def critical_step(self) -> CriticalStep:
         """Critical time step, eqs. (40)-(54)."""
-        return critical_step(self.sand, self.contact, self.dimension, self.time_step.coordination)
+        return critical_step(self.sand, self.contact, self.time_step, self.dimension)
 
     @property
     def step_s(self) -> float:

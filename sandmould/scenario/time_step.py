@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from sandmould.scenario.contact import Contact, ContactLaw
 from sandmould.scenario.quantity import Section, quantity
@@ -22,6 +23,12 @@ class TimeStep(Section):
         source=ARGUED,
         ge=1,
         le=30,
+    )
+    rotational_inertia: Literal["physical", "scaled"] = quantity(
+        "physical",
+        "Moments of inertia as they are, or raised to m r^2 k_T / k_n so that rotation does not "
+        "set the critical step.",
+        source=ARGUED,
     )
     step_s: float | None = quantity(
         None, "A time step of the user's own, at most the critical one.", unit="s",
@@ -59,8 +66,20 @@ def _modes(
     return _damped(omega_n, law.damping_ratio * omega_n / omega_pair), 2 / omega_r
 
 
+def inertia_factor(sand: Sand, contact: Contact, time_step: TimeStep, dimension: int) -> float:
+    """Moment of inertia over m r^2 that the equations of motion use.
+
+    Scaled, eqs. (51) and (52) give the same frequency: I = m r^2 k_T / k_n, section 3.5.
+    """
+    physical = sand.inertia_factor(dimension)
+    if time_step.rotational_inertia == "physical":
+        return physical
+    law = contact.grain_grain
+    return max(physical, law.tangential_stiffness_n_m / law.normal_stiffness_n_m)
+
+
 def critical_step(
-    sand: Sand, contact: Contact, dimension: int, coordination: float | None = None
+    sand: Sand, contact: Contact, time_step: TimeStep, dimension: int
 ) -> CriticalStep:
     """Critical time step of a scene, set by its smallest grains.
 
@@ -68,9 +87,9 @@ def critical_step(
     ----------
     sand : Sand
     contact : Contact
+    time_step : TimeStep
+        Its coordination and its rotational inertia count.
     dimension : int
-    coordination : float, optional
-        Contacts a grain; 6 in 2D and 12 in 3D by default.
 
     Returns
     -------
@@ -81,13 +100,13 @@ def critical_step(
     The paper's (51) is the case of one contact with a fixed body. The smallest class stands for
     all, since omega goes as 1/sqrt(m).
     """
-    contacts = coordination or (6.0 if dimension == 2 else 12.0)
-    inertia_factor = 0.5 if dimension == 2 else 0.4
+    contacts = time_step.coordination or (6.0 if dimension == 2 else 12.0)
+    factor = inertia_factor(sand, contact, time_step, dimension)
     smallest = sand.classes(dimension)[0].diameter_m
     mass = sand.grain_mass_kg(smallest, dimension)
-    grain_n, grain_r = _modes(contact.grain_grain, mass, contacts, inertia_factor, 2)
+    grain_n, grain_r = _modes(contact.grain_grain, mass, contacts, factor, 2)
     # At most `dimension` walls meet in a corner.
-    wall_n, wall_r = _modes(contact.grain_wall, mass, dimension, inertia_factor, 1)
+    wall_n, wall_r = _modes(contact.grain_wall, mass, dimension, factor, 1)
     steps = {
         "normal grain-grain contact": grain_n,
         "rotation at grain-grain contacts": grain_r,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,12 +14,13 @@ import pandas as pd
 
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.scenario.reading import Origin, read_yaml, validated
+from sandmould.study.agreement import agreement_table, compare_study, sweep_part
 from sandmould.study.plan import STUDY_FILE
 from sandmould.study.study import Study
 
 NO_OUTCOME = "no outcome written"
 _OUTCOME_COLUMNS = ("outcome_code", "outcome", "detail", "simulated_s", "planned_s")
-_PARAMETER_FREE = ("run", "replicate", "seed")
+_PARAMETER_FREE = ("run", "replicate", "seed", "part")
 _CLOCK = ("time_s", "vibration_time_s", "stage")
 # The summary has these of the run; those of the snapshot get a prefix there.
 _OF_SNAPSHOT = (*_CLOCK, "grains", "largest_overlap_fraction")
@@ -38,6 +39,11 @@ class Collected:
     keys: tuple[str, ...]
     """The swept keys, in the order of ``runs.tsv``."""
 
+    @property
+    def of_sweep(self) -> Collected:
+        """Without the runs that check a point of the sweep on another engine."""
+        return replace(self, summary=sweep_part(self.summary))
+
 
 def swept_keys(runs: pd.DataFrame) -> tuple[str, ...]:
     """Columns of ``runs.tsv`` that are swept parameters."""
@@ -45,18 +51,24 @@ def swept_keys(runs: pd.DataFrame) -> tuple[str, ...]:
 
 
 def collect(study_folder: Path) -> None:
-    """Write ``summary.tsv`` and ``curves.tsv`` beside ``runs.tsv``, each moved into place last.
+    """Write the tables of a study beside ``runs.tsv``, each moved into place last.
+
+    ``summary.tsv`` has a row a run, ``curves.tsv`` one a snapshot, ``agreement.tsv`` one a pair of
+    settings and measure that the study compares.
 
     Raises
     ------
     OSError, ValueError
         When ``runs.tsv`` itself cannot be read; a broken run is told in its row instead.
     """
-    found = gather(study_folder, read_study(study_folder).objective.at_vibration_s)
-    for name, table in (("summary.tsv", found.summary), ("curves.tsv", found.curves)):
-        partial = study_folder / f"{name}.partial"
+    study = read_study(study_folder)
+    found = gather(study_folder, study.objective.at_vibration_s)
+    agreement = agreement_table(compare_study(found.summary, found.keys, study))
+    tables = {"summary": found.summary, "curves": found.curves, "agreement": agreement}
+    for name, table in tables.items():
+        partial = study_folder / f"{name}.tsv.partial"
         table.to_csv(partial, sep="\t", index=False, na_rep="nan")
-        os.replace(partial, study_folder / name)
+        os.replace(partial, study_folder / f"{name}.tsv")
 
 
 def read_study(study_folder: Path) -> Study:

@@ -17,10 +17,12 @@ from typing import Any
 import pandas as pd
 
 from sandmould import ROOT
-from sandmould.engines.choosing import engine_of
+from sandmould.engines.choosing import engine_of, engine_problem
+from sandmould.study.agreement import speeds
 from sandmould.study.expand import Run, expand, scenario_hash
 from sandmould.study.opening import open_study
 from sandmould.study.plan import planned_grain_steps
+from sandmould.study.study import Study
 
 RECORDS = ROOT / "docs" / "results"
 COPIED = ("runs.tsv", "summary.tsv")
@@ -53,6 +55,7 @@ def record(path: Path, results: Path) -> Path:
         raise SystemExit(f"{folder} has no all_runs_finished: run the study first.")
     runs = expand(study)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
+    names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
     provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
     kept: dict[str, Any] = {
         "study": str(path),
@@ -60,16 +63,22 @@ def record(path: Path, results: Path) -> Path:
         "command": f"snakemake --configfile {path}",
         "commit": provenance["commit"],
         "versions": provenance["versions"],
+        "engines": {speed.engine: speed.version for speed in speeds(summary)},
         "machine": provenance["machine"],
         "wall_s_of_all_runs": round(float(summary.wall_s.sum()), 1),
         "grain_steps": float(summary.grain_steps.sum()),
     }
     target = RECORDS / study.name
     target.mkdir(parents=True, exist_ok=True)
-    for name in COPIED:
+    for name in names:
         shutil.copy(folder / name, target / name)
     (target / "record.json").write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     return target
+
+
+def _compares(study: Study) -> bool:
+    """Whether a study compares settings, so that it has a table of agreement."""
+    return bool(study.equivalence.keys) or study.cross_check is not None
 
 
 def stale_records() -> list[tuple[str, str]]:
@@ -90,6 +99,8 @@ def stale_records() -> list[tuple[str, str]]:
 def recompute_smallest(results: Path) -> list[str]:
     """Run the cheapest recorded study again and say where its means differ from the record.
 
+    Studies with an engine that this machine lacks are passed over.
+
     Returns
     -------
     list of str
@@ -97,12 +108,13 @@ def recompute_smallest(results: Path) -> list[str]:
     """
     studies = {path.parent.name: json.loads(path.read_text())["study"]
                for path in RECORDS.glob("*/record.json")}  # fmt: skip
-    if not studies:
+    cost = {}
+    for name, study in studies.items():
+        runs = expand(open_study(ROOT / study))
+        if not any(engine_problem(run.scenario) for run in runs):
+            cost[name] = sum(planned_grain_steps(run.scenario) for run in runs)
+    if not cost:
         return []
-    cost = {
-        name: sum(planned_grain_steps(run.scenario) for run in expand(open_study(ROOT / study)))
-        for name, study in studies.items()
-    }
     name = min(cost, key=lambda n: cost[n])
     print(f"computing {name} again", flush=True)
     shutil.rmtree(results / name, ignore_errors=True)
@@ -114,7 +126,7 @@ def recompute_smallest(results: Path) -> list[str]:
     return [
         f"{name}: mean {column} is {new[column].mean():.4f}, recorded {old[column].mean():.4f}"
         for column, margin in SAME.items()
-        if abs(new[column].mean() - old[column].mean()) > margin
+        if column in old and abs(new[column].mean() - old[column].mean()) > margin
     ]
 
 

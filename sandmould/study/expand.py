@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from sandmould.scenario import checks
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.quantity import Section, fields_at
+from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import SolidMesh, with_hash
+from sandmould.study.comparing import ENGINE
+from sandmould.study.labels import run_label
 from sandmould.study.opening import OpenStudy
 from sandmould.study.sweep import Point, points, value_at
 
+Part = Literal["sweep", "cross_check"]
 MOST_PROBLEMS = 10
 """Problems told at once; the first few are those that teach."""
 ROOT_KEY = "scenario"
@@ -38,6 +41,8 @@ class Run:
     scenario: Scenario
     sources: dict[str, str]
     """Where each leaf of the scenario came from, by key path."""
+    part: Part = "sweep"
+    """Of the sweep, or a point of it on the engine that checks it."""
 
     @property
     def seed(self) -> int:
@@ -65,7 +70,8 @@ def expand(study: OpenStudy) -> list[Run]:
     Returns
     -------
     list of Run
-        Points in the order of the sweep, the replicates of a point together.
+        Points in the order of the sweep, the replicates of a point together; those of the cross
+        check after those of its point.
 
     Raises
     ------
@@ -83,7 +89,7 @@ def expand(study: OpenStudy) -> list[Run]:
             break
         if found:
             continue
-        for run in at_point.runs():
+        for run in (*at_point.runs(), *at_point.cross_check()):
             if run.run in runs:
                 twice = Problem("sweep", point, "points that differ", study.file)
                 found[str(twice)] = twice
@@ -111,7 +117,7 @@ class _AtPoint:
         tree = self.base
         for key, value in point.items():
             tree = _put(tree, key.split("."), value, origin, f"sweep of {self.study.file}")
-        return validated(Scenario, tree, origin, ROOT_KEY)
+        return _with_mesh_hashes(validated(Scenario, tree, origin, ROOT_KEY))
 
     def _misfits(self, scenario: Scenario) -> list[Problem]:
         """What is wrong with a well-typed scenario of this study, keys from the study's root."""
@@ -150,35 +156,64 @@ class _AtPoint:
                 # Below a swept section the problem's own value says more than the section.
                 below = problem.key.removeprefix(f"{ROOT_KEY}.{key}")
                 inner = below if below.startswith(".") else ""
-                shown = problem.value if inner else value
+                shown = problem.value if _holds(key, problem.key) else value
                 return Problem(self._file_key(key) + inner, shown, problem.valid, self.study.file)
         return problem
 
     def _file_key(self, key: str) -> str:
         """Where a swept key stands in the file; an empty one stands for all."""
-        sweep = self.study.study.sweep
-        place = "sweep.keys"
-        if sweep.design == "list":
-            place = f"sweep.points.{list(sweep.points).index(self.point)}"
-        return f"{place}.{key}".rstrip(".")
+        return swept_key(self.study, self.point, key)
 
     def runs(self) -> Iterator[Run]:
         """The replicates of this point."""
-        dump = self.scenario.model_dump(mode="json")
+        yield from self._replicates(self.scenario, self.study.study.replicates, {}, "sweep")
+
+    def cross_check(self) -> Iterator[Run]:
+        """Replicates of this point on the engine that checks it, if this is the point to check."""
+        check = self.study.study.cross_check
+        if check is None or check.at != self.point:
+            return
+        engine = self.scenario.engine.model_copy(update={"name": check.engine})
+        scenario = self.scenario.model_copy(update={"engine": engine})
+        number = check.replicates or self.study.study.replicates
+        source = {ENGINE: f"cross_check of {self.study.file}"}
+        yield from self._replicates(scenario, number, source, "cross_check")
+
+    def _replicates(
+        self, base: Scenario, number: int, source: dict[str, str], part: Part
+    ) -> Iterator[Run]:
+        dump = base.model_dump(mode="json")
         parameters = {key: value_at(dump, key) for key in self.point}
-        sources = dict(_sources(self.scenario, self.origin))
-        own = self.scenario.seed
-        for replicate in range(1, self.study.study.replicates + 1):
-            seed = replicate_seed(own, replicate)
-            scenario = self.scenario.model_copy(update={"seed": seed})
+        label = run_label({ENGINE: base.engine.name, **parameters} if source else parameters)
+        sources = {**dict(_sources(base, self.origin)), **source}
+        own = base.seed
+        for replicate in range(1, number + 1):
+            scenario = base.model_copy(update={"seed": replicate_seed(own, replicate)})
             yield Run(
                 self.study.name,
-                f"{_label(parameters)}_r{replicate}_{scenario_hash(scenario)[:6]}",
+                f"{label}_r{replicate}_{scenario_hash(scenario)[:6]}",
                 parameters,
                 replicate,
                 scenario,
                 {**sources, "seed": f"replicate {replicate} of seed {own} ({sources['seed']})"},
+                part,
             )
+
+
+def swept_key(study: OpenStudy, point: Point, key: str) -> str:
+    """Where the value of a swept key at a point stands in the study's file."""
+    sweep = study.study.sweep
+    place = "sweep.keys"
+    if sweep.design == "list":
+        number = next((i for i, p in enumerate(sweep.points) if p == point), "")
+        place = f"sweep.points.{number}".rstrip(".")
+    return f"{place}.{key}".rstrip(".")
+
+
+def _with_mesh_hashes(scenario: Scenario) -> Scenario:
+    """The scenario with the hashes of its meshes, so that a changed mesh makes another run."""
+    obstacles = tuple(with_hash(o) if isinstance(o, SolidMesh) else o for o in scenario.obstacles)
+    return scenario.model_copy(update={"obstacles": obstacles})
 
 
 def _holds(swept: str, problem_key: str) -> bool:
@@ -231,33 +266,3 @@ def scenario_hash(scenario: Scenario) -> str:
     """Hash of everything that a scenario says, whatever the order of its keys."""
     text = json.dumps(scenario.model_dump(mode="json"), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _label(parameters: Point) -> str:
-    """Names and values of at most three swept keys, in letters that any file system takes."""
-    keys = sorted(parameters)
-    last = [key.rsplit(".", 1)[-1] for key in keys]
-    words = []
-    for key, name in list(zip(keys, last, strict=True))[:3]:
-        parent = key.split(".")[-2] + "_" if last.count(name) > 1 and "." in key else ""
-        value = parameters[key]
-        words.append(_letters(parent + name.removesuffix(_unit_suffix(key)))[:16])
-        if isinstance(value, int | float):
-            words.append(f"{value:.4g}".replace("-", "m").replace(".", "p").replace("+", ""))
-        elif isinstance(value, str):
-            words.append(_letters(value)[:12])
-    return "_".join(words) or "base"
-
-
-def _letters(text: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
-
-
-def _unit_suffix(key: str) -> str:
-    """Unit of a key as its name ends with it, such as ``_kg_m3``."""
-    for field in fields_at(Scenario, key):
-        extra = field.json_schema_extra
-        if isinstance(extra, dict):
-            unit = str(extra["unit"]).lower()
-            return "_" + unit.replace("1/", "per_").replace("/", "_")
-    return ""

@@ -32,7 +32,7 @@ def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> Non
     log : Path
         Takes all that the process prints, which also goes to the terminal.
     ranks : int
-        MPI ranks.
+        MPI ranks; 1 for an engine whose ranks are threads of one process.
     mpi : str
         Command that starts ranks, such as ``srun --mpi=pmix``.
 

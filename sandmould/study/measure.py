@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from analysis.coordination import contacts
 from analysis.density import apparent_density
-from analysis.export import to_ovito, to_vtk
+from analysis.export import solids_to_vtk, to_ovito, to_vtk
 from analysis.layers import mixing_index
 from analysis.plots import draw_by_layer, draw_scene
 from analysis.solid_fraction import (
@@ -77,11 +77,14 @@ def write_picture(folder: Path, out: Path) -> None:
 
 def write_exports(folder: Path, out: Path) -> None:
     """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks."""
-    wanted = read_run(folder / "scenario.yaml").scenario.record.export
+    scenario = read_run(folder / "scenario.yaml").scenario
+    wanted = scenario.record.export
     out.mkdir(exist_ok=True)
     moments = list_moments(folder)
     if wanted == "none" or not moments:
         return
+    if scenario.scene.solids:
+        solids_to_vtk(scenario.scene, out / "solids.vtu")
     last_s = moments[-1].vibration_time_s
     chosen = (
         moments if wanted == "all" else {nearest(moments, f * last_s) for f in MOMENTS.values()}

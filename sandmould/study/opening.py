@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -11,15 +12,17 @@ from typing import Any
 from pydantic import BaseModel
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.study import sweep
+from sandmould.study import comparing, sweep
 from sandmould.study.study import NAME, Material, Study
 
 STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
 MATERIALS = (ROOT / "config" / "materials",)
+_OF_SWEEP = ("sweep", "equivalence", "cross_check")
+_MESH_FILE = r"\bobstacles(\.\d+)+\.file(\.value)?$"
 
 
 @dataclass(frozen=True)
@@ -46,14 +49,6 @@ class _File:
     path: Path
     shown: str
     tree: Tree
-
-
-def shown_name(path: Path) -> str:
-    """A file's name in messages: seen from here, else from the repository, else as given."""
-    for folder in (Path.cwd(), ROOT):
-        if path.is_absolute() and path.is_relative_to(folder):
-            return str(path.relative_to(folder))
-    return str(path)
 
 
 def open_study(path: Path) -> OpenStudy:
@@ -90,7 +85,8 @@ def open_study(path: Path) -> OpenStudy:
         tree = merge(tree, {"scenario": material.tree}, origin, material.shown)
     for file in files:
         if "sweep" in file.tree:
-            tree.pop("sweep", None)
+            for section in _OF_SWEEP:
+                tree.pop(section, None)
         tree = merge(tree, file.tree, origin, file.shown)
     if tree.get("kind") in ("solidification", "flow"):
         valid = "sand; solidification and flow come with their own solvers"
@@ -99,7 +95,7 @@ def open_study(path: Path) -> OpenStudy:
         raise BadInputError(found)
     study = validated(Study, tree, origin)
     base = study.scenario.model_dump(mode="json")
-    found = sweep.problems(study.sweep, base, study.replicates)
+    found = sweep.problems(study.sweep, base, study.replicates) or comparing.problems(study)
     if found:
         raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found])
     return OpenStudy(path.stem, path, study, tree, origin)
@@ -140,7 +136,24 @@ def _material(files: list[_File]) -> _File | None:
 
 def _read(path: Path) -> _File:
     shown = shown_name(path)
-    return _File(path, shown, read_yaml(path, shown))
+    return _File(path, shown, _from_root(read_yaml(path, shown), path.parent))
+
+
+def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
+    """A file's tree with the meshes that it names as seen from itself named as seen from ROOT.
+
+    So a run finds them from any working directory, and no path of this machine enters its
+    scenario as long as the file lies in the repository.
+    """
+    if isinstance(tree, dict):
+        return {n: _from_root(v, folder, f"{key}.{n}") for n, v in tree.items()}
+    if isinstance(tree, list):
+        # the values of a swept key stand at the key, entries of other lists below it
+        swept = re.search(_MESH_FILE, key)
+        return [_from_root(v, folder, key if swept else f"{key}.{i}") for i, v in enumerate(tree)]
+    if isinstance(tree, str) and re.search(_MESH_FILE, key):
+        return Path(os.path.relpath(folder / tree, ROOT)).as_posix()
+    return tree
 
 
 def _places(name: Any, folders: tuple[Path, ...]) -> list[Path]:

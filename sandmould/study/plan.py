@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import Run
+from sandmould.study.expand import Part, Run
 from sandmould.study.study import Study
 
 STUDY_FILE = "study.yaml"
@@ -36,6 +36,7 @@ class _RunFile(Section):
     replicate: int
     scenario: Scenario
     sources: dict[str, str]
+    part: Part = "sweep"
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
@@ -88,10 +89,13 @@ def _scenario_text(run: Run) -> str:
 
 def _table_text(runs: Sequence[Run]) -> str:
     keys = list(dict.fromkeys(key for run in runs for key in run.parameters))
-    rows = [["run", *keys, "replicate", "seed"]]
+    # Only a study with a cross check has runs of two parts to tell apart.
+    several = len({run.part for run in runs}) > 1
+    rows = [["run", *keys, "replicate", "seed", *(["part"] if several else [])]]
     for run in runs:
         values = [_cell(run.parameters.get(key)) for key in keys]
-        rows.append([run.run, *values, str(run.replicate), str(run.seed)])
+        part = [run.part] if several else []
+        rows.append([run.run, *values, str(run.replicate), str(run.seed), *part])
     return "".join("\t".join(row) + "\n" for row in rows)
 
 
@@ -126,26 +130,38 @@ def planned_grain_steps(scenario: Scenario) -> float:
     return build_program(scenario).expected_grain_steps
 
 
-def plan_table(runs: Sequence[Run], rate_grain_steps_per_s: float | None, cores: int) -> str:
+Kind = tuple[str, int]
+"""Engine and dimension: what the speed of a core depends on most."""
+
+
+def kind_of(scenario: Scenario) -> Kind:
+    """Kind of scenario that a calibration holds for."""
+    return scenario.engine.name, scenario.dimension
+
+
+def plan_table(
+    runs: Sequence[Run], rate_grain_steps_per_s: Mapping[Kind, float | None], cores: int
+) -> str:
     """What the runs of a study will take, as text.
 
     Parameters
     ----------
     runs : sequence of Run
-    rate_grain_steps_per_s : float or None
-        Speed of one core, from the calibration; None before it.
+    rate_grain_steps_per_s : mapping of Kind to float or None
+        Speed of one core, from the calibration; None or missing before it.
     cores : int
         Cores that share the runs.
     """
     points: dict[str, list[Run]] = {}
     for run in runs:
-        points.setdefault(json.dumps(run.parameters), []).append(run)
+        points.setdefault(f"{run.part} {json.dumps(run.parameters)}", []).append(run)
     rows = [["point", "runs", "grains", "time step", "steps", "grain-steps", "wall time a run"]]
     work = core_s = longest_s = 0.0
     for alike in points.values():
         scenario = alike[0].scenario
         one = planned_grain_steps(scenario)
-        one_s = one / rate_grain_steps_per_s if rate_grain_steps_per_s else math.nan
+        rate = rate_grain_steps_per_s.get(kind_of(scenario))
+        one_s = one / rate if rate else math.nan
         work += one * len(alike)
         core_s += one_s * len(alike)
         longest_s = max(longest_s, one_s / scenario.engine.ranks)

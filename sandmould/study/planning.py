@@ -23,9 +23,16 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import Run, expand
+from sandmould.study.comparing import ENGINE
+from sandmould.study.expand import Run, expand, swept_key
 from sandmould.study.opening import OpenStudy, open_study
-from sandmould.study.plan import plan_table, planned_grain_steps, write_plan, write_study
+from sandmould.study.plan import (
+    kind_of,
+    plan_table,
+    planned_grain_steps,
+    write_plan,
+    write_study,
+)
 
 DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
 CALIBRATION_GRAINS = 400
@@ -48,9 +55,26 @@ class Plan:
     def _by_name(self) -> dict[str, Run]:
         return {run.run: run for run in self.runs}
 
-    def ranks(self, name: str) -> int:
-        """MPI ranks of a run."""
+    def threads(self, name: str) -> int:
+        """Cores that a run keeps busy, as MPI ranks or as threads."""
         return self._by_name[name].scenario.engine.ranks
+
+    def ranks(self, name: str) -> int:
+        """MPI ranks of a run; the reference engine's ranks are threads of one process."""
+        engine = self._by_name[name].scenario.engine
+        return 1 if engine.name == "reference" else engine.ranks
+
+    def deck_sources(self, name: str) -> list[str]:
+        """Files of the repository that a run's deck is made from, and its solver if it is ours.
+
+        Decks name the state of the solver, so a changed kernel changes the decks of its runs and
+        they are computed again.
+        """
+        engine = self._by_name[name].scenario.engine.name
+        files = [*Path("templates", engine).glob("*.j2")]
+        if engine == "reference":
+            files += (ROOT / "sandmould" / "dem").glob("*.py")
+        return sorted(map(str, files))
 
     def memory_mb(self, name: str) -> int:
         """Memory to ask for: several times the 126 MB measured at 1 134 discs, 144 at 8 000."""
@@ -101,12 +125,23 @@ def open_plan(path: Path) -> Plan:
     for run in runs:
         problem = engine_problem(run.scenario)
         if problem is not None:
-            key = f"scenario.{problem.key}"
-            told = Problem(key, problem.value, problem.valid, study.origin.file_of(key))
+            told = _told(study, run, problem)
             found[str(told)] = told
     if found:
         raise BadInputError(list(found.values()))
     return Plan(study, tuple(runs))
+
+
+def _told(study: OpenStudy, run: Run, problem: Problem) -> Problem:
+    """What an engine refuses, told at the key that gave the value."""
+    if problem.key in run.parameters:
+        key, file = swept_key(study, run.parameters, problem.key), study.file
+    elif problem.key == ENGINE and run.part == "cross_check":
+        key, file = "cross_check.engine", study.origin.file_of("cross_check.engine")
+    else:
+        key = f"scenario.{problem.key}"
+        file = study.origin.file_of(key)
+    return Problem(key, problem.value, problem.valid, file)
 
 
 def announce(plan: Plan, results: Path, cores: int) -> str:
@@ -114,14 +149,10 @@ def announce(plan: Plan, results: Path, cores: int) -> str:
     folder = results / plan.study.name
     write_plan(plan.runs, folder)
     write_study(plan.study.study, folder)
-    rates = {}
-    for run in plan.runs:
-        kind = (run.scenario.engine.name, run.scenario.dimension)
-        if kind not in rates:
-            rates[kind] = calibrated_rate(run.scenario, results)
-    slowest = None if None in rates.values() else min(r for r in rates.values() if r is not None)
+    one_each = {kind_of(run.scenario): run.scenario for run in plan.runs}
+    rates = {kind: calibrated_rate(one, results) for kind, one in one_each.items()}
     title = plan.study.study.title or plan.study.name
-    return f"\n{title}\n{plan_table(plan.runs, slowest, cores)}"
+    return f"\n{title}\n{plan_table(plan.runs, rates, cores)}"
 
 
 def calibrated_rate(scenario: Scenario, results: Path) -> float | None:

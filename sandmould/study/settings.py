@@ -93,7 +93,7 @@ def compare(
     best: Setting, others: Sequence[Setting], found: Mapping[str, pd.Series[float]]
 ) -> tuple[Comparison, ...]:
     """The best minus each other setting, nearest first."""
-    tests = {o.label: _standard_error(found[best.label], found[o.label]) for o in others}
+    tests = {o.label: standard_error(found[best.label], found[o.label]) for o in others}
     factor = max(1, sum(t is not None for t in tests.values()))
     results = []
     for other in others:
@@ -110,7 +110,7 @@ def compare(
     return tuple(results)
 
 
-def _standard_error(a: pd.Series[float], b: pd.Series[float]) -> tuple[float, float, bool] | None:
+def standard_error(a: pd.Series[float], b: pd.Series[float]) -> tuple[float, float, bool] | None:
     """Standard error of the difference of means, degrees of freedom, and whether paired.
 
     None where a side has fewer than two values, or where no spread is left to judge by.

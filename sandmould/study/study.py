@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -37,6 +37,46 @@ class Objective(Section):
     )
 
 
+class Equivalence(Section):
+    """Which settings should agree, and how closely: set before the runs, judged after them."""
+
+    keys: tuple[str, ...] = Field(
+        (),
+        description="Swept keys, such as engine.name, whose values should agree: settings that "
+        "differ in one of them alone are compared.",
+    )
+    margins: dict[Annotated[str, Field(pattern=NAME)], Annotated[float, Field(gt=0)]] = Field(
+        {},
+        description="Columns of measures.tsv and the largest difference of means, in the unit of "
+        "the column, that counts as none.",
+    )
+    confidence: float = quantity(
+        0.9,
+        "Confidence of the interval that must lie inside the margin: 0.9 makes two one-sided "
+        "tests at 5 %.",
+        source=ARGUED,
+        ge=0.5,
+        lt=1,
+    )
+
+
+class CrossCheck(Section):
+    """Runs of one swept point again, on another engine; margins are those of equivalence."""
+
+    engine: Literal["lammps", "liggghts", "reference"] = quantity(
+        ..., "Engine that computes them.", source="user"
+    )
+    at: dict[str, Any] = Field(
+        {}, description="The swept point: a value of every swept key, as the sweep has it."
+    )
+    replicates: int | None = quantity(
+        None,
+        "The first so many replicates, which share their seeds with the sweep's; all unless given.",
+        source=ARGUED,
+        ge=1,
+    )
+
+
 class Material(Section):
     """A named sand: the part of a scenario that a material file may state."""
 
@@ -61,7 +101,11 @@ class Study(Section):
         None, "Sand of config/materials that the scenario starts from.", source="user", pattern=NAME
     )
     scenario: Scenario = Field(Scenario(), description="The scene of sand.")
-    sweep: Sweep = Field(Sweep(), description="What is varied; replaces the sweep of based_on.")
+    sweep: Sweep = Field(
+        Sweep(),
+        description="What is varied; replaces the sweep of based_on, its equivalence and its "
+        "cross_check.",
+    )
     replicates: int = quantity(
         1,
         "Runs of every point, alike but for the grains' starting places.",
@@ -70,3 +114,9 @@ class Study(Section):
         le=1000,
     )
     objective: Objective = Field(Objective(), description="What makes a setting the best.")
+    equivalence: Equivalence = Field(
+        Equivalence(), description="Which settings should agree within margins."
+    )
+    cross_check: CrossCheck | None = Field(
+        None, description="One point of the sweep computed on another engine too."
+    )

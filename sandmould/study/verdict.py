@@ -64,6 +64,7 @@ def judge(
     measure: str,
     better: Better = "larger",
     notes: Sequence[str] = (),
+    seeks_best: bool = True,
 ) -> Verdict:
     """Compare the settings of a study by the mean of the objective.
 
@@ -84,6 +85,8 @@ def judge(
         Which values are better.
     notes : sequence of str
         Caveats that the caller knows of, put after those found here.
+    seeks_best : bool
+        Whether the study looks for the best setting, so that its place in the sweep matters.
 
     Returns
     -------
@@ -105,7 +108,7 @@ def judge(
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
     caveats = [
         *_run_caveats(settings, len(summary), int(values.notna().sum())),
-        *_edge_caveats(best, settings, keys),
+        *(_edge_caveats(best, settings, keys) if seeks_best else ()),
         *(_identical(c) for c in comparisons if _is_identical(c, found, best)),
         *notes,
     ]
@@ -159,7 +162,10 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
 
 
 def sand_notes(
-    keys: Sequence[str], stage: VibrationStage | None, largest_overlap_fraction: float = 0.0
+    keys: Sequence[str],
+    stage: VibrationStage | None,
+    largest_overlap_fraction: float = 0.0,
+    seeks_best: bool = True,
 ) -> tuple[str, ...]:
     """What a sweep over sand leaves open: what the vibration held constant, and the springs.
 
@@ -170,6 +176,8 @@ def sand_notes(
     stage : VibrationStage, optional
     largest_overlap_fraction : float
         Of all runs, over the smaller radius.
+    seeks_best : bool
+        Whether the study looks for the best setting.
 
     Returns
     -------
@@ -187,7 +195,7 @@ def sand_notes(
             f"The amplitude of {stage.hold} was held constant while the frequency changed; with "
             f"{' or '.join(others)} held instead, another frequency may be best."
         )
-    return (*notes, NOT_TESTED)
+    return (*notes, NOT_TESTED) if seeks_best else tuple(notes)
 
 
 def _is_identical(

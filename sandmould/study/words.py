@@ -14,6 +14,8 @@ _UNITS = (
     ("_s", "s"), ("_n", "N"), ("_j", "J"),
 )  # fmt: skip
 _NAMES = {
+    "engine.name": "engine",
+    "background_damping.form": "background damping",
     "coordination": "coordination number",
     "solid_fraction": "solid fraction",
     "bed_height_m": "bed height",
@@ -36,8 +38,8 @@ def name_of(key: str) -> str:
     'frequency'
     """
     last = key.rsplit(".", 1)[-1]
-    if last in _NAMES:
-        return _NAMES[last]
+    if key in _NAMES or last in _NAMES:
+        return _NAMES.get(key) or _NAMES[last]
     if last.endswith("_fill_fraction"):
         return f"fill of the {last.removesuffix('_fill_fraction').replace('_', ' ')}"
     suffix = next((s for s, _ in _UNITS if last.endswith(s)), "")
@@ -90,7 +92,7 @@ def value_text(key: str, value: Any) -> str:
     if isinstance(value, float | int) and not isinstance(value, bool):
         text = f"{value:.6g}"
     else:
-        text = str(value)
+        text = str(value).replace("_", " ")
     unit = unit_of(key)
     return f"{text} {unit}" if unit else text
 

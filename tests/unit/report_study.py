@@ -122,8 +122,93 @@ def write_study(
     return folder
 
 
+ENGINES = {"lammps": 2.8e6, "liggghts": 3.4e6, "reference": 2.1e7}
+"""Engines with a speed in grain-steps per second."""
+
+
+def write_twins(
+    folder: Path,
+    fill: Mapping[str, float],
+    packing: Mapping[str, float],
+    replicates: int = 6,
+    failed: Sequence[str] = (),
+) -> Path:
+    """Write a study over engines that share their seeds, with planted fills and solid fractions."""
+    runs = []
+    for engine in fill:
+        for replicate in range(1, replicates + 1):
+            at = scenario(50.0)
+            chosen = at.engine.model_copy(update={"name": engine})
+            at = at.model_copy(update={"seed": 1000 + replicate, "engine": chosen})
+            name = f"engine_{engine}_r{replicate}"
+            runs.append(Run(folder.name, name, {"engine.name": engine}, replicate, at, {}))
+    write_plan(runs, folder)
+    (folder / "study.yaml").write_text(
+        "title: Do three engines fill and shake the same box alike?\n"
+        "sweep: {keys: {engine.name: [" + ", ".join(fill) + "]}}\n"
+        "equivalence: {keys: [engine.name], margins: {solid_fraction: 0.005, "
+        "tube_fill_fraction: 0.03}}\n"
+    )
+    noise = np.random.default_rng(7)
+    for run in runs:
+        engine = run.scenario.engine.name
+        value = fill[engine] + float(noise.normal(0, 0.012))
+        dense = packing[engine] + float(noise.normal(0, 0.0015))
+        _write_run(
+            folder / "runs" / run.run,
+            run,
+            value,
+            run.run in failed,
+            200,
+            12,
+            dense,
+            ENGINES[engine],
+        )
+    return folder
+
+
+def write_cross_check(folder: Path, engine: str = "lammps", replicates: int = 3) -> Path:
+    """Write a study over frequency on the reference engine, with one point on another too."""
+    runs = []
+    for frequency in PLANTED:
+        for part in ("sweep", "cross_check"):
+            own = part == "sweep"
+            for replicate in range(1, replicates + 1) if own or frequency == 50.0 else ():
+                at = scenario(frequency)
+                chosen = at.engine.model_copy(update={"name": "reference" if own else engine})
+                at = at.model_copy(update={"seed": 1000 + replicate, "engine": chosen})
+                name = f"{'' if own else 'engine_lammps_'}f{frequency:g}_r{replicate}"
+                one = Run(folder.name, name, {KEY: frequency}, replicate, at, {}, part)  # type: ignore[arg-type]
+                runs.append(one)
+    write_plan(runs, folder)
+    (folder / "study.yaml").write_text(
+        "title: Which frequency fills the tube best?\n"
+        "scenario: {engine: {name: reference}}\n"
+        f"sweep: {{keys: {{{KEY}: [25, 50, 100]}}}}\nreplicates: {replicates}\n"
+        f"cross_check: {{engine: {engine}, at: {{{KEY}: 50}}}}\n"
+        "equivalence: {margins: {solid_fraction: 0.005, tube_fill_fraction: 0.03}}\n"
+    )
+    noise = np.random.default_rng(7)
+    for run in runs:
+        own = run.part == "sweep"
+        # the other engine's runs would win if they counted
+        value = PLANTED[run.parameters[KEY]] + (0.0 if own else 0.3)
+        value += float(noise.normal(0, 0.005))
+        dense = 0.78 + float(noise.normal(0, 0.0015))
+        speed = ENGINES[run.scenario.engine.name]
+        _write_run(folder / "runs" / run.run, run, value, False, 200, 12, dense, speed)
+    return folder
+
+
 def _write_run(
-    path: Path, run: Run, value: float, is_failed: bool, grains: int, count: int
+    path: Path,
+    run: Run,
+    value: float,
+    is_failed: bool,
+    grains: int,
+    count: int,
+    packing: float = 0.78,
+    speed: float | None = None,
 ) -> None:
     made = snapshots(run, value, grains, count)
     made = made[: count // 3] if is_failed else made
@@ -143,7 +228,7 @@ def _write_run(
                 "grains": len(snapshot.id),
                 **(tube if run.scenario.obstacles else {}),
                 "bed_height_m": 0.085 - 0.003 * share,
-                "solid_fraction": 0.78 + 0.04 * share,
+                "solid_fraction": packing + 0.04 * share,
                 "apparent_density_corrected_kg_m3": 1800 + 90 * share,
                 "coordination": 3.2 + 0.5 * share,
                 "largest_overlap_fraction": 0.02,
@@ -156,11 +241,11 @@ def _write_run(
         outcome = RunOutcome(Outcome.LOST_GRAINS, said, made[-1].time_s, FILLING_S + DURATION_S)
     outcome.write(path / "outcome.json")
     cost = {
-        "engine": "lammps", "version": "22 Jul 2025", "ranks": 1, "grains": grains,
+        "engine": run.scenario.engine.name, "version": "22 Jul 2025", "ranks": 1, "grains": grains,
         "steps": 400_000, "grain_steps": 400_000 * grains, "wall_s": 41.5, "engine_wall_s": 40.9,
         "cpu_s": 41.2, "peak_memory_bytes": 1.6e8, "time_step_s": 6.1e-6,
         "time_step_fraction": 0.5, "largest_overlap_fraction": 0.034,
-        "grain_steps_per_s": 400_000 * grains / 41.5,
+        "grain_steps_per_s": speed or 400_000 * grains / 41.5,
     }  # fmt: skip
     pd.DataFrame([cost]).to_csv(path / "cost.tsv", sep="\t", index=False)
     said = {

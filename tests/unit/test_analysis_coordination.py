@@ -6,6 +6,8 @@ from numpy.testing import assert_array_equal
 
 from analysis.coordination import contacts
 from sandmould.scenario.geometry import Block, Scene, Wall
+from sandmould.scenario.outline import Outline
+from sandmould.scenario.revolved import Revolved
 
 
 def hexagon():
@@ -63,6 +65,25 @@ def test_walls_and_blocks():
     pressed = contacts(position + np.full(2, 0.3), radius, scene)
     assert_array_equal(pressed.count, [0, 1])
     assert pressed.largest_overlap_fraction == pytest.approx(0.3 / 0.5)
+
+
+def test_other_solids_count_once_each():
+    notch = np.array([[0, 0], [6, 0], [6, 4], [4, 4], [4, 1], [2, 1], [2, 4], [0, 4]], dtype=float)
+    scene = Scene(2, (), (), (), (Outline("u", notch),))
+    # in the notch, touching its floor and both legs; beside the left leg; away
+    got = contacts(np.array([[3.0, 2.0], [-0.9, 2.0], [9, 9]]), np.full(3, 1.01), scene)
+    assert_array_equal(got.count, [1, 1, 0])
+    assert got.largest_overlap_fraction == pytest.approx(0.11 / 1.01)
+    rod = Revolved("rod", np.zeros(3), np.eye(3)[0],
+                   np.array([[0.0, 0], [4, 0], [4, 1], [0, 1]]))  # fmt: skip
+    position, radius = (
+        np.array([[1.0, 0, 1.9], [3.5, 0, 2.1], [5.5, 0.5, 0]]),
+        np.array([1, 1, 1.6]),
+    )
+    for solids in ({"revolved": (rod,)}, {"meshes": (rod.mesh(),)}):
+        scene = Scene(3, (), (), (), **solids)
+        assert_array_equal(contacts(position, radius, scene).count, [1, 0, 1])
+        assert_array_equal(contacts(position, radius, scene, 0.2).count, [1, 1, 1])
 
 
 def test_overlap_is_taken_over_the_smaller_radius():

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from analysis.export import to_ovito, to_vtk
+from analysis.export import solids_to_vtk, to_ovito, to_vtk
 from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.geometry import Block, Scene
+from sandmould.scenario.outline import Outline
+from sandmould.scenario.revolved import Revolved
 
 
 @pytest.fixture(params=[2, 3], ids=["2D", "3D"])
@@ -41,6 +44,28 @@ def test_vtu_round_trip(snapshot, tmp_path):
     assert_array_equal(data["spin_rad_s"], snapshot.spin_rad_s)
     assert_array_equal(data["time_s"], np.full(5, 1.25))
     assert_array_equal(data["vibration_time_s"], np.full(5, 0.5))
+
+
+def test_solids_round_trip(tmp_path):
+    square = Block("square", np.array([0.5, 0.5]), np.array([0.5, 0.5]), np.eye(2))
+    wedge = Outline("wedge", np.array([[2.0, 0.0], [3.0, 0.0], [2.0, 1.0]]))
+    solids_to_vtk(Scene(2, (), (square,), (), (wedge,)), tmp_path / "flat.vtu")
+    flat = meshio.read(tmp_path / "flat.vtu")
+    assert_array_equal(flat.cell_data["solid"][0], [0, 0, 0, 0, 1, 1, 1])
+    ends = flat.points[flat.cells_dict["line"]]
+    assert_allclose(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), [1, 1, 1, 1, 1, 2**0.5, 1])
+    cube = Block("cube", np.zeros(3), np.full(3, 0.5), np.eye(3))
+    profile = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]])
+    rod = Revolved("rod", np.array([5.0, 0.0, 0.0]), np.eye(3)[0], profile)
+    scene = Scene(3, (), (cube,), (), meshes=(rod.mesh(8),), revolved=(rod,))
+    solids_to_vtk(scene, tmp_path / "solids.vtu")
+    solids = meshio.read(tmp_path / "solids.vtu")
+    assert_array_equal(np.unique(solids.cell_data["solid"][0]), [0, 1, 2])
+    a, b, c = solids.points[solids.cells_dict["triangle"]].transpose(1, 0, 2)
+    volume = np.sum(a * np.cross(b, c)) / 6
+    assert volume == pytest.approx(1 + 2 * rod.measure)
+    solids_to_vtk(Scene(2, (), (), ()), tmp_path / "none.vtu")
+    assert (tmp_path / "none.vtu").is_file()
 
 
 def test_dump_round_trip(snapshot, tmp_path):

@@ -1,5 +1,7 @@
 """Pictures: what is on the axes, in mm."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.collections import EllipseCollection, LineCollection
@@ -11,6 +13,8 @@ from numpy.testing import assert_allclose
 from analysis import plots
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.geometry import Block, Bore, Scene, Wall
+from sandmould.scenario.outline import Outline
+from sandmould.scenario.revolved import Revolved
 
 
 def box(size, blocks=(), bores=()):
@@ -77,6 +81,30 @@ def test_scene_3d_is_cut_by_the_middle_plane(ax):
     other = Figure().subplots()
     plots.draw_scene(scene, other, 0.2, cut_m=0.055)
     assert len(other.patches) == 0
+
+
+def test_outline_is_drawn_as_it_is(ax):
+    notched = np.array([[0, 0], [6, 0], [6, 4], [4, 4], [4, 1], [2, 1], [2, 4], [0, 4]]) * 1e-2
+    scene = replace(box([0.1]), outlines=(Outline("u", notched),))
+    plots.draw_scene(scene, ax, 0.2)
+    (shown,) = ax.patches
+    assert shown.get_fill()
+    assert_allclose(shown.get_xy()[:-1], notched * 1e3)
+
+
+def test_hole_of_a_mesh_stays_open_in_its_section(ax):
+    profile = np.array([[0.02, 0.01], [0.04, 0.01], [0.04, 0.02], [0.02, 0.02]])
+    ring = Revolved("ring", np.array([0.05, 0.0, 0.05]), np.eye(3)[1], profile)
+    for scene in (
+        replace(box([0.1, 0.06]), revolved=(ring,)),
+        replace(box([0.1, 0.06]), meshes=(ring.mesh(),)),
+    ):
+        other = Figure().subplots()
+        plots.draw_scene(scene, other, 0.2)
+        (shown,) = other.patches
+        path = shown.get_path()
+        assert path.contains_point((50.0 + 15.0, 50.0))
+        assert not path.contains_point((50.0, 50.0))
 
 
 def test_grains_2d(ax):

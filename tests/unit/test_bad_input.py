@@ -86,6 +86,52 @@ CASES: dict[str, tuple[str | bytes, str]] = {
         "trial.yaml: scenario.obstacles.0.vertices_m = [[0.0, 0.0], [0.2, 0.0], [0.0, 0.05]] "
         "cannot be used: valid is a polygon inside the box, 0.12 x 0.11 m.",
     ),
+    "polygon that crosses itself": (
+        "based_on: tube\nscenario: {obstacles: [{kind: polygon, "
+        "vertices_m: [[0.01, 0.01], [0.05, 0.05], [0.05, 0.01], [0.01, 0.04]]}]}",
+        "trial.yaml: scenario.obstacles.0.vertices_m = [[0.01, 0.01], [0.05, 0.05], [0.05, 0.01], "
+        "[0.01, 0.04]] cannot be used: valid is edges that neither cross nor touch one another.",
+    ),
+    "polygon in 3D": (
+        "based_on: bracket\nscenario: {obstacles: [{kind: polygon, "
+        "vertices_m: [[0, 0], [0.1, 0], [0, 0.05]]}]}",
+        "trial.yaml: scenario.obstacles.0.kind = 'polygon' cannot be used: "
+        "valid is plate, tube, cylinder or mesh in 3D.",
+    ),
+    "cylinder in 2D": (
+        "based_on: tube\nscenario: {obstacles: [{kind: cylinder, centre_m: [0, 0, 0], "
+        "diameter_m: 0.01, length_m: 0.02}]}",
+        "trial.yaml: scenario.obstacles.0.kind = 'cylinder' cannot be used: "
+        "valid is plate, tube or polygon in 2D.",
+    ),
+    "cylinder outside the box": (
+        "based_on: bracket\nscenario: {obstacles: [{kind: cylinder, centre_m: [0.07, 0.05, 0.02], "
+        "axis: x, diameter_m: 0.05, length_m: 0.02}]}",
+        "trial.yaml: scenario.obstacles.0.centre_m = [0.07, 0.05, 0.02] cannot be used: "
+        "valid is a cylinder inside the box, 0.14 x 0.1 x 0.14 m.",
+    ),
+    "mesh that is not there": (
+        "based_on: bracket\nscenario: {obstacles: [{kind: mesh, file: absent.stl}]}",
+        "trial.yaml: scenario.obstacles.0.file = 'absent.stl' cannot be used: "
+        "valid is a readable STL file (No such file or directory).",
+    ),
+    "mesh that is no STL": (
+        "based_on: bracket\nscenario: {obstacles: [{kind: mesh, file: trial.yaml}]}",
+        "trial.yaml: scenario.obstacles.0.file = 'trial.yaml' cannot be used: "
+        "valid is an STL file, ASCII or binary.",
+    ),
+    "mesh outside the box": (
+        "based_on: tube_3d_small\nscenario: {obstacles: [{kind: mesh, "
+        f"file: {ROOT}/config/meshes/bracket.stl, position_m: [0, 0, 0.05]}}]}}",
+        "trial.yaml: scenario.obstacles.0.position_m = [0.0, 0.0, 0.05] cannot be used: valid is "
+        "one that puts the mesh, now from (-30, -30, -7.95) to (50, 30, 8.05) m, inside the box, "
+        "0.18 x 0.12 x 0.18 m.",
+    ),
+    "swept mesh that is not there": (
+        "based_on: bracket\nsweep: {keys: {obstacles.0.file: [absent.stl]}}",
+        "trial.yaml: sweep.keys.obstacles.0.file = 'absent.stl' cannot be used: "
+        "valid is a readable STL file (No such file or directory).",
+    ),
     "grains larger than the tube": (
         "based_on: tube\nscenario: {sand: {size_scale: 30}}",
         "config/scenarios/tube.yaml: scenario.obstacles.0.diameter_m = 0.024 cannot be used: "

@@ -40,10 +40,14 @@ def test_missing_or_old_lammps(version: int, valid: str, monkeypatch: pytest.Mon
 
 
 def test_lammps_refuses_what_it_would_only_approximate() -> None:
+    scaled = tube_scene(time_step={"rotational_inertia": "scaled"})
+    assert "valid is physical on engine lammps" in told(scaled)
     polygon = {"kind": "polygon", "vertices_m": [[0.01, 0.01], [0.02, 0.01], [0.02, 0.02]]}
-    assert "obstacles.0.kind = 'polygon'" in told(tube_scene(obstacles=[polygon]))
-    isotropic = tube_scene(background_damping={"form": "nonviscous_isotropic"})
-    assert "valid is none, viscous or nonviscous_componentwise" in told(isotropic)
+    isotropic = {"form": "nonviscous_isotropic"}
+    for changes in ({"obstacles": [polygon]}, {"background_damping": isotropic}):
+        assert engine_problem(tube_scene(**changes)) is None
+        sentence = told(tube_scene(**changes, engine={"ranks": 2}))
+        assert "engine.ranks = 2 cannot be used: valid is 1 on engine lammps with" in sentence
 
 
 @pytest.mark.skipif(

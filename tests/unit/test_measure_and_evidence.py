@@ -53,7 +53,7 @@ def test_exports_are_read_back_by_meshio_and_hold_the_moments(folder: Path) -> N
     write_exports(folder, folder / "exports")
     names = sorted(p.name for p in (folder / "exports").iterdir())
     assert names == ["000000.dump", "000000.vtu", "000001.dump", "000001.vtu", "000002.dump",
-                     "000002.vtu"]  # fmt: skip
+                     "000002.vtu", "solids.vtu"]  # fmt: skip
     mesh = meshio.read(folder / "exports" / "000002.vtu")
     assert mesh.points[0] == pytest.approx([0.06, 0.02, 0.0])
 

@@ -10,9 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sandmould import ROOT
 from sandmould.engines.snapshot import Snapshot
+from sandmould.study.expand import expand
 from sandmould.study.moments import list_moments, nearest
+from sandmould.study.opening import open_study
 from sandmould.study.report.animation import ABSENT, Film, make_film
+from sandmould.study.report.figures import cut_m, scene_outline
 from tests.unit.report_study import write_study
 
 
@@ -29,6 +33,16 @@ def unpack(film: Film) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rest = raw[2 * whole :].astype(np.int64)
     radius = (rest[:n] | rest[n : 2 * n] << 8) / 65535 * film.largest_radius_m
     return metres, radius, rest[2 * n : 3 * n]
+
+
+def test_page_shows_the_section_of_a_mesh_where_it_is_cut_open() -> None:
+    (run,) = expand(open_study(ROOT / "config" / "studies" / "bracket_small.yaml"))
+    assert cut_m(run.scenario) == pytest.approx(0.05)
+    outline = scene_outline(run.scenario, 0.12)
+    (solid,) = outline.solids
+    assert solid.min(axis=0) == pytest.approx([0.03, 0.037], abs=1e-4)
+    assert solid.max(axis=0) == pytest.approx([0.11, 0.053], abs=1e-4)
+    assert outline.bores == ()
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -106,7 +106,7 @@ def test_keys_of_a_path_are_known_from_the_types() -> None:
     assert known_keys(Scenario, ["box"]) == ["depth_m", "height_m", "width_m"]
     assert "facets" in known_keys(Scenario, ["obstacles", "0"])
     assert known_keys(Scenario, ["seed"]) == []
-    (length,) = fields_at(Scenario, "obstacles.0.length_m")
-    assert length.description == "Inner length."
-    assert len(fields_at(Scenario, "obstacles.0.name")) == 3
+    (thickness,) = fields_at(Scenario, "obstacles.0.wall_thickness_m")
+    assert thickness.description == "Thickness of the tube's wall."
+    assert len(fields_at(Scenario, "obstacles.0.name")) == 5
     assert fields_at(Scenario, "") == fields_at(Scenario, "0") == []

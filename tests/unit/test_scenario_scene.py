@@ -12,7 +12,7 @@ from sandmould.scenario.contact import Contact, ContactLaw
 from sandmould.scenario.placement import WALL_GAP, loose_height_m, plan_counts, plan_layer
 from sandmould.scenario.sand import Sand, SievePoint
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.time_step import critical_step
+from sandmould.scenario.time_step import TimeStep, critical_step
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2, VibrationStage
 
 EQUAL = Sand(
@@ -78,18 +78,19 @@ def test_stage_lasts_whole_periods_and_ends_where_it_began() -> None:
 def test_critical_step_of_equal_undamped_discs() -> None:
     law = ContactLaw(normal_stiffness_n_m=7e4, tangential_stiffness_n_m=1.0, damping_ratio=0.0)
     soft = ContactLaw(normal_stiffness_n_m=1.0, tangential_stiffness_n_m=1.0)
-    found = critical_step(EQUAL, Contact(grain_grain=law, grain_wall=soft), 2)
+    found = critical_step(EQUAL, Contact(grain_grain=law, grain_wall=soft), TimeStep(), 2)
     mass = EQUAL.grain_mass_kg(1.1e-3, 2)
     assert found.step_s == pytest.approx(2 / math.sqrt(6 * 7e4 / mass))
     assert found.cause == "normal grain-grain contact"
 
 
 def test_damping_and_softer_springs_move_the_critical_step() -> None:
-    paper = critical_step(Sand(), Contact(), 2).step_s
+    paper = critical_step(Sand(), Contact(), TimeStep(), 2).step_s
     undamped = ContactLaw(damping_ratio=0.0)
-    assert critical_step(Sand(), Contact(grain_grain=undamped), 2).step_s > paper
+    assert critical_step(Sand(), Contact(grain_grain=undamped), TimeStep(), 2).step_s > paper
     hard = ContactLaw(normal_stiffness_n_m=28e4)
-    assert critical_step(Sand(), Contact(grain_grain=hard), 2).step_s == pytest.approx(paper / 2)
+    found = critical_step(Sand(), Contact(grain_grain=hard), TimeStep(), 2)
+    assert found.step_s == pytest.approx(paper / 2)
 
 
 TUBE = Tube(kind="tube", diameter_m=0.02, length_m=0.05, left_end_x_m=0.03, axis_height_m=0.04)
@@ -105,6 +106,13 @@ def test_tube_in_2d_is_two_plates_and_an_end() -> None:
     assert bore.measure == pytest.approx(0.02 * 0.05)
     depth, across = bore.local(np.array([[0.05, 0.045]]))
     np.testing.assert_allclose([depth[0], across[0, 0]], [0.02, 0.005])
+
+
+def test_copy_with_other_obstacles_has_their_geometry() -> None:
+    scenario = Scenario.model_validate({"obstacles": [TUBE]})
+    assert len(scenario.scene.blocks) == 3
+    assert scenario.model_copy(update={"obstacles": ()}).scene.blocks == ()
+    assert scenario.model_copy(update={"seed": 2}).scene is scenario.scene
 
 
 def test_tube_at_the_box_wall_needs_no_end() -> None:

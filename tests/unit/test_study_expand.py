@@ -14,6 +14,8 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.expand import MOST_PROBLEMS, Run, expand, replicate_seed, scenario_hash
 from sandmould.study.opening import open_study
+from sandmould.study.plan import read_run, write_plan
+from tests.bracket import BRACKET
 
 FREQUENCY = "vibration.0.frequency_hz"
 Runs = Callable[..., list[Run]]
@@ -220,3 +222,38 @@ def test_many_problems_are_told_by_the_first(runs_of: Runs) -> None:
     lines = told(runs_of, sweep=swept(sand__size_scale=[-n for n in range(1, 99)]), replicates=9)
     assert len(lines) == MOST_PROBLEMS
     assert lines[0].startswith("trial.yaml: sweep.keys.sand.size_scale = -1 cannot be used")
+
+
+def test_run_finds_its_mesh_from_anywhere_and_another_mesh_is_another_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, elsewhere = tmp_path / "own", tmp_path / "elsewhere"
+    for place in (folder, elsewhere):
+        place.mkdir()
+    mesh, content = folder / "part.stl", BRACKET.read_bytes()
+    mesh.write_bytes(content)
+    path = folder / "trial.yaml"
+    path.write_text(
+        "based_on: bracket\nscenario: {obstacles: [{kind: mesh, file: part.stl, "
+        "unit_m: {value: 0.001, unit: m, source: mm}, position_m: [0.06, 0.05, 0.045]}]}",
+        encoding="utf-8",
+    )
+    monkeypatch.chdir(elsewhere)
+    (run,) = expand(open_study(path))
+    write_plan([run], elsewhere)
+    again = read_run(elsewhere / "runs" / run.run / "scenario.yaml")
+    assert again.scenario.scene.meshes[0].measure == pytest.approx(4.772e-5, rel=1e-3)
+    # the header of a binary STL says nothing about the surface, but the file is another one
+    mesh.write_bytes(b"another" + content[7:])
+    (other,) = expand(open_study(path))
+    assert other.run != run.run
+    with pytest.raises(BadInputError, match="the file that the study was planned with") as caught:
+        _ = read_run(elsewhere / "runs" / run.run / "scenario.yaml").scenario.scene
+    assert "obstacles.0.file" in str(caught.value)
+
+
+def test_shipped_mesh_is_named_from_the_repository() -> None:
+    (run,) = expand(open_study(ROOT / "config" / "studies" / "bracket_small.yaml"))
+    (obstacle,) = run.scenario.model_dump()["obstacles"]
+    assert obstacle["file"] == "config/meshes/bracket.stl"
+    assert run.sources["obstacles.0.unit_m"] == "drawn in mm, tests/bracket.py"

@@ -181,9 +181,14 @@ def test_damaged_checkpoint_is_told_and_the_run_starts_from_the_one_before(
 def test_checkpoint_of_another_scenario_is_left_alone(tmp_path: Path) -> None:
     folder = run_folder(tube_scene(guard={"wall_limit_s": 0.5}), tmp_path)
     assert simulate(folder) == RESTARTABLE_EXIT
+    newest, _ = newest_checkpoint(folder / "work")
+    assert newest is not None
+    kept = {p.name: p.read_bytes() for p in newest[0].iterdir()}
     other = Driver(build_program(tube_scene()), folder, "test", "another").run()
     assert other.outcome is Outcome.FINISHED
-    assert "belongs to another scenario" in other.detail
+    assert "checkpoints of another scenario were set aside" in other.detail
+    (aside,) = folder.glob("checkpoints_of_*")
+    assert {p.name: p.read_bytes() for p in (aside / newest[0].name).iterdir()} == kept
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ rule collect:
             category="Study",
             labels={"table": "measures against time"},
         ),
+        agreement=f"{FOLDER}/agreement.tsv",
     log:
         f"{FOLDER}/logs/collect.log",
     conda:

@@ -4,7 +4,7 @@
 rule render:
     input:
         scenario=f"{FOLDER}/runs/{{run}}/scenario.yaml",
-        templates=TEMPLATES,
+        sources=deck_sources_of,
     output:
         deck=f"{FOLDER}/runs/{{run}}/deck.in",
         layers=directory(f"{FOLDER}/runs/{{run}}/layers"),
@@ -40,7 +40,7 @@ rule simulate:
         f"{FOLDER}/logs/simulate_{{run}}.benchmark.tsv"
     conda:
         "../envs/sandmould.yaml"
-    threads: ranks_of
+    threads: threads_of
     resources:
         tasks=ranks_of,
         mpi="mpiexec",

@@ -19,8 +19,15 @@ if workflow.is_main_process and "--lint" not in sys.argv:
 STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"
 RUNS = [run.run for run in PLAN.runs]
-TEMPLATES = sorted(str(p) for p in Path("templates/lammps").glob("*.j2"))
 REPORT_TEMPLATES = sorted(str(p) for p in Path("templates/report").iterdir())
+
+
+def deck_sources_of(wildcards):
+    return PLAN.deck_sources(wildcards.run)
+
+
+def threads_of(wildcards):
+    return PLAN.threads(wildcards.run)
 
 
 def ranks_of(wildcards):

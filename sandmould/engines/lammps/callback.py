@@ -1,8 +1,9 @@
 """What LAMMPS calls in every step: the surface contacts and the damping (38) of our own solver.
 
-LAMMPS gets the address of a compiled function and of one table. The table lists the addresses and
-shapes of arrays that the session owns, so no Python runs in a step. The grains' own arrays are
-asked of LAMMPS in each call: it moves them when grains are inserted.
+No Python runs in a step: LAMMPS gets the address of a compiled function and of a table of arrays
+that the session owns. The grains' own arrays are asked of LAMMPS in each call, since it moves them
+when grains are inserted. All that is compiled for LAMMPS alone stands in this one file, whose
+changes numba notices; those of the kernels it knows from their hash.
 """
 
 from __future__ import annotations
@@ -11,11 +12,19 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir  # type: ignore[import-untyped]
 from numba import carray, cfunc, njit, types
-from numba.extending import intrinsic
-from numpy.typing import NDArray
 
+from sandmould.dem.addresses import (
+    Floats,
+    Ints,
+    call_with_two,
+    int_line_at,
+    int_rows_at,
+    line_at,
+    rows_at,
+    to_floats,
+    to_ints,
+)
 from sandmould.dem.broad_phase import Candidates, find_candidates
 from sandmould.dem.contact_law import Law
 from sandmould.dem.motion import ISOTROPIC, damped
@@ -24,13 +33,11 @@ from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
 from sandmould.dem.vectors import OPTIONS, PLANE, SPACE, dot, load, load_spin, plus, store, times
 from sandmould.dem.wall_history import WallHistory, carry_history
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 LAST_STEP, ROWS, GRAINS, LISTED, FIRST_SHOWN, LOAD_EVERY, WINDOW, HANDLE, EXTRACT = range(9)
 """Places in ``Bridge.counts``."""
 ALPHA_TRANSLATION, ALPHA_ROTATION, SKIN, STEP = range(8, 12)
 """Places in ``Bridge.numbers`` after the law."""
+VELOCITY, SPIN, FORCE, MOMENT, RADIUS, MASS = range(6)
 GRAIN_ARRAYS = (b"v", b"omega", b"f", b"torque", b"radius", b"rmass")
 """What LAMMPS calls its arrays of grains, in the order of ``Bridge.names``."""
 
@@ -78,104 +85,54 @@ class Bridge(NamedTuple):
     """(nv, d) float64, N: loads of steps that are no sample; nobody reads them."""
 
 
-def table_of(bridge: Bridge) -> Ints:
-    """Addresses and shapes of the arrays, (fields, 3) int64."""
-    return np.array([[a.ctypes.data, *a.shape, 1][:3] for a in bridge], dtype=np.int64)
-
-
-def _pointer_to(kind: Any) -> Any:
-    @intrinsic
-    def pointer(typing_context: Any, address: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
-
-        return types.CPointer(kind)(types.int64), generate
-
-    return pointer
-
-
-_to_floats, _to_ints = _pointer_to(types.float64), _pointer_to(types.int64)
-
-
-def _call_extract(typing_context: Any, function: Any, handle: Any, name: Any) -> Any:
-    """Call lammps_extract_atom by its address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        word = ir.IntType(64)
-        called = builder.inttoptr(args[0], ir.FunctionType(word, [word, word]).as_pointer())
-        return builder.call(called, args[1:])
-
-    return types.int64(types.int64, types.int64, types.int64), generate
-
-
-_extract: Any = intrinsic(_call_extract)
-
-
 @njit(**OPTIONS)
-def _line(table: Ints, k: int) -> Floats:
-    return carray(_to_floats(table[k, 0]), (table[k, 1],))
-
-
-@njit(**OPTIONS)
-def _rows(table: Ints, k: int) -> Floats:
-    return carray(_to_floats(table[k, 0]), (table[k, 1], table[k, 2]))
-
-
-@njit(**OPTIONS)
-def _int_line(table: Ints, k: int) -> Ints:
-    return carray(_to_ints(table[k, 0]), (table[k, 1],))
-
-
-@njit(**OPTIONS)
-def _int_rows(table: Ints, k: int) -> Ints:
-    return carray(_to_ints(table[k, 0]), (table[k, 1], table[k, 2]))
-
-
-@njit(**OPTIONS)
-def _open(table: Ints) -> Bridge:
-    """Make the arrays out of their addresses, in the order of the fields."""
+def _open(address: Any) -> Bridge:
+    """Make the arrays out of the table at an address, in the order of the fields."""
+    table = carray(address, (len(Bridge._fields), 3))
     return Bridge(
-        _int_line(table, 0),
-        _int_line(table, 1),
-        _line(table, 2),
-        _rows(table, 3),
-        _line(table, 4),
-        _rows(table, 5),
-        _rows(table, 6),
-        _int_line(table, 7),
-        _int_line(table, 8),
-        _rows(table, 9),
-        _int_rows(table, 10),
-        _rows(table, 11),
-        _rows(table, 12),
-        _int_line(table, 13),
-        _int_line(table, 14),
-        _int_line(table, 15),
-        _int_line(table, 16),
-        _int_line(table, 17),
-        _rows(table, 18),
-        _rows(table, 19),
-        _rows(table, 20),
-        _rows(table, 21),
-        _rows(table, 22),
+        int_line_at(table, 0),
+        int_line_at(table, 1),
+        line_at(table, 2),
+        rows_at(table, 3),
+        line_at(table, 4),
+        rows_at(table, 5),
+        rows_at(table, 6),
+        int_line_at(table, 7),
+        int_line_at(table, 8),
+        rows_at(table, 9),
+        int_rows_at(table, 10),
+        rows_at(table, 11),
+        rows_at(table, 12),
+        int_line_at(table, 13),
+        int_line_at(table, 14),
+        int_line_at(table, 15),
+        int_line_at(table, 16),
+        int_line_at(table, 17),
+        rows_at(table, 18),
+        rows_at(table, 19),
+        rows_at(table, 20),
+        rows_at(table, 21),
+        rows_at(table, 22),
     )
 
 
 @njit(**OPTIONS)
 def _of_grains(bridge: Bridge, which: int) -> int:
     """Address of an array of LAMMPS; of one with rows that of its row pointers."""
-    return _extract(bridge.counts[EXTRACT], bridge.counts[HANDLE], bridge.names[which])
+    return call_with_two(bridge.counts[EXTRACT], bridge.counts[HANDLE], bridge.names[which])
 
 
 @njit(**OPTIONS)
-def _vectors_of_grains(bridge: Bridge, which: int, n: int) -> Floats:
-    first_row = carray(_to_ints(_of_grains(bridge, which)), (1,))[0]
-    return carray(_to_floats(first_row), (n, 3))
+def _vectors(bridge: Bridge, which: int, n: int) -> Floats:
+    """LAMMPS's array of a vector for each of n grains, (n, 3) float64."""
+    first_row = carray(to_ints(_of_grains(bridge, which)), (1,))[0]
+    return carray(to_floats(first_row), (n, 3))
 
 
 @njit(**OPTIONS)
-def _numbers_of_grains(bridge: Bridge, which: int, n: int) -> Floats:
-    return carray(_to_floats(_of_grains(bridge, which)), (n,))
+def _numbers(bridge: Bridge, which: int, n: int) -> Floats:
+    """LAMMPS's array of a number for each of n grains, (n,) float64."""
+    return carray(to_floats(_of_grains(bridge, which)), (n,))
 
 
 @njit(**OPTIONS)
@@ -280,7 +237,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
     along = load(dim, bridge.direction, 0)
     shift = times(along, displacement[shown])
     shift_velocity = times(along, (displacement[shown] - displacement[shown - 1]) / dt)
-    radius = _numbers_of_grains(bridge, 4, n)
+    radius = _numbers(bridge, RADIUS, n)
     part = bridge.part
     if _must_list(dim, bridge, arrays, position, shift):
         part = _list(dim, bridge, arrays, position, radius, ids, shift)
@@ -305,12 +262,12 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         counts[ROWS],
         Candidates(bridge.rows, bridge.start, part),
         position,
-        _vectors_of_grains(bridge, 0, n),
-        _vectors_of_grains(bridge, 1, n),
+        _vectors(bridge, VELOCITY, n),
+        _vectors(bridge, SPIN, n),
         radius,
-        _numbers_of_grains(bridge, 5, n),
+        _numbers(bridge, MASS, n),
         added,
-        _vectors_of_grains(bridge, 3, n),
+        _vectors(bridge, MOMENT, n),
         arrays,
         shift,
         shift_velocity,
@@ -325,8 +282,8 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
 @njit(**OPTIONS)
 def _damp(dim: Any, bridge: Bridge, n: int, added: Floats) -> None:
     """Isotropic damping of all that acts on the grains so far, eqs. (38) and (39)."""
-    velocity, spin = _vectors_of_grains(bridge, 0, n), _vectors_of_grains(bridge, 1, n)
-    force, moment = _vectors_of_grains(bridge, 2, n), _vectors_of_grains(bridge, 3, n)
+    velocity, spin = _vectors(bridge, VELOCITY, n), _vectors(bridge, SPIN, n)
+    force, moment = _vectors(bridge, FORCE, n), _vectors(bridge, MOMENT, n)
     alpha_t, alpha_r = bridge.numbers[ALPHA_TRANSLATION], bridge.numbers[ALPHA_ROTATION]
     _clear(added)
     for i in range(n):
@@ -345,31 +302,30 @@ _SIGNATURE = types.void(
     types.CPointer(types.int64),
     types.CPointer(types.int64),
 )
-_FIELDS = len(Bridge._fields)
 
 
 def _press_in_plane(table: Any, step: int, n: int, ids: Any, position: Any, added: Any) -> None:
     if n > 0:
-        x, f = carray(_to_floats(position[0]), (n, 3)), carray(_to_floats(added[0]), (n, 3))
-        _press(PLANE, _open(carray(table, (_FIELDS, 3))), step, carray(ids, (n,)), x, f)
+        x, f = carray(to_floats(position[0]), (n, 3)), carray(to_floats(added[0]), (n, 3))
+        _press(PLANE, _open(table), step, carray(ids, (n,)), x, f)
 
 
 def _press_in_space(table: Any, step: int, n: int, ids: Any, position: Any, added: Any) -> None:
     if n > 0:
-        x, f = carray(_to_floats(position[0]), (n, 3)), carray(_to_floats(added[0]), (n, 3))
-        _press(SPACE, _open(carray(table, (_FIELDS, 3))), step, carray(ids, (n,)), x, f)
+        x, f = carray(to_floats(position[0]), (n, 3)), carray(to_floats(added[0]), (n, 3))
+        _press(SPACE, _open(table), step, carray(ids, (n,)), x, f)
 
 
 def _damp_in_plane(table: Any, step: int, n: int, ids: Any, position: Any, added: Any) -> None:
     if n > 0:
-        f = carray(_to_floats(added[0]), (n, 3))
-        _damp(PLANE, _open(carray(table, (_FIELDS, 3))), n, f)
+        f = carray(to_floats(added[0]), (n, 3))
+        _damp(PLANE, _open(table), n, f)
 
 
 def _damp_in_space(table: Any, step: int, n: int, ids: Any, position: Any, added: Any) -> None:
     if n > 0:
-        f = carray(_to_floats(added[0]), (n, 3))
-        _damp(SPACE, _open(carray(table, (_FIELDS, 3))), n, f)
+        f = carray(to_floats(added[0]), (n, 3))
+        _damp(SPACE, _open(table), n, f)
 
 
 _COMPILED: dict[tuple[str, int], Any] = {}

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.dem.addresses import table_of
 from sandmould.dem.surfaces import Surfaces
 from sandmould.dem.vectors import like
 from sandmould.dem.wall_history import new_history
@@ -24,7 +25,6 @@ from sandmould.engines.lammps.callback import (
     WINDOW,
     Bridge,
     address_of,
-    table_of,
 )
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.reference.model import scene_of

@@ -96,6 +96,8 @@ class Chart:
     """Where the x axis is marked; round numbers unless given."""
     rows: tuple[str, ...] = ()
     """Names of settings that have no scale: y counts them from the top and the intervals lie."""
+    band: tuple[float, float] | None = None
+    """Values along x between which the chart is shaded."""
 
 
 @dataclass(frozen=True)
@@ -202,7 +204,8 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
 
 def _xs(chart: Chart) -> list[float]:
     """All values along x, ends of lying intervals included."""
-    xs = [v for line in chart.lines for v in line.xy[:, 0].tolist()] + list(chart.x_ticks)
+    xs = [v for line in chart.lines for v in line.xy[:, 0].tolist()]
+    xs += [*chart.x_ticks, *(chart.band or ())]
     for mark in chart.marks:
         reach = mark.half_width if chart.rows and math.isfinite(mark.half_width) else 0.0
         xs += [mark.x - reach, mark.x + reach]

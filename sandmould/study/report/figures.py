@@ -23,7 +23,8 @@ from PIL import Image
 from analysis.density import apparent_density
 from analysis.plots import draw_by_layer, draw_grains, draw_scene
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.box import Polygon, Tube
+from sandmould.scenario.box import Tube
+from sandmould.scenario.geometry import Block
 from sandmould.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -72,21 +73,22 @@ def scene_outline(scenario: Scenario, height_m: float) -> Outline:
 
 
 def cut_m(scenario: Scenario) -> float | None:
-    """Where a 3D scene is cut open: y (m) of the axis of its first tube, or the middle."""
+    """Where a 3D scene is cut open, y in m: at its first tube, mesh or round solid, or midway."""
     if scenario.dimension == 2:
         return None
     tubes = [o for o in scenario.obstacles if isinstance(o, Tube)]
-    middle_m = scenario.box.depth_m / 2
-    return middle_m if not tubes or tubes[0].axis_y_m is None else tubes[0].axis_y_m
+    if tubes and tubes[0].axis_y_m is not None:
+        return tubes[0].axis_y_m
+    solids = [s for s in scenario.scene.solids if not isinstance(s, Block)]
+    if not tubes and solids:
+        y = solids[0].corners()[:, 1]
+        return 0.5 * float(y.min() + y.max())
+    return scenario.box.depth_m / 2
 
 
 def _draw_scene(scenario: Scenario, ax: Axes, height_m: float) -> None:
-    """Box, blocks and bores, and the polygons, which the scene leaves to the engine."""
+    """Box, solids and bores, cut where all pictures of the scenario are."""
     draw_scene(scenario.scene, ax, height_m, cut_m(scenario))
-    for obstacle in scenario.obstacles:
-        if isinstance(obstacle, Polygon):
-            corners = np.array(obstacle.vertices_m) * _MM
-            ax.add_patch(Patch(corners, facecolor="0.8", edgecolor="0.25", zorder=2.5))
 
 
 def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -17,6 +17,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, gather, read_provenance, read_study
 from sandmould.study.plan import STUDY_FILE, read_run
+from sandmould.study.report.agreement import agreement_pages
 from sandmould.study.report.animation import BUDGET_BYTES
 from sandmould.study.report.chart import NARROW, SMALL, WIDE, lay_out
 from sandmould.study.report.curves import objective_charts, runs_of
@@ -73,16 +74,18 @@ class _Page:
 
 
 def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
-    objective, summary, keys = study.objective, collected.summary, collected.keys
+    objective, keys, summary = study.objective, collected.keys, collected.of_sweep.summary
+    seeks_best = not study.equivalence.keys
     scenarios = _scenarios(study_folder, [str(r) for r in summary["run"]])
     if not scenarios:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
     any_scenario = next(iter(scenarios.values()))
     stage = any_scenario.vibration[0] if any_scenario.vibration else None
-    notes = sand_notes(keys, stage, _deepest_overlap_fraction(summary))
+    deepest = _deepest_overlap_fraction(collected.summary)
+    notes = sand_notes(keys, stage, deepest, seeks_best)
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
-    verdict = judge(summary, keys, objective.measure, objective.better, notes)
+    verdict = judge(summary, keys, objective.measure, objective.better, notes, seeks_best)
     shown = next(iter(shown_runs(study_folder, summary, verdict).values()), "")
     by_setting = {
         setting.label: scenarios[run]
@@ -114,8 +117,9 @@ def _scenarios(study_folder: Path, runs: Sequence[str]) -> dict[str, Scenario]:
 
 
 def _render(page: _Page, film_budget_bytes: int) -> str:
-    summary, keys, verdict = page.collected.summary, page.collected.keys, page.verdict
-    objective = page.study.objective
+    of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
+    summary, objective = page.collected.summary, page.study.objective
+    seeks_best = not page.study.equivalence.keys
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
     method: tuple[Row, ...] = (
         *sand_method(page.scenario, keys, summary),
@@ -135,16 +139,18 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         verdict=verdict,
         measure_name=name_of(verdict.measure),
         keys=keys,
-        key_numbers=key_numbers(summary, verdict),
-        objective_charts=[_both_sizes(c) for c in objective_charts(summary, verdict, keys)],
+        seeks_best=seeks_best,
+        agreement=agreement_pages(page.collected, page.study),
+        key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
+        objective_charts=[
+            _both_sizes(c) for c in objective_charts(of_sweep.summary, verdict, keys)
+        ],
         settings=settings_table(verdict, page.by_setting),
         runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
         method=method,
         provenance=provenance_rows(provenance),
         files=data_files(page.study_folder, page.href),
-        pages=sand_pages(
-            page.study_folder, page.scenario, page.collected, verdict, film_budget_bytes
-        ),
+        pages=sand_pages(page.study_folder, page.scenario, of_sweep, verdict, film_budget_bytes),
         both_sizes=_both_sizes,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
         dimension=page.scenario.dimension,

@@ -170,7 +170,7 @@ def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Mo
 def _shown_height_m(snapshots: Sequence[Snapshot], scenario: Scenario) -> float:
     """Height of the pictures: the sand and the tubes, not the empty space above."""
     tops = [float((s.position_m[:, -1] + s.radius_m).max()) for s in snapshots if len(s.id)]
-    tops += [float(b.corners()[:, -1].max()) for b in scenario.scene.blocks]
+    tops += [float(solid.corners()[:, -1].max()) for solid in scenario.scene.solids]
     # sand heaped over the rim is shown too, grains still falling from high up are not
     return min(1.12 * max(tops, default=scenario.box.height_m), 1.4 * scenario.box.height_m)
 

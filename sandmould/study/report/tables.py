@@ -268,6 +268,7 @@ _FILES = (
     ("runs.tsv", "the plan: every run, its parameters, replicate and seed"),
     ("summary.tsv", "one row a run: parameters, outcome, final measures, cost"),
     ("curves.tsv", "one row a snapshot: all measures of all runs against time"),
+    ("agreement.tsv", "one row a pair of settings and measure that the study compares"),
     ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "
      "snapshots; exports/ holds some of them for ParaView (.vtu) and OVITO (.dump)"),
 )  # fmt: skip

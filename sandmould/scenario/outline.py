@@ -1,0 +1,144 @@
+"""Closed outlines of straight edges: the solids of 2D that are no rectangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_CHUNK = 1_000_000
+"""Pairs of point and edge held in memory together."""
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A solid of 2D bounded by one closed line of straight edges that never meets itself."""
+
+    name: str
+    vertices_m: Array
+    """(k, 2) float64, m: counter-clockwise; the last is joined to the first."""
+
+    def distance_m(self, position_m: Array) -> Array:
+        """Signed distance of points from the outline, negative inside.
+
+        Parameters
+        ----------
+        position_m : (n, 2) float64, m
+
+        Returns
+        -------
+        (n,) float64, m
+        """
+        start_m, end_m = self.vertices_m, np.roll(self.vertices_m, -1, axis=0)
+        parts = max(1, -(-len(position_m) * len(start_m) // _CHUNK))
+        found = [
+            np.where(_is_inside(p, start_m, end_m), -1.0, 1.0) * _nearest_edge_m(p, start_m, end_m)
+            for p in np.array_split(position_m, parts)
+        ]
+        return np.concatenate(found)
+
+    def corners(self) -> Array:
+        """Corners of the outline, (k, 2) float64, m."""
+        return self.vertices_m
+
+    @property
+    def measure(self) -> float:
+        """Area, m2."""
+        return signed_area_m2(self.vertices_m)
+
+
+def signed_area_m2(vertices_m: Array) -> float:
+    """Area of a closed polygon, positive when its vertices run counter-clockwise.
+
+    Parameters
+    ----------
+    vertices_m : (k, 2) float64, m
+    """
+    # from the first vertex, or digits are lost far from the origin
+    x, y = (vertices_m - vertices_m[0]).T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def outline_fault(vertices_m: Array) -> str | None:
+    """What keeps a list of vertices from bounding a solid, or None.
+
+    Parameters
+    ----------
+    vertices_m : (k, 2) float64, m
+    """
+    end_m = np.roll(vertices_m, -1, axis=0)
+    extent_m = float(np.ptp(vertices_m, axis=0).max())
+    tiny_m = 1e-9 * extent_m
+    if (np.linalg.norm(end_m - vertices_m, axis=1) <= tiny_m).any():
+        return "no vertex that repeats the one before it (the last is joined to the first)"
+    if _meets_itself(vertices_m, end_m):
+        return "edges that neither cross nor touch one another"
+    if abs(signed_area_m2(vertices_m)) <= tiny_m * extent_m:
+        return "vertices that enclose an area"
+    return None
+
+
+def _meets_itself(start_m: Array, end_m: Array) -> bool:
+    """Whether two edges meet elsewhere than at the vertex that they share."""
+    k = len(start_m)
+    one, two = np.triu_indices(k, 1)
+    neighbours = (two - one == 1) | ((one == 0) & (two == k - 1))
+    # neighbours meet in more than their vertex only when one folds back on the other
+    i, j = one[neighbours], two[neighbours]
+    along_i, along_j = end_m[i] - start_m[i], end_m[j] - start_m[j]
+    folded = (_cross(along_i, along_j) == 0.0) & (np.sum(along_i * along_j, axis=1) < 0.0)
+    i, j = one[~neighbours], two[~neighbours]
+    a, b, c, d = start_m[i], end_m[i], start_m[j], end_m[j]
+    sides = [_cross(b - a, c - a), _cross(b - a, d - a), _cross(d - c, a - c), _cross(d - c, b - c)]
+    apart = (np.maximum(a, b) < np.minimum(c, d)) | (np.maximum(c, d) < np.minimum(a, b))
+    crossing = (sides[0] * sides[1] <= 0.0) & (sides[2] * sides[3] <= 0.0) & ~apart.any(axis=1)
+    return bool(folded.any() or crossing.any())
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _is_inside(point_m: Array, start_m: Array, end_m: Array) -> NDArray[np.bool_]:
+    """Whether a ray from each point along the second axis meets an odd number of edges."""
+    u, v = point_m[:, None, 0], point_m[:, None, 1]
+    spans = (start_m[:, 0] > u) != (end_m[:, 0] > u)
+    width_m = np.where(start_m[:, 0] == end_m[:, 0], 1.0, end_m[:, 0] - start_m[:, 0])
+    share = (u - start_m[:, 0]) / width_m
+    above = start_m[:, 1] + share * (end_m[:, 1] - start_m[:, 1]) > v
+    return np.asarray(np.sum(spans & above, axis=1) % 2 == 1)
+
+
+def _nearest_edge_m(point_m: Array, start_m: Array, end_m: Array) -> Array:
+    """Distance of points from the nearest of some edges, (n,) float64, m."""
+    edge_m = end_m - start_m
+    from_start_m = point_m[:, None] - start_m
+    share = np.sum(from_start_m * edge_m, axis=2) / np.sum(edge_m**2, axis=1)
+    away_m = from_start_m - np.clip(share, 0.0, 1.0)[..., None] * edge_m
+    return np.asarray(np.sqrt(np.sum(away_m**2, axis=2).min(axis=1)))
+
+
+def meridian_distance_m(point_m: Array, profile_m: Array) -> Array:
+    """Signed distance in the half plane through the axis of a body of revolution.
+
+    Edges of the profile on the axis bound nothing: the body goes on beyond them.
+
+    Parameters
+    ----------
+    point_m : (n, 2) float64, m
+        Place along the axis, distance from it.
+    profile_m : (k, 2) float64, m
+        Closed polygon of the same two coordinates.
+
+    Returns
+    -------
+    (n,) float64, m
+        Negative inside.
+    """
+    start_m, end_m = profile_m, np.roll(profile_m, -1, axis=0)
+    real = (start_m[:, 1] > 0.0) | (end_m[:, 1] > 0.0)
+    distance_m = _nearest_edge_m(point_m, start_m[real], end_m[real])
+    # the ray leads away from the axis, so edges on the axis are never met
+    return np.where(_is_inside(point_m, start_m, end_m), -distance_m, distance_m)

@@ -1,0 +1,114 @@
+"""Obstacles of 3D that no flat plates can make: round cylinders and surfaces from files."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from sandmould import ROOT
+from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
+from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.mesh_file import MeshFileError, file_hash, read_surface
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.revolved import Revolved
+
+
+class Cylinder(Section):
+    """A solid round cylinder, 3D only."""
+
+    kind: Literal["cylinder"]
+    name: str = quantity("cylinder", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
+    centre_m: tuple[float, float, float] = quantity(..., "Centre.", unit="m", source="user")
+    axis: Literal["x", "y", "z"] = quantity("z", "Direction of the axis.", source="user")
+    diameter_m: float = quantity(..., "Diameter.", unit="m", source="user", gt=0, le=100)
+    length_m: float = quantity(..., "Length.", unit="m", source="user", gt=0, le=100)
+
+
+class SolidMesh(Section):
+    """A solid bounded by the triangles of an STL file, 3D only."""
+
+    kind: Literal["mesh"]
+    name: str = quantity("mesh", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
+    file: str = quantity(
+        ...,
+        "STL file, seen from the file that names it; in a resolved scenario, from the repository.",
+        source="user",
+        min_length=1,
+    )
+    sha256: str | None = quantity(
+        None,
+        "Hash of the file; the plan of a study writes it, so that another mesh is another run.",
+        source="user",
+        pattern=r"^[0-9a-f]{64}$",
+    )
+    unit_m: float = quantity(
+        1.0,
+        "Length that stands for 1 in the file: 0.001 for one drawn in mm.",
+        unit="m",
+        source="user",
+        gt=0,
+        le=100,
+    )
+    angle_deg: float = quantity(
+        0.0, "Turn about the vertical through the file's origin.", unit="deg", source="user",
+        ge=-360, le=360,
+    )  # fmt: skip
+    position_m: tuple[float, float, float] = quantity(
+        (0.0, 0.0, 0.0), "Place of the file's origin in the box.", unit="m", source="user"
+    )
+
+    @property
+    def path(self) -> Path:
+        """Where the file lies."""
+        return Path(os.path.normpath(ROOT / self.file))
+
+
+def cylinder_solid(cylinder: Cylinder) -> Revolved:
+    """Geometry of a cylinder."""
+    axis = np.eye(3)["xyz".index(cylinder.axis)]
+    half_m, radius_m = cylinder.length_m / 2, cylinder.diameter_m / 2
+    profile_m = np.array([[-half_m, 0.0], [half_m, 0.0], [half_m, radius_m], [-half_m, radius_m]])
+    return Revolved(cylinder.name, np.array(cylinder.centre_m), axis, profile_m)
+
+
+def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
+    """Geometry of a mesh, turned, scaled and shifted into the box.
+
+    Parameters
+    ----------
+    solid : SolidMesh
+    key : str
+        Key path of the obstacle, for messages.
+
+    Raises
+    ------
+    BadInputError
+        When the file bounds no solid, or is not the one that the scenario was planned with.
+    """
+    shown = shown_name(solid.path)
+    try:
+        found = file_hash(solid.path)
+        if solid.sha256 not in (None, found):
+            valid = "the file that the study was planned with; this one has changed since"
+            raise MeshFileError(valid)
+        vertices, triangles = read_surface(solid.path)
+    except MeshFileError as fault:
+        raise BadInputError([Problem(f"{key}.file", shown, str(fault))]) from fault
+    c, s = math.cos(math.radians(solid.angle_deg)), math.sin(math.radians(solid.angle_deg))
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    placed_m = solid.unit_m * vertices @ turn.T + np.array(solid.position_m)
+    return TriangleMesh(solid.name, placed_m, triangles)
+
+
+def with_hash(solid: SolidMesh) -> SolidMesh:
+    """The same solid with the hash of its file; unchanged if that is given or the file missing."""
+    if solid.sha256 is not None:
+        return solid
+    try:
+        return solid.model_copy(update={"sha256": file_hash(solid.path)})
+    except MeshFileError:
+        return solid

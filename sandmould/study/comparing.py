@@ -1,0 +1,49 @@
+"""What keeps a study from comparing what it asks to compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sandmould.scenario.bad_input import Problem
+from sandmould.study.study import CrossCheck, Equivalence, Study
+from sandmould.study.sweep import Sweep, points
+
+ENGINE = "engine.name"
+
+
+def problems(study: Study) -> list[Problem]:
+    """List what is wrong with the comparisons of a study whose sweep has no problems."""
+    found = list(_equivalence(study.equivalence, study.sweep))
+    if study.cross_check is not None:
+        found += _cross_check(study.cross_check, study)
+    compares = bool(study.equivalence.keys) or study.cross_check is not None
+    if compares and not study.equivalence.margins:
+        valid = "at least one measure with its margin, such as solid_fraction: 0.005"
+        found.append(Problem("equivalence.margins", {}, valid))
+    return found
+
+
+def _equivalence(equivalence: Equivalence, sweep: Sweep) -> Iterator[Problem]:
+    for i, key in enumerate(equivalence.keys):
+        if key not in sweep.swept:
+            valid = f"a swept key: {', '.join(sweep.swept) or 'none is'}"
+            yield Problem(f"equivalence.keys.{i}", key, valid)
+        elif key in equivalence.keys[:i]:
+            yield Problem(f"equivalence.keys.{i}", key, "each key once")
+
+
+def _cross_check(check: CrossCheck, study: Study) -> Iterator[Problem]:
+    own = study.scenario.engine.name
+    if ENGINE in study.sweep.swept:
+        valid = f"absent where {ENGINE} is swept: equivalence.keys compares the engines"
+        yield Problem("cross_check", check.model_dump(), valid)
+        return
+    if check.engine == own:
+        valid = f"another engine than the study's own, {own}, or cross_check: null"
+        yield Problem("cross_check.engine", check.engine, valid)
+    if check.replicates is not None and check.replicates > study.replicates:
+        valid = f"at most {study.replicates}, the study's own: runs are compared in pairs"
+        yield Problem("cross_check.replicates", check.replicates, valid)
+    swept = points(study.sweep, study.scenario.seed)
+    if check.at not in swept:
+        yield Problem("cross_check.at", check.at, f"a point of the sweep, such as {swept[0]}")

@@ -1,0 +1,42 @@
+"""Short names of runs, from the values of their swept keys."""
+
+from __future__ import annotations
+
+import re
+
+from sandmould.scenario.quantity import fields_at
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.comparing import ENGINE
+from sandmould.study.sweep import Point
+
+
+def run_label(parameters: Point) -> str:
+    """Names and values of at most three swept keys, in letters that any file system takes."""
+    keys = sorted(parameters)
+    last = [key.rsplit(".", 1)[-1] for key in keys]
+    words = []
+    for key, name in list(zip(keys, last, strict=True))[:3]:
+        parent = key.split(".")[-2] + "_" if last.count(name) > 1 and "." in key else ""
+        if key == ENGINE:
+            parent, name = "", "engine"
+        value = parameters[key]
+        words.append(_letters(parent + name.removesuffix(_unit_suffix(key)))[:16])
+        if isinstance(value, int | float):
+            words.append(f"{value:.4g}".replace("-", "m").replace(".", "p").replace("+", ""))
+        elif isinstance(value, str):
+            words.append(_letters(value)[:12])
+    return "_".join(words) or "base"
+
+
+def _letters(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+
+
+def _unit_suffix(key: str) -> str:
+    """Unit of a key as its name ends with it, such as ``_kg_m3``."""
+    for field in fields_at(Scenario, key):
+        extra = field.json_schema_extra
+        if isinstance(extra, dict):
+            unit = str(extra["unit"]).lower()
+            return "_" + unit.replace("1/", "per_").replace("/", "_")
+    return ""

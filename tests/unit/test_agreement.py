@@ -1,0 +1,174 @@
+"""Which settings are compared, what is said of them, and the page on the engines."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sandmould import ROOT
+from sandmould.study import twins
+from sandmould.study.agreement import (
+    COLUMNS,
+    agreement_sentences,
+    compare_keys,
+    compare_study,
+    speeds,
+    sweep_part,
+)
+from sandmould.study.collect import collect, gather, read_study
+from sandmould.study.study import Equivalence
+from tests.unit.report_study import ENGINES, KEY, write_cross_check, write_twins
+
+FILL = "tube_fill_fraction"
+FORM = "background_damping.form"
+EQUAL = dict.fromkeys(ENGINES, 0.5)
+DENSE = dict.fromkeys(ENGINES, 0.78)
+
+
+def summary(**columns: list[object]) -> pd.DataFrame:
+    """A summary of a grid of settings with four replicates each, fill 0.5 with a little noise."""
+    noise = np.random.default_rng(2)
+    rows = []
+    for values in itertools.product(*columns.values()):
+        for replicate in (1, 2, 3, 4):
+            row = dict(zip(columns, values, strict=True))
+            fill = 0.5 + float(noise.normal(0, 0.004))
+            rows.append({**row, "replicate": replicate, "seed": 100 + replicate,
+                         "outcome_code": 0, FILL: fill})  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def test_settings_that_differ_in_one_chosen_key_are_compared() -> None:
+    table = summary(**{FORM: ["none", "viscous"], "engine.name": ["lammps", "reference"]})
+    margins = {FILL: 0.03}
+    one = compare_keys(table, [FORM, "engine.name"], Equivalence(keys=(FORM,), margins=margins))
+    assert [(c.first, c.second, c.at) for c in one] == [
+        ("none", "viscous", "engine lammps"),
+        ("none", "viscous", "engine reference"),
+    ]
+    both = Equivalence(keys=(FORM, "engine.name"), margins=margins)
+    found = compare_keys(table, [FORM, "engine.name"], both)
+    assert [c.key for c in found].count("engine.name") == 2
+    assert len(found) == 4
+    assert {c.agreement.judged for c in found} == {"equivalent"}
+
+
+def test_numbers_are_named_and_words_stand_alone() -> None:
+    table = summary(**{"contact.grain_grain.rolling_arm_fraction": [0.1, 0.0]})
+    keys = list(table.columns[:1])
+    (one,) = compare_keys(table, keys, Equivalence(keys=tuple(keys), margins={FILL: 0.03}))
+    assert one.pair == "rolling arm 0 − rolling arm 0.1"
+
+
+def test_planted_difference_between_engines_is_found(tmp_path: Path) -> None:
+    folder = write_twins(tmp_path / "twins", {**EQUAL, "reference": 0.6}, DENSE)
+    collected = gather(folder)
+    found = compare_study(collected.summary, collected.keys, read_study(folder))
+    judged = {(c.measure, c.first, c.second): c.agreement.judged for c in found}
+    assert judged[FILL, "lammps", "liggghts"] == "equivalent"
+    assert judged[FILL, "lammps", "reference"] == "different"
+    assert judged[FILL, "liggghts", "reference"] == "different"
+    assert judged["solid_fraction", "lammps", "reference"] == "equivalent"
+    sentences = agreement_sentences(found, 0.9)
+    assert sentences == (
+        "They differ by more than the margin in fill of the tube (lammps – reference and "
+        "liggghts – reference), at 90 %.",
+        "4 of 6 comparisons agree within the margins set beforehand.",
+    )
+
+
+def test_engine_without_finished_runs_is_not_tested(tmp_path: Path) -> None:
+    failed = [f"engine_liggghts_r{r}" for r in (1, 2, 3)]
+    folder = write_twins(tmp_path / "twins", EQUAL, DENSE, replicates=3, failed=failed)
+    collected = gather(folder)
+    found = compare_study(collected.summary, collected.keys, read_study(folder))
+    untested = [c for c in found if "liggghts" in (c.first, c.second)]
+    assert {c.agreement.judged for c in untested} == {"not tested"}
+    said = agreement_sentences(found, 0.9)
+    assert any(s.startswith("Not tested: solid fraction (lammps – liggghts") for s in said)
+
+
+def test_all_equivalent_is_said_in_one_sentence(tmp_path: Path) -> None:
+    collected = gather(write_twins(tmp_path / "twins", EQUAL, DENSE))
+    found = compare_study(collected.summary, collected.keys, read_study(tmp_path / "twins"))
+    assert agreement_sentences(found, 0.9) == (
+        "All 6 comparisons agree within the margins set beforehand, at 90 %.",
+    )
+
+
+def test_cross_check_is_compared_at_its_point_alone(tmp_path: Path) -> None:
+    folder = write_cross_check(tmp_path / "demo")
+    collected = gather(folder)
+    assert len(collected.summary) == 12
+    assert len(sweep_part(collected.summary)) == len(collected.of_sweep.summary) == 9
+    assert collected.keys == (KEY,)
+    packing, fill = compare_study(collected.summary, collected.keys, read_study(folder))
+    assert (fill.first, fill.second, fill.at) == ("reference", "lammps", "50 Hz")
+    assert fill.agreement.n == packing.agreement.n == 3
+    assert fill.agreement.means == pytest.approx((0.55, 0.85), abs=0.02)
+    assert fill.agreement.judged == "different"
+
+
+def test_table_is_written_and_reads_back(tmp_path: Path) -> None:
+    folder = write_twins(tmp_path / "twins", EQUAL, DENSE)
+    collect(folder)
+    table = pd.read_csv(folder / "agreement.tsv", sep="\t")
+    assert tuple(table.columns) == COLUMNS
+    assert len(table) == 6
+    assert set(table["verdict"]) == {"equivalent"}
+    (folder / "study.yaml").unlink()
+    collect(folder)
+    assert pd.read_csv(folder / "agreement.tsv", sep="\t").empty
+
+
+def test_speed_of_each_engine_fastest_first(tmp_path: Path) -> None:
+    collected = gather(write_twins(tmp_path / "twins", EQUAL, DENSE, replicates=2))
+    found = speeds(collected.summary)
+    assert [s.engine for s in found] == ["reference", "liggghts", "lammps"]
+    assert found[0].grain_steps_per_s == 2.1e7
+    assert {s.runs for s in found} == {2}
+    assert speeds(collected.summary.drop(columns="engine")) == ()
+
+
+def records(folder: Path) -> Path:
+    """Committed results of all studies of the page, the twins' own with planted values."""
+    for name in (twins.TWINS, *twins.EFFECTS):
+        made = write_twins(folder / "made" / name, EQUAL, DENSE)
+        collect(made)
+        kept = folder / "records" / name
+        kept.mkdir(parents=True)
+        for file in ("runs.tsv", "summary.tsv"):
+            shutil.copy(made / file, kept / file)
+        record = {"study": f"config/studies/{twins.TWINS}.yaml", "commit": "abc1234",
+                  "machine": {"processor": "one", "cores": 2}}  # fmt: skip
+        (kept / "record.json").write_text(json.dumps(record))
+    return folder / "records"
+
+
+def test_page_on_the_engines_has_its_tables(tmp_path: Path) -> None:
+    text = twins.page_text(records(tmp_path))
+    assert "# Do three engines fill and shake the same box alike?" in text
+    assert "| solid fraction | lammps − reference | 0.81" in text
+    assert text.count("| equivalent |") >= 6
+    assert "| reference | 22 Jul 2025 | 6 | 21 M |" in text
+    assert "2/5 m r²" in text
+    assert "\n\n\n\n" not in text
+
+
+def test_page_names_what_was_not_recorded(tmp_path: Path) -> None:
+    folder = records(tmp_path)
+    shutil.rmtree(folder / "frames")
+    with pytest.raises(SystemExit, match="no record of frames"):
+        twins.page_text(folder)
+
+
+@pytest.mark.skipif(not twins.PAGE.exists(), reason="the engines' page is not committed yet")
+def test_committed_page_is_that_of_the_committed_results() -> None:
+    written = twins.PAGE.read_text(encoding="utf-8")
+    assert written == twins.page_text(), f"make twins, in {ROOT}"

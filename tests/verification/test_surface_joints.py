@@ -1,0 +1,373 @@
+"""Grains against surfaces of many parts: no bump, no double contact, no lost friction at joints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sandmould.dem.broad_phase import find_candidates
+from sandmould.dem.contact_law import Law
+from sandmould.dem.surface_contacts import press_on_surfaces
+from sandmould.dem.surfaces import Surfaces, move_vertices
+from sandmould.dem.vectors import like
+from sandmould.dem.wall_history import new_history
+
+Array = NDArray[np.float64]
+RADIUS_M, MASS_KG, STEP_S = 1e-3, 1e-5, 1e-6
+LAW = Law(2e4, 2e4, 0.35, 0.95, 0.1, 2e4, clip_total=True, twist=False)
+SMOOTH = LAW._replace(friction=0.0, damping_ratio=0.0, rolling_arm=0.0)
+
+
+@dataclass
+class Touch:
+    """What one grain feels in one step."""
+
+    force: Array
+    moment: Array
+    loads: Array
+    contacts: int
+
+
+class Probe:
+    """One grain and its memory of the surfaces."""
+
+    def __init__(self, surfaces: Surfaces, law: Law = LAW) -> None:
+        self.surfaces, self.law = surfaces, law
+        self.d = surfaces.dimension
+        self.like = like(self.d)
+        self.history = new_history(self.like, 1)
+
+    def touch(
+        self, position: Array, velocity: Array, spin: Array, shift_velocity: Array | None = None
+    ) -> Touch:
+        """Put the grain somewhere for one step."""
+        arrays = self.surfaces.arrays
+        radius, mass, still = np.array([RADIUS_M]), np.array([MASS_KG]), (0.0,) * self.d
+        x, v, w = (np.array([a], dtype=float) for a in (position, velocity, spin))
+        force, moment = np.zeros_like(x), np.zeros_like(w)
+        loads = np.zeros_like(arrays.vertices)
+        found = find_candidates(self.like, x, radius, 0.0, arrays, still)
+        shift_v = still if shift_velocity is None else tuple(shift_velocity)
+        press_on_surfaces(
+            self.like, 0, len(found.rows), found, x, v, w, radius, mass, force, moment, arrays,
+            still, shift_v, self.law, STEP_S, True, self.history, loads,
+        )  # fmt: skip
+        contacts = int(self.history.used[0]) if len(found.rows) else 0
+        return Touch(force[0], moment[0], loads, contacts)
+
+
+def turn(d: int, angle: float) -> Array:
+    """Some rotation."""
+    c, s = math.cos(angle), math.sin(angle)
+    flat = np.array([[c, -s], [s, c]])
+    if d == 2:
+        return flat
+    about_z, about_x = np.eye(3), np.eye(3)
+    about_z[:2, :2], about_x[1:, 1:] = flat, flat
+    return about_x @ about_z
+
+
+def floors(d: int, tilt: float = 0.0) -> tuple[Surfaces, Surfaces, Array]:
+    """One plane, the same plane as uneven facets of two surfaces, and the axes of both."""
+    axes = turn(d, tilt)
+    plane = Surfaces(d)
+    plane.add_plane("floor", np.zeros(d), axes[:, -1])
+    pieces = Surfaces(d)
+    grid = np.array([-4e-3, -2e-3, -1.5e-3, 0.0, 0.25e-3, 1e-3, 4e-3])
+    n = len(grid)
+    if d == 2:
+        points = np.column_stack([grid, np.zeros(n)]) @ axes.T
+        facets = np.column_stack([np.arange(n - 1), np.arange(1, n)])
+        facets[::2] = facets[::2, ::-1]
+    else:
+        first, second = np.meshgrid(grid, grid, indexing="ij")
+        flat = np.column_stack([first.ravel(), second.ravel(), np.zeros(n * n)])
+        points = flat @ axes.T
+        at = np.arange(n * n).reshape(n, n)
+        lower = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:]], axis=-1).reshape(-1, 3)
+        upper = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:]], axis=-1).reshape(-1, 3)
+        facets = np.concatenate([lower, upper])
+    # A joint of two surfaces is as good as one of facets.
+    pieces.add_facets("one", points, facets[::2])
+    pieces.add_facets("other", points, facets[1::2])
+    return plane, pieces, axes
+
+
+DIRECTIONS = [0.0, 0.3, math.pi / 4, math.pi / 2, 2.0]
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+@pytest.mark.parametrize(
+    ("d", "direction"), [(2, 0.0), (2, math.pi), *((3, a) for a in DIRECTIONS)]
+)
+def test_joints_of_a_flat_floor_are_not_felt(d: int, direction: float, tilt: float) -> None:
+    plane, pieces, axes = floors(d, tilt)
+    one, many = Probe(plane), Probe(pieces)
+    along = np.zeros(d)
+    along[0] = math.cos(direction)
+    if d == 3:
+        along[1] = math.sin(direction)
+    spin = np.array([30.0]) if d == 2 else np.array([30.0, -20.0, 10.0])
+    worst, scale = 0.0, 0.35 * LAW.k_n * 0.02 * RADIUS_M
+    place = -2.5e-3 * along
+    for step in range(2000):
+        # To and fro, so that friction turns round; in the middle it passes exactly over vertices.
+        speed = 4.0 * math.sin(step / 2000 * 3 * math.pi) * along
+        place = place + STEP_S * speed
+        if step == 1000:
+            place = np.zeros(d)
+        center = place.copy()
+        center[-1] = RADIUS_M * 0.98
+        a = one.touch(axes @ center, axes @ speed, spin)
+        b = many.touch(axes @ center, axes @ speed, spin)
+        assert b.contacts == a.contacts == 1
+        worst = max(worst, float(np.abs(a.force - b.force).max()) / scale)
+        worst = max(worst, float(np.abs(a.moment - b.moment).max()) / scale / RADIUS_M)
+    assert worst < 1e-12
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_grain_dragged_by_a_constant_force_moves_alike_on_plane_and_facets(d: int) -> None:
+    plane, pieces, _ = floors(d)
+    tracks = []
+    for surfaces in (plane, pieces):
+        probe = Probe(surfaces)
+        x, v = np.zeros(d), np.zeros(d)
+        x[0], x[-1] = -2.5e-3, RADIUS_M
+        w = np.zeros(1 if d == 2 else 3)
+        pull = np.zeros(d)
+        pull[0], pull[-1] = 0.05, -0.1
+        track = []
+        for _ in range(2000):
+            t = probe.touch(x, v, w)
+            v = v + (t.force + pull) / MASS_KG * STEP_S
+            w = w + t.moment / (0.4 * MASS_KG * RADIUS_M**2) * STEP_S
+            x = x + v * STEP_S
+            track.append([*x, *v * 1e-3, *w * 1e-6])
+        tracks.append(track)
+    assert tracks[0][-1][0] > 3e-3  # it has crossed most joints
+    np.testing.assert_allclose(tracks[1], tracks[0], rtol=0, atol=1e-12 * 4e-3)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_contact_goes_smoothly_round_a_convex_edge(d: int) -> None:
+    surfaces = block(d, 4e-3)
+    probe = Probe(surfaces, SMOOTH)
+    h, reach = 2e-3, 0.95 * RADIUS_M
+    # Along the top, round the edge by a quarter of a turn, down the side, at one distance.
+    flat = [(x, h + reach, 0.0) for x in np.linspace(1e-3, h, 200)]
+    edge = [
+        (h + reach * math.sin(a), h + reach * math.cos(a), a)
+        for a in np.linspace(0, math.pi / 2, 400)
+    ]
+    side = [(h + reach, y, math.pi / 2) for y in np.linspace(h, 1e-3, 200)]
+    for x, y, angle in [*flat, *edge, *side]:
+        center = np.zeros(d)
+        center[0], center[-1] = x, y
+        t = probe.touch(center, np.zeros(d), np.zeros(1 if d == 2 else 3))
+        expected = np.zeros(d)
+        push = SMOOTH.k_n * 0.05 * RADIUS_M
+        expected[0], expected[-1] = push * math.sin(angle), push * math.cos(angle)
+        assert t.contacts == 1
+        np.testing.assert_allclose(t.force, expected, atol=1e-12 * push)
+
+
+def block(d: int, size: float) -> Surfaces:
+    """A square or a cube about the origin, each side of several facets."""
+    surfaces = Surfaces(d)
+    if d == 2:
+        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * size / 2
+        surfaces.add_facets("block", corners, [(0, 1), (1, 2), (2, 3), (3, 0)])
+        return surfaces
+    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size / 2
+    quads = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    triangles = [t for a, b, c, e in quads for t in ((a, b, c), (a, c, e))]
+    surfaces.add_facets("block", corners, triangles)
+    return surfaces
+
+
+def test_cube_is_touched_once_from_every_side() -> None:
+    h, rng = 2e-3, np.random.default_rng(5)
+    probe = Probe(block(3, 2 * h), SMOOTH)
+    for _ in range(2000):
+        # A point at 0.97 radii from the cube: any point outside, drawn towards its nearest one.
+        outside = rng.normal(size=3) * 2 * h
+        nearest = np.clip(outside, -h, h)
+        if np.array_equal(outside, nearest):
+            continue
+        n = (outside - nearest) / np.linalg.norm(outside - nearest)
+        t = probe.touch(nearest + 0.97 * RADIUS_M * n, np.zeros(3), np.zeros(3))
+        assert t.contacts == 1
+        push = SMOOTH.k_n * 0.03 * RADIUS_M
+        np.testing.assert_allclose(t.force, push * n, atol=1e-9 * push)
+
+
+@pytest.mark.parametrize("angle_deg", [20.0, 45.0, 90.0, 130.0])
+def test_concave_corner_has_two_contacts(angle_deg: float) -> None:
+    surfaces = Surfaces(2)
+    a = math.radians(angle_deg)
+    rise = np.array([math.cos(a), math.sin(a)])
+    corners = np.array([(-5e-3, 0.0), (0.0, 0.0), 5e-3 * rise])
+    surfaces.add_facets("corner", corners, [(0, 1), (1, 2)])
+    n = np.array([[0.0, 1.0], [-math.sin(a), math.cos(a)]])
+    # Into the first side by 1 % of the radius, into the second by 2 %.
+    center = np.linalg.solve(n, RADIUS_M * np.array([0.99, 0.98]))
+    t = Probe(surfaces, SMOOTH).touch(center, np.zeros(2), np.zeros(1))
+    assert t.contacts == 2
+    expected = SMOOTH.k_n * RADIUS_M * (0.01 * n[0] + 0.02 * n[1])
+    np.testing.assert_allclose(t.force, expected, rtol=1e-11)
+
+
+def test_concave_corner_of_three_sides_has_three_contacts() -> None:
+    surfaces = block(3, 4e-3)
+    depth = np.array([0.01, 0.02, 0.015]) * RADIUS_M
+    t = Probe(surfaces, SMOOTH).touch(2e-3 - RADIUS_M + depth, np.zeros(3), np.zeros(3))
+    assert t.contacts == 3
+    np.testing.assert_allclose(t.force, -SMOOTH.k_n * depth, rtol=1e-11)
+
+
+def test_obtuse_joints_of_a_round_wall_count_once_and_keep_friction() -> None:
+    # A bore of 72 sides, 5 degrees each: a grain slides round the inside, always against one.
+    surfaces = Surfaces(2)
+    angles = np.radians(np.arange(72) * 5.0)
+    corners = 0.01 * np.column_stack([np.cos(angles), np.sin(angles)])
+    surfaces.add_facets(
+        "bore", corners, np.column_stack([np.arange(72), np.roll(np.arange(72), -1)])
+    )
+    probe = Probe(surfaces)
+    orbit = 0.01 - 0.98 * RADIUS_M
+    ratios = []
+    for a in np.linspace(0.0, 1.0, 4000):
+        out = np.array([math.cos(a), math.sin(a)])
+        around = np.array([-out[1], out[0]])
+        t = probe.touch(orbit * out, 0.1 * around, np.zeros(1))
+        assert t.contacts == 1
+        ratios.append(-float(t.force @ around) / -float(t.force @ out))
+    # Sliding all the way: friction never starts anew; normals turn by 2.5 degrees about the exact.
+    assert min(ratios[200:]) > math.tan(math.atan(0.35) - math.radians(2.6))
+    assert max(ratios[200:]) < math.tan(math.atan(0.35) + math.radians(2.6))
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_facets_finer_than_the_contact_make_one_contact(side: float) -> None:
+    # Some 150 edges lie within the grain, more than it keeps; it touches a ring from either side.
+    count, ring = 3000, 5e-3
+    angles = 2 * math.pi * np.arange(count) / count
+    surfaces = Surfaces(2)
+    corners = ring * np.column_stack([np.cos(angles), np.sin(angles)])
+    first = np.arange(count)
+    surfaces.add_facets("ring", corners, np.column_stack([first, np.roll(first, -1)]))
+    probe = Probe(surfaces, SMOOTH)
+    push = SMOOTH.k_n * 0.05 * RADIUS_M
+    for a in np.linspace(0.0, 0.1, 500):
+        out = np.array([math.cos(a), math.sin(a)])
+        t = probe.touch((ring + side * 0.95 * RADIUS_M) * out, np.zeros(2), np.zeros(1))
+        assert t.contacts == 1
+        np.testing.assert_allclose(t.force, side * push * out, atol=4e-3 * push)
+
+
+def test_revolved_tube_is_the_limit_of_many_facets() -> None:
+    profile = [(0.0, 4e-3), (10e-3, 4e-3), (10e-3, 5e-3), (0.0, 5e-3)]
+    axis = np.array([0.3, 0.5, 0.8])
+    exact = Surfaces(3)
+    exact.add_revolved("tube", (1e-3, 0, 0), axis, profile, closed=True)
+    unit = axis / np.linalg.norm(axis)
+    first = np.cross(unit, [1.0, 0, 0])
+    first /= np.linalg.norm(first)
+    second = np.cross(unit, first)
+    rng = np.random.default_rng(2)
+    places = []
+    for _ in range(100):
+        a, kind = rng.uniform(0, 2 * math.pi), rng.integers(4)
+        axial, radial = {
+            0: (rng.uniform(0, 10e-3), 4e-3 - 0.97 * RADIUS_M),
+            1: (rng.uniform(0, 10e-3), 5e-3 + 0.97 * RADIUS_M),
+            2: (10e-3 + 0.97 * RADIUS_M, rng.uniform(4e-3, 5e-3)),
+            3: (-0.6 * RADIUS_M, 5e-3 + 0.75 * RADIUS_M),
+        }[int(kind)]
+        out = math.cos(a) * first + math.sin(a) * second
+        places.append(np.array([1e-3, 0, 0]) + axial * unit + radial * out)
+    errors = []
+    for count in (48, 96, 192):
+        angles = 2 * math.pi * np.arange(count) / count
+        out = np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
+        rings = [np.array([1e-3, 0, 0]) + ax * unit + rad * out for ax, rad in profile]
+        at = np.arange(4 * count).reshape(4, count)
+        triangles = []
+        for k in range(4):
+            p, q = at[k], at[(k + 1) % 4]
+            p_next, q_next = np.roll(p, -1), np.roll(q, -1)
+            triangles += [np.column_stack([p, q, q_next]), np.column_stack([p, q_next, p_next])]
+        facets = Surfaces(3)
+        facets.add_facets("tube", np.concatenate(rings), np.concatenate(triangles))
+        one, many = Probe(exact, SMOOTH), Probe(facets, SMOOTH)
+        worst = 0.0
+        for x in places:
+            a_touch = one.touch(x, np.zeros(3), np.zeros(3))
+            b_touch = many.touch(x, np.zeros(3), np.zeros(3))
+            assert a_touch.contacts == b_touch.contacts == 1
+            worst = max(worst, float(np.linalg.norm(a_touch.force - b_touch.force)))
+        errors.append(worst / (SMOOTH.k_n * 0.03 * RADIUS_M))
+    assert errors[-1] < 0.05
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[2] < 0.6 * errors[1]
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_loads_on_vertices_do_the_work_of_the_contacts(d: int) -> None:
+    surfaces = block(d, 4e-3)
+    rng = np.random.default_rng(7)
+    for _ in range(100):
+        probe = Probe(surfaces)
+        x = rng.uniform(-1, 1, d)
+        x *= (2e-3 + 0.98 * RADIUS_M) / np.abs(x).max()
+        t = probe.touch(x, rng.normal(size=d), rng.normal(size=1 if d == 2 else 3))
+        if t.contacts == 0:
+            continue
+        size = float(np.linalg.norm(t.force))
+        np.testing.assert_allclose(t.loads.sum(axis=0), -t.force, atol=1e-12 * size)
+        on_point = np.clip(x, -2e-3, 2e-3)
+        # One contact: sum x_j (x) f_j = p (x) f.
+        first = np.einsum("ni,nj->ij", surfaces.arrays.vertices, t.loads)
+        np.testing.assert_allclose(first, -np.outer(on_point, t.force), atol=1e-12 * size * 2e-3)
+        np.testing.assert_allclose(surfaces.forces(t.loads)["block"], -t.force, atol=1e-12 * size)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("moved_by", ["belt", "vertices", "box"])
+def test_moving_floor_drags_a_grain_to_its_speed_at_mu_g(d: int, moved_by: str) -> None:
+    surfaces = Surfaces(d)
+    low, high = -0.1, 0.1
+    if d == 2:
+        surfaces.add_facets("floor", [(low, 0), (0, 0), (high, 0)], [(0, 1), (1, 2)])
+    else:
+        ring = [(low, low, 0), (high, low, 0), (high, high, 0), (low, high, 0)]
+        surfaces.add_facets("floor", ring, [(0, 1, 2), (0, 2, 3)])
+    belt = np.zeros(d)
+    belt[0] = 0.02
+    if moved_by == "belt":
+        surfaces.set_belt("floor", belt)
+    elif moved_by == "vertices":
+        target = surfaces.arrays.vertices + belt * 1.0
+        surfaces.set_motion("floor", target, 1.0, STEP_S)
+    probe = Probe(surfaces, LAW._replace(rolling_arm=0.0))
+    weight = np.zeros(d)
+    weight[-1] = -9.81
+    x, v = np.zeros(d), np.zeros(d)
+    x[-1] = RADIUS_M - 9.81 * MASS_KG / LAW.k_n
+    speeds = []
+    for _ in range(8000):
+        move_vertices(surfaces.arrays, STEP_S)
+        # The spin is held, as by a second wall: a free grain would roll instead.
+        t = probe.touch(x, v, np.zeros(1 if d == 2 else 3), belt if moved_by == "box" else None)
+        v = v + (t.force / MASS_KG + weight) * STEP_S
+        x = x + v * STEP_S
+        speeds.append(v[0])
+    slipping = np.array(speeds[500:4500])
+    gain = (slipping[-1] - slipping[0]) / ((len(slipping) - 1) * STEP_S)
+    assert gain == pytest.approx(0.35 * 9.81, rel=1e-6)
+    assert speeds[-1] == pytest.approx(0.02, rel=2e-2)
