@@ -12,7 +12,7 @@ from sandmould.engines.checkpoint import Mark
 from sandmould.engines.choosing import engine_of
 from sandmould.engines.guard import Guard
 from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.engines.products import Cost, peak_memory_bytes
+from sandmould.engines.products import Cost, cpu_time_s, peak_memory_bytes
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.progress import Progress
 from sandmould.engines.recording import Recorder
@@ -96,20 +96,21 @@ class Driver:
 
     def _begin_clocks(self) -> None:
         self._earlier = (self.cost.wall_s, self.cost.cpu_s)
-        self._begun, self._cpu_begun = time.monotonic(), time.process_time()
+        self._begun, self._cpu_begun = time.monotonic(), cpu_time_s()
 
     def _read_clocks(self) -> None:
         self.cost.wall_s = self._earlier[0] + time.monotonic() - self._begun
-        self.cost.cpu_s = self._earlier[1] + time.process_time() - self._cpu_begun
+        self.cost.cpu_s = self._earlier[1] + cpu_time_s() - self._cpu_begun
         self.cost.peak_memory_bytes = max(self.cost.peak_memory_bytes, peak_memory_bytes())
 
     def _end(self, session: Session | None) -> None:
-        self._read_clocks()
         if self._recorder is not None:
             self._recorder.close()
         if session is not None:
             self.cost.version = session.version
             session.close()
+        # Last, since the time of an engine of its own process counts once that has ended.
+        self._read_clocks()
 
     def _go(self, session: Session, mark: Mark | None) -> None:
         names = [stage.name for stage in self._program.stages]

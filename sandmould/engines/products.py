@@ -47,9 +47,15 @@ class Cost:
         return asdict(self)
 
 
+def cpu_time_s() -> float:
+    """Processor time of this process and of the engines it has started and seen end."""
+    return sum(os.times()[:4])
+
+
 def peak_memory_bytes() -> int:
-    """Largest resident memory of this process so far."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    """Largest resident memory of this process and of the largest engine it has seen end."""
+    whose = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return sum(resource.getrusage(who).ru_maxrss for who in whose) * 1024
 
 
 def finish(

@@ -71,10 +71,11 @@ class Plan:
         they are computed again.
         """
         engine = self._by_name[name].scenario.engine.name
-        files = [*Path("templates", engine).glob("*.j2")]
+        files = [*(ROOT / "templates" / engine).glob("*.j2")]
         if engine == "reference":
             files += (ROOT / "sandmould" / "dem").glob("*.py")
-        return sorted(map(str, files))
+        # As seen from here: another place of the repository is no reason to compute again.
+        return sorted(os.path.relpath(path) for path in files)
 
     def memory_mb(self, name: str) -> int:
         """Memory to ask for: several times the 126 MB measured at 1 134 discs, 144 at 8 000."""

@@ -17,6 +17,7 @@ _NAMES = {
     "engine.name": "engine",
     "background_damping.form": "background damping",
     "coordination": "coordination number",
+    "rolling_arm_fraction": "rolling arm",
     "solid_fraction": "solid fraction",
     "bed_height_m": "bed height",
     "apparent_density_raw_kg_m3": "apparent density, as eq. (55) prints it",

@@ -60,7 +60,7 @@ def test_ids_repeat_and_differ_from_run_to_run() -> None:
     demo = ROOT / "config" / "studies" / "tube_demo.yaml"
     runs, again = expand(open_study(demo)), expand(open_study(demo))
     assert [r.run for r in runs] == [r.run for r in again]
-    assert len({r.run for r in runs}) == len(runs) == 9
+    assert len({r.run for r in runs}) == len(runs)
 
 
 def test_ids_do_not_depend_on_the_order_of_columns(runs_of: Runs) -> None:

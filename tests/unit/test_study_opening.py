@@ -36,7 +36,8 @@ def test_shipped_study_opens_and_expands(path: Path) -> None:
     study = open_study(path)
     assert study.name == path.stem
     assert study.study.title
-    assert len(expand(study)) == study.study.sweep.number_of_points * study.study.replicates
+    runs = [run for run in expand(study) if run.part == "sweep"]
+    assert len(runs) == study.study.sweep.number_of_points * study.study.replicates
 
 
 def test_shipped_studies_are_what_they_are_named() -> None:
@@ -48,7 +49,9 @@ def test_shipped_studies_are_what_they_are_named() -> None:
     )
     key = "vibration.0.frequency_hz"
     assert len({r.parameters[key] for r in demo}) >= 3
-    assert {r.replicate for r in demo} == {1, 2, 3}
+    assert {r.replicate for r in demo} >= {1, 2, 3}
+    # The sweep may run on the solver of the house, one point always on LAMMPS too.
+    assert {r.part for r in demo if r.scenario.engine.name == "lammps"} == {"cross_check"}
     assert min(r.parameters[key] for r in frequency) <= 15
     assert max(r.parameters[key] for r in frequency) >= 150
     assert {r.replicate for r in frequency} == {1, 2, 3, 4, 5}

@@ -9,7 +9,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sandmould import ROOT
 from sandmould.engines.program import REST_AFTER_FALL_S, build_program
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
@@ -25,9 +24,21 @@ from sandmould.study.plan import (
 )
 
 
+LAMMPS = ("lammps", 2)
+THREE = """\
+based_on: tube
+scenario: {sand: {size_scale: 6}}
+sweep: {keys: {vibration.0.frequency_hz: [25, 50, 100]}}
+replicates: 3
+"""
+
+
 @pytest.fixture(scope="module")
-def demo() -> list[Run]:
-    return expand(open_study(ROOT / "config" / "studies" / "tube_demo.yaml"))
+def demo(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+    """Nine runs of a small study."""
+    path = tmp_path_factory.mktemp("studies") / "three.yaml"
+    path.write_text(THREE, encoding="utf-8")
+    return expand(open_study(path))
 
 
 def times(folder: Path) -> dict[str, int]:
@@ -126,7 +137,7 @@ def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
 
 
 def test_price_before_calibration_is_unknown(demo: list[Run]) -> None:
-    text = plan_table(demo, None, 2)
+    text = plan_table(demo, {}, 2)
     assert text.count("unknown until calibrated") == 4
     assert "9 runs" in text
 
@@ -134,15 +145,15 @@ def test_price_before_calibration_is_unknown(demo: list[Run]) -> None:
 def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
     total = sum(planned_grain_steps(r.scenario) for r in demo)
     # times well inside the range of their unit: the sums above carry round-off
-    lines = plan_table(demo, total / 9000, 1).splitlines()
+    lines = plan_table(demo, {LAMMPS: total / 9000}, 1).splitlines()
     grains = sum(plan_counts(demo[0].scenario))
     assert lines[1].split()[:3] == ["frequency_25", "3", f"{grains:,}"]
     assert lines[-1].startswith("9 runs, ")
     assert lines[-1].endswith("wall time on 1 cores: 2.5 h")
-    assert plan_table(demo, total / 9000, 2).endswith("on 2 cores: 75.0 min\n")
+    assert plan_table(demo, {LAMMPS: total / 9000}, 2).endswith("on 2 cores: 75.0 min\n")
     # On more cores than runs the longest run decides.
     longest = max(planned_grain_steps(r.scenario) for r in demo)
-    assert plan_table(demo, longest / 30, 99).endswith("on 99 cores: 30 s\n")
+    assert plan_table(demo, {LAMMPS: longest / 30}, 99).endswith("on 99 cores: 30 s\n")
 
 
 def test_long_table_is_cut(tmp_path: Path) -> None:
@@ -152,6 +163,6 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
         "{low: 15, high: 100, number: 30}}}",
         encoding="utf-8",
     )
-    lines = plan_table(expand(open_study(path)), 1e6, 2).splitlines()
+    lines = plan_table(expand(open_study(path)), {LAMMPS: 1e6}, 2).splitlines()
     assert len(lines) == 23
     assert lines[-2] == "... and 10 more points"

@@ -85,10 +85,13 @@ class Bridge(NamedTuple):
     """(nv, d) float64, N: loads of steps that are no sample; nobody reads them."""
 
 
+_FIELDS = len(Bridge._fields)
+
+
 @njit(**OPTIONS)
 def _open(address: Any) -> Bridge:
     """Make the arrays out of the table at an address, in the order of the fields."""
-    table = carray(address, (len(Bridge._fields), 3))
+    table = carray(address, (_FIELDS, 3))
     return Bridge(
         int_line_at(table, 0),
         int_line_at(table, 1),

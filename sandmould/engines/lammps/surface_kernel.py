@@ -27,27 +27,12 @@ from sandmould.engines.lammps.callback import (
     address_of,
 )
 from sandmould.engines.program import Program, Stage
-from sandmould.engines.reference.model import scene_of
+from sandmould.engines.reference.model import add_solids, scene_of
 from sandmould.engines.session import Array
 from sandmould.engines.step_counts import StepCounts
-from sandmould.scenario.geometry import Scene
 
 _KEPT = ("row_ids", "used", "normal", "friction", "rolling")
 _MOVED = ("vertices", "vertex_velocity", "steps_left")
-
-
-def pressed_surfaces(scene: Scene) -> Surfaces:
-    """Outlines, meshes and round solids: the surfaces that are no regions of LAMMPS."""
-    surfaces = Surfaces(scene.dimension)
-    for outline in scene.outlines:
-        first = np.arange(len(outline.vertices_m))
-        ring = np.column_stack([first, np.roll(first, -1)])
-        surfaces.add_facets(outline.name, outline.vertices_m, ring)
-    for mesh in scene.meshes:
-        surfaces.add_facets(mesh.name, mesh.vertices_m, mesh.triangles)
-    for solid in scene.revolved:
-        surfaces.add_revolved(solid.name, solid.origin_m, solid.axis, solid.profile_m, closed=True)
-    return surfaces
 
 
 class SurfaceKernel:
@@ -67,7 +52,8 @@ class SurfaceKernel:
         self._lmp = lmp
         self._counts = StepCounts.of(scenario)
         self._in_box_frame = scenario.frame == "box"
-        self._surfaces = pressed_surfaces(scenario.scene)
+        self._surfaces = Surfaces(scenario.dimension)
+        add_solids(self._surfaces, scenario.scene)
         d, n = scenario.dimension, sum(program.counts)
         self._dimension = d
         arrays = self._surfaces.arrays

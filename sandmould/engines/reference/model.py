@@ -12,6 +12,7 @@ from sandmould.dem.steps import Scene
 from sandmould.dem.surfaces import Surfaces
 from sandmould.engines.program import Stage
 from sandmould.scenario.contact import ContactLaw
+from sandmould.scenario.geometry import Scene as GeometricScene
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
@@ -59,14 +60,8 @@ def scene_of(scenario: Scenario, stage: Stage, step_s: float) -> Scene:
     )
 
 
-def surfaces_of(scenario: Scenario) -> Surfaces:
-    """Walls, blocks, outlines, meshes and round solids as surfaces."""
-    scene = scenario.scene
-    surfaces = Surfaces(scenario.dimension)
-    for wall in scene.walls:
-        surfaces.add_plane(wall.name, wall.point_m, wall.normal)
-    for block in scene.blocks:
-        surfaces.add_facets(block.name, block.corners(), block.facets())
+def add_solids(surfaces: Surfaces, scene: GeometricScene) -> None:
+    """Add outlines, meshes and round solids: all solids but blocks."""
     for outline in scene.outlines:
         k = len(outline.vertices_m)
         ring = np.column_stack([np.arange(k), np.roll(np.arange(k), -1)])
@@ -77,6 +72,17 @@ def surfaces_of(scenario: Scenario) -> Surfaces:
         surfaces.add_revolved(
             round_solid.name, round_solid.origin_m, round_solid.axis, round_solid.profile_m, True
         )
+
+
+def surfaces_of(scenario: Scenario) -> Surfaces:
+    """Walls, blocks, outlines, meshes and round solids as surfaces."""
+    scene = scenario.scene
+    surfaces = Surfaces(scenario.dimension)
+    for wall in scene.walls:
+        surfaces.add_plane(wall.name, wall.point_m, wall.normal)
+    for block in scene.blocks:
+        surfaces.add_facets(block.name, block.corners(), block.facets())
+    add_solids(surfaces, scene)
     return surfaces
 
 

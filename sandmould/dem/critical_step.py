@@ -1,0 +1,261 @@
+"""Critical time steps of the contacts as they are, eqs. (40)-(54) of the paper.
+
+Central differences take the damping force at the velocity of half a step ago:
+M (x+ - 2 x + x-) / dt^2 + C (x - x-) / dt + K x = 0. They lose stability where a vector phi first
+grows as (-1)^n phi, that is where 4 M - 2 dt C - dt^2 K stops being positive definite. For one
+mode, C = 2 xi omega M and K = omega^2 M, this is eq. (42). For a system it is, with s = 1 / dt,
+
+    (4 s^2 M - 2 s C - K) phi = 0,
+
+whose largest s is that of a symmetric matrix: for K = B^T B, b = B M^-1/2 and c = M^-1/2 C M^-1/2
+
+    s [u, w] = 1/2 [[c, b^T], [b, 0]] [u, w].
+
+All contacts count as sticking unless they are smooth, and none opens: the stiffest case. The turn
+of the normals under the contact forces is left out, of the order of the overlap over the radius.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import block_array, coo_array, csr_array, diags_array
+from scipy.sparse.linalg import eigsh
+
+from sandmould.dem.contact_law import Law
+from sandmould.dem.grains import Floats, Ints
+from sandmould.dem.solver import Solver
+
+
+@dataclass(frozen=True)
+class StableStep:
+    """Highest frequency of some motion, and the steps up to which it stays bounded."""
+
+    omega_rad_s: float
+    """Largest natural frequency without damping, 0 where nothing touches."""
+    undamped_s: float
+    """Critical step of the springs alone, eq. (41)."""
+    damped_s: float
+    """Critical step with the dashpots, eq. (42)."""
+
+
+class Contacts(NamedTuple):
+    """The springs and dashpots of c active contacts, and the grains between which they act.
+
+    The rows of a contact give the elongations, times the square roots of their stiffnesses, that
+    unit displacements and rotations of its grains make, each over the square root of its mass or
+    inertia: the energy is half the square of their product with the motion. Of r = 3 rows in 2D
+    and 6 in 3D the first is normal, the next tangential, the last rolling.
+    """
+
+    first: Ints
+    """(c,) int64."""
+    second: Ints
+    """(c,) int64: -1 at a surface."""
+    rows_first: Floats
+    """(c, r, d + s) float64, rad/s: of the first grain."""
+    rows_second: Floats
+    """(c, r, d + s) float64, rad/s: of the second grain, zero at a surface."""
+    dashpot: Floats
+    """(c,) float64, s: damping constant over normal stiffness."""
+    grains: int
+    """How many grains there are, touched or not."""
+
+
+class _Ends(NamedTuple):
+    """Where contacts act: what ``_rows`` turns into rows."""
+
+    first: Ints
+    second: Ints
+    normal: Floats
+    arms: Floats
+    """(c, 2) float64, m: from the centres to the contact point; (r, 0) at a surface."""
+    effective: Floats
+    """(c,) float64, m: radius at which the rolling spring acts."""
+    mass: Floats
+    """(c,) float64, kg: of eq. (21)."""
+
+
+def _pair_ends(solver: Solver) -> _Ends:
+    """Contacts between grains."""
+    grains, pairs = solver.grains, solver.pairs
+    owner = np.repeat(np.arange(len(grains.id)), np.diff(pairs.start))
+    touching = pairs.touching.astype(bool)
+    i, j = owner[touching], pairs.other[touching].astype(np.int64)
+    apart = grains.position[j] - grains.position[i]
+    distance = np.sqrt((apart**2).sum(axis=1))
+    r_i, r_j, m_i, m_j = grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j]
+    half = 0.5 * (r_i + r_j - distance)
+    arms = np.column_stack([r_i - half, r_j - half])
+    normal = apart / distance[:, None]
+    return _Ends(i, j, normal, arms, r_i * r_j / (r_i + r_j), m_i * m_j / (m_i + m_j))
+
+
+def _wall_ends(solver: Solver) -> _Ends:
+    """Contacts with surfaces; the arm is the radius, the longest that it can be."""
+    grains, walls = solver.grains, solver._moving.walls
+    used, d = walls.history.used, solver.dimension
+    slots = 2 * d
+    in_use = (np.arange(slots) < used[:, None]).ravel()
+    i = np.repeat(walls.candidates.rows, slots)[in_use]
+    radius = grains.radius[i]
+    arms = np.column_stack([radius, np.zeros(len(i))])
+    second = np.full(len(i), -1)
+    return _Ends(i, second, walls.history.normal[in_use], arms, radius, grains.mass[i])
+
+
+def _tangents(normal: Floats) -> Floats:
+    """Unit vectors across the normals: (c, 1, 2) in 2D, (c, 2, 3) in 3D."""
+    if normal.shape[1] == 2:
+        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
+    least = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    one = np.cross(normal, least)
+    one /= np.sqrt((one**2).sum(axis=1))[:, None]
+    return np.stack([one, np.cross(normal, one)], axis=1)
+
+
+def _rows(solver: Solver, ends: _Ends, law: Law) -> Contacts:
+    """Turn springs of eqs. (16), (25) and (29) into rows.
+
+    The slip of grain 2 over grain 1 along a tangent t is
+    (v_2 - v_1) t - (a_1 w_1 + a_2 w_2) (n x t), where in 2D n x t = 1.
+    """
+    n, grains = ends.normal, solver.grains
+    c, d = n.shape
+    tangents = _tangents(n)
+    turns = np.ones((c, 1, 1)) if d == 2 else np.cross(n[:, None], tangents)
+    rolls = np.ones((c, 1, 1)) if d == 2 else np.concatenate([n[:, None], tangents], axis=1)
+    k_t = law.k_t if law.friction > 0.0 else 0.0
+    k_roll = law.k_roll * ends.effective**2 if law.rolling_arm > 0.0 else np.zeros(c)
+    roll = np.sqrt(k_roll)[:, None, None] * rolls
+    if d == 3 and not law.twist:
+        roll[:, 0] = 0.0
+
+    def one(side: int, grain: Ints) -> Floats:
+        sign = 2.0 * side - 1.0
+        moving = np.zeros((c, 3 * d - 3, d + rolls.shape[2]))
+        moving[:, 0, :d] = sign * math.sqrt(law.k_n) * n
+        moving[:, 1:d, :d] = sign * math.sqrt(k_t) * tangents
+        moving[:, 1:d, d:] = -math.sqrt(k_t) * ends.arms[:, side, None, None] * turns
+        moving[:, d:, d:] = sign * roll
+        moving[:, :, :d] /= np.sqrt(grains.mass[grain])[:, None, None]
+        moving[:, :, d:] /= np.sqrt(grains.inertia[grain])[:, None, None]
+        return np.where((grain < 0)[:, None, None], 0.0, moving)
+
+    damping = 2.0 * law.damping_ratio * np.sqrt(ends.mass * law.k_n)
+    rows = one(0, ends.first), one(1, ends.second)
+    return Contacts(ends.first, ends.second, *rows, damping / law.k_n, len(grains.id))
+
+
+def active_contacts(solver: Solver) -> Contacts:
+    """Give the contacts of the last step, with grains and with surfaces.
+
+    Parameters
+    ----------
+    solver : Solver
+        After a step, or after ``place``.
+    """
+    between = _rows(solver, _pair_ends(solver), solver.scene.grain_law)
+    at_walls = _rows(solver, _wall_ends(solver), solver.scene.wall_law)
+    first, second, rows_first, rows_second, dashpot = (
+        np.concatenate(parts) for parts in zip(between[:-1], at_walls[:-1], strict=True)
+    )
+    return Contacts(first, second, rows_first, rows_second, dashpot, between.grains)
+
+
+def _per_grain(contacts: Contacts, values: Floats, of_second: Floats) -> Floats:
+    """Sum over the contacts of each grain of what they bring to their first and second grain."""
+    total = np.zeros((contacts.grains, *values.shape[1:]))
+    np.add.at(total, contacts.first, values)
+    pair = contacts.second >= 0
+    np.add.at(total, contacts.second[pair], of_second[pair])
+    return total
+
+
+def _stable(omega_rad_s: float, damped_rate_rad_s: float) -> StableStep:
+    """Steps of a frequency and of the rate omega (sqrt(1 + xi^2) + xi) that (42) puts for it."""
+    undamped, damped = (
+        2.0 / rate if rate > 0.0 else math.inf for rate in (omega_rad_s, damped_rate_rad_s)
+    )
+    return StableStep(float(omega_rad_s), undamped, damped)
+
+
+def simplified_step(contacts: Contacts) -> StableStep:
+    """The paper's estimate: a grain swings along one line or turns, eqs. (48)-(54).
+
+    With the real number of contacts, all taken to act along that line: omega_n^2 = sum k_n / m
+    with xi = sum c / (2 m omega_n), and omega_theta^2 = sum k_T r^2 / I without damping. Other
+    grains are held. The paper's (51) and (52) are the case of one contact.
+    """
+    d = contacts.rows_first.shape[1] // 3 + 1
+
+    def square(rows: Floats) -> Floats:
+        normal = (rows[:, 0] ** 2).sum(axis=1)
+        # In 3D both tangents turn the grain, each about an axis of its own.
+        turning = (rows[:, 1:d, d:] ** 2).sum(axis=(1, 2)) / (d - 1)
+        return np.column_stack([normal, contacts.dashpot * normal, turning])
+
+    total = _per_grain(contacts, square(contacts.rows_first), square(contacts.rows_second))
+    k, c, turning = total.T
+    along, about = 0.5 * (np.sqrt(c**2 + 4.0 * k) + c), np.sqrt(turning)
+    omega = np.maximum(np.sqrt(k), about)
+    return _stable(omega.max(initial=0.0), np.maximum(along, about).max(initial=0.0))
+
+
+def grain_step(contacts: Contacts) -> StableStep:
+    """Eigenproblem of every grain among neighbours held fixed, eqs. (43)-(47).
+
+    A grain's matrix is a diagonal block of that of the whole, and a contact between two grains
+    stores at most twice the energy that it stores when either is held: the frequency of the
+    whole lies between this one and sqrt(2) times it, its damped step between half of this one
+    and this one.
+    """
+
+    def outer(rows: Floats) -> Floats:
+        k = np.einsum("cri,crj->cij", rows, rows)
+        c = np.einsum("c,ci,cj->cij", contacts.dashpot, rows[:, 0], rows[:, 0])
+        return np.stack([k, c], axis=1)
+
+    total = _per_grain(contacts, outer(contacts.rows_first), outer(contacts.rows_second))
+    squares, modes = np.linalg.eigh(total[:, 0])
+    omega = np.sqrt(np.maximum(squares, 0.0))
+    root = (modes * omega[:, None]) @ modes.transpose(0, 2, 1)
+    both = np.block([[total[:, 1], root], [root, np.zeros_like(root)]])
+    return _stable(omega.max(initial=0.0), np.linalg.eigvalsh(both).max(initial=0.0))
+
+
+def _largest(matrix: csr_array) -> float:
+    """Largest eigenvalue of a symmetric matrix."""
+    n = matrix.shape[0]
+    if n < 200:
+        return float(np.linalg.eigvalsh(matrix.toarray())[-1])
+    # A start of no symmetry, always the same.
+    start = np.random.default_rng(1).standard_normal(n)
+    found = eigsh(matrix, k=1, which="LA", v0=start, ncv=40, tol=1e-10, return_eigenvectors=False)
+    return float(found[0])
+
+
+def whole_step(contacts: Contacts) -> StableStep:
+    """Eigenproblem of all grains together: the judge of the other two.
+
+    The damped step is exact for central differences, whether or not the modes are damped alike.
+    """
+    if not len(contacts.first):
+        return _stable(0.0, 0.0)
+    c, r, f = contacts.rows_first.shape
+    pair = np.flatnonzero(contacts.second >= 0)
+    values = np.concatenate([contacts.rows_first, contacts.rows_second[pair]])
+    grain = np.concatenate([contacts.first, contacts.second[pair]])
+    contact = np.concatenate([np.arange(c), pair])
+    row = np.broadcast_to((contact[:, None] * r + np.arange(r))[:, :, None], values.shape)
+    column = np.broadcast_to((grain[:, None] * f + np.arange(f))[:, None, :], values.shape)
+    b = coo_array(
+        (values.ravel(), (row.ravel(), column.ravel())), shape=(c * r, contacts.grains * f)
+    ).tocsr()
+    omega = math.sqrt(_largest(b.T @ b))
+    normal = b[::r]
+    damping = normal.T @ diags_array(contacts.dashpot) @ normal
+    return _stable(omega, _largest(block_array([[damping, b.T], [b, None]], format="csr")))
