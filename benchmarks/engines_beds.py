@@ -29,11 +29,10 @@ Floats = NDArray[np.float64]
 KEPT = ROOT / "results" / "benchmarks"
 SPRING_N_M = 7e4
 """Stiffness of all contacts, walls included: softer walls let a grain through in deep beds."""
-_GRAIN_MEASURE = {2: 5.5e-6, 3: 1.2e-8}
-"""Mean area (m2) and volume (m3) of the default sand's grains, nearly."""
-_SOLID_FRACTION = {2: 0.80, 3: 0.58}
-_DEPTH_M = 0.131
-"""Height of a settled bed in 2D: 2 500 discs fill a square."""
+PERIOD_S = 0.02
+"""Of the shaking."""
+_WIDTH_PER_DISC_M = 0.131 / 2_500
+_FLOOR_PER_SPHERE = 0.069**3 / 8_000
 _REST_M_S = 1e-3
 
 
@@ -63,9 +62,10 @@ class Bed:
 
 
 def floor_m(dimension: int, grains: int) -> float:
-    """Width of the box: beds of discs are all equally high, of spheres half as high as wide."""
-    measure = grains * _GRAIN_MEASURE[dimension] / _SOLID_FRACTION[dimension]
-    return measure / _DEPTH_M if dimension == 2 else math.cbrt(2 * measure)
+    """Width of the box: beds of discs are all equally high, of spheres of one shape."""
+    if dimension == 2:
+        return _WIDTH_PER_DISC_M * grains
+    return math.cbrt(_FLOOR_PER_SPHERE * grains)
 
 
 def scene(
@@ -93,7 +93,7 @@ def scene(
             "layers": [{"count": grains}],
             "settling": {"rms_speed_m_s": _REST_M_S, "longest_s": 5.0},
         },
-        "vibration": [{"frequency_hz": 50.0, "acceleration_g": 1.5, "duration_s": 10.0}],
+        "vibration": [{"frequency_hz": 1 / PERIOD_S, "acceleration_g": 1.5, "duration_s": 10.0}],
         "engine": {"name": engine, "ranks": threads},
     }
     return Scenario.model_validate(merge(base, changes, Origin(), "benchmark"))
@@ -163,7 +163,9 @@ def settled(dimension: int, grains: int) -> Bed:
     print(f"settling {grains} grains in {dimension}D", flush=True)
     soft = SPRING_N_M / (4 if dimension == 2 else 100)
     falls = scene(dimension, grains, width_m, width_m, threads=2, **_softer(soft))
-    bed = _rested(scenario, _rested(falls, None))
+    often = {"fill": {"settling": {"shortest_s": 0.002}}, "record": {"series_every_s": 0.002}}
+    rests = scene(dimension, grains, width_m, width_m, threads=2, **often)
+    bed = _rested(rests, _rested(falls, None))
     KEPT.mkdir(parents=True, exist_ok=True)
     arrays = {k: v for k, v in vars(bed).items() if isinstance(v, np.ndarray)}
     np.savez(path, **arrays)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.engines_beds import Bed, opened, scene
+from benchmarks.engines_beds import PERIOD_S, Bed, opened, scene
 from benchmarks.engines_timing import Settings, interleaved, ratio, seconds, spread, steps_lasting
 from sandmould.engines.choosing import engine_problem
 from sandmould.engines.lammps.render import skin_m
@@ -38,6 +38,15 @@ def _per_grain(session: Session, gap_m: float) -> float:
     state = session.snapshot()
     found = touching_pairs(state.position_m, state.radius_m, gap_m)
     return sum(len(first) for first, _, _ in found) / session.grains
+
+
+def _steps(session: Session, block_s: float, shaken: bool) -> int:
+    """Steps of a block after a warm-up: one period of shaking, or a time."""
+    if not shaken:
+        return steps_lasting(lambda steps: session.advance(steps * session.step_s), block_s)
+    steps = round(PERIOD_S / session.step_s)
+    session.advance(steps * session.step_s)
+    return steps
 
 
 def _runner(session: Session, steps: int) -> Callable[[], float]:
@@ -78,8 +87,7 @@ def measure_bed(bed: Bed, settings: Settings, shaken: bool = False) -> dict[str,
             session = sessions[name] = stack.enter_context(opened(scenario))
             _begin(session, scenario, bed, shaken)
             skin = _skin_m(scenario)
-            advance = lambda n, s=session: s.advance(n * s.step_s)  # noqa: E731
-            blocks[name] = _runner(session, steps_lasting(advance, settings.block_s))
+            blocks[name] = _runner(session, _steps(session, settings.block_s, shaken))
             rows[name] = {"skin_m": skin, "listed_per_grain": _per_grain(session, skin)}
         rates = interleaved(blocks, settings.rounds)
         for name, session in sessions.items():

@@ -24,7 +24,7 @@ class Settings:
     tile: int = 10_000
     """Discs of the bed that larger ones are copied from."""
     scale_discs: tuple[int, ...] = (10_000, 30_000, 100_000, 300_000, 1_000_000)
-    scale_spheres: tuple[int, ...] = (10_000, 30_000, 100_000, 300_000)
+    scale_spheres: tuple[int, ...] = (8_000, 32_000, 96_000, 304_000)
     fractions: tuple[float, ...] = (0.05, 0.1, 0.2, 0.4, 0.8)
     """Time steps over the critical one."""
     far_bytes: int = 1_500_000_000
@@ -38,8 +38,8 @@ QUICK = Settings(
     spheres=300,
     thread_discs=10_000,
     tile=600,
-    scale_discs=(1_000, 10_000),
-    scale_spheres=(1_000, 5_000),
+    scale_discs=(600, 6_000),
+    scale_spheres=(300, 3_000),
     fractions=(0.1, 0.8),
     far_bytes=30_000_000,
 )

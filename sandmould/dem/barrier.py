@@ -34,7 +34,6 @@ def _place(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return cgutils.gep(builder, array.data, args[1])
 
 
-@intrinsic  # type: ignore[untyped-decorator]
 def _add(typing_context: Any, counters: Any, place: Any, more: Any) -> Any:
     """Add to a counter at once for all threads; gives its value before."""
 
@@ -45,7 +44,6 @@ def _add(typing_context: Any, counters: Any, place: Any, more: Any) -> Any:
     return types.int64(counters, types.int64, types.int64), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
 def _look(typing_context: Any, counters: Any, place: Any) -> Any:
     """Read a counter as the other threads left it."""
 
@@ -54,6 +52,10 @@ def _look(typing_context: Any, counters: Any, place: Any) -> Any:
         return builder.load_atomic(pointer, "seq_cst", 8, typ=ir.IntType(64))
 
     return types.int64(counters, types.int64), code
+
+
+_add_at_once: Any = intrinsic(_add)
+_look_now: Any = intrinsic(_look)
 
 
 @njit(**OPTIONS)
@@ -68,13 +70,13 @@ def wait_for_all(counters: NDArray[np.int64], threads: int) -> None:
     """
     if threads == 1:
         return
-    turn = _look(counters, _TURN)
-    if _add(counters, _ARRIVED, 1) == threads - 1:
-        _add(counters, _ARRIVED, -threads)
-        _add(counters, _TURN, 1)
+    turn = _look_now(counters, _TURN)
+    if _add_at_once(counters, _ARRIVED, 1) == threads - 1:
+        _add_at_once(counters, _ARRIVED, -threads)
+        _add_at_once(counters, _TURN, 1)
         return
     spins = 0
-    while _look(counters, _TURN) == turn:
+    while _look_now(counters, _TURN) == turn:
         spins += 1
         if spins > _SPINS:
             _sched_yield()

@@ -27,7 +27,7 @@ def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
     """
     if stage.vibration is None:
         return np.zeros(count)
-    times = (np.arange(first, first + count) - 1) * step_s
+    times: Array = (np.arange(first, first + count) - 1) * np.float64(step_s)
     return stage.vibration.displacements_at(times)
 
 

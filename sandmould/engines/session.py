@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -25,6 +26,21 @@ class EngineStop(Exception):  # noqa: N818 - it is an outcome, not always an err
         self.outcome = outcome
         self.detail = detail
         super().__init__(f"{outcome.label}: {detail}")
+
+
+_LOST = re.compile(r"Lost atoms|Did not assign all atoms|out of range atoms")
+_LACKS = re.compile(r"(Unrecognized|Invalid|Unknown) (\w+ ){0,2}style|not enabled in this LAMMPS")
+
+
+def engine_stop(engine: str, message: str) -> EngineStop:
+    """Outcome that fits an error message of LAMMPS or LIGGGHTS, which is quoted."""
+    text = " ".join(message.split())
+    if _LOST.search(text):
+        return EngineStop(Outcome.LOST_GRAINS, f"{engine} says: {text}")
+    if _LACKS.search(text):
+        lacks = f"this build of {engine} lacks a style that the deck needs; it says: {text}"
+        return EngineStop(Outcome.ENGINE_MISSING, lacks)
+    return EngineStop(Outcome.ENGINE_FAILED, f"{engine} says: {text}")
 
 
 class RefusedError(Exception):

@@ -45,8 +45,8 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "unknown key named like a type": (
         "based_on: tube\nstrength: 1",
-        "trial.yaml: strength = 1 cannot be used: valid is one of the keys based_on, kind, "
-        "material, objective, replicates, scenario, sweep, title.",
+        "trial.yaml: strength = 1 cannot be used: valid is one of the keys based_on, "
+        "cross_check, equivalence, kind, material, objective, replicates, scenario, sweep, title.",
     ),
     "negative size": (
         "based_on: tube\nscenario: {sand: {size_scale: -4}}",

@@ -11,8 +11,11 @@ import pytest
 
 from sandmould.engines.choosing import engine_problem
 from sandmould.engines.lammps import engine
+from sandmould.engines.lammps.engine import open_session
 from sandmould.engines.lammps.render import write_deck
+from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
+from sandmould.engines.session import EngineStop, engine_stop
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene
 
@@ -61,3 +64,29 @@ def test_deck_run_by_hand_on_an_old_lammps_says_so(tmp_path: Path) -> None:
     )
     assert ran.returncode == 1
     assert "This deck needs LAMMPS 20250722 or newer" in ran.stdout
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "ERROR: Unrecognized pair style 'granular' is part of the GRANULAR package which is not "
+        "enabled in this LAMMPS binary. (src/force.cpp:275)",
+        "ERROR: Invalid pair style (./src/force.cpp:247)",
+        "ERROR: Unrecognized fix style 'wall/gran/region' (src/modify.cpp:929)",
+    ],
+)
+def test_a_build_without_a_style_is_an_engine_missing(message: str) -> None:
+    stop = engine_stop("LAMMPS", message)
+    assert stop.outcome is Outcome.ENGINE_MISSING
+    assert stop.detail.startswith("this build of LAMMPS lacks a style that the deck needs")
+    assert engine_stop("LAMMPS", "ERROR: Illegal fix command").outcome is Outcome.ENGINE_FAILED
+
+
+def test_a_deck_with_a_style_that_the_build_lacks_ends_with_that_sentence(tmp_path: Path) -> None:
+    program = build_program(tube_scene())
+    write_deck(program, {}, tmp_path, "test", "test")
+    deck = tmp_path / "deck.in"
+    deck.write_text(deck.read_text().replace("pair_style granular", "pair_style gritty"))
+    with pytest.raises(EngineStop, match="lacks a style") as stop:
+        open_session(program, tmp_path, tmp_path / "log")
+    assert stop.value.outcome is Outcome.ENGINE_MISSING

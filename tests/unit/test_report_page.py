@@ -13,7 +13,14 @@ import pytest
 
 from sandmould.study.report import figures
 from sandmould.study.report.page import LIMIT_BYTES, write_report
-from tests.unit.report_study import FAILED, PLANTED, write_study
+from tests.unit.report_study import (
+    ENGINES,
+    FAILED,
+    PLANTED,
+    write_cross_check,
+    write_study,
+    write_twins,
+)
 
 _VOID = {"meta", "link", "img", "input", "line", "circle", "path", "br"}
 
@@ -242,3 +249,54 @@ def test_many_drawn_settings(tmp_path: Path) -> None:
     text = report(study)
     assert "against friction" in text
     assert first_sentence(text).startswith("Not resolved:")
+
+
+def test_study_of_twins_begins_with_whether_they_agree(tmp_path: Path) -> None:
+    fill = {**dict.fromkeys(ENGINES, 0.5), "reference": 0.6}
+    text = report(write_twins(tmp_path / "twins", fill, dict.fromkeys(ENGINES, 0.78)))
+    assert first_sentence(text).startswith("They differ by more than the margin in fill")
+    page = Page(text)
+    for said in (
+        "Do the settings agree?",
+        "liggghts − reference",
+        "±0.005",
+        "6 pairs",
+        "Speed of the engines in these runs",
+        "21 M",
+        "4 of 6 comparisons agree",
+    ):
+        assert said in page.text, said
+    # no setting is to be recommended, nor is an optimum under suspicion
+    for absent in ("compared with the best", "Recommended", "optimum belongs", "is best"):
+        assert absent not in page.text, absent
+    bands = [attrs for tag, attrs in page.tags if tag == "rect"]
+    assert len(bands) == 2 * 2
+    assert all(float(band["width"]) > 10 for band in bands)
+
+
+def test_twins_that_agree_say_so(tmp_path: Path) -> None:
+    same = dict.fromkeys(ENGINES, 0.5)
+    text = report(write_twins(tmp_path / "twins", same, dict.fromkeys(ENGINES, 0.78)))
+    assert first_sentence(text).startswith("All 6 comparisons agree within the margins")
+    assert '<div class="verdict resolved">' in text
+
+
+def test_cross_check_stands_beside_a_verdict_that_it_does_not_touch(tmp_path: Path) -> None:
+    folder = write_cross_check(tmp_path / "demo")
+    text = report(folder)
+    # the other engine's runs at 50 Hz are 0.3 higher
+    assert first_sentence(text).startswith(
+        "50 Hz is best: it gives the highest fill of the tube, 0.5"
+    )
+    page = Page(text)
+    assert "The verdict above uses the sweep's own engine alone" in page.text
+    assert "reference − lammps, 50 Hz" in page.text
+    assert text.count("engine_lammps_f50_r1") >= 1
+    assert "Recommended among the settings swept: 50 Hz" in page.text
+    checked = next(s for s in page.of("svg") if "fill of the tube by setting" in s["aria-label"])
+    assert "50 Hz: 0.550, 3 runs" in checked["aria-label"]
+
+
+def test_study_that_compares_nothing_has_no_such_section(text: str) -> None:
+    assert "Do the settings agree?" not in text
+    assert 'href="#agreement"' not in text

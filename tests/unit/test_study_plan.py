@@ -23,7 +23,6 @@ from sandmould.study.plan import (
     write_plan,
 )
 
-
 LAMMPS = ("lammps", 2)
 THREE = """\
 based_on: tube

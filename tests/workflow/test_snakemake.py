@@ -17,14 +17,16 @@ from sandmould import ROOT
 from sandmould.engines.outcome import Outcome
 from sandmould.study.expand import expand
 from sandmould.study.opening import open_study
+from sandmould.study.plan import kind_of
 from sandmould.study.planning import calibrated_rate
 
 SNAKEMAKE = Path(sys.executable).parent / "snakemake"
 STUDIES = sorted((ROOT / "config" / "studies").glob("*.yaml"))
 TINY = """\
-based_on: tube_demo
+based_on: tube
 scenario:
   sand: {size_scale: 12, size_classes: 3}
+  time_step: {fraction: 0.8}
   vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 0.06}]
   record: {snapshot_every_s: 0.02}
 """
@@ -38,11 +40,11 @@ def snakemake(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]
 
 @pytest.fixture(scope="session")
 def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Measure the engine's speed once for all tests."""
+    """Measure the engines' speeds once for all tests."""
     results = tmp_path_factory.mktemp("results")
-    for name in ("tube_demo", "tube_3d_small"):
-        study = open_study(ROOT / "config" / "studies" / f"{name}.yaml")
-        calibrated_rate(expand(study)[0].scenario, results)
+    runs = [run for path in STUDIES for run in expand(open_study(path))]
+    for scenario in {kind_of(run.scenario): run.scenario for run in runs}.values():
+        calibrated_rate(scenario, results)
     return results / "calibration.json"
 
 
@@ -114,6 +116,31 @@ def test_tiny_study_end_to_end(checkout: Path) -> None:
     assert (checkout / "report.zip").stat().st_size > 1e5
 
 
+def test_point_of_a_sweep_on_two_engines(checkout: Path) -> None:
+    study = checkout / "checked.yaml"
+    study.write_text(
+        TINY.replace("scenario:", "scenario:\n  engine: {name: reference, ranks: 2}")
+        + "sweep: {keys: {sand.disc_inertia: [sphere, disc]}}\nreplicates: 2\n"
+        "cross_check: {engine: liggghts, at: {sand.disc_inertia: sphere}, replicates: 2}\n"
+        "equivalence: {margins: {solid_fraction: 0.05}}\n"
+    )
+    refused = snakemake("--configfile", str(study), folder=checkout)
+    assert refused.returncode != 0
+    assert "on engine liggghts" in refused.stderr
+    study.write_text(study.read_text().replace("engine: liggghts", "engine: lammps"))
+    # Two ranks of LAMMPS are two processes, two of the reference engine two threads of one.
+    ran = snakemake("--configfile", str(study), folder=checkout)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    results = checkout / "results" / "checked"
+    summary = pd.read_csv(results / "summary.tsv", sep="\t")
+    assert sorted(summary.engine) == ["lammps"] * 2 + ["reference"] * 4
+    assert set(summary.ranks) == {2}
+    assert list(summary[summary.engine == "lammps"].part) == ["cross_check"] * 2
+    (pair,) = pd.read_csv(results / "agreement.tsv", sep="\t").to_dict("records")
+    assert (pair["first"], pair["second"], pair["n"]) == ("reference", "lammps", 2)
+    assert "Do the settings agree?" in (results / "report.html").read_text()
+
+
 def test_killed_snakemake_is_taken_up_by_the_next(checkout: Path) -> None:
     study = checkout / "killed.yaml"
     study.write_text(TINY + "replicates: 2\nsweep: {}\n")
@@ -174,10 +201,14 @@ def test_one_failing_run_leaves_the_others_alone_and_fails_the_study(checkout: P
     ("text", "sentence"),
     [
         ("scenario: {sand: {density_kg_m3: -5}}\n", "scenario.sand.density_kg_m3 = -5"),
-        ("scenario: {engine: {name: liggghts}}\n", "scenario.engine.name = 'liggghts'"),
         (
-            "scenario: {background_damping: {form: nonviscous_isotropic}}\n",
-            "scenario.background_damping.form = 'nonviscous_isotropic'",
+            "scenario: {time_step: {rotational_inertia: scaled}}\n",
+            "scenario.time_step.rotational_inertia = 'scaled'",
+        ),
+        (
+            "cross_check: {engine: reference, at: {sand.size_scale: 3}}\n"
+            "equivalence: {margins: {solid_fraction: 0.005}}\n",
+            "cross_check.at = {'sand.size_scale': 3}",
         ),
     ],
 )
@@ -185,7 +216,7 @@ def test_bad_input_is_one_sentence_and_starts_nothing(
     text: str, sentence: str, checkout: Path
 ) -> None:
     study = checkout / "bad.yaml"
-    study.write_text("based_on: tube_demo\n" + text)
+    study.write_text("based_on: tube\n" + text)
     ran = snakemake("--configfile", str(study), folder=checkout)
     assert ran.returncode != 0
     said = [line for line in ran.stderr.splitlines() if line and "profile" not in line]

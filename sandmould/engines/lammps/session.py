@@ -16,7 +16,7 @@ from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.render import needs_callback, skin_m, surfaces
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program, Stage
-from sandmould.engines.session import Array, EngineStop, RefusedError, Shared
+from sandmould.engines.session import Array, EngineStop, RefusedError, Shared, engine_stop
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.scenario import Scenario
@@ -140,14 +140,7 @@ class LammpsSession:
         try:
             self._lmp.commands_string(commands)
         except Exception as error:
-            raise self._stop(str(error)) from error
-
-    @staticmethod
-    def _stop(message: str) -> EngineStop:
-        text = " ".join(message.split())
-        lost = ("Lost atoms", "Did not assign all atoms", "out of range atoms")
-        outcome = Outcome.LOST_GRAINS if any(m in text for m in lost) else Outcome.ENGINE_FAILED
-        return EngineStop(outcome, f"LAMMPS says: {text}")
+            raise engine_stop("LAMMPS", str(error)) from error
 
     def _take_up(self, state: dict[str, Any]) -> None:
         """Go on inside the stage of a checkpoint: its commands again, its own start step."""

@@ -25,7 +25,7 @@ from sandmould.engines.liggghts.render import atoms_data, surface_meshes
 from sandmould.engines.liggghts.vtk_stress import TriangleLoads, read_triangle_loads
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program, Stage
-from sandmould.engines.session import Array, EngineStop, RefusedError, Shared
+from sandmould.engines.session import Array, EngineStop, RefusedError, Shared, engine_stop
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 
@@ -33,7 +33,6 @@ _SETUP = ("header", "box", "create", "contacts", "motion", "walls", "background"
           "measures")  # fmt: skip
 _LOOP = re.compile(r"^label settling_\d+$.*^label settled_\d+$\n", re.M | re.S)
 _VALUE = re.compile(r"^value (\S+)$", re.M)
-_LOST = ("Lost atoms", "Did not assign all atoms", "out of range atoms")
 
 
 def around_run(block: Block) -> tuple[str, str]:
@@ -111,10 +110,7 @@ class LiggghtsSession:
         try:
             return self._liggghts.say(commands)
         except LiggghtsDied as death:
-            text = " ".join(str(death).split())
-            lost = any(m in text for m in _LOST)
-            outcome = Outcome.LOST_GRAINS if lost else Outcome.ENGINE_FAILED
-            raise EngineStop(outcome, f"LIGGGHTS says: {text}") from death
+            raise engine_stop("LIGGGHTS", str(death)) from death
 
     def values(self, formulas: list[str]) -> list[float]:
         """Numbers that LIGGGHTS's formulas give now, such as ``c_top``."""
