@@ -48,14 +48,14 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: Scene, moving: Movin
 
 
 def _some_pairs(pairs: Pairs, keep: np.ndarray) -> Pairs:
-    """A part of the pairs, as a list of their own."""
+    """Some of the pairs, as a list of their own."""
     kept = np.concatenate([[0], np.cumsum(keep)])
     fields = (pairs.other, pairs.touching, pairs.friction, pairs.rolling)
     return Pairs(kept[pairs.start], *(array[keep] for array in fields))
 
 
-def _same_slots(moving: Moving, keep: np.ndarray) -> Moving:
-    """The scene with some of its pairs; slots between chunks are enough for all of them."""
+def _with_pairs(moving: Moving, keep: np.ndarray) -> Moving:
+    """Keep some of the pairs; there are slots enough between chunks for all of them."""
     return moving._replace(pairs=_some_pairs(moving.pairs, keep))
 
 
@@ -72,7 +72,7 @@ def _block(solver: Solver, moving: Moving, parts: int, block_s: float) -> Callab
 
 
 def measure_phases(solver: Solver, rounds: int, block_s: float) -> dict[str, Any]:
-    """Time of each part of a step, and what makes up the one of the pairs.
+    """Time of each part of a step, and what makes up the one of the pairs; spoils the state.
 
     Each part is the difference of a step with it and a step without it, so that it finds the
     cache as it does in the step loop. Lists of the touching pairs alone and of the others alone
@@ -88,9 +88,9 @@ def measure_phases(solver: Solver, rounds: int, block_s: float) -> dict[str, Any
     blocks = {
         name: _block(solver, moving, i + 1, block_s) for i, name in enumerate(PARTS)
     } | {
-        "touching": _block(solver, _same_slots(moving, touching), 1, block_s),
-        "apart": _block(solver, _same_slots(moving, ~touching), 1, block_s),
-        "no pairs": _block(solver, _same_slots(moving, touching & False), 1, block_s),
+        "touching": _block(solver, _with_pairs(moving, touching), 1, block_s),
+        "apart": _block(solver, _with_pairs(moving, ~touching), 1, block_s),
+        "no pairs": _block(solver, _with_pairs(moving, np.zeros_like(touching)), 1, block_s),
     }  # fmt: skip
     times = interleaved(blocks, rounds)
     steps = np.array([times[name] for name in PARTS])

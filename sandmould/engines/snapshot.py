@@ -31,12 +31,16 @@ class Snapshot:
     """(n, 3) float64, rad/s; in 2D only the last component differs from zero."""
     radius_m: NDArray[np.float64]
     """(n,) float64, m."""
+    orientation: NDArray[np.float64] | None = None
+    """(n, 1) float64, rad, in 2D or (n, 9) float64, rotation matrices row by row, in 3D; None where
+    ``record.orientation`` does not ask for it."""
 
     def save(self, path: Path) -> None:
         """Write to an ``.npz`` file, first under a temporary name."""
         partial = path.with_name(path.name + ".partial")
         with partial.open("wb") as file:
-            np.savez(file, **{f.name: getattr(self, f.name) for f in fields(self)})
+            values = {f.name: getattr(self, f.name) for f in fields(self)}
+            np.savez(file, **{name: v for name, v in values.items() if v is not None})
         os.replace(partial, path)
 
     @classmethod
@@ -50,7 +54,7 @@ class Snapshot:
         """
         try:
             with np.load(path, allow_pickle=False) as data:
-                values = {f.name: data[f.name] for f in fields(cls)}
+                values = {f.name: data[f.name] for f in fields(cls) if f.name in data}
         except Exception as error:
             raise ValueError(f"{path}: not a readable snapshot ({error})") from error
         for scalar, kind in (("time_s", float), ("vibration_time_s", float), ("stage", str)):

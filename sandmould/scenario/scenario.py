@@ -49,6 +49,11 @@ class Record(Section):
         "the vibration, or all.",
         source=ARGUED,
     )
+    orientation: bool = quantity(
+        False,
+        "Whether snapshots hold the orientation of every grain, eqs. (8)-(13).",
+        source=ARGUED,
+    )
     load_every_steps: int = quantity(
         20, "Steps between samples of the wall loads.", source=ARGUED, ge=1, le=100000
     )

@@ -18,6 +18,7 @@ from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import RefusedError
+from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene
 from tests.workflow.test_one_run import drive, last_snapshot, run_folder, simulate
@@ -147,3 +148,26 @@ def test_a_block_pushed_into_the_bed_carries_a_load(tmp_path: Path) -> None:
         session.move_surface("nothing", vertices, 0.02)
     with pytest.raises(RefusedError):
         session.attach_elastic_surface("tube_lower", np.eye(2), np.ones(2), np.ones(2))
+
+
+@pytest.mark.parametrize("changes", [{}, SPHERES], ids=["2D", "3D"])
+def test_orientations_are_recorded_where_asked(changes: dict[str, Any], tmp_path: Path) -> None:
+    short = {"record": {"orientation": True, "series_every_s": 0.005}, "vibration": []}
+    program = build_program(scene(**(changes | short)))
+    session = ReferenceSession(program)
+    session.insert_layer(1)
+    session.start_stage(program.stages[0])
+    for _ in range(20):
+        session.advance()
+    session.snapshot().save(tmp_path / "one.npz")
+    kept = Snapshot.load(tmp_path / "one.npz")
+    assert kept.orientation is not None
+    d = program.scenario.dimension
+    assert kept.orientation.shape == (len(kept.id), 1 if d == 2 else 9)
+    if d == 2:
+        assert np.ptp(kept.orientation) > 0.01
+    else:
+        turned = kept.orientation.reshape(-1, 3, 3)
+        unit = np.broadcast_to(np.eye(3), turned.shape)
+        np.testing.assert_allclose(turned @ turned.transpose(0, 2, 1), unit, atol=1e-9)
+        assert np.abs(turned - unit).max() > 0.01

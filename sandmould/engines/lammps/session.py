@@ -40,6 +40,8 @@ def refuse(scenario: Scenario) -> None:
         raise RefusedError("contact.rolling_axes", "all", "tangent on engine lammps in 3D")
     if scenario.time_step.rotational_inertia == "scaled":
         raise RefusedError("time_step.rotational_inertia", "scaled", "physical on engine lammps")
+    if scenario.record.orientation:
+        raise RefusedError("record.orientation", True, "false on engine lammps")
     if scenario.engine.ranks > 1 and needs_callback(scenario):
         # The force callback lives in one process.
         valid = "1 on engine lammps with polygons, round solids, meshes or isotropic damping"

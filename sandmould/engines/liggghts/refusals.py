@@ -23,6 +23,8 @@ def refuse(scenario: Scenario) -> None:
         raise RefusedError("sand.disc_inertia", "disc", f"sphere {_HERE}")
     if scenario.time_step.rotational_inertia == "scaled":
         raise RefusedError("time_step.rotational_inertia", "scaled", f"physical {_HERE}")
+    if scenario.record.orientation:
+        raise RefusedError("record.orientation", True, f"false {_HERE}")
     _refuse_round_solids(scenario)
     _refuse_damping(scenario)
     _refuse_rolling(scenario)

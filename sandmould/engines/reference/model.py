@@ -95,6 +95,7 @@ def solver_of(scenario: Scenario, stage: Stage, step_s: float) -> Solver:
         surfaces_of(scenario),
         SKIN_OVER_DIAMETER * mean_m,
         scenario.engine.ranks,
+        scenario.record.orientation,
     )
 
 

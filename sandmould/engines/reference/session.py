@@ -149,6 +149,7 @@ class ReferenceSession:
         grains, start = self.solver.grains, self._vibration_start
         velocity, spin = self.solver.whole_step_velocities(self._body())
         order = np.argsort(grains.id)
+        turned = self.solver.orientation[order] if self._scenario.record.orientation else None
         spins = np.zeros((self.grains, 3))
         spins[:, 3 - spin.shape[1] :] = spin[order]
         return Snapshot(
@@ -161,6 +162,7 @@ class ReferenceSession:
             velocity_m_s=velocity[order] - speed,
             spin_rad_s=spins,
             radius_m=grains.radius[order],
+            orientation=turned,
         )
 
     def surface_loads(self) -> Mapping[str, Array] | None:

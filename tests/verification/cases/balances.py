@@ -18,7 +18,10 @@ from tests.verification.cases.bench import (
     case,
     inertia_factor,
     law,
+    mass_kg,
     scene,
+    stiffness,
+    vector,
 )
 
 SPEED_M_S = 0.08
@@ -69,8 +72,8 @@ def _collision(
             return {
                 "momentum": press.sum(axis=0),
                 "angular": np.cross(x, press).sum(axis=0) + inertia @ now.spin_rad_s,
-                "energy": np.array(
-                    0.5 * mass @ (v**2).sum(axis=1) + 0.5 * inertia @ (now.spin_rad_s**2).sum(axis=1)
+                "energy": 0.5 * (
+                    mass @ (v**2).sum(axis=1) + inertia @ (now.spin_rad_s**2).sum(axis=1)
                 ),
                 "touching": np.array((apart < 0).sum() // 2),
                 "sizes": np.array([
@@ -89,7 +92,9 @@ def _collision(
     return found, found[0]["sizes"]
 
 
-@case("(14)-(17)", "1e-5: contacts begin and end between steps, (omega dt)^2 = 4e-5 of what they store")
+@case(
+    "(14)-(17)", "1e-5: contacts begin and end between steps, (omega dt)^2 = 4e-5 of their energy"
+)
 def energy_of_smooth_collisions(engine: str, dimension: int) -> Iterator[Measured]:
     """Undamped smooth grains keep their kinetic energy once they have parted."""
     found, _ = _collision(engine, dimension, law(dimension))
@@ -98,7 +103,9 @@ def energy_of_smooth_collisions(engine: str, dimension: int) -> Iterator[Measure
     yield Measured("energy after over before", float(after / before), 1.0, 1e-5)
 
 
-@case("(14), (22)-(33)", "1e-12: round-off; 2e-10 for angular momentum, normals from small overlaps")
+@case(
+    "(14), (22)-(33)", "1e-12: round-off; 2e-10 for angular momentum, from the normals' last digits"
+)
 def momenta_of_rough_collisions(engine: str, dimension: int) -> Iterator[Measured]:
     """Damped rough grains with rolling resistance keep momentum, and angular momentum with spin.
 
@@ -114,7 +121,10 @@ def momenta_of_rough_collisions(engine: str, dimension: int) -> Iterator[Measure
     yield Measured("change of angular momentum", float(turned), 0.0, 2e-10)
 
 
-@case("(3)-(5), (16)", "1e-6 of the drop: the energy kept is a shadow, (omega dt)^2/8 off; depth 1e-5")
+@case(
+    "(3)-(5), (16)",
+    "5e-5: the energy kept is a shadow, (omega dt)^2/8 of the spring's off; depth 1e-4",
+)
 def bounces_of_a_grain(engine: str, dimension: int) -> Iterator[Measured]:
     """An undamped grain bounces under gravity: m v^2/2 + m g z + k u^2/2 stays.
 

@@ -198,6 +198,7 @@ def law(
 def scene(
     engine: str,
     dimension: int,
+    /,
     grains: int = 1,
     radii_m: tuple[float, ...] = (RADIUS_M,),
     pair: dict[str, float] | None = None,
@@ -205,7 +206,7 @@ def scene(
     step_s: float = 1e-6,
     **changes: Any,
 ) -> Scenario:
-    """Scenario of some grains in a wide empty box: no gravity, no damping, smooth undamped contacts.
+    """Some grains in a wide empty box: no gravity, no damping, smooth undamped contacts.
 
     LIGGGHTS has spheres alone, so its discs have their moment of inertia.
     """
@@ -268,13 +269,14 @@ class Bench:
             raise RefusedCase(problem.key, problem.valid)
         self.scenario = scenario
         self._folder = tempfile.TemporaryDirectory(prefix="bench_")
-        folder = Path(self._folder.name)
-        program = build_program(scenario)
+        self.folder = Path(self._folder.name)
+        self.program = build_program(scenario)
         engine = engine_of(scenario)
-        engine.write_deck(program, {}, folder, "bench", "verification")
-        self.session: Session = engine.open_session(program, folder, folder / "engine.log")
+        engine.write_deck(self.program, {}, self.folder, "bench", "verification")
+        self.session: Session = engine.open_session(
+            self.program, self.folder, self.folder / "engine.log"
+        )
         self.session.insert_layer(1)
-        self.stages = program.stages
 
     def __enter__(self) -> Bench:
         return self
@@ -307,7 +309,7 @@ class Bench:
         velocity = np.zeros_like(position) if velocity_m_s is None else np.array(velocity_m_s)
         spins = np.zeros((len(position), 3)) if spin_rad_s is None else np.array(spin_rad_s)
         self.session.set_state(position, velocity.astype(float), spins.astype(float))
-        self.session.start_stage(self.stages[stage])
+        self.session.start_stage(self.program.stages[stage])
 
     def advance(self, duration_s: float) -> Snapshot:
         """Compute for a while, and give the state then."""

@@ -72,6 +72,7 @@ class Oblique:
         options = {"rtol": 1e-11, "atol": 1e-13 * abs(v_s) / w, "max_step": end / 200}
         while t < end * (1 - 1e-9):
             if sticks:
+
                 def rates(_: float, y: list[float]) -> list[float]:
                     return [y[1], -compliance * y[0], compliance / (1 + 1 / self.kappa) * y[0]]
 
@@ -83,6 +84,7 @@ class Oblique:
                 t, (x, v, impulse) = found.t[-1], found.y[:, -1]
                 sticks, sign = False, math.copysign(1.0, x)
             else:
+
                 def slides(time: float, y: list[float], sign: float = sign) -> list[float]:
                     pull = sign * compliance * limit(time)
                     return [-pull, pull / (1 + 1 / self.kappa)]

@@ -80,9 +80,7 @@ def nonviscous_damping_of_a_jump(engine: str, dimension: int, form: str) -> Iter
     """Thrown straight up, a grain is slowed by g (1 + alpha) and then falls with g (1 - alpha)."""
     share, climb, start = 0.1, 0.5, 0.02
     damping = {"form": form, "nonviscous_translation": share, "nonviscous_rotation": 0.0}
-    given = scene(
-        engine, dimension, step_s=2e-6, background_damping=damping, gravity_m_s2=GRAVITY
-    )
+    given = scene(engine, dimension, step_s=2e-6, background_damping=damping, gravity_m_s2=GRAVITY)
     turns = climb / (GRAVITY * (1 + share))
     with Bench(given) as bench:
         bench.place([vector(dimension, 0.05, start)], [vector(dimension, 0.0, climb)])
@@ -112,9 +110,7 @@ def nonviscous_damping_of_a_throw(engine: str, dimension: int, form: str) -> Ite
     """
     share, speed, climb = 0.2, 0.4, 0.4
     damping = {"form": form, "nonviscous_translation": share, "nonviscous_rotation": 0.0}
-    given = scene(
-        engine, dimension, step_s=2e-6, background_damping=damping, gravity_m_s2=GRAVITY
-    )
+    given = scene(engine, dimension, step_s=2e-6, background_damping=damping, gravity_m_s2=GRAVITY)
     with Bench(given) as bench:
         bench.place([vector(dimension, 0.02, 0.05)], [vector(dimension, speed, climb)])
         found = bench.advance(0.07)
@@ -129,7 +125,7 @@ def nonviscous_damping_of_a_throw(engine: str, dimension: int, form: str) -> Ite
     yield Measured(f"v_x, {form.removeprefix('nonviscous_')}", along, exact, 1e-5 * speed, "m/s")
 
 
-@case("(34), (35)", "0: nothing acts, so nothing is damped", dimensions=(2, 3), engines=("reference", "lammps"))
+@case("(34), (35)", "0: nothing acts, so nothing is damped", engines=("lammps", "reference"))
 def nonviscous_damping_of_a_free_grain(engine: str, dimension: int) -> Iterator[Measured]:
     """Without force and moment the damping (38), (39) is none: speed and spin stay."""
     damping = {

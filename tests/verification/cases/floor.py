@@ -60,9 +60,7 @@ class Track:
 def follow(bench: Bench, until_s: float, samples: int) -> list[Track]:
     """Compute up to a time in equal parts; the motion of each grain."""
     start = bench.session.time_s
-    states: list[Snapshot] = [
-        bench.advance((until_s - start) / samples) for _ in range(samples)
-    ]
+    states: list[Snapshot] = [bench.advance((until_s - start) / samples) for _ in range(samples)]
     d = bench.scenario.dimension
     return [
         Track(
@@ -138,9 +136,7 @@ def rolling_to_a_stop(engine: str, dimension: int) -> Iterator[Measured]:
         kappa = inertia_factor(engine, dimension)
         slowing = arm * LIGHT_M_S2 / (1 + kappa)
         start = on_floor(dimension, 1)
-        bench.place(
-            start, [vector(dimension, speed, 0.0)], [spin(dimension, -speed / RADIUS_M)]
-        )
+        bench.place(start, [vector(dimension, speed, 0.0)], [spin(dimension, -speed / RADIUS_M)])
         stops = speed / slowing
         bench.advance(0.98 * stops)
         (track,) = follow(bench, 1.01 * stops, 60)

@@ -99,8 +99,8 @@ def sliding_impact(engine: str, dimension: int, damping_ratio: float) -> Iterato
     """A fast oblique impact slides throughout: the tangential impulse is mu times the normal one.
 
     It holds whatever the normal law is, for the total normal force caps the friction. The moment
-    r J_t turns the grain: r dw kappa = J_t/m. Undamped, the normal speed is reversed, J_n = 2 m v_n,
-    so the speed along the floor falls by 2 mu v_n and the grain leaves at that angle.
+    r J_t turns the grain: r dw kappa = J_t/m. Undamped, the normal speed is reversed,
+    J_n = 2 m v_n, so the speed along the floor falls by 2 mu v_n and the grain leaves at that angle.
     """
     mu, slip = 0.1, 20 * SPEED_M_S
     contact_law = law(dimension, damping_ratio, mu)
@@ -160,4 +160,6 @@ def contact_point(engine: str, dimension: int) -> Iterator[Measured]:
     contact_law = law(dimension, 0.0, mu)
     found = next(impacts(engine, dimension, contact_law, speed, 10 * speed))
     share = {"reference": math.pi / 4, "liggghts": math.pi / 8, "lammps": 0.0}[engine]
-    yield Measured("moment over r times impulse, u_m = 0.02 r", found.turn, 1 - share * depth / LARGE_M, 1e-6)
+    yield Measured(
+        "moment over r times impulse, u_m = 0.02 r", found.turn, 1 - share * depth / LARGE_M, 1e-6
+    )

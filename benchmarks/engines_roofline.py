@@ -1,0 +1,136 @@
+"""How near the reference solver's step comes to what the core can do, and where the rest goes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.engines_beds import Bed, settled, solver_on, tiled
+from benchmarks.engines_peaks import bandwidth, measure_peaks
+from benchmarks.engines_phases import measure_listing, measure_phases
+from benchmarks.engines_scale import advance, bytes_of
+from benchmarks.engines_timing import Settings, one_core, seconds, spread, steps_lasting
+from sandmould.dem.solver import Solver
+
+# Operations counted by hand in pairs.py, contact_law.py and motion.py; a multiply-add is two,
+# comparisons, signs and what leaves the loop are none. First discs, then spheres.
+FLOPS_PER_LISTED = (
+    ("vector between the centres", 2, 3),
+    ("its square", 3, 5),
+    ("sum of the radii and its square", 2, 2),
+)
+FLOPS_PER_CONTACT = (
+    ("overlap, unit normal, both arms", 6, 7),
+    ("relative velocity", 2, 3),
+    ("reduced mass and radius, but their quotients", 3, 3),
+    ("normal force, (16)-(21)", 8, 10),
+    ("slip at the contact point", 7, 32),
+    ("friction: turned, advanced, limited, (24)-(28)", 7, 28),
+    ("force and moments on both grains", 8, 21),
+    ("rolling moment: turned, advanced, limited, (29)-(33)", 14, 49),
+    ("sums over the contacts of both grains", 6, 12),
+)
+FLOPS_PER_GRAIN = (
+    ("sums stored", 3, 6),
+    ("velocity and spin, (3)-(7)", 10, 18),
+    ("position and largest speed", 8, 12),
+)
+QUOTIENTS_PER_CONTACT, ROOTS_PER_CONTACT = 5, 4
+"""1/distance, reduced mass and radius, two limits; distance, damping, two limits."""
+QUOTIENTS_PER_GRAIN = 2
+"""dt/m and dt/I."""
+CHAINED_PER_CONTACT = 2
+"""Square roots each followed by a quotient, one pair after the other: distance and 1/distance,
+then the limit of friction."""
+TRAFFIC = {
+    "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains radius": 1,
+    "grains mass": 1, "grains inertia": 1, "grains force": 2, "grains moment": 2,
+    "pairs start": 1, "pairs other": 1, "pairs touching": 2, "pairs friction": 2,
+    "pairs rolling": 2, "chunks grain": 1, "chunks incoming": 1, "chunks force": 2,
+    "chunks moment": 2, "walls candidates rows": 1, "walls candidates start": 1,
+    "walls candidates part": 1, "walls history used": 2, "walls history normal": 2,
+    "walls history friction": 2, "walls history rolling": 2,
+}  # fmt: skip
+"""How often a step takes an array from memory or gives it back: once read, once written. A chunk
+stays in the core's cache from its first contact to its drift."""
+
+
+def flops(dimension: int, listed: float, contacts: float) -> float:
+    """Operations of a grain-step, square roots and quotients apart."""
+    column = dimension - 1
+    per_listed = sum(row[column] for row in FLOPS_PER_LISTED)
+    per_contact = sum(row[column] for row in FLOPS_PER_CONTACT)
+    return listed * per_listed + contacts * per_contact + sum(r[column] for r in FLOPS_PER_GRAIN)
+
+
+def traffic_bytes(solver: Solver) -> float:
+    """Bytes of a grain-step that cross into or out of the core's own cache, at most."""
+    sizes = bytes_of(solver)
+    return sum(times * sizes[name] for name, times in TRAFFIC.items()) / len(solver.grains.id)
+
+
+def _bounds(
+    solver: Solver, contacts: float, listed: float, peaks: dict[str, Any], gb_s: float
+) -> dict[str, float]:
+    """Least time of a grain-step by each limit, ns."""
+    operations = flops(solver.dimension, listed, contacts)
+    quotients = contacts * QUOTIENTS_PER_CONTACT + QUOTIENTS_PER_GRAIN
+    return {
+        "bandwidth": traffic_bytes(solver) / gb_s,
+        "vector arithmetic": operations * peaks["vector_ns_per_flop"]["median"],
+        "scalar arithmetic": operations * peaks["scalar_ns_per_flop"]["median"],
+        "quotients and roots": quotients * peaks["ns_per_quotient"]["median"]
+        + contacts * ROOTS_PER_CONTACT * peaks["ns_per_root"]["median"],
+    }
+
+
+def _measure_bed(
+    bed: Bed, peaks: dict[str, Any], settings: Settings, phases: bool
+) -> dict[str, Any]:
+    """Limits, time of a step, and its parts where asked."""
+    solver = solver_on(bed)
+    steps = steps_lasting(lambda n: advance(solver, n), settings.block_s)
+    found = []
+    for _ in range(settings.rounds):
+        found.append(1e9 * seconds(lambda: advance(solver, steps)) / (bed.grains * steps))
+    measured, pairs = spread(found), solver.pairs
+    listed, contacts = len(pairs.other) / bed.grains, float(pairs.touching.sum()) / bed.grains
+    held = sum(size for name, size in bytes_of(solver).items() if name in TRAFFIC)
+    gb_s = bandwidth(held, settings.rounds)
+    bounds = _bounds(solver, contacts, listed, peaks, gb_s["median"])
+    row = {
+        "bed": bed.name,
+        "dimension": bed.dimension,
+        "held_bytes": held,
+        "gb_s": gb_s,
+        "bytes_per_grain_step": traffic_bytes(solver),
+        "flops_per_grain_step": flops(bed.dimension, listed, contacts),
+        "listed_per_grain": listed,
+        "contacts_per_grain": contacts,
+        "ns_per_grain_step": measured,
+        "bounds_ns": bounds,
+        "fractions": {name: ns / measured["median"] for name, ns in bounds.items()},
+        "waiting_ns": contacts
+        * CHAINED_PER_CONTACT
+        * peaks["ns_per_chained_root_and_quotient"]["median"],
+    }
+    if phases:
+        row["listing_ns_per_grain"] = measure_listing(solver, settings.rounds)
+        row |= measure_phases(solver, 3 * settings.rounds, settings.block_s / 10)
+    return row
+
+
+def measure_roofline(settings: Settings) -> dict[str, Any]:
+    """Peaks of one core, and beds of several sizes against them."""
+    beds = [settled(2, n) for n in settings.discs] + [settled(3, settings.spheres)]
+    largest = tiled(settled(2, settings.tile), settings.scale_discs[-1])
+    with one_core():
+        peaks = measure_peaks(settings.rounds, max(1, round(2_000 * settings.block_s)))
+        sizes = (500_000, 30_000_000, settings.far_bytes)
+        peaks["gb_s"] = [
+            {"bytes": size, **bandwidth(size, settings.rounds)} for size in sizes
+        ]
+        rows = [_measure_bed(bed, peaks, settings, phases=True) for bed in beds]
+        rows.append(_measure_bed(largest, peaks, settings, phases=False))
+    return {"peaks": peaks, "beds": rows}

@@ -1,0 +1,267 @@
+"""Three scenes at rest, disturbed a little, and what becomes of them with a given time step.
+
+One grain on the floor, a column of eight, and a settled bed. The disturbance is so small (a
+hundredth of the speed of a grain that sags under its weight) that no contact opens before the
+kinetic energy has grown a thousandfold: what is tested is the linear stability of (40)-(42).
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sandmould.dem.critical_step import (
+    StableStep,
+    active_contacts,
+    grain_step,
+    simplified_step,
+    whole_step,
+)
+from sandmould.engines.choosing import engine_of
+from sandmould.engines.program import build_program
+from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.reading import Origin, merge
+from sandmould.scenario.scenario import Scenario
+
+Array = NDArray[np.float64]
+STABLE, DRIFTS, BLOWS_UP = "stable", "drifts", "blows up"
+STEPS = 1024
+LOOKS = tuple(sorted({round(2 ** (k / 2)) for k in range(2, 21)}))
+"""Steps after which the state is looked at: an energy that passed one look below the bound has at
+most squared at the next, so no number overflows inside an engine."""
+BOUND = 1e3
+"""Kinetic energy over that of the disturbance at which a run has blown up. Next to the limit a
+bounded swing of central differences grows by 1 / (1 - (omega dt / 2)^2), 50 at 0.99."""
+GROWTH = 2.0
+"""Largest kinetic energy of the last quarter of a run over that of the second; more is drift."""
+SAGS = 1.0
+"""Way of the centre of mass, in sags of one grain under its weight; more is drift."""
+DISTURBANCE = 0.01
+RADIUS_M = 0.002
+COLUMN, BED = 8, 200
+
+_SMOOTH = {"friction": 0.0, "rolling_arm_fraction": 0.0}
+_ONE_SIZE = {
+    "size_scale": 1.0,
+    "size_classes": 1,
+    "sieve": [
+        {"opening_m": 2 * RADIUS_M / 1.001, "passing_fraction": 0.0},
+        {"opening_m": 2 * RADIUS_M * 1.001, "passing_fraction": 1.0},
+    ],
+}
+_BASE: dict[str, Any] = {
+    "box": {"width_m": 0.05, "height_m": 0.05},
+    # A moment of inertia that LIGGGHTS has too, and no background damping, which it lacks.
+    "sand": {"disc_inertia": "sphere"},
+    "background_damping": {"form": "none"},
+    # Never at rest before the end; LAMMPS keeps grains up to where a layer would be dropped from.
+    "fill": {"drop_height_m": 0.1, "settling": {"shortest_s": 99.0, "longest_s": 100.0}},
+    "record": {"load_every_steps": 100000},
+}
+SCENES: dict[str, dict[str, Any]] = {
+    "contact": {
+        "sand": _ONE_SIZE,
+        "fill": {"layers": [{"count": 1}]},
+        "contact": {"grain_grain": _SMOOTH, "grain_wall": _SMOOTH},
+    },
+    "column": {
+        "sand": _ONE_SIZE,
+        "fill": {"layers": [{"count": COLUMN}]},
+        "contact": {"grain_grain": _SMOOTH, "grain_wall": _SMOOTH},
+    },
+    "bed": {"box": {"width_m": 0.035}, "fill": {"layers": [{"count": BED}]}},
+}
+
+
+@dataclass(frozen=True)
+class Start:
+    """Grains at rest under their weight, in the order of ids."""
+
+    position_m: Array
+    """(n, 2) float64, m."""
+    mass_kg: Array
+    """(n,) float64, kg."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Critical steps of a scene at one damping ratio."""
+
+    simplified: StableStep
+    grain: StableStep
+    whole: StableStep
+    planned_s: float
+
+
+@dataclass(frozen=True)
+class Run:
+    """What became of a disturbance."""
+
+    outcome: str
+    energy_ratio: float
+    """Largest kinetic energy over that of the disturbance; infinite where there was no number."""
+    steps: int
+    """Steps until the outcome was clear."""
+
+
+def scenario_of(scene: str, engine: str, damping_ratio: float, **changes: Any) -> Scenario:
+    """Make a scenario of a scene; what a study checks, such as its time step, is not."""
+    law = {"damping_ratio": damping_ratio}
+    merged = _BASE
+    for more in (
+        SCENES[scene],
+        {"engine": {"name": engine}, "contact": {"grain_grain": law, "grain_wall": law}},
+        changes,
+    ):
+        merged = merge(merged, more, Origin(), "benchmark")
+    return Scenario.model_validate(merged)
+
+
+class Opened:
+    """A session on a scenario in a folder of its own, with its grains in the box."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="stability_")
+        folder = Path(self._folder.name)
+        self.program = build_program(scenario)
+        engine = engine_of(scenario)
+        engine.write_deck(self.program, {}, folder, "stability", "stability")
+        self.session: Session = engine.open_session(self.program, folder, folder / "engine.log")
+        self.session.insert_layer(1)
+
+    def __enter__(self) -> Opened:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.session.close()
+        self._folder.cleanup()
+
+    def begin(self, position_m: Array, velocity_m_s: Array) -> None:
+        """Put the grains in their places and begin."""
+        self.session.set_state(position_m, velocity_m_s, np.zeros((len(position_m), 3)))
+        self.session.start_stage(self.program.stages[0])
+
+
+def _masses_kg(scenario: Scenario, snapshot: Snapshot) -> Array:
+    unit = scenario.sand.grain_mass_kg(1.0, scenario.dimension)
+    return unit * (2 * snapshot.radius_m) ** scenario.dimension
+
+
+def _settled(scenario: Scenario, position_m: Array | None, settle_s: float) -> Start:
+    """Let smooth grains come to rest on the reference engine, from a place or from a fall."""
+    with Opened(scenario) as opened:
+        session = opened.session
+        if position_m is None:
+            session.start_stage(opened.program.stages[0])
+        else:
+            opened.begin(position_m, np.zeros_like(position_m))
+        session.advance(settle_s)
+        last = session.snapshot()
+        return Start(last.position_m, _masses_kg(scenario, last))
+
+
+@cache
+def start_of(scene: str) -> Start:
+    """Rest of a scene with smooth contacts, which is one with rough contacts too.
+
+    Without friction nothing but the places matters, and they are all that ``set_state`` takes:
+    every engine begins with contacts that carry their loads and have not slipped.
+    """
+    damped = {
+        "background_damping": {"form": "viscous", "viscous_translation_per_s": 100.0},
+        "contact": {"grain_grain": _SMOOTH, "grain_wall": _SMOOTH},
+        "time_step": {"fraction": 0.8},
+    }
+    scenario = scenario_of(scene, "reference", 0.5, **damped)
+    if scene == "bed":
+        return _settled(scenario, None, 2.5)
+    law = scenario.contact.grain_grain.normal_stiffness_n_m
+    wall = scenario.contact.grain_wall.normal_stiffness_n_m
+    n = COLUMN if scene == "column" else 1
+    mass = scenario.sand.grain_mass_kg(scenario.sand.classes(2)[0].diameter_m, 2)
+    radius = scenario.sand.classes(2)[0].diameter_m / 2
+    weight = mass * scenario.gravity_m_s2
+    # Each contact carries the weight of all grains above it.
+    height = radius - n * weight / wall + np.concatenate(
+        [[0.0], np.cumsum([2 * radius - (n - 1 - i) * weight / law for i in range(n - 1)])]
+    )
+    # Beside the diagonal of the floor, along which LIGGGHTS splits it.
+    position = np.column_stack([np.full(n, 0.011), height])
+    return Start(position, np.full(n, mass))
+
+
+@cache
+def limits_of(scene: str, damping_ratio: float, rotational_inertia: str = "physical") -> Limits:
+    """Critical steps of the contacts of a scene at rest."""
+    changes = {"time_step": {"rotational_inertia": rotational_inertia}}
+    scenario = scenario_of(scene, "reference", damping_ratio, **changes)
+    start = start_of(scene)
+    with Opened(scenario) as opened:
+        opened.begin(start.position_m, np.zeros_like(start.position_m))
+        contacts = active_contacts(opened.session.solver)  # type: ignore[attr-defined]
+    steps = (estimate(contacts) for estimate in (simplified_step, grain_step, whole_step))
+    return Limits(*steps, scenario.critical_step.step_s)
+
+
+def _disturbance(start: Start, speed_m_s: float, vertical: bool) -> Array:
+    """Velocities of a given root mean square, always the same; up and down alone in a column."""
+    velocity = np.random.default_rng(7).standard_normal(start.position_m.shape)
+    if vertical:
+        velocity[:, 0] = 0.0
+    energy = float(start.mass_kg @ (velocity**2).sum(axis=1))
+    return velocity * speed_m_s * math.sqrt(start.mass_kg.sum() / energy)
+
+
+def disturb(scene: str, engine: str, damping_ratio: float, step_s: float) -> Run:
+    """Disturb a scene at rest, compute 1 024 steps, and say what became of it.
+
+    Parameters
+    ----------
+    scene, engine : str
+    damping_ratio : float
+        Of all contacts.
+    step_s : float
+
+    Notes
+    -----
+    The kinetic energy is that of the velocities of central differences, (x - x-) / dt: at whole
+    steps a swing of alternating sign has hardly any.
+    """
+    start = start_of(scene)
+    scenario = scenario_of(scene, engine, damping_ratio, time_step={"step_s": step_s})
+    gravity = scenario.gravity_m_s2
+    omega = limits_of(scene, 0.0).whole.omega_rad_s
+    velocity = _disturbance(start, DISTURBANCE * gravity / omega, scene != "bed")
+    first = float(start.mass_kg @ (velocity**2).sum(axis=1))
+    looks: list[tuple[int, float]] = []
+    with Opened(scenario) as opened:
+        session = opened.session
+        opened.begin(start.position_m, velocity)
+        try:
+            for look in LOOKS:
+                if look - session.steps > 1:
+                    session.advance((look - 1 - session.steps) * step_s)
+                before = session.snapshot().position_m
+                session.advance(step_s)
+                after = session.snapshot().position_m
+                moved = float(start.mass_kg @ ((after - before) ** 2).sum(axis=1)) / step_s**2
+                looks.append((look, moved / first))
+                if not moved / first < BOUND:
+                    return Run(BLOWS_UP, looks[-1][1], look)
+        except EngineStop:
+            return Run(BLOWS_UP, math.inf, session.steps)
+    highest = max(ratio for _, ratio in looks)
+    early = max(ratio for step, ratio in looks if step <= STEPS // 2)
+    late = max(ratio for step, ratio in looks if step > STEPS // 2)
+    way = abs(start.mass_kg @ (after - start.position_m)[:, 1]) / start.mass_kg.sum()
+    sag = gravity * float(start.mass_kg.min()) / scenario.contact.grain_wall.normal_stiffness_n_m
+    drifts = (late > 1.0 and late > GROWTH * early) or way > SAGS * sag
+    return Run(DRIFTS if drifts else STABLE, highest, STEPS)
