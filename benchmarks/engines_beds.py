@@ -31,9 +31,11 @@ SPRING_N_M = 7e4
 """Stiffness of all contacts, walls included: softer walls let a grain through in deep beds."""
 PERIOD_S = 0.02
 """Of the shaking."""
+_SOFTER = {2: 4.0, 3: 100.0}
+"""By how much the springs are softer during the fall."""
 _WIDTH_PER_DISC_M = 0.131 / 2_500
-_FLOOR_PER_SPHERE = 0.069**3 / 8_000
-_REST_M_S = 1e-3
+_VOLUME_PER_SPHERE_M3 = 0.045**3 / 8_000
+"""Of a cube as wide as the box; the bed fills some two thirds of it."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def floor_m(dimension: int, grains: int) -> float:
     """Width of the box: beds of discs are all equally high, of spheres of one shape."""
     if dimension == 2:
         return _WIDTH_PER_DISC_M * grains
-    return math.cbrt(_FLOOR_PER_SPHERE * grains)
+    return math.cbrt(_VOLUME_PER_SPHERE_M3 * grains)
 
 
 def scene(
@@ -91,7 +93,7 @@ def scene(
         "background_damping": {"form": "none"},
         "fill": {
             "layers": [{"count": grains}],
-            "settling": {"rms_speed_m_s": _REST_M_S, "longest_s": 5.0},
+            "settling": {"longest_s": 5.0},
         },
         "vibration": [{"frequency_hz": 1 / PERIOD_S, "acceleration_g": 1.5, "duration_s": 10.0}],
         "engine": {"name": engine, "ranks": threads},
@@ -115,13 +117,33 @@ def opened(scenario: Scenario) -> Iterator[Session]:
             session.close()
 
 
-def _softer(springs_n_m: float) -> dict[str, Any]:
+def _falling(dimension: int) -> dict[str, Any]:
+    """Changes for the fall: springs that allow longer steps."""
+    springs_n_m = SPRING_N_M / _SOFTER[dimension]
     law = {
         "normal_stiffness_n_m": springs_n_m,
         "tangential_stiffness_n_m": springs_n_m,
         "rolling_stiffness_n_m": springs_n_m,
     }
-    return {"contact": {"grain_grain": law, "grain_wall": law}, "time_step": {"fraction": 0.8}}
+    return {
+        "contact": {"grain_grain": law, "grain_wall": law},
+        "time_step": {"fraction": 0.8},
+        "fill": {"settling": {"rms_speed_m_s": 1e-3}},
+    }
+
+
+def _resting() -> dict[str, Any]:
+    """Changes for coming to rest with the springs as they are: in a thick oil."""
+    return {
+        "time_step": {"fraction": 0.8},
+        "background_damping": {
+            "form": "viscous",
+            "viscous_translation_per_s": 1e3,
+            "viscous_rotation_per_s": 1e3,
+        },
+        "fill": {"settling": {"rms_speed_m_s": 3e-4, "shortest_s": 0.005}},
+        "record": {"series_every_s": 0.001},
+    }
 
 
 def _rested(scenario: Scenario, bed: Bed | None) -> Bed:
@@ -150,22 +172,23 @@ def _rested(scenario: Scenario, bed: Bed | None) -> Bed:
 def settled(dimension: int, grains: int) -> Bed:
     """Settle a bed on the reference engine, or take the one kept from an earlier run.
 
-    It falls with springs 4 (2D) or 100 (3D) times softer, which takes longer steps, and comes to
-    rest again with its own: its grains overlap by less than a hundredth of a diameter either way.
+    It falls with softer springs, which takes longer steps, and comes to rest again with its own
+    under a viscous damping. Both are off when speeds are measured.
     """
     width_m = floor_m(dimension, grains)
-    scenario = scene(dimension, grains, width_m, width_m, threads=2)
-    key = hashlib.sha256((scenario.model_dump_json() + source_hash()).encode()).hexdigest()[:12]
+
+    def changed(changes: dict[str, Any]) -> Scenario:
+        return scene(dimension, grains, width_m, width_m, threads=2, **changes)
+
+    falling, resting = changed(_falling(dimension)), changed(_resting())
+    words = falling.model_dump_json() + resting.model_dump_json() + source_hash()
+    key = hashlib.sha256(words.encode()).hexdigest()[:12]
     path = KEPT / f"bed_{dimension}d_{grains}_{key}.npz"
     if path.exists():
         with np.load(path) as kept:
             return Bed(dimension, width_m, width_m, **kept)
     print(f"settling {grains} grains in {dimension}D", flush=True)
-    soft = SPRING_N_M / (4 if dimension == 2 else 100)
-    falls = scene(dimension, grains, width_m, width_m, threads=2, **_softer(soft))
-    often = {"fill": {"settling": {"shortest_s": 0.002}}, "record": {"series_every_s": 0.002}}
-    rests = scene(dimension, grains, width_m, width_m, threads=2, **often)
-    bed = _rested(rests, _rested(falls, None))
+    bed = _rested(resting, _rested(falling, None))
     KEPT.mkdir(parents=True, exist_ok=True)
     arrays = {k: v for k, v in vars(bed).items() if isinstance(v, np.ndarray)}
     np.savez(path, **arrays)

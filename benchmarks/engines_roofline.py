@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from benchmarks.engines_beds import Bed, settled, solver_on, tiled
 from benchmarks.engines_peaks import bandwidth, measure_peaks
 from benchmarks.engines_phases import measure_listing, measure_phases
@@ -128,9 +126,7 @@ def measure_roofline(settings: Settings) -> dict[str, Any]:
     with one_core():
         peaks = measure_peaks(settings.rounds, max(1, round(2_000 * settings.block_s)))
         sizes = (500_000, 30_000_000, settings.far_bytes)
-        peaks["gb_s"] = [
-            {"bytes": size, **bandwidth(size, settings.rounds)} for size in sizes
-        ]
+        peaks["gb_s"] = [{"bytes": size, **bandwidth(size, settings.rounds)} for size in sizes]
         rows = [_measure_bed(bed, peaks, settings, phases=True) for bed in beds]
         rows.append(_measure_bed(largest, peaks, settings, phases=False))
     return {"peaks": peaks, "beds": rows}

@@ -66,9 +66,12 @@ def seconds(work: Callable[[], object]) -> float:
 
 def steps_lasting(advance: Callable[[int], object], block_s: float) -> int:
     """How many steps take so long; the steps tried on the way are the warm-up."""
-    steps = 4
-    while (took := seconds(lambda: advance(steps))) < 0.3 * block_s:
+    steps, took = 2, 0.0
+    while took < 0.3 * block_s:
         steps *= 2
+        begun = time.perf_counter()
+        advance(steps)
+        took = time.perf_counter() - begun
     return max(4, round(steps * block_s / took))
 
 

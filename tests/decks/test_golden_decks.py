@@ -32,6 +32,13 @@ VARIANTS: dict[str, dict[str, object]] = {
             {"acceleration_g": 1.0, "duration_s": 0.1, "ramp_s": 0.02, "direction": "horizontal"}
         ],
     },
+    "polygon_isotropic": {
+        "obstacles": [
+            {"kind": "polygon", "vertices_m": [[0.02, 0.02], [0.06, 0.02], [0.05, 0.03]]},
+            {"kind": "plate", "name": "shelf", "centre_m": [0.01, 0.03], "size_m": [0.01, 0.004]},
+        ],
+        "background_damping": {"form": "nonviscous_isotropic"},
+    },
     "plate_turned_no_rolling": {
         "obstacles": [
             {"kind": "plate", "centre_m": [0.04, 0.03], "size_m": [0.03, 0.004], "angle_deg": 30}

@@ -55,6 +55,7 @@ def write_deck(
     d, critical = scenario.dimension, scenario.critical_step
     keys = [("gravity", "gravity_m_s2"), ("density", "sand.density_kg_m3")]
     keys += [("disc_thickness", "sand.disc_thickness_m")] if d == 2 else []
+    keys += _damping_keys(scenario)
     keys += [(f"{law}_{name}", f"{key}.{last}") for law, key in _LAWS for name, last in _LAW_KEYS]
     text = (
         environment("reference")
@@ -84,6 +85,17 @@ def write_deck(
     partial = folder / "deck.in.partial"
     partial.write_text(text, encoding="utf-8")
     os.replace(partial, folder / "deck.in")
+
+
+def _damping_keys(scenario: Scenario) -> list[tuple[str, str]]:
+    form = scenario.background_damping.form
+    if form == "none":
+        return []
+    kind, end = form.split("_")[0], "_per_s" if form == "viscous" else ""
+    return [
+        (f"damping_{part}", f"background_damping.{kind}_{part}{end}")
+        for part in ("translation", "rotation")
+    ]
 
 
 def _write_layer(layer: PlannedLayer, path: Path, d: int) -> None:

@@ -100,7 +100,7 @@ def sliding_impact(engine: str, dimension: int, damping_ratio: float) -> Iterato
 
     It holds whatever the normal law is, for the total normal force caps the friction. The moment
     r J_t turns the grain: r dw kappa = J_t/m. Undamped, the normal speed is reversed,
-    J_n = 2 m v_n, so the speed along the floor falls by 2 mu v_n and the grain leaves at that angle.
+    J_n = 2 m v_n, and the speed along the floor falls by 2 mu v_n, which gives the angle.
     """
     mu, slip = 0.1, 20 * SPEED_M_S
     contact_law = law(dimension, damping_ratio, mu)

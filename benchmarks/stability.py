@@ -1,0 +1,185 @@
+"""Where each engine loses stability: a map over time step and damping, and the exact limits.
+
+``python -m benchmarks.stability`` writes stability.json beside this file and docs/stability.md
+with its picture; ``--draw`` draws them again from the json.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.stability_page import FIGURE, PAGE, draw, write
+from benchmarks.stability_scenes import (
+    RADIUS_M,
+    SCENES,
+    STABLE,
+    Opened,
+    disturb,
+    limits_of,
+    scenario_of,
+    start_of,
+)
+from sandmould.engines.choosing import engine_of, engine_problem
+
+OUT = Path(__file__).with_name("stability.json")
+ENGINES = ("reference", "lammps", "liggghts")
+DAMPING_RATIOS = (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)
+STEPS_OVER_CRITICAL = (
+    0.05, 0.1, 0.2, 0.3, 0.38, 0.46, 0.55, 0.65, 0.75, 0.85, 0.94, 0.98, 1.02, 1.06, 1.25, 1.5, 2.0,
+)  # fmt: skip
+"""Time steps over that of (41); none lies on a limit of (42), where neither outcome is wrong."""
+HALVINGS = 5
+SLOPE_DEG = 10.0
+
+
+def engines_here() -> dict[str, str]:
+    """Engines that are installed, with their versions; that of the reference is the source's."""
+    found = {}
+    for name in ENGINES:
+        if engine_problem(scenario_of("bed", name, 0.0)) is None:
+            version = engine_of(scenario_of("bed", name, 0.0)).installed_version()
+            found[name] = "of this tree" if name == "reference" else str(version)
+    return found
+
+
+def measured_limit(
+    scene: str, engine: str, damping_ratio: float, stable: float, grown: float
+) -> float:
+    """Largest stable step over that of (41), by halving the interval that the map leaves."""
+    critical_s = limits_of(scene, 0.0).whole.undamped_s
+    for _ in range(HALVINGS):
+        middle = (stable + grown) / 2
+        found = disturb(scene, engine, damping_ratio, middle * critical_s, follow=False)
+        stable, grown = (middle, grown) if found.outcome == STABLE else (stable, middle)
+    return (stable + grown) / 2
+
+
+def map_of(scene: str, engine: str) -> list[dict[str, Any]]:
+    """Outcomes at all time steps and damping ratios, and the limits between them."""
+    critical_s = limits_of(scene, 0.0).whole.undamped_s
+    rows = []
+    for zeta in DAMPING_RATIOS:
+        runs = [disturb(scene, engine, zeta, x * critical_s, True) for x in STEPS_OVER_CRITICAL]
+        outcomes = [run.outcome for run in runs]
+        first = next(i for i, outcome in enumerate(outcomes) if outcome != STABLE)
+        stable, grown = STEPS_OVER_CRITICAL[first - 1], STEPS_OVER_CRITICAL[first]
+        limit = measured_limit(scene, engine, zeta, stable, grown)
+        rows.append({
+            "damping_ratio": zeta,
+            "outcomes": outcomes,
+            "largest_stable_over_critical": round(limit, 4),
+            "known_within": round((grown - stable) / 2 ** (HALVINGS + 1), 5),
+        })  # fmt: skip
+        print(f"{scene:8} {engine:10} zeta {zeta:4}: stable up to {limit:.3f}", flush=True)
+    return rows
+
+
+def one_contact_s(damping_ratio: float) -> float:
+    """The paper's step for the smallest grain of the bed with one contact, (42), (51) and (54)."""
+    s = scenario_of("bed", "reference", damping_ratio)
+    law, smallest = s.contact.grain_grain, s.sand.classes(2)[0].diameter_m
+    mass = s.sand.grain_mass_kg(smallest, 2)
+    along = 2 * math.sqrt(mass / law.normal_stiffness_n_m)
+    about = 2 * math.sqrt(s.sand.inertia_factor(2) * mass / law.tangential_stiffness_n_m)
+    return min(along * (math.hypot(1, damping_ratio) - damping_ratio), about)
+
+
+def limit_row(scene: str, damping_ratio: float, inertia: str = "physical") -> dict[str, float]:
+    """Critical steps of a scene by all estimates, s."""
+    limits = limits_of(scene, damping_ratio, inertia)
+    steps = {
+        "simplified": limits.simplified.damped_s,
+        "grain": limits.grain.damped_s,
+        "whole": limits.whole.damped_s,
+        "planned": limits.planned_s,
+    }
+    return {"damping_ratio": damping_ratio} | {
+        f"{k}_s": float(f"{v:.4g}") for k, v in steps.items()
+    }
+
+
+def rolling_acceleration_m_s2(inertia: str, disc_inertia: str) -> float:
+    """Acceleration of a disc that rolls down a plate turned by 10 degrees, reference engine."""
+    angle = math.radians(SLOPE_DEG)
+    along = np.array([math.cos(angle), -math.sin(angle)])
+    normal = np.array([math.sin(angle), math.cos(angle)])
+    plate = {
+        "kind": "plate", "centre_m": [0.2, 0.1], "size_m": [0.3, 0.01], "angle_deg": -SLOPE_DEG,
+    }  # fmt: skip
+    scenario = scenario_of(
+        "contact",
+        "reference",
+        0.95,
+        box={"width_m": 0.4, "height_m": 0.2},
+        obstacles=[plate],
+        sand={"disc_inertia": disc_inertia},
+        contact={"grain_wall": {"friction": 0.8}},
+        time_step={"rotational_inertia": inertia, "fraction": 0.5},
+    )
+    first = np.array([0.2, 0.1]) - 0.1 * along + (0.005 + RADIUS_M) * normal
+    duration_s = 0.3
+    with Opened(scenario) as opened:
+        opened.begin(first[None], np.zeros((1, 2)))
+        opened.session.advance(duration_s)
+        last = opened.session.snapshot()
+    way = float((last.position_m[0] - first) @ along)
+    return 2 * way / last.time_s**2
+
+
+def rotation() -> dict[str, Any]:
+    """What raised moments of inertia slow, and how much larger the step may be."""
+    gravity = scenario_of("contact", "reference", 0.0).gravity_m_s2 * math.sin(
+        math.radians(SLOPE_DEG)
+    )
+    rolling = []
+    for name, c in (("disc", 0.5), ("sphere", 0.4)):
+        physical, scaled = (rolling_acceleration_m_s2(i, name) for i in ("physical", "scaled"))
+        rolling.append({
+            "inertia": name,
+            "physical_m_s2": round(physical, 4),
+            "scaled_m_s2": round(scaled, 4),
+            "factor": round(scaled / physical, 4),
+            "exact_physical_m_s2": round(gravity / (1 + c), 4),
+            "exact_factor": round((1 + c) / 2, 4),
+        })  # fmt: skip
+    scaled_steps = [limit_row("bed", zeta, "scaled") for zeta in DAMPING_RATIOS]
+    return {"rolling": rolling, "bed_scaled": scaled_steps}
+
+
+def measure() -> dict[str, Any]:
+    """Compute everything."""
+    engines = engines_here()
+    return {
+        "engines": engines,
+        "steps_over_critical": list(STEPS_OVER_CRITICAL),
+        "scenes": {
+            scene: {
+                "grains": len(start_of(scene).mass_kg),
+                "critical_s": float(f"{limits_of(scene, 0.0).whole.undamped_s:.6g}"),
+                "limits": [limit_row(scene, zeta) for zeta in DAMPING_RATIOS],
+                "maps": {engine: map_of(scene, engine) for engine in engines},
+            }
+            for scene in SCENES
+        },
+        "bed_one_contact_s": [float(f"{one_contact_s(zeta):.4g}") for zeta in DAMPING_RATIOS],
+        "rotation": rotation(),
+    }
+
+
+def main(arguments: list[str]) -> None:
+    """Measure unless told only to draw, then draw and write."""
+    if "--draw" not in arguments:
+        OUT.write_text(json.dumps(measure(), indent=1) + "\n", encoding="utf-8")
+    results = json.loads(OUT.read_text(encoding="utf-8"))
+    draw(results, FIGURE)
+    write(results, PAGE)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
