@@ -1,7 +1,8 @@
 # make demo   the main job on real input: sand flows into a tube at three frequencies
 # make test   lint, types, import contract and all tests
 # The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, decks, schema, lock,
-# twins (the engines compared, docs/engine_twins.md), results-check, clean.
+# twins (the engines compared, docs/engine_twins.md), verification (docs/verification.md),
+# stability (docs/stability.md), results-check, clean.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= $(shell nproc)
@@ -12,7 +13,7 @@ NAME = $(basename $(notdir $(STUDY)))
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
-.PHONY: demo study plan twins test lint decks schema lock results-check clean
+.PHONY: demo study plan twins verification stability test lint decks schema lock results-check clean
 
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
@@ -31,6 +32,12 @@ twins: $(INSTALLED)
 	    && $(BIN)/python -m sandmould.study.evidence record config/studies/$$name.yaml || exit 1; \
 	done
 	@$(BIN)/python -m sandmould.study.twins
+
+verification: $(INSTALLED)
+	$(BIN)/python -m tests.verification.table
+
+stability: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.stability
 
 test: lint
 	$(BIN)/pytest -n 2 --dist loadfile

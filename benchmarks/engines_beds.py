@@ -178,7 +178,7 @@ def settled(dimension: int, grains: int) -> Bed:
     width_m = floor_m(dimension, grains)
 
     def changed(changes: dict[str, Any]) -> Scenario:
-        return scene(dimension, grains, width_m, width_m, threads=2, **changes)
+        return scene(dimension, grains, width_m, width_m, **changes)
 
     falling, resting = changed(_falling(dimension)), changed(_resting())
     words = falling.model_dump_json() + resting.model_dump_json() + source_hash()

@@ -73,6 +73,9 @@ def map_of(scene: str, engine: str) -> list[dict[str, Any]]:
         rows.append({
             "damping_ratio": zeta,
             "outcomes": outcomes,
+            "rise_of_centre": [
+                None if math.isnan(run.rise) else float(f"{run.rise:.2g}") for run in runs
+            ],
             "largest_stable_over_critical": round(limit, 4),
             "known_within": round((grown - stable) / 2 ** (HALVINGS + 1), 5),
         })  # fmt: skip

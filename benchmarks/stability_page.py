@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -123,13 +122,16 @@ def _limits_table(results: dict[str, Any]) -> str:
     for name, scene in results["scenes"].items():
         for i, limits in enumerate(scene["limits"]):
             zeta, exact = limits["damping_ratio"], limits["whole_s"] / scene["critical_s"]
-            measured = [scene["maps"][e][i] for e in engines]
+            measured = [
+                f"{row['largest_stable_over_critical']:.3f} ± {row['known_within']:.3f}"
+                for row in (scene["maps"][engine][i] for engine in engines)
+            ]
             rows.append([
                 TITLES[name].format(grains=scene["grains"]),
                 f"{zeta:g}",
                 f"{of_one_mode(zeta):.3f}",
                 f"{exact:.3f}",
-                *(f"{m['largest_stable_over_critical']:.3f} ± {m['known_within']:.3f}" for m in measured),
+                *measured,
             ])  # fmt: skip
     titles = [ENGINE_TITLES[engine] for engine in engines]
     head = ["scene", "ζ", "(42), ξ = ζ", "(42), whole system", *titles]
@@ -174,11 +176,11 @@ def _rolling_table(results: dict[str, Any]) -> str:
 
 def _gain_table(results: dict[str, Any]) -> str:
     physical, scaled = results["scenes"]["bed"]["limits"], results["rotation"]["bed_scaled"]
-    rows = [
-        [f"{a['damping_ratio']:g}"]
-        + [f"{1e6 * a[k]:.1f} → {1e6 * b[k]:.1f} ({b[k] / a[k]:.2f})" for k in ("whole_s", "planned_s")]
-        for a, b in zip(physical, scaled, strict=True)
-    ]  # fmt: skip
+    rows = []
+    for a, b in zip(physical, scaled, strict=True):
+        steps = ((a[k], b[k]) for k in ("whole_s", "planned_s"))
+        gains = (f"{1e6 * x:.1f} → {1e6 * y:.1f} ({y / x:.2f})" for x, y in steps)
+        rows.append([f"{a['damping_ratio']:g}", *gains])
     return _table(["ζ", "whole system, µs", "planned, µs"], rows)
 
 
@@ -203,6 +205,18 @@ def _largest_error(results: dict[str, Any]) -> float:
         for rows in scene["maps"].values()
         for limits, row in zip(scene["limits"], rows, strict=True)
     )
+
+
+def _rise(results: dict[str, Any], scene: str) -> str:
+    """Largest rise of the centre of mass of runs that drifted, percent."""
+    rises = [
+        rise
+        for rows in results["scenes"][scene]["maps"].values()
+        for row in rows
+        for outcome, rise in zip(row["outcomes"], row["rise_of_centre"], strict=True)
+        if outcome == DRIFTS
+    ]
+    return f"{100 * max(rises, default=0.0):.2g}"
 
 
 def _agreement(results: dict[str, Any]) -> str:
@@ -239,7 +253,10 @@ def write(results: dict[str, Any], path: Path) -> None:
         "one_contact": f"{min(factors):.1f} to {max(factors):.1f}",
         "planned": f"{min(planned):.2f} to {max(planned):.2f}",
         "planned_half": f"{min(planned) / 2:.2f} to {max(planned) / 2:.2f}",
-        "sqrt_2": f"{math.sqrt(2):.2f}",
+        "rise_column": _rise(results, "column"),
+        "rise_bed": _rise(results, "bed"),
+        "grain": f"{max(r['grain_s'] / r['whole_s'] for r in bed['limits']):.2f}",
+        "grain_undamped": f"{bed['limits'][0]['grain_s'] / bed['limits'][0]['whole_s']:.2f}",
     }
     for name, text in words.items():
         template = template.replace(f"@{name}@", text)

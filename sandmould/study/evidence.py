@@ -20,7 +20,7 @@ from sandmould import ROOT
 from sandmould.engines.choosing import engine_of, engine_problem
 from sandmould.study.agreement import speeds
 from sandmould.study.expand import Run, expand, scenario_hash
-from sandmould.study.opening import open_study
+from sandmould.study.opening import OpenStudy, open_study
 from sandmould.study.plan import planned_grain_steps
 from sandmould.study.study import Study
 
@@ -65,6 +65,7 @@ def record(path: Path, results: Path) -> Path:
         "versions": provenance["versions"],
         "engines": {speed.engine: speed.version for speed in speeds(summary)},
         "machine": provenance["machine"],
+        "margins": study.study.equivalence.margins,
         "wall_s_of_all_runs": round(float(summary.wall_s.sum()), 1),
         "grain_steps": float(summary.grain_steps.sum()),
     }
@@ -89,11 +90,17 @@ def stale_records() -> list[tuple[str, str]]:
         study = ROOT / kept["study"]
         if not study.exists():
             found.append((path.parent.name, f"its study {kept['study']} is gone"))
-        elif study_hash(expand(open_study(study))) != kept["study_sha256"]:
-            found.append((path.parent.name, "the study or the templates have changed since"))
         else:
-            found.append((path.parent.name, ""))
+            found.append((path.parent.name, _what_changed(open_study(study), kept)))
     return found
+
+
+def _what_changed(study: OpenStudy, kept: dict[str, Any]) -> str:
+    """Say what parts a study from its record; margins count where the record has them."""
+    if study_hash(expand(study)) != kept["study_sha256"]:
+        return "the study or the templates have changed since"
+    margins = study.study.equivalence.margins
+    return "its margins were set after the runs" if kept.get("margins", margins) != margins else ""
 
 
 def recompute_smallest(results: Path) -> list[str]:

