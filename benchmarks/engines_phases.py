@@ -71,19 +71,29 @@ def _block(solver: Solver, moving: Moving, parts: int, block_s: float) -> Callab
     return lambda: 1e9 * work(times) / (n * times)
 
 
-def measure_phases(solver: Solver, rounds: int, block_s: float) -> dict[str, Any]:
+def measure_phases(
+    solver: Solver, step: Callable[[], float], rounds: int, block_s: float
+) -> dict[str, Any]:
     """Time of each part of a step, and what makes up the one of the pairs; spoils the state.
 
     Each part is the difference of a step with it and a step without it, so that it finds the
     cache as it does in the step loop. Lists of the touching pairs alone and of the others alone
     have no branch to be guessed: what the whole list takes beyond both is the price of guessing.
 
+    Parameters
+    ----------
+    solver : Solver
+    step : callable
+        Block of whole steps on another solver with the same bed, ns per grain-step.
+    rounds : int
+    block_s : float
+
     Returns
     -------
     dict
         Spreads in ns per grain-step.
     """
-    moving = solver._moving
+    moving = solver._moving  # what the step loop itself is given
     touching = moving.pairs.touching.astype(bool)
     blocks = {
         name: _block(solver, moving, i + 1, block_s) for i, name in enumerate(PARTS)
@@ -92,9 +102,9 @@ def measure_phases(solver: Solver, rounds: int, block_s: float) -> dict[str, Any
         "apart": _block(solver, _with_pairs(moving, ~touching), 1, block_s),
         "no pairs": _block(solver, _with_pairs(moving, np.zeros_like(touching)), 1, block_s),
     }  # fmt: skip
-    times = interleaved(blocks, rounds)
-    steps = np.array([times[name] for name in PARTS])
-    parts = np.diff(steps, axis=0, prepend=0.0)
+    times = interleaved(blocks | {"step": step}, rounds)
+    sums = np.array([times[name] for name in (*PARTS, "step")])
+    parts = np.diff(sums, axis=0, prepend=0.0)
     touch, apart, bare = (np.array(times[name]) for name in ("touching", "apart", "no pairs"))
     within = {
         "the loop over grains": bare,
@@ -102,8 +112,10 @@ def measure_phases(solver: Solver, rounds: int, block_s: float) -> dict[str, Any
         "contacts": touch - bare,
         "guessing which": parts[0] - touch - apart + bare,
     }
+    names = (*PARTS, "rest")
     return {
-        "parts": {name: spread(part) for name, part in zip(PARTS, parts.tolist(), strict=True)},
+        "ns_per_grain_step": spread(times["step"]),
+        "parts": {name: spread(part) for name, part in zip(names, parts.tolist(), strict=True)},
         "within_pairs": {name: spread(part.tolist()) for name, part in within.items()},
     }
 

@@ -89,7 +89,7 @@ def measure_bed(bed: Bed, settings: Settings, shaken: bool = False) -> dict[str,
             skin = _skin_m(scenario)
             blocks[name] = _runner(session, _steps(session, settings.block_s, shaken))
             rows[name] = {"skin_m": skin, "listed_per_grain": _per_grain(session, skin)}
-        rates = interleaved(blocks, settings.rounds)
+        rates = interleaved(blocks, (settings.rounds + 1) // 2 if shaken else settings.rounds)
         for name, session in sessions.items():
             moved = np.linalg.norm(session.snapshot().position_m - bed.position_m, axis=1)
             rows[name] |= {

@@ -7,8 +7,8 @@ from typing import Any
 from benchmarks.engines_beds import Bed, settled, solver_on, tiled
 from benchmarks.engines_peaks import bandwidth, measure_peaks
 from benchmarks.engines_phases import measure_listing, measure_phases
-from benchmarks.engines_scale import advance, bytes_of
-from benchmarks.engines_timing import Settings, one_core, seconds, spread, steps_lasting
+from benchmarks.engines_scale import advance, bytes_of, cost_of
+from benchmarks.engines_timing import Settings, one_core, spread, steps_lasting
 from sandmould.dem.solver import Solver
 
 # Operations counted by hand in pairs.py, contact_law.py and motion.py; a multiply-add is two,
@@ -83,21 +83,32 @@ def _bounds(
     }
 
 
+def _times(bed: Bed, settings: Settings, phases: bool) -> tuple[Solver, dict[str, Any]]:
+    """Solver with the bed, and time of its steps with their parts where asked."""
+    solver, block_s = solver_on(bed), settings.block_s
+    if not phases:
+        step = cost_of(solver, steps_lasting(lambda n: advance(solver, n), block_s))
+        return solver, {"ns_per_grain_step": spread([step() for _ in range(settings.rounds)])}
+    still = solver_on(bed)
+    block_s /= 10
+    step = cost_of(solver, steps_lasting(lambda n: advance(solver, n), block_s))
+    listing = measure_listing(still, settings.rounds)
+    found = measure_phases(still, step, 3 * settings.rounds, block_s)
+    return solver, found | {"listing_ns_per_grain": listing}
+
+
 def _measure_bed(
     bed: Bed, peaks: dict[str, Any], settings: Settings, phases: bool
 ) -> dict[str, Any]:
-    """Limits, time of a step, and its parts where asked."""
-    solver = solver_on(bed)
-    steps = steps_lasting(lambda n: advance(solver, n), settings.block_s)
-    found = []
-    for _ in range(settings.rounds):
-        found.append(1e9 * seconds(lambda: advance(solver, steps)) / (bed.grains * steps))
-    measured, pairs = spread(found), solver.pairs
+    """Time of a step against its limits."""
+    solver, times = _times(bed, settings, phases)
+    step_ns, pairs = times["ns_per_grain_step"]["median"], solver.pairs
     listed, contacts = len(pairs.other) / bed.grains, float(pairs.touching.sum()) / bed.grains
     held = sum(size for name, size in bytes_of(solver).items() if name in TRAFFIC)
     gb_s = bandwidth(held, settings.rounds)
     bounds = _bounds(solver, contacts, listed, peaks, gb_s["median"])
-    row = {
+    chained_ns = peaks["ns_per_chained_root_and_quotient"]["median"]
+    return {
         "bed": bed.name,
         "dimension": bed.dimension,
         "held_bytes": held,
@@ -106,17 +117,11 @@ def _measure_bed(
         "flops_per_grain_step": flops(bed.dimension, listed, contacts),
         "listed_per_grain": listed,
         "contacts_per_grain": contacts,
-        "ns_per_grain_step": measured,
         "bounds_ns": bounds,
-        "fractions": {name: ns / measured["median"] for name, ns in bounds.items()},
-        "waiting_ns": contacts
-        * CHAINED_PER_CONTACT
-        * peaks["ns_per_chained_root_and_quotient"]["median"],
+        "fractions": {name: ns / step_ns for name, ns in bounds.items()},
+        "waiting_ns": contacts * CHAINED_PER_CONTACT * chained_ns,
+        **times,
     }
-    if phases:
-        row["listing_ns_per_grain"] = measure_listing(solver, settings.rounds)
-        row |= measure_phases(solver, 3 * settings.rounds, settings.block_s / 10)
-    return row
 
 
 def measure_roofline(settings: Settings) -> dict[str, Any]:

@@ -39,6 +39,11 @@ def _steps(solver: Solver, block_s: float) -> int:
     return steps_lasting(lambda steps: advance(solver, steps), block_s)
 
 
+def cost_of(solver: Solver, steps: int) -> Callable[[], float]:
+    """Give a block of steps whose value is ns per grain-step."""
+    return lambda: 1e9 / _rate(solver, steps)
+
+
 def _independent(core: int, bed: Bed, steps: int, rounds: int, start: Any, rates: Any) -> None:
     """Process with one thread on one core: as many blocks as rounds, each at a signal."""
     os.sched_setaffinity(0, {core})
@@ -109,16 +114,11 @@ def _memory(solver: Solver) -> dict[str, Any]:
     }
 
 
-def _block(solver: Solver, steps: int) -> Callable[[], float]:
-    """Give a block whose value is ns per grain-step."""
-    return lambda: 1e9 / _rate(solver, steps)
-
-
 def _measure_sizes(tile: Bed, sizes: tuple[int, ...], settings: Settings) -> dict[str, Any]:
     """Cost per grain-step of beds of several sizes, on one core."""
     solvers = {str(n): solver_on(tiled(tile, n)) for n in sizes}
     with one_core():
-        blocks = {n: _block(s, _steps(s, settings.block_s)) for n, s in solvers.items()}
+        blocks = {n: cost_of(s, _steps(s, settings.block_s)) for n, s in solvers.items()}
         found = interleaved(blocks, settings.rounds)
     costs = [spread(found[str(n)]) for n in sizes]
     medians = [cost["median"] for cost in costs]

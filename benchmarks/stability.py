@@ -6,9 +6,11 @@ with its picture; ``--draw`` draws them again from the json.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ from benchmarks.stability_scenes import (
     STABLE,
     Opened,
     disturb,
+    follow_bed,
     limits_of,
     scenario_of,
     start_of,
@@ -35,6 +38,8 @@ STEPS_OVER_CRITICAL = (
 )  # fmt: skip
 """Time steps over that of (41); none lies on a limit of (42), where neither outcome is wrong."""
 HALVINGS = 5
+BEYOND = (1.05, 1.2, 1.5, 2.0)
+"""Steps over the exact limit with which the bed is followed for long."""
 SLOPE_DEG = 10.0
 
 
@@ -155,6 +160,22 @@ def rotation() -> dict[str, Any]:
     return {"rolling": rolling, "bed_scaled": scaled_steps}
 
 
+def followed_beds(engines: Iterable[str]) -> list[dict[str, Any]]:
+    """What a study's guards see of a bed beyond its limit."""
+    rows = []
+    for zeta, factor in itertools.product((0.0, 0.5, 1.0), BEYOND):
+        step_s = factor * limits_of("bed", zeta).whole.damped_s
+        row: dict[str, Any] = {"damping_ratio": zeta, "step_over_limit": factor}
+        for engine in engines:
+            found = follow_bed(engine, zeta, step_s)
+            row[engine] = {"outcome": found.outcome}
+            if found.outcome == "not noticed":
+                row[engine]["rms_speed_m_s"] = float(f"{found.rms_speed_m_s:.2g}")
+                row[engine]["rise"] = float(f"{found.rise:.2g}")
+        rows.append(row)
+    return rows
+
+
 def measure() -> dict[str, Any]:
     """Compute everything."""
     engines = engines_here()
@@ -171,6 +192,7 @@ def measure() -> dict[str, Any]:
             for scene in SCENES
         },
         "bed_one_contact_s": [float(f"{one_contact_s(zeta):.4g}") for zeta in DAMPING_RATIOS],
+        "bed_followed": followed_beds(engines),
         "rotation": rotation(),
     }
 

@@ -207,16 +207,19 @@ def _largest_error(results: dict[str, Any]) -> float:
     )
 
 
-def _rise(results: dict[str, Any], scene: str) -> str:
-    """Largest rise of the centre of mass of runs that drifted, percent."""
-    rises = [
-        rise
-        for rows in results["scenes"][scene]["maps"].values()
-        for row in rows
-        for outcome, rise in zip(row["outcomes"], row["rise_of_centre"], strict=True)
-        if outcome == DRIFTS
-    ]
-    return f"{100 * max(rises, default=0.0):.2g}"
+def _followed_table(results: dict[str, Any]) -> str:
+    engines = list(results["engines"])
+    rows = []
+    for row in results["bed_followed"]:
+        seen = [
+            f"{1e3 * row[e]['rms_speed_m_s']:.3g} mm/s, {100 * row[e]['rise']:+.2f} %"
+            if "rise" in row[e]
+            else f"stopped: {row[e]['outcome']}"
+            for e in engines
+        ]
+        rows.append([f"{row['damping_ratio']:g}", f"{row['step_over_limit']:g}", *seen])
+    titles = [ENGINE_TITLES[engine] for engine in engines]
+    return _table(["ζ", "step over the limit", *titles], rows)
 
 
 def _agreement(results: dict[str, Any]) -> str:
@@ -253,8 +256,7 @@ def write(results: dict[str, Any], path: Path) -> None:
         "one_contact": f"{min(factors):.1f} to {max(factors):.1f}",
         "planned": f"{min(planned):.2f} to {max(planned):.2f}",
         "planned_half": f"{min(planned) / 2:.2f} to {max(planned) / 2:.2f}",
-        "rise_column": _rise(results, "column"),
-        "rise_bed": _rise(results, "bed"),
+        "followed_table": _followed_table(results),
         "grain": f"{max(r['grain_s'] / r['whole_s'] for r in bed['limits']):.2f}",
         "grain_undamped": f"{bed['limits'][0]['grain_s'] / bed['limits'][0]['whole_s']:.2f}",
     }

@@ -26,9 +26,9 @@ from sandmould.dem.critical_step import (
     whole_step,
 )
 from sandmould.engines.choosing import engine_of
+from sandmould.engines.guard import Guard, grain_masses_kg
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop, Session
-from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 
@@ -107,14 +107,23 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class Followed:
+    """What a study would see of a bed computed for long with too large a step."""
+
+    outcome: str
+    """What the guards say."""
+    rms_speed_m_s: float
+    rise: float
+    """Rise of the centre of mass over its height."""
+
+
+@dataclass(frozen=True)
 class Run:
     """What became of a disturbance."""
 
     outcome: str
     energy_ratio: float
     """Largest kinetic energy over that of the disturbance; infinite where there was no number."""
-    steps: int
-    """Steps until the outcome was clear."""
     rise: float
     """Rise of the centre of mass over its height; not a number where there was none."""
 
@@ -157,18 +166,13 @@ class Opened:
         self.session.start_stage(self.program.stages[0])
 
 
-def _masses_kg(scenario: Scenario, snapshot: Snapshot) -> Array:
-    unit = scenario.sand.grain_mass_kg(1.0, scenario.dimension)
-    return unit * (2 * snapshot.radius_m) ** scenario.dimension
-
-
 def _settled(scenario: Scenario, settle_s: float) -> Start:
     """Let grains fall and come to rest on the reference engine."""
     with Opened(scenario) as opened:
         opened.session.start_stage(opened.program.stages[0])
         opened.session.advance(settle_s)
         last = opened.session.snapshot()
-    return Start(last.position_m, _masses_kg(scenario, last))
+    return Start(last.position_m, grain_masses_kg(scenario, last))
 
 
 @cache
@@ -220,12 +224,14 @@ def limits_of(scene: str, damping_ratio: float, rotational_inertia: str = "physi
     return Limits(*steps, scenario.critical_step.step_s)
 
 
-def _disturbance(start: Start, speed_m_s: float, vertical: bool) -> Array:
+def _disturbance(scene: str, scenario: Scenario) -> Array:
     """Velocities of a given root mean square, always the same; up and down alone in a column."""
+    start, omega = start_of(scene), limits_of(scene, 0.0).whole.omega_rad_s
     velocity = np.random.default_rng(7).standard_normal(start.position_m.shape)
-    if vertical:
+    if scene != "bed":
         velocity[:, 0] = 0.0
     energy = float(start.mass_kg @ (velocity**2).sum(axis=1))
+    speed_m_s = DISTURBANCE * scenario.gravity_m_s2 / omega
     return velocity * speed_m_s * math.sqrt(start.mass_kg.sum() / energy)
 
 
@@ -248,9 +254,7 @@ def disturb(scene: str, engine: str, damping_ratio: float, step_s: float, follow
     """
     start = start_of(scene)
     scenario = scenario_of(scene, engine, damping_ratio, time_step={"step_s": step_s})
-    gravity = scenario.gravity_m_s2
-    omega = limits_of(scene, 0.0).whole.omega_rad_s
-    velocity = _disturbance(start, DISTURBANCE * gravity / omega, scene != "bed")
+    velocity = _disturbance(scene, scenario)
     first = float(start.mass_kg @ (velocity**2).sum(axis=1))
     looks: list[tuple[int, float]] = []
     with Opened(scenario) as opened:
@@ -269,14 +273,44 @@ def disturb(scene: str, engine: str, damping_ratio: float, step_s: float, follow
                     break
         except EngineStop:
             looks.append((session.steps, math.inf))
-    highest, steps = max(ratio for _, ratio in looks), looks[-1][0]
+    highest = max(ratio for _, ratio in looks)
     if not highest < BLOWN:
-        return Run(BLOWS_UP, highest, steps, math.nan)
+        return Run(BLOWS_UP, highest, math.nan)
     early = max(ratio for step, ratio in looks if step <= STEPS // 2)
     late = max((ratio for step, ratio in looks if step > STEPS // 2), default=0.0)
     height = float(start.mass_kg @ start.position_m[:, 1])
     way = float(start.mass_kg @ (after - start.position_m)[:, 1])
-    sag = gravity * float(start.mass_kg.min()) / scenario.contact.grain_wall.normal_stiffness_n_m
+    weight = scenario.gravity_m_s2 * float(start.mass_kg.min())
+    sag = weight / scenario.contact.grain_wall.normal_stiffness_n_m
     sinks = abs(way) > SAGS * sag * start.mass_kg.sum()
     drifts = highest > GROWN or late > max(1.0, GROWTH * early) or sinks
-    return Run(DRIFTS if drifts else STABLE, highest, steps, way / height)
+    return Run(DRIFTS if drifts else STABLE, highest, way / height)
+
+
+def follow_bed(engine: str, damping_ratio: float, step_s: float) -> Followed:
+    """Compute 10 000 steps of the disturbed bed under a study's own guards.
+
+    Parameters
+    ----------
+    engine : str
+    damping_ratio : float
+    step_s : float
+    """
+    start = start_of("bed")
+    scenario = scenario_of("bed", engine, damping_ratio, time_step={"step_s": step_s})
+    guard = Guard(scenario)
+    speed, rise = math.nan, math.nan
+    with Opened(scenario) as opened:
+        session = opened.session
+        opened.begin(start.position_m, _disturbance("bed", scenario))
+        guard.start_stage(session.stage, session.snapshot())
+        try:
+            while session.steps < 10_000:
+                session.advance(250 * step_s)
+                snapshot = session.snapshot()
+                speed = guard.check(snapshot).rms_speed_m_s
+                height = start.mass_kg @ np.column_stack([snapshot.position_m, start.position_m])
+                rise = float(height[1] / height[3]) - 1
+        except EngineStop as stop:
+            return Followed(stop.outcome.label, speed, rise)
+    return Followed("not noticed", speed, rise)

@@ -145,8 +145,7 @@ def gripping_impact(engine: str, dimension: int, regime: str) -> Iterator[Measur
 
 @case(
     "(22), (23)",
-    "1e-6, (omega dt)^2/8, on the reference engine; on the others what an arm of r makes, as a known "
-    "difference",
+    "1e-6, (omega dt)^2/8, on the reference engine; others may differ by what an arm of r makes",
 )
 def contact_point(engine: str, dimension: int) -> Iterator[Measured]:
     """Where on the overlap friction acts: the arm at a wall, shown by a deep sliding impact.

@@ -77,7 +77,11 @@ def moment_of_the_smaller_radius(engine: str, dimension: int) -> Iterator[Measur
             )
 
 
-@case("(29), regularised", "1e-5: the sag over the radius; (omega dt)^2/24 is less", where=["floor", "pair"])
+@case(
+    "(29), regularised",
+    "1e-5: the sag over the radius; (omega dt)^2/24 is less",
+    where=["floor", "pair"],
+)
 def swing_of_the_rolling_spring(engine: str, dimension: int, where: str) -> Iterator[Measured]:
     """Below its limit the rolling moment is a spring, k_roll r_eff^2 times the angle rolled.
 
