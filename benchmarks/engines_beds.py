@@ -138,8 +138,8 @@ def _resting() -> dict[str, Any]:
         "time_step": {"fraction": 0.8},
         "background_damping": {
             "form": "viscous",
-            "viscous_translation_per_s": 300.0,
-            "viscous_rotation_per_s": 300.0,
+            "viscous_translation_per_s": 1000.0,
+            "viscous_rotation_per_s": 1000.0,
         },
         "fill": {"settling": {"rms_speed_m_s": 1e-3, "shortest_s": 0.005}},
         "record": {"series_every_s": 0.001},

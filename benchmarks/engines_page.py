@@ -22,10 +22,10 @@ _HOW = """\
 
 Made by `make benchmarks` (`benchmarks/engines.py`) on a machine with nothing else to do; do not
 edit. `make benchmarks QUICK=--quick` takes tiny scenes and writes to `results/benchmarks/`. What is
-compared ran in turns (A B C, A B C, ...), {rounds} of about {block_s:g} s each. Given are medians over the
-turns, of times and of ratios within a turn, and in brackets the least and the most. All of it took
-{minutes:.0f} minutes; the load of the machine was {before:.1f} before and {after:.1f} after. Ratios travel to
-other machines better than times.
+compared ran in turns (A B C, A B C, ...), {rounds} of about {block_s:g} s each. Given are medians
+over the turns, of times and of ratios within a turn, and in brackets the least and the most. All of
+it took {minutes:.0f} minutes; the load of the machine was {before:.1f} before and {after:.1f}
+after. Ratios travel to other machines better than times.
 
 ![Rates, sizes, limits and accuracy](speed.png)
 """
