@@ -96,11 +96,14 @@ def _limits(ax: Axes, beds: list[dict[str, Any]]) -> None:
         width = np.maximum(0.0, [parts[name] for parts in shown])
         ax.barh(y, width, 0.4, left, color=colour, edgecolor="black", lw=0.4, label=name)
         left += width
+    whole = [bed["ns_per_grain_step"]["median"] for bed in beds]
+    ax.plot(whole, y + 0.3, "|", color="black", ms=10, mew=2, label="whole step")
     for name, marker in _LIMITS.items():
         x = [bed["bounds_ns"][name] for bed in beds]
         ax.plot(x, y - 0.32, marker, color="black", ms=6, label=f"limit: {name}")
     ax.set_yticks(y, [bed["bed"] for bed in beds])
     ax.set_ylim(-0.6, len(beds) - 0.5)
+    ax.set_xlim(0, 1.05 * max(*left, *whole))
     ax.set_xlabel("ns per grain-step")
     ax.set_title("Where a step of the reference goes, and its limits")
     ax.legend(frameon=False, fontsize=7, ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.14))

@@ -37,8 +37,8 @@ all engines know), friction and rolling on, no background damping, walls as stif
 The reference settles a bed once; each engine is then given the same places and velocities, without
 contact history, and computes its own deck with the neighbour skin that it takes by itself. At rest
 hardly any neighbours are listed anew; the shaken bed, one period a turn, has that too. A pair
-counts once, so contacts per grain are half the coordination number. How far a grain moved shows
-that the bed stayed what it was; engines that did more steps had more time for a straggler to fall.
+counts once, so contacts per grain are half the coordination number. All engines do the same number
+of steps; how far the farthest grain moved meanwhile shows that the bed stayed what it was.
 """
 _SIZE = """\
 ## Scene size

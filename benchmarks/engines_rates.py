@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -40,23 +41,30 @@ def _per_grain(session: Session, gap_m: float) -> float:
     return sum(len(first) for first, _, _ in found) / session.grains
 
 
-def _steps(session: Session, block_s: float, shaken: bool) -> int:
-    """Steps of a block after a warm-up: one period of shaking, or a time."""
-    if not shaken:
-        return steps_lasting(lambda steps: session.advance(steps * session.step_s), block_s)
-    steps = round(PERIOD_S / session.step_s)
-    session.advance(steps * session.step_s)
-    return steps
+def _advance(session: Session, steps: int) -> None:
+    if steps > 0:
+        session.advance(steps * session.step_s)
 
 
-def _runner(session: Session, steps: int) -> Callable[[], float]:
-    """Make a block that computes steps and gives grain-steps per second."""
+def _steps_of_turn(sessions: Iterable[Session], block_s: float, shaken: bool) -> int:
+    """Steps of a turn, the same for all engines, and all brought to the same step before it.
 
-    def block() -> float:
-        took = seconds(lambda: session.advance(steps * session.step_s))
-        return session.grains * steps / took
+    A turn at rest takes the slowest engine half as long again as a block; of shaking, a period.
+    """
+    sessions = list(sessions)
+    if shaken:
+        steps = [round(PERIOD_S / sessions[0].step_s)]
+    else:
+        steps = [steps_lasting(partial(_advance, one), block_s) for one in sessions]
+    begun = max(steps[0] if shaken else one.steps for one in sessions)
+    for one in sessions:
+        _advance(one, begun - one.steps)
+    return steps[0] if shaken else round(1.5 * min(steps))
 
-    return block
+
+def _rate(session: Session, steps: int) -> float:
+    """Grain-steps per second of a turn."""
+    return session.grains * steps / seconds(lambda: _advance(session, steps))
 
 
 def _begin(session: Session, scenario: Scenario, bed: Bed, shaken: bool) -> None:
@@ -75,7 +83,6 @@ def measure_bed(bed: Bed, settings: Settings, shaken: bool = False) -> dict[str,
     """Rates of all engines that are installed, from one state."""
     rows: dict[str, dict[str, Any]] = {}
     missing: dict[str, str] = {}
-    blocks: dict[str, Callable[[], float]] = {}
     sessions: dict[str, Session] = {}
     with ExitStack() as stack:
         for name in ENGINES:
@@ -87,8 +94,9 @@ def measure_bed(bed: Bed, settings: Settings, shaken: bool = False) -> dict[str,
             session = sessions[name] = stack.enter_context(opened(scenario))
             _begin(session, scenario, bed, shaken)
             skin = _skin_m(scenario)
-            blocks[name] = _runner(session, _steps(session, settings.block_s, shaken))
             rows[name] = {"skin_m": skin, "listed_per_grain": _per_grain(session, skin)}
+        steps = _steps_of_turn(sessions.values(), settings.block_s, shaken)
+        blocks = {name: partial(_rate, session, steps) for name, session in sessions.items()}
         rates = interleaved(blocks, (settings.rounds + 1) // 2 if shaken else settings.rounds)
         for name, session in sessions.items():
             moved = np.linalg.norm(session.snapshot().position_m - bed.position_m, axis=1)
@@ -96,7 +104,6 @@ def measure_bed(bed: Bed, settings: Settings, shaken: bool = False) -> dict[str,
                 "grain_steps_per_s": spread(rates[name]),
                 "contacts_per_grain": _per_grain(session, 0.0),
                 "farthest_moved_m": float(moved.max()),
-                "steps": session.steps,
             }
     return {
         "bed": bed.name + (", shaken at 50 Hz and 1.5 g" if shaken else ""),
@@ -104,6 +111,7 @@ def measure_bed(bed: Bed, settings: Settings, shaken: bool = False) -> dict[str,
         "grains": bed.grains,
         "settled": not shaken,
         "step_s": scenario.step_s,
+        "steps": session.steps,
         "engines": rows,
         "missing": missing,
         "reference_over": _ratios(rates),

@@ -15,7 +15,7 @@ import numpy as np
 class Settings:
     """How much is measured."""
 
-    rounds: int = 7
+    rounds: int = 9
     block_s: float = 0.5
     """Length of one timed block."""
     discs: tuple[int, ...] = (2_500, 20_000)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import re
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ def vector(components: Any) -> str:
     return " ".join(exact(c + 0.0) for c in padded)
 
 
+@functools.cache
 def environment(dialect: str) -> jinja2.Environment:
     """Strict Jinja environment of one dialect: a misspelt name is an error, never empty text.
 

@@ -339,9 +339,9 @@ def test_session_advances_by_a_duration_in_a_folder_with_spaces(tmp_path: Path) 
     restored = open_lammps(scene, folder, checkpoint=folder)
     assert steps == math.ceil(0.0123 / scene.step_s)
     assert session.steps == restored.steps > steps
-    with pytest.raises(RefusedError, match="a rigid surface on engine lammps"):
+    with pytest.raises(RefusedError, match="a polygon or a mesh on engine lammps"):
         session.move_surface("floor", np.zeros((2, 2)), 0.01)
-    with pytest.raises(RefusedError, match="a rigid surface on engine lammps"):
+    with pytest.raises(RefusedError, match="a surface moved by move_surface on engine lammps"):
         session.attach_elastic_surface("floor", np.eye(2), np.ones(2), np.ones(2))
     session.close()
     restored.close()
