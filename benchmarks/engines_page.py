@@ -66,9 +66,9 @@ _PARTS = """\
 ### Where a step goes
 
 ns per grain-step. Each part is a step with it less a step without it, so a small part may come out
-below zero; the rest is what the sum leaves of the whole step. `guessing` is what the list of pairs
-takes beyond the lists of the touching pairs alone and of the others alone: wrong guesses at the
-branch whether a pair touches.
+below zero; the rest is the whole step less all parts. Guessing is what the list of pairs takes
+beyond the lists of the touching pairs alone and of the others alone: wrong guesses at the branch
+whether a pair touches.
 """
 _VECTORS = """\
 LLVM does not make vectors across contacts: which pairs touch is known one by one, and forces are
@@ -152,6 +152,7 @@ def _targets(found: dict[str, Any]) -> str:
         *_ratio_targets(found),
         _threads_target(found["threads"]),
         _scale_target(found["scale"]["2"], "discs"),
+        _scale_target(found["scale"]["3"], "spheres"),
     ]
     return "## Targets\n\n" + _table(["what", "target", "measured", ""], rows)
 
@@ -323,14 +324,12 @@ def _parts(beds: list[dict[str, Any]]) -> str:
     ):
         rows.append([title, *(_with_range(bed[group][name]) for bed in shown)])
     rows.append(["whole step", *(_with_range(bed["ns_per_grain_step"]) for bed in shown)])
-    listing = [
-        "one listing, ns per grain",
-        *(_with_range(b["listing_ns_per_grain"]) for b in shown),
-    ]
-    waiting = ["the contacts one after the other, roots and quotients alone, ns per grain-step",
-               *(f"{bed['waiting_ns']:.1f}" for bed in shown)]  # fmt: skip
+    chain = "contacts, if each waited for the one before: its chained roots and quotients alone"
+    rows.append([chain, *(f"{bed['waiting_ns']:.1f}" for bed in shown)])
+    listing = (_with_range(bed["listing_ns_per_grain"]) for bed in shown)
+    rows.append(["one listing of neighbours, ns per grain", *listing])
     head = ["part", *(bed["bed"] for bed in shown)]
-    return _PARTS + "\n" + _table(head, [*rows, listing, waiting]) + "\n" + _VECTORS
+    return _PARTS + "\n" + _table(head, rows) + "\n" + _VECTORS
 
 
 def _accuracy(rows: list[dict[str, Any]]) -> str:

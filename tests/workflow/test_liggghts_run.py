@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +14,7 @@ from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.program import build_program
 from sandmould.study.expand import scenario_hash
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
-from tests.workflow.test_one_run import last_snapshot, run_folder, simulate
+from tests.workflow.test_one_run import kill_after_a_checkpoint, last_snapshot, run_folder, simulate
 
 pytestmark = needs_liggghts
 SHORT = {
@@ -61,21 +55,7 @@ def test_layers_come_to_rest_one_after_the_other(straight: Path) -> None:
 
 def test_killed_run_resumes_and_ends_as_if_never_stopped(straight: Path, tmp_path: Path) -> None:
     folder = run_folder(liggghts_scene(**SHORT), tmp_path)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sandmould.study.simulate", str(folder)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    deadline = time.monotonic() + 60
-    while not list(folder.glob("work/checkpoint_*/mark.json")):
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.01)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    assert not (folder / "outcome.json").exists()
-    marks = [json.loads(p.read_text())["mark"] for p in folder.glob("work/checkpoint_*/mark.json")]
-    assert max(m["steps"] for m in marks) > 0
+    kill_after_a_checkpoint(folder)
     assert simulate(folder) == 0
     one, two = last_snapshot(straight), last_snapshot(folder)
     for name in ("position_m", "velocity_m_s", "spin_rad_s"):

@@ -51,6 +51,25 @@ def simulate(folder: Path) -> int:
     return subprocess.run(command, capture_output=True, text=True).returncode
 
 
+def kill_after_a_checkpoint(folder: Path) -> None:
+    """Start a run and kill it as soon as it has left a checkpoint."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sandmould.study.simulate", str(folder)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    deadline = time.monotonic() + 60
+    while not list(folder.glob("work/checkpoint_*/mark.json")):
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (folder / "outcome.json").exists()
+    marks = [json.loads(p.read_text())["mark"] for p in folder.glob("work/checkpoint_*/mark.json")]
+    assert max(m["steps"] for m in marks) > 0
+
+
 def drive(scenario: Scenario, folder: Path) -> RunOutcome:
     """Compute a run in this process."""
     program = build_program(scenario)
@@ -136,21 +155,7 @@ def _state(folder: Path) -> dict[str, Any]:
 
 def test_killed_run_resumes_and_ends_as_if_never_stopped(straight: Path, tmp_path: Path) -> None:
     folder = run_folder(tube_scene(), tmp_path)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sandmould.study.simulate", str(folder)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    deadline = time.monotonic() + 60
-    while not list(folder.glob("work/checkpoint_*/mark.json")):
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.01)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    assert not (folder / "outcome.json").exists()
-    marks = [json.loads(p.read_text())["mark"] for p in folder.glob("work/checkpoint_*/mark.json")]
-    assert max(m["steps"] for m in marks) > 0
+    kill_after_a_checkpoint(folder)
     assert simulate(folder) == 0
     for name, values in _state(straight).items():
         np.testing.assert_array_equal(values, _state(folder)[name])

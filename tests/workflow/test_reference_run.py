@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +16,13 @@ from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene
-from tests.workflow.test_one_run import drive, last_snapshot, run_folder, simulate
+from tests.workflow.test_one_run import (
+    drive,
+    kill_after_a_checkpoint,
+    last_snapshot,
+    run_folder,
+    simulate,
+)
 
 TWO_LAYERS = {"fill": {"layers": [{"count": 60, "repeat": 2}]}, "engine": {"name": "reference"}}
 SPHERES = {
@@ -65,19 +66,7 @@ def test_killed_run_resumes_and_ends_as_if_never_stopped(tmp_path: Path) -> None
         folders.append(run_folder(shaken, tmp_path / name))
     straight, killed = folders
     assert simulate(straight) == 0
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sandmould.study.simulate", str(killed)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    deadline = time.monotonic() + 120
-    while not list(killed.glob("work/checkpoint_*/mark.json")):
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.01)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    assert not (killed / "outcome.json").exists()
+    kill_after_a_checkpoint(killed)
     assert simulate(killed) == 0
     one, two = last_snapshot(straight), last_snapshot(killed)
     for name in ("position_m", "velocity_m_s", "spin_rad_s"):
