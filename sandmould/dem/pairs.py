@@ -30,7 +30,7 @@ from sandmould.dem.vectors import (
 )
 
 CHUNK = 4096
-"""Grains of a chunk, at least."""
+"""Grains of a chunk."""
 
 
 class Chunks(NamedTuple):
@@ -53,11 +53,12 @@ class Chunks(NamedTuple):
 
 
 def chunk_bounds(grains: int) -> Ints:
-    """Split grains into chunks of 4 096 or more; how many depends on the scene alone.
+    """Split grains into chunks of about ``CHUNK``; how many depends on the scene alone.
 
-    A chunk fits into a core's own cache, and few of its pairs cross to another.
+    A chunk fits into a core's own cache, and few of its pairs cross to another. Their number is
+    even, so that two threads share them evenly.
     """
-    chunks = max(1, grains // CHUNK)
+    chunks = max(1, 2 * round(grains / (2 * CHUNK)))
     return np.linspace(0, grains, chunks + 1).astype(np.int64)
 
 

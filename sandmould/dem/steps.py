@@ -232,7 +232,7 @@ def advance(
         ``DONE``, ``LIST_IS_OLD`` (the next step has drifted) or ``NOT_A_NUMBER``.
     """
     chunks = len(moving.chunks.bound) - 1
-    mine = range(thread * chunks // threads, (thread + 1) * chunks // threads)
+    mine = range(thread, chunks, threads)
     barrier, speeds2, state = team.barrier, team.speeds2, team.state
     for k in range(1 if drifted else 0, steps + 1):
         if k == 0:

@@ -22,10 +22,11 @@ def test_case_holds(case: Case, engine: str, dimension: int) -> None:
     try:
         results = case.run(engine, dimension)
     except RefusedCase as refusal:
-        # On the machine that checks every change all engines are there.
-        if refusal.key == "engine.name" and "CI" in os.environ:
-            raise
-        pytest.skip(f"{engine} refuses {refusal}")
+        if refusal.key != "engine.name":
+            return  # a term that the engine lacks, named as it should be
+        if "CI" in os.environ:
+            raise  # there all engines are installed
+        pytest.skip(f"{engine}: {refusal}")
     assert results
     off = [r for r in results if not r.holds]
     assert not off, "; ".join(
