@@ -18,7 +18,8 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
 
 SKIN_OVER_DIAMETER = 0.3
-"""Neighbour skin over the mean diameter; within 5 % of the cheapest between 0.08 and 0.25."""
+"""Neighbour skin over the mean diameter. A run of 1 134 shaken discs took no longer at 0.4 and more
+than twice as long at 0.15, one busy machine, two runs each."""
 
 
 def _law(scenario: Scenario, law: ContactLaw) -> Law:
