@@ -14,14 +14,13 @@ from sandmould.dem.vectors import (
     INLINED,
     dot,
     in_space,
+    limited,
     plus,
     rolling_part,
     spin_slip,
-    tangent,
+    tangent_after,
     tangent_moment,
     times,
-    turned,
-    turned_moment,
 )
 
 
@@ -46,14 +45,36 @@ class Law(NamedTuple):
     """Whether rolling resistance also resists twist about the normal in 3D, as (31) reads."""
 
 
-@njit(**INLINED)
-def limited(action: Any, limit: float) -> Any:
-    """Return mapping, eqs. (26)-(28): an action no larger than the limit stays as it is.
+class Pairing(NamedTuple):
+    """What the law makes of the sizes of two bodies in contact, or of a grain at a surface."""
 
-    Without a branch: which contacts slip cannot be foretold, and a wrong guess costs more.
+    damping: float
+    """Coefficient of the dashpot, N s/m, eqs. (19)-(21)."""
+    rolling_stiffness: float
+    """N m, the spring that regularises eq. (29)."""
+    rolling_arm: float
+    """m, largest rolling moment over the normal force, eqs. (30)-(33)."""
+
+
+@njit(**INLINED)
+def pairing(law: Law, mass: float, smaller: float, effective: float) -> Pairing:
+    """Apply a law to sizes.
+
+    Parameters
+    ----------
+    law : Law
+    mass : float, kg
+        m1 m2 / (m1 + m2), or m1 at a surface, eq. (21).
+    smaller : float, m
+        Smaller of the two radii, eq. (33), or r1 at a surface.
+    effective : float, m
+        r1 r2 / (r1 + r2), or r1 at a surface.
     """
-    size2, limit2 = dot(action, action), limit * limit + 1e-300
-    return times(action, limit / math.sqrt(size2 if size2 > limit2 else limit2))
+    return Pairing(
+        2.0 * law.damping_ratio * math.sqrt(mass * law.k_n),
+        law.k_roll * effective * effective,
+        law.rolling_arm * smaller,
+    )
 
 
 @njit(**INLINED)
@@ -65,9 +86,7 @@ def contact(
     w_2: Any,
     arm_1: float,
     arm_2: float,
-    mass: float,
-    smaller: float,
-    effective: float,
+    sizes: Pairing,
     law: Law,
     dt: float,
     friction: Any,
@@ -88,12 +107,8 @@ def contact(
         Spins, one component in 2D.
     arm_1, arm_2 : float, m
         Distances of the centres from the contact point; 0 for a surface.
-    mass : float, kg
-        m1 m2 / (m1 + m2), or m1 at a surface, eq. (21).
-    smaller : float, m
-        Smaller of the two radii, eq. (33).
-    effective : float, m
-        r1 r2 / (r1 + r2), or r1 at a surface.
+    sizes : Pairing
+        Of this law.
     law : Law
     dt : float, s
     friction, rolling : tuple of floats, N and N m
@@ -110,23 +125,22 @@ def contact(
     normal : float, N
         Normal force, positive in compression.
     """
-    damping = 2.0 * law.damping_ratio * math.sqrt(mass * law.k_n)
-    normal = law.k_n * overlap - damping * dot(v, n)
+    normal = law.k_n * overlap - sizes.damping * dot(v, n)
     least = 0.0 if law.clip_total else -math.inf
     normal = normal if normal > least else least
     # Slip of body 2 over body 1 drags body 1 along: the sign that (25) needs under (14).
-    slip = plus(tangent(n, v), -1.0, spin_slip(n, plus(times(w_1, arm_1), arm_2, w_2)))
-    friction = plus(turned(n, friction), law.k_t * dt, slip)
+    spun = spin_slip(n, plus(times(w_1, arm_1), arm_2, w_2))
+    friction = plus(tangent_after(n, friction, law.k_t * dt, v), -law.k_t * dt, spun)
     friction = limited(friction, law.friction * abs(normal))
     force = plus(in_space(n, friction), -normal, n)
     turning = tangent_moment(n, friction)
     moment_1 = times(turning, arm_1)
     moment_2 = times(turning, arm_2)
     if law.rolling_arm > 0.0:
-        relative = rolling_part(n, plus(w_1, -1.0, w_2), law.twist)
-        stiffness = law.k_roll * effective * effective
-        rolling = plus(turned_moment(n, rolling, law.twist), -stiffness * dt, relative)
-        rolling = limited(rolling, law.rolling_arm * smaller * abs(normal))
+        relative = plus(w_1, -1.0, w_2)
+        rolling = plus(rolling, -sizes.rolling_stiffness * dt, relative)
+        rolling = rolling_part(n, rolling, law.twist)
+        rolling = limited(rolling, sizes.rolling_arm * abs(normal))
         moment_1 = plus(moment_1, 1.0, rolling)
         moment_2 = plus(moment_2, -1.0, rolling)
     return force, moment_1, moment_2, friction, rolling, normal

@@ -15,6 +15,7 @@ from numba import njit
 
 from sandmould.dem.contact_law import Law, contact
 from sandmould.dem.grains import Floats, Grains, Ints
+from sandmould.dem.kinds import Kinds, pairing_of
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.vectors import (
     OPTIONS,
@@ -92,7 +93,14 @@ def split(grains: Grains, pairs: Pairs) -> Chunks:
 
 @njit(**OPTIONS)
 def press_pairs(
-    dim: Any, c: int, chunks: Chunks, grains: Grains, pairs: Pairs, law: Law, dt: float
+    dim: Any,
+    c: int,
+    chunks: Chunks,
+    grains: Grains,
+    kinds: Kinds,
+    pairs: Pairs,
+    law: Law,
+    dt: float,
 ) -> None:
     """Add the forces of one chunk's pairs; its grains' forces must be zero before.
 
@@ -104,13 +112,16 @@ def press_pairs(
         The chunk.
     chunks : Chunks
     grains : Grains
+    kinds : Kinds
+        Of the grains, for this law.
     pairs : Pairs
     law : Law
     dt : float, s
     """
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     position, velocity, spin = grains.position, grains.velocity, grains.spin
-    radius, mass, force, moment = grains.radius, grains.mass, grains.force, grains.moment
+    radius, force, moment = grains.radius, grains.force, grains.moment
+    kind, pairings = kinds.of_grain, kinds.pairings
     start, other, touching = pairs.start, pairs.other, pairs.touching
     friction, rolling = pairs.friction, pairs.rolling
     slot_force, slot_moment = chunks.force, chunks.moment
@@ -118,7 +129,7 @@ def press_pairs(
     slot = chunks.first_slot[c]
     for i in range(begin, end):
         x, v, w = load(dim, position, i), load(dim, velocity, i), load_spin(dim, spin, i)
-        r, m = radius[i], mass[i]
+        r, kind_i = radius[i], kind[i]
         force_i, moment_i = no_vector(dim), no_spin(dim)
         for k in range(start[i], start[i + 1]):
             j = other[k]
@@ -129,7 +140,6 @@ def press_pairs(
             if distance2 < reach * reach:
                 distance = math.sqrt(distance2)
                 overlap = reach - distance
-                m_j = mass[j]
                 press, turn_i, turn_j, slide, roll, _ = contact(
                     times(apart, 1.0 / distance),
                     overlap,
@@ -138,9 +148,7 @@ def press_pairs(
                     load_spin(dim, spin, j),
                     r - 0.5 * overlap,
                     r_j - 0.5 * overlap,
-                    m * m_j / (m + m_j),
-                    min(r, r_j),
-                    r * r_j / reach,
+                    pairing_of(pairings, kind_i, kind[j]),
                     law,
                     dt,
                     load_spin(dim, friction, k),

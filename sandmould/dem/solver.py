@@ -11,6 +11,7 @@ import numpy as np
 from sandmould.dem.barrier import new_barrier
 from sandmould.dem.broad_phase import Candidates, find_candidates
 from sandmould.dem.grains import Floats, Grains, Ints
+from sandmould.dem.kinds import find_kinds
 from sandmould.dem.motion import kick
 from sandmould.dem.neighbours import (
     Pairs,
@@ -89,7 +90,9 @@ class Solver:
         candidates = Candidates(none, np.zeros(1, dtype=np.int64), none.copy())
         chunks = split(grains, pairs)
         walls = self._walls(chunks.bound, candidates, new_history(self._dim, 0))
-        return Moving(grains, pairs, chunks, walls, self._upright(0), np.zeros((0, d)), np.zeros(1))
+        kinds = find_kinds(grains, self.scene.grain_law)
+        upright, listed = self._upright(0), np.zeros((0, d))
+        return Moving(grains, kinds, pairs, chunks, walls, upright, listed, np.zeros(1))
 
     def _upright(self, n: int) -> Floats:
         """Orientations of grains not turned yet."""
@@ -187,6 +190,7 @@ class Solver:
         orientation = old.orientation[order] if self._orientations else old.orientation
         self._moving = Moving(
             grains,
+            find_kinds(grains, self.scene.grain_law),
             pairs,
             chunks,
             walls,
@@ -313,6 +317,13 @@ class Solver:
             chunks.bound, part(Candidates, "candidates"), part(WallHistory, "history")
         )._replace(listed=arrays["listed_vertices"])
         self._moving = Moving(
-            grains, pairs, chunks, walls, arrays["orientation"], arrays["listed"], arrays["reach"]
+            grains,
+            find_kinds(grains, self.scene.grain_law),
+            pairs,
+            chunks,
+            walls,
+            arrays["orientation"],
+            arrays["listed"],
+            arrays["reach"],
         )
         self.steps = int(arrays["steps"])

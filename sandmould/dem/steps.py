@@ -11,6 +11,7 @@ from sandmould.dem.barrier import wait_for_all
 from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Grains, Ints
+from sandmould.dem.kinds import Kinds
 from sandmould.dem.motion import Damping, drift, kick, turn
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.pairs import Chunks, gather_incoming, press_pairs
@@ -57,6 +58,7 @@ class Moving(NamedTuple):
     """What the loop moves."""
 
     grains: Grains
+    kinds: Kinds
     pairs: Pairs
     chunks: Chunks
     walls: Walls
@@ -96,7 +98,7 @@ def _press(
 ) -> None:
     """Add all forces on the grains of a chunk but those of earlier chunks."""
     grains, walls = moving.grains, moving.walls
-    press_pairs(dim, c, moving.chunks, grains, moving.pairs, scene.grain_law, dt)
+    press_pairs(dim, c, moving.chunks, grains, moving.kinds, moving.pairs, scene.grain_law, dt)
     press_on_surfaces(
         dim,
         walls.first_row[c],

@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sandmould.dem.broad_phase import Candidates
-from sandmould.dem.contact_law import Law, contact
+from sandmould.dem.contact_law import Law, contact, pairing
 from sandmould.dem.nearest_point import FAR, nearest
 from sandmould.dem.surfaces import SurfaceArrays
 from sandmould.dem.vectors import (
@@ -205,7 +205,7 @@ def press_on_surfaces(
                 taken += 1
             on_grain, moment_1, _, friction, rolling, _ = contact(
                 n, r - distance, v, w, no_spin(like), max(distance, 0.0), 0.0,
-                mass[i], r, r, law, lapse, friction, rolling,
+                pairing(law, mass[i], r, r), law, lapse, friction, rolling,
             )  # fmt: skip
             total = plus(total, 1.0, on_grain)
             turning = plus(turning, 1.0, moment_1)

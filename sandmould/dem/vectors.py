@@ -143,10 +143,9 @@ add_to = _by_length(
     two=_add_2,
     three=_add_3,
 )
-tangent = _by_length(
-    "tangent",
-    "Part of v in the tangent plane of n: tangent(n, v), eq. (22) with its missing factor n.",
-    two=lambda n, v: (n[0] * v[1] - n[1] * v[0],),
+without = _by_length(
+    "without",
+    "Part of v in the plane of n in 3D: without(n, v).",
     three=lambda n, v: plus(v, -dot(n, v), n),
 )
 in_space = _by_length(
@@ -177,25 +176,20 @@ tangent_moment = _by_length(
 )
 
 
-turned = _by_length(
-    "turned",
-    "The tangent t of the last step in the plane of n: turned(n, t).\n\n"
-    "Its length falls by the square of the angle turned in a step, some 1e-9 of it.",
-    two=lambda n, t: t,
-    three=lambda n, t: plus(t, -dot(n, t), n),
+tangent_after = _by_length(
+    "tangent_after",
+    "The tangent t of the last step in the plane of n, and s times that of v, eq. (22) with its\n"
+    "missing factor n: tangent_after(n, t, s, v).\n\n"
+    "The length of t falls by the square of the angle turned in a step, some 1e-9 of it.",
+    two=lambda n, t, s, v: (t[0] + s * (n[0] * v[1] - n[1] * v[0]),),
+    three=lambda n, t, s, v: without(n, plus(t, s, v)),
 )
 rolling_part = _by_length(
     "rolling_part",
-    "Part of a relative spin that rolls: rolling_part(n, w, twist).\n\n"
+    "Part of a relative spin or its moment that rolls: rolling_part(n, w, twist).\n\n"
     "In 3D the spin about n is left out unless twist is resisted too.",
     two=lambda n, w, twist: w,
-    three=lambda n, w, twist: w if twist else plus(w, -dot(n, w), n),
-)
-turned_moment = _by_length(
-    "turned_moment",
-    "Rolling moment of the step before, turned with the contact: turned_moment(n, m, twist).",
-    two=lambda n, m, twist: m,
-    three=lambda n, m, twist: m if twist else turned(n, m),
+    three=lambda n, w, twist: w if twist else without(n, w),
 )
 spin_cross = _by_length(
     "spin_cross",
@@ -214,6 +208,20 @@ def _one_component(action: float, rate: float, alpha: float) -> float:
     return action - alpha * abs(action) * (math.copysign(1.0, rate) if rate != 0.0 else 0.0)
 
 
+@register_jitable
+def _limited_3(action: Any, limit: float) -> Any:
+    # Without a branch: which contacts slip cannot be foretold, and a wrong guess costs more.
+    size2, limit2 = dot(action, action), limit * limit + 1e-300
+    return times(action, limit / math.sqrt(size2 if size2 > limit2 else limit2))
+
+
+limited = _by_length(
+    "limited",
+    "Return mapping, eqs. (26)-(28): an action no larger than the limit stays as it is:\n"
+    "limited(action, limit).",
+    one=lambda a, limit: (max(-limit, min(limit, a[0])),),
+    three=lambda a, limit: _limited_3(a, limit),
+)
 damped_by_component = _by_length(
     "damped_by_component",
     "(39) and (38) component by component: damped_by_component(action, rate, alpha).",
