@@ -21,6 +21,7 @@ from sandmould.dem.vectors import (
     OPTIONS,
     add_to,
     dot,
+    index,
     load,
     load_spin,
     no_spin,
@@ -125,14 +126,14 @@ def press_pairs(
     start, other, touching = pairs.start, pairs.other, pairs.touching
     friction, rolling = pairs.friction, pairs.rolling
     slot_force, slot_moment = chunks.force, chunks.moment
-    begin, end = chunks.bound[c], chunks.bound[c + 1]
+    begin, end = chunks.bound[c], index(chunks.bound[c + 1])
     slot = chunks.first_slot[c]
-    for i in range(begin, end):
+    for i in range(begin, chunks.bound[c + 1]):
         x, v, w = load(dim, position, i), load(dim, velocity, i), load_spin(dim, spin, i)
-        r, kind_i = radius[i], kind[i]
+        r, kind_i = radius[i], index(kind[i])
         force_i, moment_i = no_vector(dim), no_spin(dim)
-        for k in range(start[i], start[i + 1]):
-            j = other[k]
+        for k in range(index(start[i]), index(start[i + 1])):
+            j = index(other[k])
             r_j = radius[j]
             apart = plus(load(dim, position, j), -1.0, x)
             distance2 = dot(apart, apart)
@@ -148,7 +149,7 @@ def press_pairs(
                     load_spin(dim, spin, j),
                     r - 0.5 * overlap,
                     r_j - 0.5 * overlap,
-                    pairing_of(pairings, kind_i, kind[j]),
+                    pairing_of(pairings, kind_i, index(kind[j])),
                     law,
                     dt,
                     load_spin(dim, friction, k),

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from llvmlite import binding
 from numba.extending import overload, register_jitable
 
@@ -29,6 +30,8 @@ and the same instructions were a quarter slower where they began in the middle o
 """
 INLINED = OPTIONS | {"forceinline": True}
 """For functions called for every contact: their many arguments stay in registers."""
+index = np.uint64
+"""Turns a row number into an index that never counts from the end, which need not be asked then."""
 PLANE = (0.0, 0.0)
 """Pass as ``like`` for 2D."""
 SPACE = (0.0, 0.0, 0.0)
@@ -79,15 +82,15 @@ times = _by_length(
 load = _by_length(
     "load",
     "Row i of an array of vectors: load(like, array, i).",
-    two=lambda like, a, i: (a[i, 0], a[i, 1]),
-    three=lambda like, a, i: (a[i, 0], a[i, 1], a[i, 2]),
+    two=lambda like, a, i: (a[index(i), 0], a[index(i), 1]),
+    three=lambda like, a, i: (a[index(i), 0], a[index(i), 1], a[index(i), 2]),
 )
 load_spin = _by_length(
     "load_spin",
     "Row i of an array of spins, moments or tangents: load_spin(like, array, i).\n\n"
     "In 2D the last component, so that arrays of three serve too.",
-    two=lambda like, a, i: (a[i, a.shape[1] - 1],),
-    three=lambda like, a, i: (a[i, 0], a[i, 1], a[i, 2]),
+    two=lambda like, a, i: (a[index(i), index(a.shape[1] - 1)],),
+    three=lambda like, a, i: (a[index(i), 0], a[index(i), 1], a[index(i), 2]),
 )
 no_vector = _by_length(
     "no_vector",
@@ -104,18 +107,18 @@ no_spin = _by_length(
 
 
 def _store_1(v: Any, a: Any, i: Any) -> None:
-    a[i, a.shape[1] - 1] = v[0]
+    a[index(i), index(a.shape[1] - 1)] = v[0]
 
 
 def _store_2(v: Any, a: Any, i: Any) -> None:
-    a[i, 0] = v[0]
-    a[i, 1] = v[1]
+    a[index(i), 0] = v[0]
+    a[index(i), 1] = v[1]
 
 
 def _store_3(v: Any, a: Any, i: Any) -> None:
-    a[i, 0] = v[0]
-    a[i, 1] = v[1]
-    a[i, 2] = v[2]
+    a[index(i), 0] = v[0]
+    a[index(i), 1] = v[1]
+    a[index(i), 2] = v[2]
 
 
 store = _by_length(
@@ -128,18 +131,18 @@ store = _by_length(
 
 
 def _add_1(v: Any, s: Any, a: Any, i: Any) -> None:
-    a[i, a.shape[1] - 1] += s * v[0]
+    a[index(i), index(a.shape[1] - 1)] += s * v[0]
 
 
 def _add_2(v: Any, s: Any, a: Any, i: Any) -> None:
-    a[i, 0] += s * v[0]
-    a[i, 1] += s * v[1]
+    a[index(i), 0] += s * v[0]
+    a[index(i), 1] += s * v[1]
 
 
 def _add_3(v: Any, s: Any, a: Any, i: Any) -> None:
-    a[i, 0] += s * v[0]
-    a[i, 1] += s * v[1]
-    a[i, 2] += s * v[2]
+    a[index(i), 0] += s * v[0]
+    a[index(i), 1] += s * v[1]
+    a[index(i), 2] += s * v[2]
 
 
 add_to = _by_length(
