@@ -31,7 +31,9 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: Scene, moving: Movin
     for _ in range(times):
         for c in range(len(chunks.bound) - 1):
             first, last = chunks.bound[c], chunks.bound[c + 1]
-            press_pairs(dim, c, chunks, grains, moving.pairs, scene.grain_law, scene.dt)
+            press_pairs(
+                dim, c, chunks, grains, moving.kinds, moving.pairs, scene.grain_law, scene.dt
+            )
             if parts > 1:
                 press_on_surfaces(
                     dim, walls.first_row[c], walls.first_row[c + 1], walls.candidates,

@@ -21,12 +21,11 @@ FLOPS_PER_LISTED = (
 FLOPS_PER_CONTACT = (
     ("overlap, unit normal, both arms", 6, 7),
     ("relative velocity", 2, 3),
-    ("reduced mass and radius, but their quotients", 3, 3),
-    ("normal force, (16)-(21)", 8, 10),
-    ("slip at the contact point", 7, 32),
-    ("friction: turned, advanced, limited, (24)-(28)", 7, 28),
+    ("normal force, (16)-(21)", 6, 8),
+    ("spin at the contact point", 3, 18),
+    ("friction: advanced, turned, limited, (24)-(28)", 8, 33),
     ("force and moments on both grains", 8, 21),
-    ("rolling moment: turned, advanced, limited, (29)-(33)", 14, 49),
+    ("rolling moment: advanced, turned, limited, (29)-(33)", 7, 37),
     ("sums over the contacts of both grains", 6, 12),
 )
 FLOPS_PER_GRAIN = (
@@ -34,16 +33,15 @@ FLOPS_PER_GRAIN = (
     ("velocity and spin, (3)-(7)", 10, 18),
     ("position and largest speed", 8, 12),
 )
-QUOTIENTS_PER_CONTACT, ROOTS_PER_CONTACT = 5, 4
-"""1/distance, reduced mass and radius, two limits; distance, damping, two limits."""
+ROOTS_PER_CONTACT = {2: 1, 3: 3}
+"""Distance, and two limits in 3D; each is followed by a quotient."""
 QUOTIENTS_PER_GRAIN = 2
 """dt/m and dt/I."""
-CHAINED_PER_CONTACT = 2
-"""Square roots each followed by a quotient, one pair after the other: distance and 1/distance,
-then the limit of friction."""
+CHAINED_PER_CONTACT = {2: 1, 3: 2}
+"""Of these, what waits for each other: distance, then the limit of friction."""
 TRAFFIC = {
     "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains radius": 1,
-    "grains mass": 1, "grains inertia": 1, "grains force": 2, "grains moment": 2,
+    "kinds of_grain": 1, "grains mass": 1, "grains inertia": 1, "grains force": 2, "grains moment": 2,
     "pairs start": 1, "pairs other": 1, "pairs touching": 2, "pairs friction": 2,
     "pairs rolling": 2, "chunks grain": 1, "chunks incoming": 1, "chunks force": 2,
     "chunks moment": 2, "walls candidates rows": 1, "walls candidates start": 1,
@@ -73,13 +71,13 @@ def _bounds(
 ) -> dict[str, float]:
     """Least time of a grain-step by each limit, ns."""
     operations = flops(solver.dimension, listed, contacts)
-    quotients = contacts * QUOTIENTS_PER_CONTACT + QUOTIENTS_PER_GRAIN
+    roots = contacts * ROOTS_PER_CONTACT[solver.dimension]
     return {
         "bandwidth": traffic_bytes(solver) / gb_s,
         "vector arithmetic": operations * peaks["vector_ns_per_flop"]["median"],
         "scalar arithmetic": operations * peaks["scalar_ns_per_flop"]["median"],
-        "quotients and roots": quotients * peaks["ns_per_quotient"]["median"]
-        + contacts * ROOTS_PER_CONTACT * peaks["ns_per_root"]["median"],
+        "quotients and roots": (roots + QUOTIENTS_PER_GRAIN) * peaks["ns_per_quotient"]["median"]
+        + roots * peaks["ns_per_root"]["median"],
     }
 
 
@@ -119,7 +117,7 @@ def _measure_bed(
         "contacts_per_grain": contacts,
         "bounds_ns": bounds,
         "fractions": {name: ns / step_ns for name, ns in bounds.items()},
-        "waiting_ns": contacts * CHAINED_PER_CONTACT * chained_ns,
+        "waiting_ns": contacts * CHAINED_PER_CONTACT[bed.dimension] * chained_ns,
         **times,
     }
 

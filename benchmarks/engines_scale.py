@@ -90,6 +90,7 @@ def bytes_of(solver: Solver) -> dict[str, int]:
     moving = solver._moving
     parts = {
         "grains": moving.grains,
+        "kinds": moving.kinds,
         "pairs": moving.pairs,
         "chunks": moving.chunks,
         "walls candidates": moving.walls.candidates,

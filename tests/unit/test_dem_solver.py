@@ -128,10 +128,11 @@ def test_threads_change_no_bit(dimension: int, monkeypatch: pytest.MonkeyPatch) 
 
 def test_chunks_change_round_off_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = solver(3, 400)
-    whole.advance(np.zeros(3002))
+    whole.advance(np.zeros(2002))
     monkeypatch.setattr(pairs_module, "CHUNK", 40)
     parts = solver(3, 400)
-    parts.advance(np.zeros(3002))
+    parts.advance(np.zeros(2002))  # not for long: round-off grows with every collision
+    assert parts.pairs.touching.sum() > 100
     one, two = (s.grains.ordered(np.argsort(s.grains.id)) for s in (whole, parts))
     np.testing.assert_allclose(one.position, two.position, atol=1e-11)
     np.testing.assert_allclose(one.force, two.force, atol=1e-6)

@@ -91,7 +91,8 @@ _FIELDS = (
     ("rolling_arm", "(30), (32)"),
     ("k_roll", "(29), regularised"),
 )
-LAW, PAIRS, MOTION, STEPS = "contact_law.py", "pairs.py", "motion.py", "steps.py"
+LAW, KINDS, PAIRS = "contact_law.py", "kinds.py", "pairs.py"
+MOTION, STEPS = "motion.py", "steps.py"
 MUTATIONS = (
     *(
         Mutation(f"{field} of {where}", equation, scene=_law(which, field))
@@ -127,7 +128,7 @@ MUTATIONS = (
     Mutation("reaction on the second grain", "(14)",
              source=(PAIRS, "add_to(press, -1.0, force, j)", "add_to(press, -1.05, force, j)")),
     Mutation("mass of two grains", "(21)",
-             source=(PAIRS, "m * m_j / (m + m_j)", "1.05 * m * m_j / (m + m_j)")),
+             source=(KINDS, "m_i * m_j / (m_i + m_j)", "1.05 * m_i * m_j / (m_i + m_j)")),
     Mutation("arm of the slip", "(23)",
              source=(LAW, "plus(times(w_1, arm_1), arm_2, w_2)",
                      "plus(times(w_1, 1.05 * arm_1), 1.05 * arm_2, w_2)")),
@@ -137,15 +138,15 @@ MUTATIONS = (
     Mutation("arm of friction at walls: r instead of r - u", "(23)",
              source=("surface_contacts.py", "max(distance, 0.0), 0.0,", "r, 0.0,")),
     Mutation("sign of the slip", "(25)",
-             source=(LAW, "law.k_t * dt, slip)", "-law.k_t * dt, slip)")),
+             source=(LAW, "-law.k_t * dt, spun)", "law.k_t * dt, spun)")),
     Mutation("limit of the elastic instead of the total force", "(26)",
              source=(LAW, "law.friction * abs(normal)", "law.friction * law.k_n * overlap")),
-    Mutation("relative spin", "(31)", source=(LAW, "rolling_part(n, plus(w_1, -1.0, w_2)",
-                                              "rolling_part(n, plus(w_1, -1.05, w_2)")),
+    Mutation("relative spin", "(31)", source=(LAW, "relative = plus(w_1, -1.0, w_2)",
+                                              "relative = plus(w_1, -1.05, w_2)")),
     Mutation("larger instead of smaller radius", "(33)",
-             source=(PAIRS, "min(r, r_j)", "max(r, r_j)")),
+             source=(KINDS, "min(r_i, r_j)", "max(r_i, r_j)")),
     Mutation("effective radius of two grains", "(29), regularised",
-             source=(PAIRS, "r * r_j / reach", "1.05 * r * r_j / reach")),
+             source=(KINDS, "r_i * r_j / (r_i + r_j)", "1.05 * r_i * r_j / (r_i + r_j)")),
     Mutation("load on the vertices", "(56)",
              source=("surface_contacts.py", "add_to(on_grain, -weights[j]",
                      "add_to(on_grain, -1.05 * weights[j]")),
