@@ -42,11 +42,11 @@ CHAINED_PER_CONTACT = {2: 1, 3: 2}
 TRAFFIC = {
     "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains radius": 1,
     "kinds of_grain": 1, "grains mass": 1, "grains inertia": 1, "grains force": 2,
-    "grains moment": 2, "pairs start": 1, "pairs other": 1, "pairs touching": 2, "pairs friction": 2,
-    "pairs rolling": 2, "chunks grain": 1, "chunks incoming": 1, "chunks force": 2,
-    "chunks moment": 2, "walls candidates rows": 1, "walls candidates start": 1,
-    "walls candidates part": 1, "walls history used": 2, "walls history normal": 2,
-    "walls history friction": 2, "walls history rolling": 2,
+    "grains moment": 2, "pairs start": 1, "pairs other": 1, "pairs touching": 2,
+    "pairs friction": 2, "pairs rolling": 2, "chunks grain": 1, "chunks incoming": 1,
+    "chunks force": 2, "chunks moment": 2, "walls candidates rows": 1,
+    "walls candidates start": 1, "walls candidates part": 1, "walls history used": 2,
+    "walls history normal": 2, "walls history friction": 2, "walls history rolling": 2,
 }  # fmt: skip
 """How often a step takes an array from memory or gives it back: once read, once written. A chunk
 stays in the core's cache from its first contact to its drift."""

@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol, cast
 
+from sandmould import ROOT
+from sandmould.dem import source_hash
+from sandmould.engines.deck import dialect_hash
 from sandmould.engines.program import Program
 from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
@@ -35,8 +38,8 @@ class EngineModule(Protocol):
         """Write ``deck.in`` and ``layers/``; the deck last."""
 
     @staticmethod
-    def template_hash() -> str:
-        """Hash of all that turns a scenario into a deck."""
+    def uses_own_solver(scenario: Scenario) -> bool:
+        """Whether kernels of ``sandmould.dem`` compute some of the forces."""
 
     @staticmethod
     def open_session(
@@ -49,6 +52,20 @@ def engine_of(scenario: Scenario) -> EngineModule:
     """Import the module of a scenario's engine, and only that one."""
     module = importlib.import_module(f"sandmould.engines.{scenario.engine.name}.engine")
     return cast(EngineModule, module)
+
+
+def deck_hash(scenario: Scenario) -> str:
+    """Hash of all that turns a scenario into a deck, and of our solver where it takes part."""
+    ours = source_hash() if engine_of(scenario).uses_own_solver(scenario) else ""
+    return ours + dialect_hash(scenario.engine.name)
+
+
+def deck_sources(scenario: Scenario) -> list[Path]:
+    """Files of the repository that ``deck_hash`` is made from."""
+    files = [*(ROOT / "templates" / scenario.engine.name).glob("*.j2")]
+    if engine_of(scenario).uses_own_solver(scenario):
+        files += (ROOT / "sandmould" / "dem").glob("*.py")
+    return sorted(files)
 
 
 def engine_problem(scenario: Scenario) -> Problem | None:

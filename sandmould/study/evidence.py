@@ -17,7 +17,7 @@ from typing import Any
 import pandas as pd
 
 from sandmould import ROOT
-from sandmould.engines.choosing import engine_of, engine_problem
+from sandmould.engines.choosing import deck_hash, engine_problem
 from sandmould.study.agreement import speeds
 from sandmould.study.expand import Run, expand, scenario_hash
 from sandmould.study.opening import OpenStudy, open_study
@@ -32,10 +32,9 @@ after a few collisions, so only means are compared, with margins of a few times 
 
 
 def study_hash(runs: list[Run]) -> str:
-    """Hash of all scenarios of a study and of the templates that turn them into decks."""
-    engines = {run.scenario.engine.name: engine_of(run.scenario) for run in runs}
-    hashes = [engines[name].template_hash() for name in sorted(engines)]
-    digest = hashlib.sha256("".join(hashes).encode())
+    """Hash of all scenarios of a study and of what turns them into decks."""
+    decks = sorted({(run.scenario.engine.name, deck_hash(run.scenario)) for run in runs})
+    digest = hashlib.sha256("".join(text for _, text in decks).encode())
     for text in sorted(scenario_hash(run.scenario) for run in runs):
         digest.update(text.encode())
     return digest.hexdigest()

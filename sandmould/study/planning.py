@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
-from sandmould.engines.choosing import engine_of, engine_problem
+from sandmould.engines.choosing import deck_sources, engine_of, engine_problem
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from sandmould.scenario.bad_input import BadInputError, Problem
@@ -70,12 +70,9 @@ class Plan:
         Decks name the state of the solver, so a changed kernel changes the decks of its runs and
         they are computed again.
         """
-        engine = self._by_name[name].scenario.engine.name
-        files = [*(ROOT / "templates" / engine).glob("*.j2")]
-        if engine == "reference":
-            files += (ROOT / "sandmould" / "dem").glob("*.py")
+        files = deck_sources(self._by_name[name].scenario)
         # As seen from here: another place of the repository is no reason to compute again.
-        return sorted(os.path.relpath(path) for path in files)
+        return [os.path.relpath(path) for path in files]
 
     def memory_mb(self, name: str) -> int:
         """Memory to ask for: several times the 126 MB measured at 1 134 discs, 144 at 8 000."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
-from sandmould.engines.choosing import engine_of
+from sandmould.engines.choosing import deck_hash, engine_of
 from sandmould.engines.driver import Driver
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.products import Cost, finish
@@ -41,7 +41,7 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
     return {
         "command": " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]]),
         "scenario_sha256": scenario_hash(scenario),
-        "template_sha256": engine_of(scenario).template_hash(),
+        "template_sha256": deck_hash(scenario),
         "seed": scenario.seed,
         "commit": commit.stdout.strip() or "not a git checkout",
         "versions": {p: metadata.version(p) for p in packages}

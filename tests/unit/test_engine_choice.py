@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sandmould.engines.choosing import engine_problem
+from sandmould.engines.choosing import deck_hash, deck_sources, engine_problem
 from sandmould.engines.lammps import engine
 from sandmould.engines.lammps.engine import open_session
 from sandmould.engines.lammps.render import write_deck
@@ -48,7 +48,11 @@ def test_lammps_refuses_what_it_would_only_approximate() -> None:
     polygon = {"kind": "polygon", "vertices_m": [[0.01, 0.01], [0.02, 0.01], [0.02, 0.02]]}
     isotropic = {"form": "nonviscous_isotropic"}
     for changes in ({"obstacles": [polygon]}, {"background_damping": isotropic}):
-        assert engine_problem(tube_scene(**changes)) is None
+        scene = tube_scene(**changes)
+        assert engine_problem(scene) is None
+        # Our own kernels press then: a changed one must have the run computed again.
+        assert any(path.name == "contact_law.py" for path in deck_sources(scene))
+        assert deck_hash(scene) != deck_hash(tube_scene())
         sentence = told(tube_scene(**changes, engine={"ranks": 2}))
         assert "engine.ranks = 2 cannot be used: valid is 1 on engine lammps with" in sentence
 

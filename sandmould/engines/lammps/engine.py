@@ -5,12 +5,14 @@ from __future__ import annotations
 from importlib import metadata
 from pathlib import Path
 
-from sandmould.engines.deck import Deck, dialect_hash
+from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
+from sandmould.engines.lammps.render import needs_callback
 from sandmould.engines.lammps.render import write_deck as write_deck
 from sandmould.engines.lammps.session import LammpsSession
 from sandmould.engines.lammps.session import refuse as refuse
 from sandmould.engines.program import Program
+from sandmould.scenario.scenario import Scenario
 
 
 def installed_version() -> int:
@@ -32,9 +34,9 @@ def installation_problem() -> str | None:
     return None
 
 
-def template_hash() -> str:
-    """Hash of all templates of this dialect."""
-    return dialect_hash("lammps")
+def uses_own_solver(scenario: Scenario) -> bool:
+    """LAMMPS is given the forces of surfaces and damping that it lacks."""
+    return needs_callback(scenario)
 
 
 def open_session(

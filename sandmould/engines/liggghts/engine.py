@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sandmould.engines.deck import Deck, dialect_hash
+from sandmould.engines.deck import Deck
 from sandmould.engines.liggghts import OLDEST_VERSION
 from sandmould.engines.liggghts.process import executable, version_of
 from sandmould.engines.liggghts.refusals import refuse as refuse
 from sandmould.engines.liggghts.render import write_deck as write_deck
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.program import Program
+from sandmould.scenario.scenario import Scenario
 
 
 def installed_version() -> int | str:
@@ -33,9 +34,9 @@ def _numbers(version: str) -> list[int]:
     return [int(part) for part in version.split(".")]
 
 
-def template_hash() -> str:
-    """Hash of all templates of this dialect."""
-    return dialect_hash("liggghts")
+def uses_own_solver(scenario: Scenario) -> bool:
+    """LIGGGHTS computes all forces itself."""
+    return False
 
 
 def open_session(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sandmould.dem import source_hash
-from sandmould.engines.deck import dialect_hash, environment, exact
+from sandmould.engines.deck import environment, exact
 from sandmould.engines.deck_lines import Lines, size_classes
 from sandmould.engines.program import Program
 from sandmould.engines.reference.model import surfaces_of
@@ -41,9 +41,9 @@ def refuse(scenario: Scenario) -> None:
     """Refuse nothing: every term of the paper is there."""
 
 
-def template_hash() -> str:
-    """Hash of the solver and of the deck's template."""
-    return f"{source_hash()}{dialect_hash('reference')}"
+def uses_own_solver(scenario: Scenario) -> bool:
+    """All forces are its own."""
+    return True
 
 
 def write_deck(
