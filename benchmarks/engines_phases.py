@@ -95,7 +95,7 @@ def measure_phases(
     dict
         Spreads in ns per grain-step.
     """
-    moving = solver._moving  # what the step loop itself is given
+    moving = solver.moving  # what the step loop itself is given
     touching = moving.pairs.touching.astype(bool)
     blocks = {
         name: _block(solver, moving, i + 1, block_s) for i, name in enumerate(PARTS)

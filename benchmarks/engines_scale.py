@@ -87,7 +87,7 @@ def measure_threads(settings: Settings) -> dict[str, Any]:
 
 def bytes_of(solver: Solver) -> dict[str, int]:
     """Bytes of every array that the step loop is given."""
-    moving = solver._moving
+    moving = solver.moving
     parts = {
         "grains": moving.grains,
         "kinds": moving.kinds,

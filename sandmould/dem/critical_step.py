@@ -96,7 +96,7 @@ def _pair_ends(solver: Solver) -> _Ends:
 
 def _wall_ends(solver: Solver) -> _Ends:
     """Contacts with surfaces; the arm is the radius, the longest that it can be."""
-    grains, walls = solver.grains, solver._moving.walls
+    grains, walls = solver.grains, solver.moving.walls
     used, d = walls.history.used, solver.dimension
     slots = 2 * d
     in_use = (np.arange(slots) < used[:, None]).ravel()

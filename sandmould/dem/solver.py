@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 
 from sandmould.dem.barrier import new_barrier
 from sandmould.dem.broad_phase import Candidates, find_candidates
-from sandmould.dem.grains import Floats, Grains, Ints
+from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.kinds import find_kinds
 from sandmould.dem.motion import kick
+from sandmould.dem.moving_state import from_arrays, to_arrays
 from sandmould.dem.neighbours import (
     Pairs,
     carry_history,
@@ -27,14 +27,14 @@ from sandmould.dem.steps import (
     Moving,
     Scene,
     Team,
-    Walls,
     advance,
     find_forces,
+    new_walls,
 )
-from sandmould.dem.surfaces import SurfaceArrays, Surfaces
+from sandmould.dem.surfaces import Surfaces
 from sandmould.dem.vectors import like
-from sandmould.dem.wall_history import WallHistory, new_history
 from sandmould.dem.wall_history import carry_history as carry_wall_history
+from sandmould.dem.wall_history import new_history
 
 
 class NotANumberError(ArithmeticError):
@@ -81,7 +81,8 @@ class Solver:
         self._threads = min(threads, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(max(1, self._threads - 1))
         self._orientations = orientations
-        self._moving = self._empty()
+        self.moving = self._empty()
+        """All that the step loop moves; replaced whenever pairs are listed."""
 
     def _empty(self) -> Moving:
         d = self.dimension
@@ -89,7 +90,8 @@ class Solver:
         none = np.zeros(0, dtype=np.int64)
         candidates = Candidates(none, np.zeros(1, dtype=np.int64), none.copy())
         chunks = split(grains, pairs)
-        walls = self._walls(chunks.bound, candidates, new_history(self._dim, 0))
+        history = new_history(self._dim, 0)
+        walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
         kinds = find_kinds(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
         return Moving(grains, kinds, pairs, chunks, walls, upright, listed, np.zeros(1))
@@ -100,35 +102,29 @@ class Solver:
             return np.zeros((0, 1 if self.dimension == 2 else 9))
         return np.tile(np.zeros(1) if self.dimension == 2 else np.eye(3).ravel(), (n, 1))
 
-    def _walls(self, bound: Ints, candidates: Candidates, history: WallHistory) -> Walls:
-        arrays = self.surfaces.arrays
-        loads = np.zeros((len(bound) - 1, *arrays.vertices.shape))
-        first_row = np.searchsorted(candidates.rows, bound)
-        return Walls(arrays, candidates, history, first_row, loads, arrays.vertices.copy())
-
     @property
     def grains(self) -> Grains:
         """All grains, in the order they are stored in."""
-        return self._moving.grains
+        return self.moving.grains
 
     @property
     def pairs(self) -> Pairs:
         """Near pairs of grains and their contact history."""
-        return self._moving.pairs
+        return self.moving.pairs
 
     @property
     def orientation(self) -> Floats:
         """Orientations of the grains, eqs. (8) and (12)."""
-        return self._moving.orientation
+        return self.moving.orientation
 
     def add(self, grains: Grains) -> None:
         """Add grains that touch nothing; their velocities belong to the time of their positions."""
         n = len(grains.id)
         scene = self.scene
         kick(self._dim, 0, n, grains, scene.gravity, scene.damping, -0.5 * scene.dt)
-        moving = self._moving
+        moving = self.moving
         start = np.concatenate([moving.pairs.start, np.full(n, moving.pairs.start[-1])])
-        self._moving = moving._replace(
+        self.moving = moving._replace(
             grains=moving.grains.joined(grains),
             pairs=moving.pairs._replace(start=start),
             orientation=np.concatenate([moving.orientation, self._upright(n)]),
@@ -148,18 +144,34 @@ class Solver:
             force=np.zeros_like(position_m),
             moment=np.zeros_like(spin_rad_s),
         )
-        self._moving = self._empty()._replace(grains=same, orientation=self._upright(len(order)))
+        self.moving = self._empty()._replace(grains=same, orientation=self._upright(len(order)))
         start = np.zeros(len(order) + 1, dtype=np.int64)
-        self._moving = self._moving._replace(pairs=self.pairs._replace(start=start))
+        self.moving = self.moving._replace(pairs=self.pairs._replace(start=start))
         self._list(np.zeros(self.dimension))
-        find_forces(self._dim, self.scene, self._moving)
-        self._moving.walls.loads[:] = 0.0
+        find_forces(self._dim, self.scene, self.moving)
+        self.moving.walls.loads[:] = 0.0
         scene = self.scene
         kick(self._dim, 0, len(order), self.grains, scene.gravity, scene.damping, -0.5 * scene.dt)
 
+    def remove_surface(self, name: str) -> None:
+        """Take a surface away at once, as a gate that opens, while the box is where it began.
+
+        Loads that were collected since the last asking are forgotten.
+        """
+        self.surfaces.remove(name)
+        moving = self.moving
+        walls = new_walls(
+            self.surfaces.arrays,
+            moving.chunks.bound,
+            moving.walls.candidates,
+            moving.walls.history,
+        )
+        self.moving = moving._replace(walls=walls)
+        self._list(np.zeros(self.dimension))
+
     def _list(self, shift: Floats) -> None:
         """Sort the grains by place and list what is near what, history carried over."""
-        old = self._moving
+        old = self.moving
         n = len(old.grains.id)
         size = 2 * float(old.grains.radius.max()) + self._skin
         position = old.grains.position
@@ -185,10 +197,10 @@ class Solver:
             old.walls.history,
             grains.id[candidates.rows],
         )
-        walls = self._walls(chunks.bound, candidates, history)
+        walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
         walls.loads[0] = old.walls.loads.sum(axis=0)
         orientation = old.orientation[order] if self._orientations else old.orientation
-        self._moving = Moving(
+        self.moving = Moving(
             grains,
             find_kinds(grains, self.scene.grain_law),
             pairs,
@@ -226,7 +238,7 @@ class Solver:
 
     def _run(self, steps: int, drifted: bool, displacement_m: Floats) -> tuple[int, int]:
         """Let all threads run the step loop together."""
-        chunks = len(self._moving.chunks.bound) - 1
+        chunks = len(self.moving.chunks.bound) - 1
         threads = min(self._threads, chunks)
         team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
 
@@ -236,7 +248,7 @@ class Solver:
                 steps,
                 drifted,
                 self.scene,
-                self._moving,
+                self.moving,
                 displacement_m,
                 0.5 * self._skin,
                 thread,
@@ -276,54 +288,17 @@ class Solver:
 
     def mean_loads(self, steps: int) -> dict[str, Floats]:
         """Mean force of the grains on each surface since the last asking, (d,) float64, N."""
-        loads = self._moving.walls.loads
+        loads = self.moving.walls.loads
         mean = self.surfaces.forces(loads.sum(axis=0) / steps)
         loads[:] = 0.0
         return mean
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything that a continued run needs to go on bit for bit."""
-        parts: dict[str, Any] = {
-            "grains": self._moving.grains,
-            "pairs": self._moving.pairs,
-            "candidates": self._moving.walls.candidates,
-            "history": self._moving.walls.history,
-            "surfaces": self.surfaces.arrays,
-        }
-        arrays = {
-            f"{name}_{field}": array
-            for name, part in parts.items()
-            for field, array in part._asdict().items()
-        }
-        moving = self._moving
-        return arrays | {
-            "orientation": moving.orientation,
-            "listed": moving.listed,
-            "reach": moving.reach,
-            "listed_vertices": moving.walls.listed,
-            "steps": np.array(self.steps),
-        }
+        return to_arrays(self.moving) | {"steps": np.array(self.steps)}
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
         """Go on from what ``state`` gave, with no loads collected yet."""
-
-        def part(kind: Any, name: str) -> Any:
-            return kind(*(arrays[f"{name}_{field}"] for field in kind._fields))
-
-        self.surfaces.arrays = part(SurfaceArrays, "surfaces")
-        grains, pairs = part(Grains, "grains"), part(Pairs, "pairs")
-        chunks = split(grains, pairs)
-        walls = self._walls(
-            chunks.bound, part(Candidates, "candidates"), part(WallHistory, "history")
-        )._replace(listed=arrays["listed_vertices"])
-        self._moving = Moving(
-            grains,
-            find_kinds(grains, self.scene.grain_law),
-            pairs,
-            chunks,
-            walls,
-            arrays["orientation"],
-            arrays["listed"],
-            arrays["reach"],
-        )
+        self.moving = from_arrays(arrays, self.scene.grain_law)
+        self.surfaces.arrays = self.moving.walls.arrays
         self.steps = int(arrays["steps"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba import njit
 
 from sandmould.dem.barrier import wait_for_all
@@ -52,6 +53,15 @@ class Walls(NamedTuple):
     """(c, nv, d) float64, N: sum over steps of what each chunk puts on the vertices, eq. (56)."""
     listed: Floats
     """(nv, d) float64, m: vertices when candidates were listed."""
+
+
+def new_walls(
+    arrays: SurfaceArrays, bound: Ints, candidates: Candidates, history: WallHistory
+) -> Walls:
+    """Surfaces with newly listed candidates and no loads; ``bound`` are those of the chunks."""
+    loads = np.zeros((len(bound) - 1, *arrays.vertices.shape))
+    first_row = np.searchsorted(candidates.rows, bound)
+    return Walls(arrays, candidates, history, first_row, loads, arrays.vertices.copy())
 
 
 class Moving(NamedTuple):

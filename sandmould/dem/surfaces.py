@@ -82,7 +82,7 @@ class Surfaces:
             self._shape_of["plane"],
             self._corner_of["facet"],
         )
-        """Replaced by each addition, changed in place by motion."""
+        """Replaced by additions and removals, changed in place by motion."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -185,13 +185,41 @@ class Surfaces:
         self._corner_of[kind] = np.concatenate([self._corner_of[kind], corner + first])
         if shape is not None:
             self._shape_of[kind] = np.concatenate([self._shape_of[kind], shape])
-        self.arrays = SurfaceArrays(
+        self._set_arrays(
             np.concatenate([old.vertices, vertices]),
             np.concatenate([old.vertex_velocity, np.zeros_like(vertices)]),
             np.concatenate([old.steps_left, np.full(len(vertices), STAYS)]),
+        )
+
+    def _set_arrays(self, vertices: Array, velocity: Array, steps_left: Indices) -> None:
+        """Join the parts of all kinds on given vertices."""
+        self.arrays = SurfaceArrays(
+            vertices,
+            velocity,
+            steps_left,
             np.array([len(self._corner_of["plane"])]),
             np.concatenate([self._shape_of["plane"], self._shape_of["line"]]),
             np.concatenate([self._corner_of[k] for k in ("plane", "line", "facet")]),
+        )
+
+    def remove(self, name: str) -> None:
+        """Take a surface away; the others keep their order."""
+        rows = self._range.pop(name)
+        gone = rows.stop - rows.start
+        for other, its in self._range.items():
+            if its.start >= rows.stop:
+                self._range[other] = slice(its.start - gone, its.stop - gone)
+        for kind, corner in self._corner_of.items():
+            stays = (corner[:, 0] < rows.start) | (corner[:, 0] >= rows.stop)
+            kept = corner[stays]
+            self._corner_of[kind] = kept - gone * (kept >= rows.stop)
+            if kind in self._shape_of:
+                self._shape_of[kind] = self._shape_of[kind][stays]
+        old = self.arrays
+        self._set_arrays(
+            np.delete(old.vertices, rows, axis=0),
+            np.delete(old.vertex_velocity, rows, axis=0),
+            np.delete(old.steps_left, rows),
         )
 
     def set_motion(

@@ -120,7 +120,7 @@ def test_threads_change_no_bit(dimension: int, monkeypatch: pytest.MonkeyPatch) 
     two._threads = 2  # also where the machine has one core
     for s in (one, two):
         s.advance(np.zeros(3002))
-    assert len(two._moving.chunks.bound) == 11
+    assert len(two.moving.chunks.bound) == 11
     assert one.pairs.touching.sum() > 10
     np.testing.assert_array_equal(one.grains.position, two.grains.position)
     np.testing.assert_array_equal(one.grains.spin, two.grains.spin)
@@ -132,7 +132,7 @@ def test_chunks_change_round_off_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pairs_module, "CHUNK", 40)
     parts = solver(3, 400)
     parts.advance(np.zeros(2002))  # not for long: round-off grows with every collision
-    assert np.abs(parts._moving.chunks.force).max() > 0  # pairs touch across chunks
+    assert np.abs(parts.moving.chunks.force).max() > 0  # pairs touch across chunks
     one, two = (s.grains.ordered(np.argsort(s.grains.id)) for s in (whole, parts))
     np.testing.assert_allclose(one.position, two.position, atol=1e-11)
     np.testing.assert_allclose(one.force, two.force, atol=1e-6)
@@ -151,6 +151,33 @@ def test_restored_state_goes_on_bit_for_bit(dimension: int) -> None:
     assert resumed.steps == straight.steps
     for name, array in straight.state().items():
         np.testing.assert_array_equal(array, resumed.state()[name], err_msg=name)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_grains_fall_freely_once_the_gate_is_gone(dimension: int) -> None:
+    grains, _ = cloud(dimension, 30)
+    grains.position[:, :-1] += 0.1  # far from the side walls
+    surfaces = box(dimension, 1.0)
+    surfaces.add_plane("gate", np.zeros(dimension), np.eye(dimension)[-1])
+    surfaces.remove("floor")
+    s = Solver(scene(dimension), surfaces, 6e-4)
+    s.add(grains)
+    s.advance(np.zeros(20002))
+    assert s.mean_loads(20000)["gate"][-1] < 0
+    bonds = s.pairs.touching.sum()
+    s.remove_surface("gate")
+    assert s.pairs.touching.sum() == bonds > 0  # contacts of grains are kept
+    s.advance(np.zeros(3))  # the first step still has the gate's last force
+
+    def middle(values: np.ndarray) -> float:
+        return float(s.grains.mass @ values[:, -1] / s.grains.mass.sum())
+
+    height_m, speed_m_s, n = middle(s.grains.position), middle(s.grains.velocity), 2000
+    s.advance(np.zeros(n + 2))
+    assert "gate" not in s.mean_loads(n)
+    # Central differences: the stored speeds are half a step old.
+    exact = height_m + n * STEP_S * speed_m_s - 0.5 * 9.81 * n * (n + 1) * STEP_S**2
+    assert middle(s.grains.position) == pytest.approx(exact, abs=1e-12)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -96,6 +96,31 @@ def test_parts_are_numbered_by_kind_and_vertices_by_surface() -> None:
     np.testing.assert_array_equal(forces["floor"], loads[4])
 
 
+def three_surfaces(names: tuple[str, ...]) -> Surfaces:
+    surfaces = Surfaces(3)
+    for name in names:
+        if name == "mesh":
+            surfaces.add_facets(name, TRIANGLE, [(0, 1, 2)])
+        elif name == "tube":
+            surfaces.add_revolved(name, (0, 0, 1), (0, 0, 2), [(0, 1), (2, 1), (2, 0)], False)
+        else:
+            surfaces.add_plane(name, (0, 0, -1), (0, 0, 5))
+    return surfaces
+
+
+@pytest.mark.parametrize("gone", ["mesh", "tube", "floor", "lid"])
+def test_what_is_left_after_a_removal_is_as_if_it_had_never_been_there(gone: str) -> None:
+    names = ("mesh", "tube", "lid", "floor")
+    surfaces = three_surfaces(names)
+    surfaces.remove(gone)
+    without = three_surfaces(tuple(name for name in names if name != gone))
+    assert surfaces.names == without.names
+    for left, never in zip(surfaces.arrays, without.arrays, strict=True):
+        np.testing.assert_array_equal(left, never)
+    surfaces.add_plane("last", (0, 0, 0), (0, 0, 1))
+    assert surfaces.vertices_of("last").start == len(without.arrays.vertices)
+
+
 @pytest.mark.parametrize(
     ("add", "message"),
     [
