@@ -12,8 +12,7 @@ import numpy as np
 from benchmarks.engines_beds import PERIOD_S, Bed, opened, scene
 from benchmarks.engines_timing import Settings, interleaved, ratio, seconds, spread, steps_lasting
 from sandmould.engines.choosing import engine_problem
-from sandmould.engines.lammps.render import skin_m
-from sandmould.engines.liggghts.render import SKIN
+from sandmould.engines.deck_lines import skin_m
 from sandmould.engines.neighbours import touching_pairs
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.model import SKIN_OVER_DIAMETER
@@ -27,11 +26,10 @@ TARGETS = {2: {"lammps": 6.0}, 3: {"lammps": 4.0, "liggghts": 2.5}}
 
 def _skin_m(scenario: Scenario) -> float:
     """Neighbour skin that an engine's deck takes by itself."""
-    if scenario.engine.name == "lammps":
+    if scenario.engine.name != "reference":
         return skin_m(scenario)
-    share = SKIN if scenario.engine.name == "liggghts" else SKIN_OVER_DIAMETER
     classes = scenario.sand.classes(scenario.dimension)
-    return share * sum(c.diameter_m * c.count_fraction for c in classes)
+    return SKIN_OVER_DIAMETER * sum(c.diameter_m * c.count_fraction for c in classes)
 
 
 def _per_grain(session: Session, gap_m: float) -> float:

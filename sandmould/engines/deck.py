@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,10 +76,10 @@ class Block:
 
     def around_run(self) -> tuple[str, str]:
         """Commands before and after the block's one long run."""
-        for match in _RUN.finditer(self.text):
-            if int(match.group(1)) > 0:
-                return self.text[: match.start()], self.text[match.end() :]
-        return self.text, ""
+        if self.run_steps is None:
+            return self.text, ""
+        before, after = re.split(rf"^run {self.run_steps}\b[^\n]*$", self.text, flags=re.M)
+        return before, after
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,17 @@ class Deck:
         return {m.group(1): Block(m.group(1), m.group(2)) for m in _BLOCK.finditer(self.text)}
 
     @classmethod
+    def render(cls, dialect: str, context: Mapping[str, Any]) -> Deck:
+        """Render the deck of a dialect."""
+        return cls(environment(dialect).get_template("deck.in.j2").render(context))
+
+    @classmethod
     def read(cls, path: Path) -> Deck:
         """Read a deck from its file."""
         return cls(path.read_text(encoding="utf-8"))
+
+    def write(self, folder: Path) -> None:
+        """Write ``deck.in``, first under a temporary name: where it is, it is whole."""
+        partial = folder / "deck.in.partial"
+        partial.write_text(self.text, encoding="utf-8")
+        os.replace(partial, folder / "deck.in")

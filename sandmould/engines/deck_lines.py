@@ -13,6 +13,9 @@ from sandmould.engines.program import Program, Stage
 from sandmould.scenario.placement import predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 
+SKIN = 0.15
+"""Neighbour skin of LAMMPS and LIGGGHTS over the mean diameter."""
+
 
 class Lines:
     """Numbers as lines of a deck: name, value, unit, meaning and source."""
@@ -62,6 +65,12 @@ def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, fl
 def obstacle_top_m(scenario: Scenario) -> float:
     """Height of the highest obstacle, 0 without any."""
     return max((float(b.corners()[:, -1].max()) for b in scenario.scene.solids), default=0.0)
+
+
+def skin_m(scenario: Scenario) -> float:
+    """Neighbour skin of grains in LAMMPS and LIGGGHTS, and of grains near surfaces."""
+    classes = scenario.sand.classes(scenario.dimension)
+    return SKIN * sum(c.diameter_m * c.count_fraction for c in classes)
 
 
 def vibration_key(program: Program, stage: Stage) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,18 +9,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sandmould.engines.deck import Deck, environment, exact
-from sandmould.engines.deck_lines import (
-    Lines,
-    obstacle_top_m,
-    planned_masses_kg,
-    simulation_box,
-    size_classes,
-    vibration_key,
-)
+from sandmould.engines.deck import Deck, exact
+from sandmould.engines.deck_context import deck_context
+from sandmould.engines.deck_lines import Lines, simulation_box
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.program import Program
-from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.geometry import Array, Block
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
@@ -71,12 +63,6 @@ def needs_callback(scenario: Scenario) -> bool:
     return isotropic or bool(pressed(scenario))
 
 
-def skin_m(scenario: Scenario) -> float:
-    """Neighbour skin of grains, and of grains near surfaces."""
-    classes = scenario.sand.classes(scenario.dimension)
-    return 0.15 * sum(c.diameter_m * c.count_fraction for c in classes)
-
-
 def render_deck(
     program: Program, sources: Mapping[str, str], run: str = "scene", study: str = "none"
 ) -> Deck:
@@ -91,52 +77,20 @@ def render_deck(
         Names for the deck's first line.
     """
     scenario = program.scenario
-    counts = StepCounts.of(scenario)
-    lines = Lines(scenario, sources)
-    classes = size_classes(scenario)
-    critical = scenario.critical_step
-    text = (
-        environment("lammps")
-        .get_template("deck.in.j2")
-        .render(
-            run=run,
-            study=study,
-            scenario=scenario,
-            scene=scenario.scene,
-            program=program,
-            classes=classes,
-            laws={"grain": scenario.contact.grain_grain, "wall": scenario.contact.grain_wall},
-            clip=scenario.contact.no_tension == "total",
-            damping=scenario.background_damping,
-            settling=scenario.fill.settling,
-            critical=critical,
-            step_s=counts.step_s,
-            step_fraction=counts.step_s / critical.step_s,
-            skin=skin_m(scenario),
-            simulation_box=simulation_box(scenario, program),
-            half_slab=HALF_SLAB_M,
-            blocks=[_solid(b) for b in scenario.scene.blocks],
-            surfaces=surfaces(scenario),
-            pressed=pressed(scenario),
-            needs_callback=needs_callback(scenario),
-            obstacle_top=obstacle_top_m(scenario),
-            down="0 -1 0" if scenario.dimension == 2 else "0 0 -1",
-            window_steps=counts.window,
-            load_steps=counts.load,
-            snapshot_steps=counts.windows(scenario.record.snapshot_every_s),
-            longest_steps=counts.steps(scenario.fill.settling.longest_s),
-            shortest_steps=counts.steps(scenario.fill.settling.shortest_s),
-            vibration_steps=counts.vibration,
-            vibration_key=lambda stage: vibration_key(program, stage),
-            direction=lambda v: v.unit_direction(scenario.dimension),
-            planned_mass=planned_masses_kg(program, classes),
-            oldest_version=OLDEST_VERSION,
-            source=lines.source,
-            number=lines.number,
-            value=lines.value,
-        )
-    )
-    return Deck(text)
+    contact = scenario.contact
+    context = deck_context(program, Lines(scenario, sources), run, study)
+    context |= {
+        "scene": scenario.scene,
+        "laws": {"grain": contact.grain_grain, "wall": contact.grain_wall},
+        "simulation_box": simulation_box(scenario, program),
+        "half_slab": HALF_SLAB_M,
+        "blocks": [_solid(b) for b in scenario.scene.blocks],
+        "surfaces": surfaces(scenario),
+        "pressed": pressed(scenario),
+        "needs_callback": needs_callback(scenario),
+        "oldest_version": OLDEST_VERSION,
+    }
+    return Deck.render("lammps", context)
 
 
 def layer_data(scenario: Scenario, layer: PlannedLayer, number: int) -> str:
@@ -179,6 +133,4 @@ def write_deck(
     for number, layer in enumerate(program.layers, start=1):
         path = folder / "layers" / f"layer_{number}.data"
         path.write_text(layer_data(program.scenario, layer, number), encoding="utf-8")
-    partial = folder / "deck.in.partial"
-    partial.write_text(render_deck(program, sources, run, study).text, encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
+    render_deck(program, sources, run, study).write(folder)

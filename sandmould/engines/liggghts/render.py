@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.deck import Deck, environment, exact
-from sandmould.engines.deck_lines import (
-    Lines,
-    obstacle_top_m,
-    planned_masses_kg,
-    simulation_box,
-    size_classes,
-    vibration_key,
-)
+from sandmould.engines.deck import Deck, exact
+from sandmould.engines.deck_context import deck_context
+from sandmould.engines.deck_lines import SKIN, Lines, simulation_box
 from sandmould.engines.liggghts import OLDEST_VERSION
 from sandmould.engines.liggghts.mesh_files import (
     largest_motion_m,
@@ -31,9 +24,6 @@ from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.geometry import Array
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
-
-SKIN = 0.15
-"""Neighbour skin over the mean diameter."""
 
 
 def bounds_m(program: Program) -> list[tuple[float, float]]:
@@ -82,13 +72,8 @@ def render_deck(
         Names for the deck's first line.
     """
     scenario = program.scenario
-    counts = StepCounts.of(scenario)
     lines = Lines(scenario, sources)
-    classes = size_classes(scenario)
-    critical = scenario.critical_step
     windows = _windows(program)
-    mean_diameter = sum(c["diameter_m"] * c["count_fraction"] for c in classes)
-    first_id = [1 + sum(program.counts[:i]) for i in range(len(program.counts))]
 
     def first_window(stage: Stage) -> int:
         return windows[stage.name][0]
@@ -96,49 +81,21 @@ def render_deck(
     def settle_windows(stage: Stage) -> int:
         return windows[stage.name][1]
 
-    text = (
-        environment("liggghts")
-        .get_template("deck.in.j2")
-        .render(
-            run=run,
-            study=study,
-            scenario=scenario,
-            program=program,
-            classes=classes,
-            tables=pair_tables(scenario.contact, classes, lines),
-            rolling=rolls(scenario.contact),
-            twist=scenario.contact.rolling_axes == "all",
-            clip=scenario.contact.no_tension == "total",
-            damping=scenario.background_damping,
-            settling=scenario.fill.settling,
-            critical=critical,
-            step_s=counts.step_s,
-            step_fraction=counts.step_s / critical.step_s,
-            skin=SKIN * mean_diameter,
-            skin_source=f"{SKIN:g} of the mean diameter",
-            simulation_box=bounds_m(program),
-            surfaces=list(surface_meshes(program)),
-            wall_names=[wall.name for wall in scenario.scene.walls],
-            obstacle_top=obstacle_top_m(scenario),
-            down="0 -1 0" if scenario.dimension == 2 else "0 0 -1",
-            window_steps=counts.window,
-            load_steps=counts.load,
-            snapshot_steps=counts.windows(scenario.record.snapshot_every_s),
-            shortest_steps=counts.steps(scenario.fill.settling.shortest_s),
-            first_window=first_window,
-            settle_windows=settle_windows,
-            vibration_steps=counts.vibration,
-            vibration_key=lambda stage: vibration_key(program, stage),
-            direction=lambda v: v.unit_direction(scenario.dimension),
-            first_id=first_id,
-            planned_mass=planned_masses_kg(program, classes),
-            oldest_version=OLDEST_VERSION,
-            source=lines.source,
-            number=lines.number,
-            value=lines.value,
-        )
-    )
-    return Deck(text)
+    context = deck_context(program, lines, run, study)
+    context |= {
+        "tables": pair_tables(scenario.contact, context["classes"], lines),
+        "rolling": rolls(scenario.contact),
+        "twist": scenario.contact.rolling_axes == "all",
+        "skin_source": f"{SKIN:g} of the mean diameter",
+        "simulation_box": bounds_m(program),
+        "surfaces": list(surface_meshes(program)),
+        "wall_names": [wall.name for wall in scenario.scene.walls],
+        "first_window": first_window,
+        "settle_windows": settle_windows,
+        "first_id": [1 + sum(program.counts[:i]) for i in range(len(program.counts))],
+        "oldest_version": OLDEST_VERSION,
+    }
+    return Deck.render("liggghts", context)
 
 
 def atoms_data(
@@ -213,6 +170,4 @@ def write_deck(
         first_id += len(layer.radius_m)
     for name, triangles in surface_meshes(program).items():
         write_stl(layers / f"{name}.stl", name, triangles)
-    partial = folder / "deck.in.partial"
-    partial.write_text(render_deck(program, sources, run, study).text, encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
+    render_deck(program, sources, run, study).write(folder)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from sandmould.engines.box_motion import box_motion
 from sandmould.engines.deck import Block, Deck
+from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.liggghts.grains_file import read_grains
 from sandmould.engines.liggghts.process import (
     Conversation,
@@ -24,13 +22,10 @@ from sandmould.engines.liggghts.refusals import refuse
 from sandmould.engines.liggghts.render import atoms_data, surface_meshes
 from sandmould.engines.liggghts.vtk_stress import TriangleLoads, read_triangle_loads
 from sandmould.engines.outcome import Outcome
-from sandmould.engines.program import Program, Stage
-from sandmould.engines.session import Array, EngineStop, RefusedError, Shared, engine_stop
+from sandmould.engines.program import Program
+from sandmould.engines.session import Array, EngineStop, RefusedError, engine_stop
 from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.step_counts import StepCounts
 
-_SETUP = ("header", "box", "create", "contacts", "motion", "walls", "background", "integration",
-          "measures")  # fmt: skip
 _LOOP = re.compile(r"^label settling_\d+$.*^label settled_\d+$\n", re.M | re.S)
 _VALUE = re.compile(r"^value (\S+)$", re.M)
 
@@ -43,13 +38,17 @@ def around_run(block: Block) -> tuple[str, str]:
     return block.text[: loop.start()], block.text[loop.end() :]
 
 
-class LiggghtsSession:
+class LiggghtsSession(DeckSession):
     """See ``sandmould.engines.session.Session``.
 
     A checkpoint keeps the history of all contacts, those with meshes included. In the laboratory
     frame one force is lost: at the first step after a checkpoint, whether the run stopped there or
     not, the dashpots of walls see a wall that stands still.
     """
+
+    steps = 0
+    _restart = "liggghts.restart"
+    _valid_surface = "a rigid surface on engine liggghts"
 
     def __init__(
         self, program: Program, deck: Deck, folder: Path, log: Path, checkpoint: Path | None = None
@@ -79,31 +78,15 @@ class LiggghtsSession:
             raise EngineStop(
                 Outcome.ENGINE_MISSING, "LIGGGHTS cannot be started: apt install liggghts"
             )
+        super().__init__(program, deck)
         self.version = version
-        self._program = program
-        self._scenario = program.scenario
-        self._blocks = deck.blocks
-        self._counts = StepCounts.of(program.scenario)
         self._surfaces = list(surface_meshes(program))
-        self._layer_of_id = np.repeat(np.arange(1, len(program.counts) + 1), program.counts)
         self._scratch = tempfile.TemporaryDirectory(prefix="liggghts_", dir=log.absolute().parent)
         self._liggghts = Conversation(path, folder, log)
-        self.steps = 0
-        self.step_s = self._counts.step_s
-        self.stage = program.stages[0]
-        self.stage_over = self.at_rest = False
-        self._stage_start = self._stage_end = 0
-        self._vibration_start: int | None = None
-        self._ended_window = False
-        self._setup_due = True
-        self.grains = 0
-        for name in _SETUP:
-            if name == "create" and checkpoint is not None:
-                self.send(f'read_restart "{checkpoint.absolute()}/liggghts.restart"')
-            else:
-                self.send(self._blocks[name].text)
+        self._set_up(checkpoint)
         if checkpoint is not None:
-            self._take_up(json.loads((checkpoint / "session.json").read_text(encoding="utf-8")))
+            self.steps, self.grains = (int(x) for x in self.values(["step", "count(all)"]))
+            self._take_up(checkpoint)
 
     def send(self, commands: str) -> str:
         """Execute commands of LIGGGHTS; an error becomes the outcome that fits."""
@@ -116,31 +99,6 @@ class LiggghtsSession:
         """Numbers that LIGGGHTS's formulas give now, such as ``c_top``."""
         printed = self.send("\n".join(f'print "value $({formula})"' for formula in formulas))
         return [float(word) for word in _VALUE.findall(printed)]
-
-    def _take_up(self, state: dict[str, Any]) -> None:
-        """Go on inside the stage of a checkpoint: its commands again, its own start step."""
-        stages = {stage.name: stage for stage in self._program.stages}
-        self.steps, self.grains = (int(x) for x in self.values(["step", "count(all)"]))
-        self.start_stage(stages[state["stage"]])
-        self.send(f"variable stage_start equal {state['stage_start']}")
-        self._stage_start = state["stage_start"]
-        self._stage_end = self._stage_start + self._stage_steps()
-        self._vibration_start = state["vibration_start"]
-        self._ended_window = True
-
-    @property
-    def time_s(self) -> float:
-        """Simulated time."""
-        return self.steps * self.step_s
-
-    @property
-    def is_root(self) -> bool:
-        """Whether this process writes the files; there is only this one."""
-        return True
-
-    def share(self, value: Shared) -> Shared:
-        """Give a value to all ranks, of which there is one."""
-        return value
 
     def insert_layer(self, number: int) -> None:
         """Drop a planned layer from over the bed."""
@@ -159,39 +117,15 @@ class LiggghtsSession:
         self.send(f'delete_atoms group all\nread_data "{path}" add\nrun 0')
         self._setup_due = True
 
-    def _stage_steps(self) -> int:
-        if self.stage.vibration is not None:
-            return self._counts.vibration(self.stage.vibration)
-        return self._counts.steps(self._scenario.fill.settling.longest_s)
+    def _around_run(self) -> tuple[str, str]:
+        return around_run(self._blocks[self.stage.name])
 
-    def start_stage(self, stage: Stage) -> None:
-        """Begin to settle or to vibrate."""
-        self.stage, self.stage_over, self.at_rest = stage, False, False
-        self.send(around_run(self._blocks[stage.name])[0])
-        self._setup_due = True
-        self._stage_start = self.steps
-        self._stage_end = self._stage_start + self._stage_steps()
-        if stage.counts_as_vibration and self._vibration_start is None:
-            self._vibration_start = self._stage_start
-
-    def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration or up to the next record, not past the end of the stage."""
-        now, window = self.steps, self._counts.window
-        ahead = window - now % window if duration_s is None else self._counts.steps(duration_s)
-        target = min(now + ahead, self._stage_end)
-        # Setup computes forces with whole-step velocities; only without it do windows add up to
-        # the deck's own run, bit for bit.
-        self.send(f"run {target - now} pre {'yes' if self._setup_due else 'no'} post no")
-        self._setup_due = False
+    def _compute_to(self, target: int) -> None:
+        super()._compute_to(target)
         self.steps = target
-        self._ended_window = self.steps % window == 0
-        if self._ended_window and self.stage.layer:
-            self.at_rest = self.values(["v_at_rest"])[0] == 1.0
-        self.stage_over = self.at_rest or self.steps >= self._stage_end
 
-    def end_stage(self) -> None:
-        """Close the stage that is over."""
-        self.send(around_run(self._blocks[self.stage.name])[1])
+    def _rests(self) -> bool:
+        return self.values(["v_at_rest"])[0] == 1.0
 
     def snapshot(self) -> Snapshot:
         """State of all grains, relative to the box.
@@ -208,26 +142,16 @@ class LiggghtsSession:
             raise EngineStop(
                 Outcome.LOST_GRAINS, f"LIGGGHTS has {len(table)} grains left of {self.grains}"
             )
-        d, start = self._scenario.dimension, self._vibration_start
-        shift, speed = box_motion(
-            self._scenario, self.stage, self.steps - self._stage_start, self.step_s
-        )
-        return Snapshot(
-            time_s=self.time_s,
-            vibration_time_s=-1.0 if start is None else (self.steps - start) * self.step_s,
-            stage=self.stage.name,
-            id=table[:, 0].astype(np.int64),
-            layer=self._layer_of_id[: self.grains],
-            position_m=table[:, 1 : 1 + d] - shift,
-            velocity_m_s=table[:, 4 : 4 + d] - speed,
-            spin_rad_s=table[:, 7:10],
-            radius_m=table[:, 10],
+        d = self._scenario.dimension
+        return self._snapshot(
+            table[:, 0].astype(np.int64),
+            table[:, 1 : 1 + d],
+            table[:, 4 : 4 + d],
+            table[:, 7:10],
+            table[:, 10],
         )
 
-    def surface_loads(self) -> Mapping[str, Array] | None:
-        """Mean force of the sand on each surface over the last window, N."""
-        if not self._ended_window:
-            return None
+    def _mean_loads(self) -> Mapping[str, Array]:
         d = self._scenario.dimension
         count = d * len(self._surfaces)
         values = np.array(self.values([f"f_loads[{i + 1}]" for i in range(count)]))
@@ -242,29 +166,7 @@ class LiggghtsSession:
 
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
         """Refuse: meshes of LIGGGHTS move as a whole."""
-        raise RefusedError("surface", name, "a rigid surface on engine liggghts")
-
-    def attach_elastic_surface(
-        self, name: str, stiffness: Array, mass: Array, damping: Array
-    ) -> None:
-        """Refuse: meshes of LIGGGHTS are rigid."""
-        raise RefusedError("surface", name, "a rigid surface on engine liggghts")
-
-    @property
-    def can_checkpoint(self) -> bool:
-        """Whether the last advance ended a window and the stage goes on."""
-        return self._ended_window and not self.stage_over
-
-    def write_checkpoint(self, folder: Path) -> None:
-        """Write LIGGGHTS's restart file and where the stage stands."""
-        self.send(f'write_restart "{folder.absolute()}/liggghts.restart"')
-        self._setup_due = True
-        state = {
-            "stage": self.stage.name,
-            "stage_start": self._stage_start,
-            "vibration_start": self._vibration_start,
-        }
-        (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
+        raise RefusedError("surface", name, self._valid_surface)
 
     def close(self) -> None:
         """End LIGGGHTS."""

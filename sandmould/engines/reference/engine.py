@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from sandmould.dem import source_hash
-from sandmould.engines.deck import environment, exact
-from sandmould.engines.deck_lines import Lines, size_classes
+from sandmould.engines.deck import Deck, exact
+from sandmould.engines.deck_context import deck_context
+from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
 from sandmould.engines.reference.model import surfaces_of
 from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
@@ -51,40 +50,22 @@ def write_deck(
 ) -> None:
     """Write ``deck.in``, which lists what the solver is given, and ``layers/``; the deck last."""
     scenario = program.scenario
-    lines, counts = Lines(scenario, sources), StepCounts.of(scenario)
-    d, critical = scenario.dimension, scenario.critical_step
+    d = scenario.dimension
     keys = [("gravity", "gravity_m_s2"), ("density", "sand.density_kg_m3")]
     keys += [("disc_thickness", "sand.disc_thickness_m")] if d == 2 else []
     keys += _damping_keys(scenario)
     keys += [(f"{law}_{name}", f"{key}.{last}") for law, key in _LAWS for name, last in _LAW_KEYS]
-    text = (
-        environment("reference")
-        .get_template("deck.in.j2")
-        .render(
-            run=run,
-            study=study,
-            scenario=scenario,
-            program=program,
-            kernels=source_hash(),
-            keys=keys,
-            critical=critical,
-            step_s=counts.step_s,
-            step_fraction=counts.step_s / critical.step_s,
-            inertia_factor=inertia_factor(scenario.sand, scenario.contact, scenario.time_step, d),
-            classes=size_classes(scenario),
-            surfaces=surfaces_of(scenario).names,
-            vibration_steps=counts.vibration,
-            source=lines.source,
-            number=lines.number,
-            value=lines.value,
-        )
-    )
+    context = deck_context(program, Lines(scenario, sources), run, study)
+    context |= {
+        "kernels": source_hash(),
+        "keys": keys,
+        "inertia_factor": inertia_factor(scenario.sand, scenario.contact, scenario.time_step, d),
+        "surfaces": surfaces_of(scenario).names,
+    }
     (folder / "layers").mkdir(parents=True, exist_ok=True)
     for number, layer in enumerate(program.layers, start=1):
         _write_layer(layer, folder / "layers" / f"layer_{number}.tsv", d)
-    partial = folder / "deck.in.partial"
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
+    Deck.render("reference", context).write(folder)
 
 
 def _damping_keys(scenario: Scenario) -> list[tuple[str, str]]:

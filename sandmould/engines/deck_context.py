@@ -1,0 +1,61 @@
+"""What the templates of all dialects are given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sandmould.engines.deck_lines import (
+    Lines,
+    obstacle_top_m,
+    planned_masses_kg,
+    size_classes,
+    skin_m,
+    vibration_key,
+)
+from sandmould.engines.program import Program
+from sandmould.engines.step_counts import StepCounts
+
+
+def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[str, Any]:
+    """Names and values for the templates of any dialect; an engine adds its own.
+
+    Parameters
+    ----------
+    program : Program
+    lines : Lines
+        Of the program's scenario.
+    run, study : str
+        Names for the deck's first line.
+    """
+    scenario = program.scenario
+    counts = StepCounts.of(scenario)
+    classes = size_classes(scenario)
+    critical = scenario.critical_step
+    return {
+        "run": run,
+        "study": study,
+        "scenario": scenario,
+        "program": program,
+        "classes": classes,
+        "clip": scenario.contact.no_tension == "total",
+        "damping": scenario.background_damping,
+        "settling": scenario.fill.settling,
+        "critical": critical,
+        "step_s": counts.step_s,
+        "step_fraction": counts.step_s / critical.step_s,
+        "skin": skin_m(scenario),
+        "obstacle_top": obstacle_top_m(scenario),
+        "down": "0 -1 0" if scenario.dimension == 2 else "0 0 -1",
+        "window_steps": counts.window,
+        "load_steps": counts.load,
+        "snapshot_steps": counts.windows(scenario.record.snapshot_every_s),
+        "longest_steps": counts.steps(scenario.fill.settling.longest_s),
+        "shortest_steps": counts.steps(scenario.fill.settling.shortest_s),
+        "vibration_steps": counts.vibration,
+        "vibration_key": lambda stage: vibration_key(program, stage),
+        "direction": lambda v: v.unit_direction(scenario.dimension),
+        "planned_mass": planned_masses_kg(program, classes),
+        "source": lines.source,
+        "number": lines.number,
+        "value": lines.value,
+    }

@@ -1,0 +1,191 @@
+"""What sessions of all engines do alike: stages cut into windows, snapshots, checkpoints."""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sandmould.engines.box_motion import box_motion
+from sandmould.engines.program import Program, Stage
+from sandmould.engines.session import Array, RefusedError, Shared
+from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.step_counts import StepCounts
+
+
+class StagedSession(ABC):
+    """A session in one process; see ``sandmould.engines.session.Session``.
+
+    An engine adds how it computes, and what it saves of its own.
+    """
+
+    version: str
+    _valid_surface: ClassVar[str] = "a surface moved by move_surface"
+    """What is named as valid where an elastic surface is asked for."""
+
+    def __init__(self, program: Program) -> None:
+        """Stand before the first stage.
+
+        Parameters
+        ----------
+        program : Program
+        """
+        self._program = program
+        self._scenario = program.scenario
+        self._counts = StepCounts.of(program.scenario)
+        self._layer_of_id = np.repeat(np.arange(1, len(program.counts) + 1), program.counts)
+        self.step_s = self._counts.step_s
+        self.stage = program.stages[0]
+        self.stage_over = self.at_rest = False
+        self._stage_start = self._stage_end = 0
+        self._vibration_start: int | None = None
+        self._ended_window = False
+
+    @property
+    @abstractmethod
+    def grains(self) -> int:
+        """Grains now in the box."""
+
+    @property
+    @abstractmethod
+    def steps(self) -> int:
+        """Steps since the run began, resumed ones included."""
+
+    @abstractmethod
+    def _begin_stage(self) -> None:
+        """Prepare the engine for the stage that begins."""
+
+    @abstractmethod
+    def _compute_to(self, target: int) -> None:
+        """Compute up to a step of the stage."""
+
+    @abstractmethod
+    def _rests(self) -> bool:
+        """Whether the rest rule of the settling stage is met."""
+
+    @abstractmethod
+    def _mean_loads(self) -> Mapping[str, Array]:
+        """Mean force of the sand on each surface over the window that has just ended, N."""
+
+    @abstractmethod
+    def _save(self, folder: Path) -> None:
+        """Write the engine's own state."""
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time."""
+        return self.steps * self.step_s
+
+    @property
+    def is_root(self) -> bool:
+        """Whether this process writes the files: there is one process."""
+        return True
+
+    def share(self, value: Shared) -> Shared:
+        """Give back the value: there is one process."""
+        return value
+
+    def _stage_steps(self) -> int:
+        """Steps of the stage, at most."""
+        if self.stage.vibration is not None:
+            return self._counts.vibration(self.stage.vibration)
+        return self._counts.steps(self._scenario.fill.settling.longest_s)
+
+    def start_stage(self, stage: Stage) -> None:
+        """Begin to settle or to vibrate."""
+        self.stage, self.stage_over, self.at_rest = stage, False, False
+        self._stage_start = self.steps
+        self._stage_end = self._stage_start + self._stage_steps()
+        if stage.counts_as_vibration and self._vibration_start is None:
+            self._vibration_start = self._stage_start
+        self._begin_stage()
+
+    def advance(self, duration_s: float | None = None) -> None:
+        """Compute for a duration or up to the next record, not past the end of the stage."""
+        now, window = self.steps, self._counts.window
+        ahead = window - now % window if duration_s is None else self._counts.steps(duration_s)
+        self._compute_to(min(now + ahead, self._stage_end))
+        self._ended_window = self.steps % window == 0
+        if self._ended_window and self.stage.layer:
+            self.at_rest = self._rests()
+        self.stage_over = self.at_rest or self.steps >= self._stage_end
+
+    def _snapshot(
+        self,
+        ids: NDArray[np.int64],
+        position_m: Array,
+        velocity_m_s: Array,
+        spin_rad_s: Array,
+        radius_m: Array,
+        orientation: Array | None = None,
+    ) -> Snapshot:
+        """Make a snapshot of all grains, relative to the box, out of what the engine computes with.
+
+        Parameters
+        ----------
+        ids : (n,) int64
+            In ascending order, which is that of all other arrays.
+        position_m, velocity_m_s : (n, d) float64, m and m/s
+            In the frame of the computation.
+        spin_rad_s, radius_m, orientation
+            See ``Snapshot``.
+        """
+        shift, speed = box_motion(
+            self._scenario, self.stage, self.steps - self._stage_start, self.step_s
+        )
+        start = self._vibration_start
+        return Snapshot(
+            time_s=self.time_s,
+            vibration_time_s=-1.0 if start is None else (self.steps - start) * self.step_s,
+            stage=self.stage.name,
+            id=ids,
+            layer=self._layer_of_id[: self.grains],
+            position_m=position_m - shift,
+            velocity_m_s=velocity_m_s - speed,
+            spin_rad_s=spin_rad_s,
+            radius_m=radius_m,
+            orientation=orientation,
+        )
+
+    def surface_loads(self) -> Mapping[str, Array] | None:
+        """Mean force of the sand on each surface over the last window, N."""
+        return self._mean_loads() if self._ended_window else None
+
+    def attach_elastic_surface(
+        self, name: str, stiffness: Array, mass: Array, damping: Array
+    ) -> None:
+        """Refuse: no engine steps an elastic surface."""
+        raise RefusedError("surface", name, self._valid_surface)
+
+    @property
+    def can_checkpoint(self) -> bool:
+        """Whether the last advance ended a window and the stage goes on."""
+        return self._ended_window and not self.stage_over
+
+    def write_checkpoint(self, folder: Path) -> None:
+        """Write the engine's state and where the stage stands."""
+        self._save(folder)
+        if self.is_root:
+            state = {
+                "stage": self.stage.name,
+                "stage_start": self._stage_start,
+                "vibration_start": self._vibration_start,
+            }
+            (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
+
+    def _take_up(self, checkpoint: Path) -> None:
+        """Go on inside the stage of a checkpoint, whose own state the engine has read."""
+        state: dict[str, Any] = json.loads(
+            (checkpoint / "session.json").read_text(encoding="utf-8")
+        )
+        stages = {stage.name: stage for stage in self._program.stages}
+        self.start_stage(stages[state["stage"]])
+        self._stage_start = state["stage_start"]
+        self._stage_end = self._stage_start + self._stage_steps()
+        self._vibration_start = state["vibration_start"]
+        self._ended_window = True
