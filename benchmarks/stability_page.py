@@ -15,7 +15,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from benchmarks.stability_scenes import BLOWS_UP, DRIFTS, STABLE
+from benchmarks.stability_runs import BLOWS_UP, DRIFTS, STABLE
+from benchmarks.tables import table
 from sandmould import ROOT
 
 FIGURE = ROOT / "docs" / "stability.png"
@@ -111,11 +112,6 @@ def draw(results: dict[str, Any], path: Path) -> None:
     plt.close(figure)
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def _limits_table(results: dict[str, Any]) -> str:
     engines = list(results["engines"])
     rows = []
@@ -135,7 +131,7 @@ def _limits_table(results: dict[str, Any]) -> str:
             ])  # fmt: skip
     titles = [ENGINE_TITLES[engine] for engine in engines]
     head = ["scene", "ζ", "(42), ξ = ζ", "(42), whole system", *titles]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _estimates_table(results: dict[str, Any]) -> str:
@@ -157,7 +153,7 @@ def _estimates_table(results: dict[str, Any]) -> str:
         "its own eigenproblem, (43)-(47), µs",
         "planned, 6 contacts, µs",
     ]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _rolling_table(results: dict[str, Any]) -> str:
@@ -171,7 +167,7 @@ def _rolling_table(results: dict[str, Any]) -> str:
         for row in results["rotation"]["rolling"]
     ]
     head = ["grain", "as it is, m/s² (exact)", "scaled, m/s²", "factor (exact)"]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _gain_table(results: dict[str, Any]) -> str:
@@ -181,7 +177,7 @@ def _gain_table(results: dict[str, Any]) -> str:
         steps = ((a[k], b[k]) for k in ("whole_s", "planned_s"))
         gains = (f"{1e6 * x:.1f} → {1e6 * y:.1f} ({y / x:.2f})" for x, y in steps)
         rows.append([f"{a['damping_ratio']:g}", *gains])
-    return _table(["ζ", "whole system, µs", "planned, µs"], rows)
+    return table(["ζ", "whole system, µs", "planned, µs"], rows)
 
 
 def _first_blow_up(results: dict[str, Any], scene: str) -> str:
@@ -219,7 +215,7 @@ def _followed_table(results: dict[str, Any]) -> str:
         ]
         rows.append([f"{row['damping_ratio']:g}", f"{row['step_over_limit']:g}", *seen])
     titles = [ENGINE_TITLES[engine] for engine in engines]
-    return _table(["ζ", "step over the limit", *titles], rows)
+    return table(["ζ", "step over the limit", *titles], rows)
 
 
 def _agreement(results: dict[str, Any]) -> str:
@@ -261,5 +257,6 @@ def write(results: dict[str, Any], path: Path) -> None:
         "grain_undamped": f"{bed['limits'][0]['grain_s'] / bed['limits'][0]['whole_s']:.2f}",
     }
     for name, text in words.items():
-        template = template.replace(f"@{name}@", text)
+        # The template ends the line of a placeholder itself.
+        template = template.replace(f"@{name}@", text.rstrip("\n"))
     path.write_text(template, encoding="utf-8")

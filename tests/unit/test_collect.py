@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould.engines.outcome import Outcome
 from sandmould.study.check import failed_runs
 from sandmould.study.collect import (
     NO_OUTCOME,
@@ -129,7 +130,9 @@ def test_failed_runs_fail_loudly(study: Path) -> None:
 def test_no_failed_run_passes(tmp_path: Path) -> None:
     study = write_study(tmp_path / "tube", failed=())
     collect(study)
-    failed_runs(study / "summary.tsv")
+    summary = pd.read_csv(study / "summary.tsv", sep="\t")
+    assert list(summary["outcome"]) == [Outcome.FINISHED.label] * 9
+    failed_runs(study / "summary.tsv")  # no SystemExit
 
 
 def test_study_without_any_run_started(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def test_refusal_names_the_key_and_what_is_valid(
     ],
 )
 def test_all_else_is_taken(changes: dict[str, Any]) -> None:
-    refuse(liggghts_scene(**changes))
+    refuse(liggghts_scene(**changes))  # no RefusedError
 
 
 def test_missing_executable_is_told_before_anything_starts(

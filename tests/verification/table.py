@@ -16,7 +16,8 @@ from pathlib import Path
 
 from sandmould import ROOT
 from sandmould.engines.choosing import engine_of
-from tests.verification.cases.bench import ENGINES, Case, RefusedCase, Result, scene
+from tests.verification.cases.bench import scene
+from tests.verification.cases.case import ENGINES, Case, RefusedCase, Result
 from tests.verification.cases.catalogue import CASES
 
 PAGE = ROOT / "docs" / "verification.md"

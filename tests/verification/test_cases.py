@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from tests.verification.cases.bench import Case, RefusedCase
+from tests.verification.cases.case import Case, RefusedCase
 from tests.verification.cases.catalogue import CASES
 
 RUNS = [

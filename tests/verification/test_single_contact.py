@@ -11,30 +11,8 @@ from sandmould.engines.lammps.session import LammpsSession
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
-from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_lammps
-
-RADIUS_M = 0.002
-
-
-def one_grain_scene(**changes: object) -> Scenario:
-    """Give an empty box of which only the floor matters."""
-    base: dict[str, object] = {
-        "box": {"width_m": 0.05, "height_m": 0.05},
-        "sand": {
-            "size_scale": 1.0,
-            "size_classes": 1,
-            "sieve": [
-                {"opening_m": 2 * RADIUS_M / 1.001, "passing_fraction": 0},
-                {"opening_m": 2 * RADIUS_M * 1.001, "passing_fraction": 1},
-            ],
-        },
-        "fill": {"layers": [{"count": 1}]},
-        "background_damping": {"form": "none"},
-        "time_step": {"fraction": 0.01},
-        "record": {"load_every_steps": 1, "series_every_s": 1e-4, "snapshot_every_s": 1e-4},
-    }
-    return Scenario.model_validate(base | changes)
+from tests.verification.one_grain import RADIUS_M, one_grain_scene
 
 
 def put_grain(session: LammpsSession, height_m: float, speed_m_s: float) -> None:

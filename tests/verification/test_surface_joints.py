@@ -1,63 +1,14 @@
-"""Grains against surfaces of many parts: no bump, no double contact, no lost friction at joints."""
+"""Grains on floors and round walls of many facets: no bump, no double contact, no lost friction."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from sandmould.dem.broad_phase import find_candidates
-from sandmould.dem.contact_law import Law
-from sandmould.dem.surface_contacts import press_on_surfaces
 from sandmould.dem.surfaces import Surfaces, move_vertices
-from sandmould.dem.vectors import like
-from sandmould.dem.wall_history import new_history
-
-Array = NDArray[np.float64]
-RADIUS_M, MASS_KG, STEP_S = 1e-3, 1e-5, 1e-6
-LAW = Law(2e4, 2e4, 0.35, 0.95, 0.1, 2e4, clip_total=True, twist=False)
-SMOOTH = LAW._replace(friction=0.0, damping_ratio=0.0, rolling_arm=0.0)
-
-
-@dataclass
-class Touch:
-    """What one grain feels in one step."""
-
-    force: Array
-    moment: Array
-    loads: Array
-    contacts: int
-
-
-class Probe:
-    """One grain and its memory of the surfaces."""
-
-    def __init__(self, surfaces: Surfaces, law: Law = LAW) -> None:
-        self.surfaces, self.law = surfaces, law
-        self.d = surfaces.dimension
-        self.like = like(self.d)
-        self.history = new_history(self.like, 1)
-
-    def touch(
-        self, position: Array, velocity: Array, spin: Array, shift_velocity: Array | None = None
-    ) -> Touch:
-        """Put the grain somewhere for one step."""
-        arrays = self.surfaces.arrays
-        radius, mass, still = np.array([RADIUS_M]), np.array([MASS_KG]), (0.0,) * self.d
-        x, v, w = (np.array([a], dtype=float) for a in (position, velocity, spin))
-        force, moment = np.zeros_like(x), np.zeros_like(w)
-        loads = np.zeros_like(arrays.vertices)
-        found = find_candidates(self.like, x, radius, 0.0, arrays, still)
-        shift_v = still if shift_velocity is None else tuple(shift_velocity)
-        press_on_surfaces(
-            self.like, 0, len(found.rows), found, x, v, w, radius, mass, force, moment, arrays,
-            still, shift_v, self.law, STEP_S, True, self.history, loads,
-        )  # fmt: skip
-        contacts = int(self.history.used[0]) if len(found.rows) else 0
-        return Touch(force[0], moment[0], loads, contacts)
+from tests.verification.probe import LAW, MASS_KG, RADIUS_M, SMOOTH, STEP_S, Array, Probe
 
 
 def turn(d: int, angle: float) -> Array:
@@ -153,83 +104,6 @@ def test_grain_dragged_by_a_constant_force_moves_alike_on_plane_and_facets(d: in
     np.testing.assert_allclose(tracks[1], tracks[0], rtol=0, atol=1e-12 * 4e-3)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-def test_contact_goes_smoothly_round_a_convex_edge(d: int) -> None:
-    surfaces = block(d, 4e-3)
-    probe = Probe(surfaces, SMOOTH)
-    h, reach = 2e-3, 0.95 * RADIUS_M
-    # Along the top, round the edge by a quarter of a turn, down the side, at one distance.
-    flat = [(x, h + reach, 0.0) for x in np.linspace(1e-3, h, 200)]
-    edge = [
-        (h + reach * math.sin(a), h + reach * math.cos(a), a)
-        for a in np.linspace(0, math.pi / 2, 400)
-    ]
-    side = [(h + reach, y, math.pi / 2) for y in np.linspace(h, 1e-3, 200)]
-    for x, y, angle in [*flat, *edge, *side]:
-        center = np.zeros(d)
-        center[0], center[-1] = x, y
-        t = probe.touch(center, np.zeros(d), np.zeros(1 if d == 2 else 3))
-        expected = np.zeros(d)
-        push = SMOOTH.k_n * 0.05 * RADIUS_M
-        expected[0], expected[-1] = push * math.sin(angle), push * math.cos(angle)
-        assert t.contacts == 1
-        np.testing.assert_allclose(t.force, expected, atol=1e-12 * push)
-
-
-def block(d: int, size: float) -> Surfaces:
-    """A square or a cube about the origin, each side of several facets."""
-    surfaces = Surfaces(d)
-    if d == 2:
-        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * size / 2
-        surfaces.add_facets("block", corners, [(0, 1), (1, 2), (2, 3), (3, 0)])
-        return surfaces
-    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size / 2
-    quads = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
-    triangles = [t for a, b, c, e in quads for t in ((a, b, c), (a, c, e))]
-    surfaces.add_facets("block", corners, triangles)
-    return surfaces
-
-
-def test_cube_is_touched_once_from_every_side() -> None:
-    h, rng = 2e-3, np.random.default_rng(5)
-    probe = Probe(block(3, 2 * h), SMOOTH)
-    for _ in range(2000):
-        # A point at 0.97 radii from the cube: any point outside, drawn towards its nearest one.
-        outside = rng.normal(size=3) * 2 * h
-        nearest = np.clip(outside, -h, h)
-        if np.array_equal(outside, nearest):
-            continue
-        n = (outside - nearest) / np.linalg.norm(outside - nearest)
-        t = probe.touch(nearest + 0.97 * RADIUS_M * n, np.zeros(3), np.zeros(3))
-        assert t.contacts == 1
-        push = SMOOTH.k_n * 0.03 * RADIUS_M
-        np.testing.assert_allclose(t.force, push * n, atol=1e-9 * push)
-
-
-@pytest.mark.parametrize("angle_deg", [20.0, 45.0, 90.0, 130.0])
-def test_concave_corner_has_two_contacts(angle_deg: float) -> None:
-    surfaces = Surfaces(2)
-    a = math.radians(angle_deg)
-    rise = np.array([math.cos(a), math.sin(a)])
-    corners = np.array([(-5e-3, 0.0), (0.0, 0.0), 5e-3 * rise])
-    surfaces.add_facets("corner", corners, [(0, 1), (1, 2)])
-    n = np.array([[0.0, 1.0], [-math.sin(a), math.cos(a)]])
-    # Into the first side by 1 % of the radius, into the second by 2 %.
-    center = np.linalg.solve(n, RADIUS_M * np.array([0.99, 0.98]))
-    t = Probe(surfaces, SMOOTH).touch(center, np.zeros(2), np.zeros(1))
-    assert t.contacts == 2
-    expected = SMOOTH.k_n * RADIUS_M * (0.01 * n[0] + 0.02 * n[1])
-    np.testing.assert_allclose(t.force, expected, rtol=1e-11)
-
-
-def test_concave_corner_of_three_sides_has_three_contacts() -> None:
-    surfaces = block(3, 4e-3)
-    depth = np.array([0.01, 0.02, 0.015]) * RADIUS_M
-    t = Probe(surfaces, SMOOTH).touch(2e-3 - RADIUS_M + depth, np.zeros(3), np.zeros(3))
-    assert t.contacts == 3
-    np.testing.assert_allclose(t.force, -SMOOTH.k_n * depth, rtol=1e-11)
-
-
 def test_obtuse_joints_of_a_round_wall_count_once_and_keep_friction() -> None:
     # A bore of 72 sides, 5 degrees each: a grain slides round the inside, always against one.
     surfaces = Surfaces(2)
@@ -315,26 +189,6 @@ def test_revolved_tube_is_the_limit_of_many_facets() -> None:
     assert errors[-1] < 0.05
     assert errors[1] < 0.6 * errors[0]
     assert errors[2] < 0.6 * errors[1]
-
-
-@pytest.mark.parametrize("d", [2, 3])
-def test_loads_on_vertices_do_the_work_of_the_contacts(d: int) -> None:
-    surfaces = block(d, 4e-3)
-    rng = np.random.default_rng(7)
-    for _ in range(100):
-        probe = Probe(surfaces)
-        x = rng.uniform(-1, 1, d)
-        x *= (2e-3 + 0.98 * RADIUS_M) / np.abs(x).max()
-        t = probe.touch(x, rng.normal(size=d), rng.normal(size=1 if d == 2 else 3))
-        if t.contacts == 0:
-            continue
-        size = float(np.linalg.norm(t.force))
-        np.testing.assert_allclose(t.loads.sum(axis=0), -t.force, atol=1e-12 * size)
-        on_point = np.clip(x, -2e-3, 2e-3)
-        # One contact: sum x_j (x) f_j = p (x) f.
-        first = np.einsum("ni,nj->ij", surfaces.arrays.vertices, t.loads)
-        np.testing.assert_allclose(first, -np.outer(on_point, t.force), atol=1e-12 * size * 2e-3)
-        np.testing.assert_allclose(surfaces.forces(t.loads)["block"], -t.force, atol=1e-12 * size)
 
 
 @pytest.mark.parametrize("d", [2, 3])

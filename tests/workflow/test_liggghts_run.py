@@ -14,7 +14,13 @@ from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.program import build_program
 from sandmould.study.expand import scenario_hash
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
-from tests.workflow.test_one_run import kill_after_a_checkpoint, last_snapshot, run_folder, simulate
+from tests.workflow.runs import (
+    computed,
+    kill_after_a_checkpoint,
+    last_snapshot,
+    run_folder,
+    simulate,
+)
 
 pytestmark = needs_liggghts
 SHORT = {
@@ -26,9 +32,7 @@ SHORT = {
 @pytest.fixture(scope="module")
 def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Compute the small scene without a stop."""
-    folder = run_folder(liggghts_scene(**SHORT), tmp_path_factory.mktemp("straight"))
-    assert simulate(folder) == 0
-    return folder
+    return computed(liggghts_scene(**SHORT), tmp_path_factory.mktemp("straight"))
 
 
 def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:

@@ -1,16 +1,10 @@
-"""One run from its folder: settling, loads, kill and resume, guards, ranks."""
+"""One run by LAMMPS from its folder: settling, loads, guards, engine errors, ranks."""
 
 from __future__ import annotations
 
 import fcntl
-import json
 import math
-import os
-import signal
-import subprocess
-import sys
 import threading
-import time
 from pathlib import Path
 from typing import Any
 
@@ -18,79 +12,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould import ROOT
-from sandmould.engines.checkpoint import newest_checkpoint
-from sandmould.engines.driver import Driver
 from sandmould.engines.guard import grain_masses_kg
-from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.engines.products import finish
-from sandmould.engines.program import build_program
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import Run, expand, scenario_hash
-from sandmould.study.launch import RESTARTABLE_EXIT, _only_one, launch
-from sandmould.study.opening import open_study
-from sandmould.study.plan import write_plan
-from sandmould.study.simulate import render_run
+from sandmould.study.launch import _only_one, launch
 from tests.scenes import open_lammps, tube_scene
-
-
-def run_folder(scenario: Scenario, folder: Path) -> Path:
-    """Plan and render one run, as the workflow does."""
-    run = Run("test", "one", {}, 1, scenario, {})
-    write_plan([run], folder)
-    render_run(folder / "runs" / "one")
-    return folder / "runs" / "one"
-
-
-def simulate(folder: Path) -> int:
-    """Compute a run in a process of its own."""
-    command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
-    return subprocess.run(command, capture_output=True, text=True).returncode
-
-
-def kill_after_a_checkpoint(folder: Path) -> None:
-    """Start a run and kill it as soon as it has left a checkpoint."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sandmould.study.simulate", str(folder)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    deadline = time.monotonic() + 60
-    while not list(folder.glob("work/checkpoint_*/mark.json")):
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.01)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    assert not (folder / "outcome.json").exists()
-    marks = [json.loads(p.read_text())["mark"] for p in folder.glob("work/checkpoint_*/mark.json")]
-    assert max(m["steps"] for m in marks) > 0
-
-
-def drive(scenario: Scenario, folder: Path) -> RunOutcome:
-    """Compute a run in this process."""
-    program = build_program(scenario)
-    write_deck(program, {}, folder, "test", "test")
-    driver = Driver(program, folder, "test", scenario_hash(scenario))
-    outcome = driver.run()
-    if not outcome.outcome.restartable:
-        finish(folder, scenario.dimension, outcome, driver.cost, {})
-    return outcome
-
-
-def last_snapshot(folder: Path) -> Snapshot:
-    return Snapshot.load(max((folder / "snapshots").glob("*.npz")))
+from tests.workflow.runs import computed, drive, last_snapshot, run_folder
 
 
 @pytest.fixture(scope="module")
 def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Compute the small scene without a stop."""
-    folder = run_folder(tube_scene(), tmp_path_factory.mktemp("straight"))
-    assert simulate(folder) == 0
-    return folder
+    return computed(tube_scene(), tmp_path_factory.mktemp("straight"))
 
 
 def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
@@ -147,55 +82,6 @@ def test_weight_of_a_bed_at_rest_is_the_load_on_floor_walls_and_tube(tmp_path: P
     assert loads["left"][0] < 0 < loads["right"][0]  # the sand pushes both walls outwards
 
 
-def _state(folder: Path) -> dict[str, Any]:
-    snapshot = last_snapshot(folder)
-    return {"position": snapshot.position_m, "velocity": snapshot.velocity_m_s,
-            "spin": snapshot.spin_rad_s}  # fmt: skip
-
-
-def test_killed_run_resumes_and_ends_as_if_never_stopped(straight: Path, tmp_path: Path) -> None:
-    folder = run_folder(tube_scene(), tmp_path)
-    kill_after_a_checkpoint(folder)
-    assert simulate(folder) == 0
-    for name, values in _state(straight).items():
-        np.testing.assert_array_equal(values, _state(folder)[name])
-    for table in ("series.tsv", "loads.tsv"):
-        assert (folder / table).read_text() == (straight / table).read_text()
-    assert len(list((folder / "snapshots").iterdir())) == len(
-        list((straight / "snapshots").iterdir())
-    )
-    costs = [pd.read_csv(f / "cost.tsv", sep="\t").iloc[0] for f in (straight, folder)]
-    assert costs[0].grain_steps == costs[1].grain_steps
-
-
-def test_damaged_checkpoint_is_told_and_the_run_starts_from_the_one_before(
-    tmp_path: Path,
-) -> None:
-    scene = tube_scene(guard={"wall_limit_s": 0.5})
-    folder = run_folder(scene, tmp_path)
-    assert simulate(folder) == RESTARTABLE_EXIT
-    assert RunOutcome.read(folder / "work" / "outcome.json").outcome is Outcome.OUT_OF_WALL_TIME
-    newest = max(folder.glob("work/checkpoint_*/lammps.restart"), key=lambda p: p.stat().st_mtime)
-    newest.write_bytes(newest.read_bytes()[:1000])
-    program = build_program(tube_scene())
-    outcome = Driver(program, folder, "test", scenario_hash(scene)).run()
-    assert outcome.outcome is Outcome.FINISHED
-    assert "cannot be used" in outcome.detail
-
-
-def test_checkpoint_of_another_scenario_is_left_alone(tmp_path: Path) -> None:
-    folder = run_folder(tube_scene(guard={"wall_limit_s": 0.5}), tmp_path)
-    assert simulate(folder) == RESTARTABLE_EXIT
-    newest, _ = newest_checkpoint(folder / "work")
-    assert newest is not None
-    kept = {p.name: p.read_bytes() for p in newest[0].iterdir()}
-    other = Driver(build_program(tube_scene()), folder, "test", "another").run()
-    assert other.outcome is Outcome.FINISHED
-    assert "checkpoints of another scenario were set aside" in other.detail
-    (aside,) = folder.glob("checkpoints_of_*")
-    assert {p.name: p.read_bytes() for p in (aside / newest[0].name).iterdir()} == kept
-
-
 @pytest.mark.parametrize(
     ("changes", "outcome", "says"),
     [
@@ -250,67 +136,6 @@ def test_engine_error_and_crash_leave_an_outcome(command: str, says: str, tmp_pa
     assert ended.outcome is Outcome.ENGINE_FAILED
     assert says in ended.detail
     assert (folder / "series.tsv").exists()
-
-
-def test_paper_size_tube_starts_stops_and_resumes(tmp_path: Path) -> None:
-    run = expand(open_study(ROOT / "config" / "studies" / "tube_paper.yaml"))[0]
-    assert sum(build_program(run.scenario).counts) == 64_000
-    guard = run.scenario.guard.model_copy(update={"wall_limit_s": 0.1})
-    folder = run_folder(run.scenario.model_copy(update={"guard": guard}), tmp_path)
-    steps = []
-    for _ in range(2):
-        assert simulate(folder) == RESTARTABLE_EXIT
-        newest, damaged = newest_checkpoint(folder / "work")
-        assert newest is not None
-        assert not damaged
-        steps.append(newest[1].steps)
-    assert 0 < steps[0] < steps[1]
-    assert newest[1].cost["grains"] == 8000
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"frame": "laboratory"},
-        {
-            "dimension": 3,
-            "box": {"depth_m": 0.06},
-            "time_step": {"fraction": 0.9},
-            "fill": {"layers": [{"count": 60}], "settling": {"rms_speed_m_s": 0.3}},
-        },
-    ],
-    ids=["box", "laboratory", "3D with turned facets"],
-)
-def test_restored_session_equals_the_one_that_wrote_the_checkpoint(
-    changes: dict[str, Any], tmp_path: Path
-) -> None:
-    scene = tube_scene(**changes)
-    session = open_lammps(scene, tmp_path)
-    session.insert_layer(1)
-    session.start_stage(session._program.stages[0])
-    while not session.stage_over:
-        session.advance()
-    session.end_stage()
-    session.start_stage(session._program.stages[-1])
-    while not session.can_checkpoint:
-        session.advance()
-    session.write_checkpoint(tmp_path)
-    restored = open_lammps(scene, tmp_path, checkpoint=tmp_path)
-    steps = session.steps
-    while session.steps < steps + 1000 and not session.stage_over:
-        session.advance()
-        restored.advance()
-    one, two = session.snapshot(), restored.snapshot()
-    loads = session.surface_loads(), restored.surface_loads()
-    session.close()
-    restored.close()
-    assert one.time_s == two.time_s
-    assert one.vibration_time_s == two.vibration_time_s
-    for name in ("position_m", "velocity_m_s", "spin_rad_s"):
-        np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=0, atol=1e-9)
-    for surface, force in (loads[0] or {}).items():
-        np.testing.assert_allclose(force, (loads[1] or {})[surface], atol=1e-6)
 
 
 def test_a_second_process_waits_for_the_first_and_takes_its_outcome(tmp_path: Path) -> None:

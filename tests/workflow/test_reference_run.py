@@ -16,7 +16,8 @@ from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene
-from tests.workflow.test_one_run import (
+from tests.workflow.runs import (
+    computed,
     drive,
     kill_after_a_checkpoint,
     last_snapshot,
@@ -40,9 +41,7 @@ def scene(**changes: Any) -> Scenario:
 @pytest.fixture(scope="module")
 def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Compute the small scene without a stop."""
-    folder = run_folder(scene(), tmp_path_factory.mktemp("straight"))
-    assert simulate(folder) == 0
-    return folder
+    return computed(scene(), tmp_path_factory.mktemp("straight"))
 
 
 def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:

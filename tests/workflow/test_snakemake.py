@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pandas as pd
@@ -19,6 +16,7 @@ from sandmould.study.expand import expand
 from sandmould.study.opening import open_study
 from sandmould.study.plan import kind_of
 from sandmould.study.planning import calibrated_rate
+from tests.workflow.runs import kill_at_a_checkpoint
 
 SNAKEMAKE = Path(sys.executable).parent / "snakemake"
 STUDIES = sorted((ROOT / "config" / "studies").glob("*.yaml"))
@@ -145,17 +143,8 @@ def test_killed_snakemake_is_taken_up_by_the_next(checkout: Path) -> None:
     study = checkout / "killed.yaml"
     study.write_text(TINY + "replicates: 2\nsweep: {}\n")
     command = [str(SNAKEMAKE), "--cores", "2", "--configfile", str(study)]
-    process = subprocess.Popen(
-        command, cwd=checkout, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+    kill_at_a_checkpoint(command, checkout, "results/killed/runs/*", limit_s=120.0)
     results = checkout / "results" / "killed"
-    deadline = time.monotonic() + 120
-    while not list(results.glob("runs/*/work/checkpoint_*/mark.json")):
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.05)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
     ran = snakemake("--configfile", str(study), folder=checkout)
     assert ran.returncode == 0, ran.stderr
     summary = pd.read_csv(results / "summary.tsv", sep="\t")

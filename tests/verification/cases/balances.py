@@ -14,8 +14,6 @@ from tests.verification.cases.bench import (
     SMALL_M,
     Array,
     Bench,
-    Measured,
-    case,
     inertia_factor,
     law,
     mass_kg,
@@ -23,6 +21,7 @@ from tests.verification.cases.bench import (
     stiffness,
     vector,
 )
+from tests.verification.cases.case import Measured, case
 
 SPEED_M_S = 0.08
 

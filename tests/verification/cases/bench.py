@@ -1,16 +1,9 @@
-"""A test bench: a few grains placed exactly in a box, computed by any engine.
-
-Every case is a function of an engine and a dimension. It yields what it measured and the exact
-value; ``case`` turns that into results and keeps the list that tests and the table go through.
-"""
+"""A test bench: a few grains placed exactly in a box, computed by any engine."""
 
 from __future__ import annotations
 
-import itertools
 import math
 import tempfile
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -24,9 +17,9 @@ from sandmould.engines.session import Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
+from tests.verification.cases.case import RefusedCase
 
 Array = NDArray[np.float64]
-ENGINES = ("lammps", "liggghts", "reference")
 RADIUS_M = 0.002
 SMALL_M, LARGE_M = 0.0016, 0.0024
 OMEGA_RAD_S = 2000.0
@@ -34,111 +27,6 @@ OMEGA_RAD_S = 2000.0
 LIGHT_M_S2 = 0.1
 """A gravity so light that a grain's sag, g/omega^2, is 1e-5 radii: where on the overlap an engine
 puts the contact point then no longer matters."""
-
-
-@dataclass(frozen=True)
-class Result:
-    """One number that an engine computed beside the exact one."""
-
-    name: str
-    engine: str
-    dimension: int
-    measured: float
-    exact: float
-    unit: str
-    tolerance: float
-    """In the unit."""
-    reason: str
-    """Why the tolerance is what it is."""
-    equation: str
-
-    @property
-    def error(self) -> float:
-        return self.measured - self.exact
-
-    @property
-    def holds(self) -> bool:
-        return bool(abs(self.error) <= self.tolerance)
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What a case yields."""
-
-    name: str
-    measured: float
-    exact: float
-    tolerance: float
-    unit: str = "1"
-
-
-@dataclass(frozen=True)
-class Case:
-    """One case with its arguments."""
-
-    function: Callable[..., Iterator[Measured]]
-    arguments: dict[str, Any]
-    dimensions: tuple[int, ...]
-    engines: tuple[str, ...]
-    equation: str
-    reason: str
-
-    @property
-    def name(self) -> str:
-        words = [self.function.__name__, *(str(value) for value in self.arguments.values())]
-        return "-".join(words)
-
-    @property
-    def family(self) -> str:
-        """Title of the case with all its arguments."""
-        return self.function.__name__.replace("_", " ")
-
-    def run(self, engine: str, dimension: int) -> list[Result]:
-        """Compute the case.
-
-        Raises
-        ------
-        RefusedCase
-            When the engine lacks what it needs.
-        """
-        found = self.function(engine, dimension, **self.arguments)
-        return [
-            Result(
-                m.name, engine, dimension, float(m.measured), float(m.exact), m.unit,
-                float(m.tolerance), self.reason, self.equation,
-            )
-            for m in found
-        ]  # fmt: skip
-
-
-CASES: list[Case] = []
-Function = Callable[..., Iterator[Measured]]
-
-
-def case(
-    equation: str,
-    reason: str,
-    dimensions: tuple[int, ...] = (2, 3),
-    engines: tuple[str, ...] = ENGINES,
-    **arguments: list[Any],
-) -> Callable[[Function], Function]:
-    """Enter a function into the list of cases, once for each combination of arguments."""
-
-    def enter(function: Function) -> Function:
-        for values in itertools.product(*arguments.values()):
-            chosen = dict(zip(arguments, values, strict=True))
-            CASES.append(Case(function, chosen, dimensions, engines, equation, reason))
-        return function
-
-    return enter
-
-
-class RefusedCase(Exception):  # noqa: N818 - it is an answer, not an error
-    """The engine refuses the scene, or is not installed."""
-
-    def __init__(self, key: str, valid: str) -> None:
-        self.key = key
-        super().__init__(f"{key}: valid is {valid}")
 
 
 def sieve(dimension: int, radii_m: tuple[float, ...]) -> dict[str, Any]:

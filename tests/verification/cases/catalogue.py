@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 
-from tests.verification.cases.bench import CASES as CASES
+from tests.verification.cases.case import CASES as CASES
 
 MODULES = (
     "flight",

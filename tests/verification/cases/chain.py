@@ -12,8 +12,6 @@ from tests.verification.cases.bench import (
     OMEGA_RAD_S,
     RADIUS_M,
     Bench,
-    Measured,
-    case,
     crossing,
     law,
     mass_kg,
@@ -21,6 +19,7 @@ from tests.verification.cases.bench import (
     stiffness,
     vector,
 )
+from tests.verification.cases.case import Measured, case
 
 GRAINS = 8
 

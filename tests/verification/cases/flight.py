@@ -7,16 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tests.verification.cases.bench import (
-    Bench,
-    Measured,
-    along_of,
-    case,
-    scene,
-    spin,
-    spin_of,
-    vector,
-)
+from tests.verification.cases.bench import Bench, along_of, scene, spin, spin_of, vector
+from tests.verification.cases.case import Measured, case
 
 GRAVITY = 9.80665
 

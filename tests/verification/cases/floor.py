@@ -16,9 +16,7 @@ from tests.verification.cases.bench import (
     RADIUS_M,
     Array,
     Bench,
-    Measured,
     along_of,
-    case,
     crossing,
     inertia_factor,
     law,
@@ -27,6 +25,7 @@ from tests.verification.cases.bench import (
     spin_of,
     vector,
 )
+from tests.verification.cases.case import Measured, case
 
 SAG_M = LIGHT_M_S2 / OMEGA_RAD_S**2
 """Overlap with the floor that carries a grain of RADIUS_M."""

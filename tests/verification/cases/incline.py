@@ -13,12 +13,11 @@ from tests.verification.cases.bench import (
     RADIUS_M,
     Array,
     Bench,
-    Measured,
-    case,
     inertia_factor,
     law,
     scene,
 )
+from tests.verification.cases.case import Measured, case
 
 SIZE_M = (0.08, 0.02)
 

@@ -13,9 +13,7 @@ from tests.verification.cases.bench import (
     LARGE_M,
     SMALL_M,
     Bench,
-    Measured,
     along_of,
-    case,
     inertia_factor,
     law,
     mass_kg,
@@ -25,6 +23,7 @@ from tests.verification.cases.bench import (
     stiffness,
     vector,
 )
+from tests.verification.cases.case import Measured, case
 
 SPEED_M_S = 1e-7
 """Normal speed of an impact: so slow that overlaps and turns of the normal are below 1e-6."""

@@ -12,9 +12,7 @@ from tests.verification.cases.bench import (
     LARGE_M,
     SMALL_M,
     Bench,
-    Measured,
     along_of,
-    case,
     inertia_factor,
     law,
     mass_kg,
@@ -22,6 +20,7 @@ from tests.verification.cases.bench import (
     stiffness,
     vector,
 )
+from tests.verification.cases.case import Measured, case
 
 STEPS = (25, 50, 100, 200, 400)
 """Steps of a contact."""

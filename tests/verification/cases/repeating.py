@@ -20,16 +20,8 @@ from sandmould.dem.surfaces import Surfaces
 from sandmould.engines.choosing import engine_of
 from sandmould.engines.session import Session
 from sandmould.scenario.scenario import Scenario
-from tests.verification.cases.bench import (
-    RADIUS_M,
-    Array,
-    Bench,
-    Measured,
-    case,
-    law,
-    scene,
-    stiffness,
-)
+from tests.verification.cases.bench import RADIUS_M, Array, Bench, law, scene, stiffness
+from tests.verification.cases.case import Measured, case
 
 WINDOW_S = 1e-3
 

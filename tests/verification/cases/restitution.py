@@ -12,14 +12,13 @@ from tests.verification.cases.bench import (
     LARGE_M,
     SMALL_M,
     Bench,
-    Measured,
-    case,
     law,
     mass_kg,
     scene,
     stiffness,
     vector,
 )
+from tests.verification.cases.case import Measured, case
 
 SPEED_M_S = 0.01
 

@@ -12,8 +12,6 @@ from tests.verification.cases.bench import (
     LIGHT_M_S2,
     SMALL_M,
     Bench,
-    Measured,
-    case,
     crossing,
     inertia_factor,
     law,
@@ -24,6 +22,7 @@ from tests.verification.cases.bench import (
     stiffness,
     vector,
 )
+from tests.verification.cases.case import Measured, case
 
 
 @case("(29), (31)-(33)", "1e-6: round-off, and the lower grain sinks by 1e-5 of its radius")

@@ -7,17 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tests.verification.cases.bench import (
-    OMEGA_RAD_S,
-    RADIUS_M,
-    Array,
-    Bench,
-    Measured,
-    case,
-    law,
-    scene,
-    vector,
-)
+from tests.verification.cases.bench import OMEGA_RAD_S, RADIUS_M, Array, Bench, law, scene, vector
+from tests.verification.cases.case import Measured, case
 
 GRAVITY = 9.80665
 _FRAMES = "1e-10: round-off of the second difference of 1e-4 m over dt^2"

@@ -1,0 +1,97 @@
+"""Runs as the workflow makes them: planned in a folder, computed, and killed at a checkpoint."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from sandmould.engines.driver import Driver
+from sandmould.engines.lammps.render import write_deck
+from sandmould.engines.outcome import RunOutcome
+from sandmould.engines.products import finish
+from sandmould.engines.program import build_program
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.expand import Run, scenario_hash
+from sandmould.study.plan import write_plan
+from sandmould.study.simulate import render_run
+
+
+def run_folder(scenario: Scenario, folder: Path) -> Path:
+    """Plan and render one run, as the workflow does."""
+    run = Run("test", "one", {}, 1, scenario, {})
+    write_plan([run], folder)
+    render_run(folder / "runs" / "one")
+    return folder / "runs" / "one"
+
+
+def simulating(folder: Path) -> list[str]:
+    """Give the command that computes a run."""
+    return [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
+
+
+def simulate(folder: Path) -> int:
+    """Compute a run in a process of its own."""
+    return subprocess.run(simulating(folder), capture_output=True, text=True).returncode
+
+
+def computed(scenario: Scenario, folder: Path) -> Path:
+    """Plan, render and compute one run without a stop."""
+    folder = run_folder(scenario, folder)
+    assert simulate(folder) == 0
+    return folder
+
+
+def kill_at_a_checkpoint(
+    command: list[str], folder: Path, runs: str = ".", limit_s: float = 60.0
+) -> None:
+    """Start a command in a folder and kill it as soon as one of its runs has left a checkpoint.
+
+    Parameters
+    ----------
+    command : list of str
+    folder : Path
+        Working folder of the command.
+    runs : str
+        Pattern of the folders of runs, from there.
+    limit_s : float
+        How long to wait for the checkpoint.
+    """
+    process = subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    deadline = time.monotonic() + limit_s
+    while not list(folder.glob(f"{runs}/work/checkpoint_*/mark.json")):
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def kill_after_a_checkpoint(folder: Path) -> None:
+    """Start a run and kill it as soon as it has left a checkpoint."""
+    kill_at_a_checkpoint(simulating(folder), folder)
+    assert not (folder / "outcome.json").exists()
+    marks = [json.loads(p.read_text())["mark"] for p in folder.glob("work/checkpoint_*/mark.json")]
+    assert max(m["steps"] for m in marks) > 0
+
+
+def drive(scenario: Scenario, folder: Path) -> RunOutcome:
+    """Compute a run in this process."""
+    program = build_program(scenario)
+    write_deck(program, {}, folder, "test", "test")
+    driver = Driver(program, folder, "test", scenario_hash(scenario))
+    outcome = driver.run()
+    if not outcome.outcome.restartable:
+        finish(folder, scenario.dimension, outcome, driver.cost, {})
+    return outcome
+
+
+def last_snapshot(folder: Path) -> Snapshot:
+    return Snapshot.load(max((folder / "snapshots").glob("*.npz")))
