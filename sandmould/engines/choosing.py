@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,8 +10,8 @@ from typing import Protocol, cast
 
 from sandmould import ROOT
 from sandmould.dem import source_hash
-from sandmould.engines.deck import dialect_hash
-from sandmould.engines.program import Program
+from sandmould.engines.deck import Deck, dialect_hash
+from sandmould.engines.program import Program, build_program
 from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.scenario import Scenario
@@ -30,6 +31,10 @@ class EngineModule(Protocol):
     @staticmethod
     def refuse(scenario: Scenario) -> None:
         """Raise RefusedError for what the engine lacks."""
+
+    @staticmethod
+    def render_deck(program: Program, sources: Mapping[str, str], run: str, study: str) -> Deck:
+        """Render the deck."""
 
     @staticmethod
     def write_deck(
@@ -66,6 +71,17 @@ def deck_sources(scenario: Scenario) -> list[Path]:
     if engine_of(scenario).uses_own_solver(scenario):
         files += (ROOT / "sandmould" / "dem").glob("*.py")
     return sorted(files)
+
+
+def computed_hash(scenario: Scenario) -> str:
+    """Hash of what the engine is told to compute, and of our solver where it takes part.
+
+    Other templates, comments or keys that leave a deck's commands alone do not change it.
+    """
+    engine = engine_of(scenario)
+    deck = engine.render_deck(build_program(scenario), {}, "run", "study")
+    ours = source_hash() if engine.uses_own_solver(scenario) else ""
+    return hashlib.sha256((deck.commands + ours).encode()).hexdigest()
 
 
 def engine_problem(scenario: Scenario) -> Problem | None:

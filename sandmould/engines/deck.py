@@ -93,6 +93,12 @@ class Deck:
         """Named blocks in order."""
         return {m.group(1): Block(m.group(1), m.group(2)) for m in _BLOCK.finditer(self.text)}
 
+    @property
+    def commands(self) -> str:
+        """All but comments and empty lines."""
+        bare = (line.split("#", 1)[0].rstrip() for line in self.text.splitlines())
+        return "\n".join(line for line in bare if line)
+
     @classmethod
     def render(cls, dialect: str, context: Mapping[str, Any]) -> Deck:
         """Render the deck of a dialect."""

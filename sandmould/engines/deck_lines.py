@@ -58,13 +58,8 @@ def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, fl
     bed = predicted_bed_height_m(scenario, list(program.counts))
     column = max(layer.height_m for layer in program.layers)
     # Half a bed more than predicted: a heap may stand higher than an even bed.
-    top = max(1.5 * bed, obstacle_top_m(scenario)) + scenario.fill.drop_height_m + column + margin
+    top = max(1.5 * bed, scenario.scene.top_m) + scenario.fill.drop_height_m + column + margin
     return [(-margin, size + margin) for size in across] + [(-margin, top)]
-
-
-def obstacle_top_m(scenario: Scenario) -> float:
-    """Height of the highest obstacle, 0 without any."""
-    return max((float(b.corners()[:, -1].max()) for b in scenario.scene.solids), default=0.0)
 
 
 def skin_m(scenario: Scenario) -> float:

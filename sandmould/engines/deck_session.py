@@ -49,6 +49,9 @@ class DeckSession(StagedSession):
         """Commands of the stage before and after its long run."""
         return self._blocks[self.stage.name].around_run()
 
+    def _open(self, gate: str) -> None:
+        self.send(self._blocks[f"open_{gate}"].text)
+
     def _begin_stage(self) -> None:
         self.send(self._around_run()[0])
         self._setup_due = True
@@ -66,6 +69,9 @@ class DeckSession(StagedSession):
     def _save(self, folder: Path) -> None:
         self.send(f'write_restart "{folder.absolute()}/{self._restart}"')
         self._setup_due = True
+
+    def _restore(self, checkpoint: Path) -> None:
+        """Read nothing: it was read before the walls were made, in place of an empty box."""
 
     def _take_up(self, checkpoint: Path) -> None:
         """Go on inside the stage of a checkpoint: its commands again, its own start step."""

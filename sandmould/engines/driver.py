@@ -8,6 +8,7 @@ from pathlib import Path
 from types import FrameType
 
 from sandmould.engines import checkpoint as checkpoints
+from sandmould.engines.blockage import what_blocks
 from sandmould.engines.checkpoint import Mark
 from sandmould.engines.choosing import engine_of
 from sandmould.engines.guard import Guard
@@ -121,22 +122,33 @@ class Driver:
             self._guard.start_stage(stage, session.snapshot())
             while not session.stage_over:
                 self._window(session)
-            if stage.layer and not session.at_rest:
-                longest = self._scenario.fill.settling.longest_s
-                raise EngineStop(
-                    Outcome.NOT_SETTLED,
-                    f"layer {stage.layer} still moved after fill.settling.longest_s = {longest:g}",
-                )
+            self._judge_end(session, stage)
             session.end_stage()
         if session.is_root:
             self._show(session, last=True)
+
+    def _judge_end(self, session: Session, stage: Stage) -> None:
+        """Stop where the sand did not come to rest, or came to rest before it had flowed out."""
+        settling = stage.settling
+        if settling is not None and not session.at_rest:
+            what, key = (
+                (f"layer {stage.layer}", "fill") if stage.layer else ("the sand", stage.name)
+            )
+            raise EngineStop(
+                Outcome.NOT_SETTLED,
+                f"{what} still moved after {key}.settling.longest_s = {settling.longest_s:g}",
+            )
+        if stage.opens:
+            why = what_blocks(self._scenario, session.snapshot())
+            if why:
+                raise EngineStop(Outcome.NO_FLOW, why)
 
     def _begin_stage(self, session: Session, stage: Stage) -> None:
         if stage.layer:
             session.insert_layer(stage.layer)
         session.start_stage(stage)
         snapshot = session.snapshot()  # all ranks take part in gathering
-        if stage.counts_as_vibration and self._recorder is not None:
+        if (stage.counts_as_vibration or stage.opens) and self._recorder is not None:
             self._recorder.save(snapshot)
 
     def _window(self, session: Session) -> None:

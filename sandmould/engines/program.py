@@ -1,4 +1,4 @@
-"""The order of things in a run: layer after layer, each at rest before the next, then vibration."""
+"""The order of things in a run: layers, each at rest before the next, discharge, vibration."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
+from sandmould.scenario.discharge import Discharge
+from sandmould.scenario.fill import Settling
 from sandmould.scenario.placement import (
     PlannedLayer,
+    filled_measure,
     loose_height_m,
     plan_counts,
     plan_layer,
@@ -15,17 +18,24 @@ from sandmould.scenario.placement import (
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
 
+OUTFLOW = 0.6
+"""Solid measure that flows through an outlet of width w in the time w^(1/2 - d) / sqrt(g): about
+0.65 measured in 2D with an outlet of seven largest grains; only used to foretell times."""
 REST_AFTER_FALL_S = 0.3
 """Guess of the time a bed needs to come to rest after the last grain has landed."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One part of a run: a layer falls and settles, or the box vibrates."""
+    """One part of a run: a layer falls and settles, sand flows out, or the box vibrates."""
 
     name: str
     layer: int = 0
-    """Layer that falls at the start, from 1; 0 in a vibration stage."""
+    """Layer that falls at the start, from 1; 0 in any other stage."""
+    opens: str = ""
+    """Plate that is taken away at the start."""
+    settling: Settling | None = None
+    """When the sand is at rest, which ends the stage; none in a vibration stage."""
     vibration: VibrationStage | None = None
     expected_s: float = 0.0
     """Duration: exact for vibration, a guess for settling."""
@@ -70,6 +80,17 @@ def _settling_s(scenario: Scenario, count: int) -> float:
     return min(max(guess + REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s)
 
 
+def _outflow_s(scenario: Scenario, discharge: Discharge) -> float:
+    """Guess of the time that the sand takes to leave through a gate and come to rest."""
+    gate, g, d = scenario.gate, scenario.gravity_m_s2, scenario.dimension
+    if gate is None or g == 0.0:
+        return discharge.settling.longest_s
+    width = max(gate.size_m)
+    flow = OUTFLOW * math.sqrt(g) * width ** (d - 0.5)
+    guess = filled_measure(scenario) / flow + REST_AFTER_FALL_S
+    return min(max(guess, discharge.settling.shortest_s), discharge.settling.longest_s)
+
+
 def build_program(scenario: Scenario) -> Program:
     """Write out the stages of a scenario."""
     counts = plan_counts(scenario)
@@ -77,12 +98,26 @@ def build_program(scenario: Scenario) -> Program:
     stages: list[Stage] = []
     for number, count in enumerate(counts, start=1):
         stages.append(
-            Stage(f"settle_{number}", layer=number, expected_s=_settling_s(scenario, count))
+            Stage(
+                f"settle_{number}",
+                layer=number,
+                settling=scenario.fill.settling,
+                expected_s=_settling_s(scenario, count),
+            )
         )
         if between is not None and number < len(counts):
             stages.append(
                 Stage(f"between_{number}", vibration=between, expected_s=between.whole_duration_s)
             )
+    if scenario.discharge is not None:
+        stages.append(
+            Stage(
+                "discharge",
+                opens=scenario.discharge.gate,
+                settling=scenario.discharge.settling,
+                expected_s=_outflow_s(scenario, scenario.discharge),
+            )
+        )
     stages += [
         Stage(
             f"vibrate_{number}",

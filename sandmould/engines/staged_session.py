@@ -45,6 +45,7 @@ class StagedSession(ABC):
         self._stage_start = self._stage_end = 0
         self._vibration_start: int | None = None
         self._ended_window = False
+        self._opened: set[str] = set()
 
     @property
     @abstractmethod
@@ -55,6 +56,10 @@ class StagedSession(ABC):
     @abstractmethod
     def steps(self) -> int:
         """Steps since the run began, resumed ones included."""
+
+    @abstractmethod
+    def _open(self, gate: str) -> None:
+        """Take a plate away."""
 
     @abstractmethod
     def _begin_stage(self) -> None:
@@ -76,6 +81,10 @@ class StagedSession(ABC):
     def _save(self, folder: Path) -> None:
         """Write the engine's own state."""
 
+    @abstractmethod
+    def _restore(self, checkpoint: Path) -> None:
+        """Read what ``_save`` wrote."""
+
     @property
     def time_s(self) -> float:
         """Simulated time."""
@@ -94,10 +103,20 @@ class StagedSession(ABC):
         """Steps of the stage, at most."""
         if self.stage.vibration is not None:
             return self._counts.vibration(self.stage.vibration)
-        return self._counts.steps(self._scenario.fill.settling.longest_s)
+        assert self.stage.settling is not None
+        return self._counts.steps(self.stage.settling.longest_s)
 
     def start_stage(self, stage: Stage) -> None:
-        """Begin to settle or to vibrate."""
+        """Begin to settle, to flow out or to vibrate."""
+        if stage.opens:
+            self._take_away(stage.opens)
+        self._start(stage)
+
+    def _take_away(self, gate: str) -> None:
+        self._open(gate)
+        self._opened.add(gate)
+
+    def _start(self, stage: Stage) -> None:
         self.stage, self.stage_over, self.at_rest = stage, False, False
         self._stage_start = self.steps
         self._stage_end = self._stage_start + self._stage_steps()
@@ -111,7 +130,7 @@ class StagedSession(ABC):
         ahead = window - now % window if duration_s is None else self._counts.steps(duration_s)
         self._compute_to(min(now + ahead, self._stage_end))
         self._ended_window = self.steps % window == 0
-        if self._ended_window and self.stage.layer:
+        if self._ended_window and self.stage.settling is not None:
             self.at_rest = self._rests()
         self.stage_over = self.at_rest or self.steps >= self._stage_end
 
@@ -154,7 +173,9 @@ class StagedSession(ABC):
 
     def surface_loads(self) -> Mapping[str, Array] | None:
         """Mean force of the sand on each surface over the last window, N."""
-        return self._mean_loads() if self._ended_window else None
+        if not self._ended_window:
+            return None
+        return {name: f for name, f in self._mean_loads().items() if name not in self._opened}
 
     def attach_elastic_surface(
         self, name: str, stiffness: Array, mass: Array, damping: Array
@@ -179,12 +200,17 @@ class StagedSession(ABC):
             (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
 
     def _take_up(self, checkpoint: Path) -> None:
-        """Go on inside the stage of a checkpoint, whose own state the engine has read."""
+        """Go on inside the stage of a checkpoint, with the gates of earlier stages open."""
         state: dict[str, Any] = json.loads(
             (checkpoint / "session.json").read_text(encoding="utf-8")
         )
-        stages = {stage.name: stage for stage in self._program.stages}
-        self.start_stage(stages[state["stage"]])
+        names = [stage.name for stage in self._program.stages]
+        passed = self._program.stages[: names.index(state["stage"]) + 1]
+        for stage in passed:
+            if stage.opens:
+                self._take_away(stage.opens)
+        self._restore(checkpoint)
+        self._start(passed[-1])
         self._stage_start = state["stage_start"]
         self._stage_end = self._stage_start + self._stage_steps()
         self._vibration_start = state["vibration_start"]

@@ -28,7 +28,14 @@ def problems(scenario: Scenario) -> list[Problem]:
     -------
     list of Problem
     """
-    found = [*_obstacles(scenario), *_grains(scenario), *_time(scenario), *_vibration(scenario)]
+    found = [
+        *_obstacles(scenario),
+        *_discharge(scenario),
+        *_grains(scenario),
+        *_pouring(scenario),
+        *_time(scenario),
+        *_vibration(scenario),
+    ]
     # The bed can only be predicted for a scene that is otherwise sound.
     return found or [*_fill(scenario)]
 
@@ -136,6 +143,30 @@ def _size(s: Scenario) -> str:
     return f"{s.box.width_m:g}{depth} x {s.box.height_m:g} m"
 
 
+def _discharge(s: Scenario) -> Iterator[Problem]:
+    if s.discharge is None:
+        return
+    if s.gate is None:
+        plates = [o.name for o in s.obstacles if isinstance(o, Plate)]
+        valid = f"a plate among the obstacles: {', '.join(plates) or 'there is none'}"
+        yield Problem("discharge.gate", s.discharge.gate, valid)
+    elif s.gate.angle_deg != 0.0:
+        valid = "a plate with angle_deg 0, level or upright"
+        yield Problem("discharge.gate", s.discharge.gate, valid)
+
+
+def _pouring(s: Scenario) -> Iterator[Problem]:
+    largest = s.sand.classes(s.dimension)[-1].diameter_m
+    sizes = (("over_x_m", s.box.width_m, "width_m"), ("over_y_m", s.box.depth_m, "depth_m"))
+    for (key, size_m, name), (low, high) in zip(sizes, s.pouring_m, strict=False):
+        if not (low >= 0.0 and high <= size_m and high - low >= 3 * largest):
+            valid = (
+                f"two numbers between 0 and box.{name}, {size_m:g} m, at least three of the "
+                f"largest grains apart, {3 * largest:.6g} m"
+            )
+            yield Problem(f"fill.{key}", [low, high], valid)
+
+
 def _grains(s: Scenario) -> Iterator[Problem]:
     largest = s.sand.classes(s.dimension)[-1].diameter_m
     narrowest = min(s.box.width_m, s.box.depth_m) if s.dimension == 3 else s.box.width_m
@@ -197,6 +228,12 @@ def _fill(s: Scenario) -> Iterator[Problem]:
         yield Problem("fill.layers", f"{sum(counts)} grains", "at most 20 million grains")
         return
     height = predicted_bed_height_m(s, counts)
+    if s.discharge is not None and height > s.scene.top_m:
+        yield Problem(
+            "fill.layers",
+            f"a bed about {height:.4g} m high",
+            f"layers that stay below {s.scene.top_m:g} m, the top of what holds the sand",
+        )
     if height > s.box.height_m:
         yield Problem(
             "fill.layers",

@@ -72,6 +72,17 @@ class Fill(Section):
         ge=0,
         le=10,
     )
+    over_x_m: tuple[float, float] | None = quantity(
+        None,
+        "Part of the box's width that sand is poured over, such as that of a hopper; all of it "
+        "unless given.",
+        unit="m",
+        source="user",
+    )
+    over_y_m: tuple[float, float] | None = quantity(
+        None, "Part of the box's depth that sand is poured over, 3D only; all of it unless given.",
+        unit="m", source="user",
+    )  # fmt: skip
     nominal_solid_fraction: float | None = quantity(
         None,
         "Solid fraction that turns a layer's height into grains; 0.80 in 2D and 0.58 in 3D "

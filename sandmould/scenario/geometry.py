@@ -6,7 +6,7 @@ moulding box, at rest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,6 +177,15 @@ class Scene:
     def solids(self) -> tuple[Solid, ...]:
         """All that fills space: every block, outline, mesh and round solid."""
         return (*self.blocks, *self.outlines, *self.meshes, *self.revolved)
+
+    @property
+    def top_m(self) -> float:
+        """Height of the highest solid, 0 without any."""
+        return max((float(solid.corners()[:, -1].max()) for solid in self.solids), default=0.0)
+
+    def without(self, block: str) -> Scene:
+        """The scene after one of its blocks was taken away."""
+        return replace(self, blocks=tuple(b for b in self.blocks if b.name != block))
 
     def clearance_m(self, position_m: Array, reach_m: float = np.inf) -> Array:
         """Distance of points from the nearest wall or solid, negative where inside one.

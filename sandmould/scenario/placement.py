@@ -74,12 +74,33 @@ def plan_counts(s: Scenario) -> list[int]:
     return counts
 
 
+def filled_measure(s: Scenario, counts: list[int] | None = None) -> float:
+    """Area (m2) of all discs or volume (m3) of all spheres of the fill."""
+    return sum(plan_counts(s) if counts is None else counts) * _mean_grain_measure(s)
+
+
 def predicted_bed_height_m(s: Scenario, counts: list[int]) -> float:
-    """Height of the filled bed, obstacles and empty bores included."""
-    sand = sum(counts) * _mean_grain_measure(s) / _nominal_fraction(s)
+    """Height of the filled bed over the floor.
+
+    Sand that stands on a gate, or is poured over a part of the box, displaces no obstacles; all
+    other sand has obstacles and empty bores in it.
+    """
+    sand = filled_measure(s, counts) / _nominal_fraction(s)
+    if s.fill.over_x_m or s.fill.over_y_m:
+        return _gate_under_sand_m(s) + sand / s.floor_measure
     displaced = sum(solid.measure for solid in s.scene.solids)
     displaced += sum(bore.measure for bore in s.scene.bores)
     return (sand + displaced) / s.floor_measure
+
+
+def _gate_under_sand_m(s: Scenario) -> float:
+    """Height of the top of a gate that the sand stands on, 0 without one."""
+    gate = s.gate
+    if gate is None:
+        return 0.0
+    over = zip(gate.centre_m, s.pouring_m, strict=False)
+    under = all(low < centre < high for centre, (low, high) in over)
+    return gate.centre_m[-1] + gate.size_m[-1] / 2 if under else 0.0
 
 
 def loose_height_m(s: Scenario, count: int) -> float:
@@ -114,12 +135,13 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     drawn = np.sort(_draw_classes(s, count, rng))[::-1]
     diameters = {c.number: c.diameter_m for c in s.sand.classes(s.dimension)}
     radius = np.array([diameters[c] for c in drawn]) / 2
-    size = np.array([s.box.width_m, s.box.depth_m])[: s.dimension - 1]
+    low, high = np.array(s.pouring_m).T
     height = max(loose_height_m(s, count), 2.2 * radius[0])
-    while (position := _add_sequentially(radius, size, height, rng)) is None:
+    while (position := _add_sequentially(radius, high - low, height, rng)) is None:
         height *= 1.15
     order = np.argsort(position[:, -1], kind="stable")
     position[:, -1] -= (position[:, -1] - radius).min()
+    position[:, :-1] += low
     return PlannedLayer(drawn[order], radius[order], position[order])
 
 

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, Literal, Self
 
+import numpy as np
 from pydantic import Field
 
-from sandmould.scenario.box import Box, Obstacle, build_scene
+from sandmould.scenario.box import Box, Obstacle, Plate, build_scene
 from sandmould.scenario.contact import BackgroundDamping, Contact
+from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.fill import Fill
 from sandmould.scenario.geometry import Scene
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
 from sandmould.scenario.vibration import VibrationStage
+
+FILLING = ("settle_", "between_")
+"""How the names of those stages of a run begin in which sand is filled in."""
 
 
 class Engine(Section):
@@ -103,8 +109,11 @@ class Scenario(Section):
         BackgroundDamping(), description="Damping of free grains."
     )
     fill: Fill = Field(Fill(), description="How the sand is filled in.")
+    discharge: Discharge | None = Field(
+        None, description="Flow of the filled sand through an opened gate, before any vibration."
+    )
     vibration: tuple[VibrationStage, ...] = Field(
-        (), description="Stages of vibration after the fill, in order."
+        (), description="Stages of vibration after fill and discharge, in order."
     )
     frame: Literal["box", "laboratory"] = quantity(
         "box",
@@ -121,6 +130,18 @@ class Scenario(Section):
     def scene(self) -> Scene:
         """Geometry of the box and the obstacles."""
         return build_scene(self.box, self.obstacles, self.dimension)
+
+    def scene_in(self, stage: str) -> Scene:
+        """Geometry in a stage of the run: from the discharge on without its gate."""
+        if self.discharge is None or stage.startswith(FILLING):
+            return self.scene
+        return self.scene.without(self.discharge.gate)
+
+    @property
+    def gate(self) -> Plate | None:
+        """The plate that the discharge takes away."""
+        plates = (o for o in self.obstacles if isinstance(o, Plate))
+        return next((p for p in plates if self.discharge and p.name == self.discharge.gate), None)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Copy the scenario with some sections replaced, and the geometry that goes with them."""
@@ -147,6 +168,26 @@ class Scenario(Section):
         return self.dimension - 1
 
     @property
+    def pouring_m(self) -> tuple[tuple[float, float], ...]:
+        """Part of the box that sand is poured over, (low, high) of each horizontal axis, m."""
+        x = self.fill.over_x_m or (0.0, self.box.width_m)
+        y = self.fill.over_y_m or (0.0, self.box.depth_m)
+        return (x, y)[: self.dimension - 1]
+
+    @property
+    def pouring_top_m(self) -> float:
+        """Height of the highest obstacle that sand is poured over, 0 without any."""
+        low, high = np.array(self.pouring_m).T
+        tops = [0.0]
+        for corners_m in (solid.corners() for solid in self.scene.solids):
+            least, most = corners_m[:, :-1].min(axis=0), corners_m[:, :-1].max(axis=0)
+            gap = np.maximum(low - most, least - high)
+            # A wall beside the part of the box is not under it, its face on the bound included.
+            if (gap < -1e-9 * (high - low)).all():
+                tops.append(float(corners_m[:, -1].max()))
+        return max(tops)
+
+    @property
     def floor_measure(self) -> float:
-        """Width (m) of the floor in 2D, its area (m2) in 3D."""
-        return self.box.width_m * (1.0 if self.dimension == 2 else self.box.depth_m)
+        """Width (m) in 2D or area (m2) in 3D of the floor that sand is poured over."""
+        return math.prod(high - low for low, high in self.pouring_m)

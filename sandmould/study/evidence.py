@@ -17,7 +17,7 @@ from typing import Any
 import pandas as pd
 
 from sandmould import ROOT
-from sandmould.engines.choosing import deck_hash, engine_problem
+from sandmould.engines.choosing import computed_hash, engine_problem
 from sandmould.study.agreement import speeds
 from sandmould.study.expand import Run, expand, scenario_hash
 from sandmould.study.opening import OpenStudy, open_study
@@ -32,10 +32,9 @@ after a few collisions, so only means are compared, with margins of a few times 
 
 
 def study_hash(runs: list[Run]) -> str:
-    """Hash of all scenarios of a study and of what turns them into decks."""
-    decks = sorted({(run.scenario.engine.name, deck_hash(run.scenario)) for run in runs})
-    digest = hashlib.sha256("".join(text for _, text in decks).encode())
-    for text in sorted(scenario_hash(run.scenario) for run in runs):
+    """Hash of all scenarios of a study and of what their decks command."""
+    digest = hashlib.sha256()
+    for text in sorted(scenario_hash(r.scenario) + computed_hash(r.scenario) for r in runs):
         digest.update(text.encode())
     return digest.hexdigest()
 
@@ -97,7 +96,7 @@ def stale_records() -> list[tuple[str, str]]:
 def _what_changed(study: OpenStudy, kept: dict[str, Any]) -> str:
     """Say what parts a study from its record; margins count where the record has them."""
     if study_hash(expand(study)) != kept["study_sha256"]:
-        return "the study or the templates have changed since"
+        return "the study, its decks or our solver have changed since"
     margins = study.study.equivalence.margins
     return "its margins were set after the runs" if kept.get("margins", margins) != margins else ""
 

@@ -263,6 +263,16 @@ def _sources(section: Section, origin: Origin, above: str = "", group: str | Non
 
 
 def scenario_hash(scenario: Scenario) -> str:
-    """Hash of everything that a scenario says, whatever the order of its keys."""
-    text = json.dumps(scenario.model_dump(mode="json"), sort_keys=True)
+    """Hash of everything that a scenario says, whatever the order of its keys.
+
+    What is absent is left out: a key that comes later, absent unless given, changes no hash.
+    """
+    text = json.dumps(_present(scenario.model_dump(mode="json")), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _present(tree: Any) -> Any:
+    """A tree without keys whose value is None or an empty list."""
+    if isinstance(tree, dict):
+        return {key: _present(value) for key, value in tree.items() if value not in (None, [])}
+    return [_present(item) for item in tree] if isinstance(tree, list) else tree

@@ -24,6 +24,7 @@ from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.moments import MOMENTS, list_moments, nearest
+from sandmould.study.outflow import add_outflow, measure_outflow
 from sandmould.study.plan import read_run
 
 
@@ -32,7 +33,9 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
 
     The solid fraction is taken from the floor to the mean surface of the bed.
     """
-    scene, position, radius = scenario.scene, snapshot.position_m, snapshot.radius_m
+    scene, position, radius = (
+        scenario.scene_in(snapshot.stage), snapshot.position_m, snapshot.radius_m
+    )  # fmt: skip
     row: dict[str, Any] = {
         "time_s": snapshot.time_s,
         "vibration_time_s": snapshot.vibration_time_s,
@@ -60,7 +63,7 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         "largest_overlap_fraction": touching.largest_overlap_fraction,
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
-    return row
+    return row | measure_outflow(scenario, snapshot)
 
 
 def write_picture(folder: Path, out: Path) -> None:
@@ -68,10 +71,12 @@ def write_picture(folder: Path, out: Path) -> None:
     scenario = read_run(folder / "scenario.yaml").scenario
     figure = Figure(figsize=(6, 4.5), dpi=150, layout="constrained")
     ax = figure.add_subplot()
-    draw_scene(scenario.scene, ax, scenario.box.height_m)
     moments = list_moments(folder)
-    if moments:
-        draw_by_layer(Snapshot.load(moments[-1].path), ax)
+    last = Snapshot.load(moments[-1].path) if moments else None
+    scene = scenario.scene if last is None else scenario.scene_in(last.stage)
+    draw_scene(scene, ax, scenario.box.height_m)
+    if last is not None:
+        draw_by_layer(last, ax)
     figure.savefig(out)
 
 
@@ -109,7 +114,7 @@ def write_profile(folder: Path, out: Path) -> None:
         moment = nearest(moments, share * moments[-1].vibration_time_s)
         snapshot = Snapshot.load(moment.path)
         profile = solid_fraction_profile(
-            snapshot.position_m, snapshot.radius_m, scenario.scene, edges_m
+            snapshot.position_m, snapshot.radius_m, scenario.scene_in(snapshot.stage), edges_m
         )
         for height_m, fraction in zip(profile.height_m, profile.solid_fraction, strict=True):
             rows.append((heading, moment.vibration_time_s, height_m, fraction))
@@ -132,6 +137,7 @@ def write_measures(folder: Path, out: Path) -> None:
             rows.append({"stage": f"unreadable: {error}"})
     columns = ["time_s", "vibration_time_s", "stage", "grains"]
     table = pd.DataFrame(rows) if rows else pd.DataFrame(columns=columns)
+    table = add_outflow(table, folder)
     partial = out.with_name(out.name + ".partial")
     table.to_csv(partial, sep="\t", index=False, float_format="%.8g")
     os.replace(partial, out)

@@ -94,6 +94,8 @@ def _entry_keys(entry: type[BaseModel], indent: str) -> Iterator[str]:
     for name, field in entry.model_fields.items():
         only = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
         shown = only[0] if field.is_required() and len(only) == 1 else field.default
+        if isinstance(shown, BaseModel):
+            shown = shown.model_dump(mode="json")
         default = "" if shown is PydanticUndefined else f" {json.dumps(shown)}"
         yield from _comment(f"{name}:{default}  {_meaning(field)}".rstrip(), indent, "  ")
 

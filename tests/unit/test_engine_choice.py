@@ -9,7 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from sandmould.engines.choosing import deck_hash, deck_sources, engine_problem
+from sandmould.engines.choosing import (
+    computed_hash,
+    deck_hash,
+    deck_sources,
+    engine_of,
+    engine_problem,
+)
+from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import engine
 from sandmould.engines.lammps.engine import open_session
 from sandmould.engines.lammps.render import write_deck
@@ -55,6 +62,26 @@ def test_lammps_refuses_what_it_would_only_approximate() -> None:
         assert deck_hash(scene) != deck_hash(tube_scene())
         sentence = told(tube_scene(**changes, engine={"ranks": 2}))
         assert "engine.ranks = 2 cannot be used: valid is 1 on engine lammps with" in sentence
+
+
+@pytest.mark.parametrize("name", ["lammps", "liggghts", "reference"])
+def test_hash_of_what_is_computed_sees_commands_alone(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes = {"engine": {"name": name}, "background_damping": {"form": "none"}}
+    scene = tube_scene(**changes)
+    before = computed_hash(scene)
+    assert before != computed_hash(tube_scene(**changes, time_step={"fraction": 0.4}))
+    module = engine_of(scene)
+    render = module.render_deck
+    added = ""
+    monkeypatch.setattr(
+        module, "render_deck", lambda *given: Deck(render(*given).text + added), raising=True
+    )
+    added = "\n# a word more\n"
+    assert computed_hash(scene) == before
+    added = "\nrun 1\n"
+    assert computed_hash(scene) != before
 
 
 @pytest.mark.skipif(

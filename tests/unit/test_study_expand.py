@@ -12,7 +12,14 @@ import yaml
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.expand import MOST_PROBLEMS, Run, expand, replicate_seed, scenario_hash
+from sandmould.study.expand import (
+    MOST_PROBLEMS,
+    Run,
+    _present,
+    expand,
+    replicate_seed,
+    scenario_hash,
+)
 from sandmould.study.opening import open_study
 from sandmould.study.plan import read_run, write_plan
 from tests.bracket import BRACKET
@@ -257,3 +264,8 @@ def test_shipped_mesh_is_named_from_the_repository() -> None:
     (obstacle,) = run.scenario.model_dump()["obstacles"]
     assert obstacle["file"] == "config/meshes/bracket.stl"
     assert run.sources["obstacles.0.unit_m"] == "drawn in mm, tests/bracket.py"
+
+
+def test_keys_that_are_absent_change_no_hash() -> None:
+    tree = {"box": {"width_m": 0.1, "note": None}, "stages": [], "list": [{"key": None, "b": 0}]}
+    assert _present(tree) == {"box": {"width_m": 0.1}, "list": [{"b": 0}]}

@@ -8,6 +8,7 @@ from pathlib import Path
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.render import needs_callback
+from sandmould.engines.lammps.render import render_deck as render_deck
 from sandmould.engines.lammps.render import write_deck as write_deck
 from sandmould.engines.lammps.session import LammpsSession
 from sandmould.engines.lammps.session import refuse as refuse

@@ -8,6 +8,7 @@ from sandmould.engines.deck import Deck
 from sandmould.engines.liggghts import OLDEST_VERSION
 from sandmould.engines.liggghts.process import executable, version_of
 from sandmould.engines.liggghts.refusals import refuse as refuse
+from sandmould.engines.liggghts.render import render_deck as render_deck
 from sandmould.engines.liggghts.render import write_deck as write_deck
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.program import Program

@@ -15,7 +15,7 @@ SizeClass = dict[str, Any]
 
 @dataclass(frozen=True)
 class PairTable:
-    """One symmetric table: a row a size class, then one for the walls."""
+    """One symmetric table: a row a size class, then one for the walls, then one for a gate."""
 
     name: str
     property: str
@@ -24,6 +24,12 @@ class PairTable:
     meaning: str
     source: str
     rows: list[list[float]]
+
+    def without_gate(self) -> list[list[float]]:
+        """Rows with the last type, the gate's, at zero."""
+        last = len(self.rows) - 1
+        return [[0.0 if last in (i, j) else x for j, x in enumerate(row)]
+                for i, row in enumerate(self.rows)]  # fmt: skip
 
 
 def damping_per_s(law: ContactLaw, mass_kg: float) -> float:
@@ -44,7 +50,9 @@ def rolling_friction(law: ContactLaw, first: SizeClass, second: SizeClass) -> fl
     return float(law.rolling_arm_fraction * (1 + low / high))
 
 
-def pair_tables(contact: Contact, classes: list[SizeClass], lines: Lines) -> list[PairTable]:
+def pair_tables(
+    contact: Contact, classes: list[SizeClass], lines: Lines, has_gate: bool = False
+) -> list[PairTable]:
     """All tables of a scenario.
 
     Parameters
@@ -54,7 +62,10 @@ def pair_tables(contact: Contact, classes: list[SizeClass], lines: Lines) -> lis
         As ``sandmould.engines.deck_lines.size_classes`` gives them.
     lines : Lines
         Knows the source of each key.
+    has_gate : bool
+        Whether a plate has a type of its own, alike to that of the walls until it is taken away.
     """
+    flat = 2 if has_gate else 1
     grain, wall = contact.grain_grain, contact.grain_wall
 
     def table(
@@ -66,9 +77,9 @@ def pair_tables(contact: Contact, classes: list[SizeClass], lines: Lines) -> lis
         of_pair: Callable[[SizeClass, SizeClass], float],
         of_wall: Callable[[SizeClass], float],
     ) -> PairTable:
-        rows = [[of_pair(i, j) for j in classes] + [of_wall(i)] for i in classes]
+        rows = [[of_pair(i, j) for j in classes] + flat * [of_wall(i)] for i in classes]
         # Walls never meet walls; LIGGGHTS wants a number all the same.
-        rows.append([of_wall(j) for j in classes] + [of_wall(classes[0])])
+        rows += flat * [[of_wall(j) for j in classes] + flat * [of_wall(classes[0])]]
         sources = [lines.source(f"contact.{law}.{key}") for law in ("grain_grain", "grain_wall")]
         source = " and ".join(dict.fromkeys(sources))
         return PairTable(name, liggghts, unit, meaning, source, rows)

@@ -45,13 +45,13 @@ def surface_meshes(program: Program) -> dict[str, Array]:
 def _windows(program: Program) -> dict[str, tuple[int, int]]:
     """Of each settling stage, the steps to its first record and its largest number of windows."""
     counts = StepCounts.of(program.scenario)
-    longest = counts.steps(program.scenario.fill.settling.longest_s)
     into_window, found = 0, {}
     for stage in program.stages:
         if stage.vibration is not None:
             into_window = (into_window + counts.vibration(stage.vibration)) % counts.window
-        else:
+        elif stage.settling is not None:
             # A bed comes to rest at a record.
+            longest = counts.steps(stage.settling.longest_s)
             first = counts.window - into_window
             found[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.window)))
             into_window = 0
@@ -83,7 +83,9 @@ def render_deck(
 
     context = deck_context(program, lines, run, study)
     context |= {
-        "tables": pair_tables(scenario.contact, context["classes"], lines),
+        "tables": pair_tables(
+            scenario.contact, context["classes"], lines, scenario.discharge is not None
+        ),
         "rolling": rolls(scenario.contact),
         "twist": scenario.contact.rolling_axes == "all",
         "skin_source": f"{SKIN:g} of the mean diameter",

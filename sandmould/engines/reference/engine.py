@@ -45,10 +45,8 @@ def uses_own_solver(scenario: Scenario) -> bool:
     return True
 
 
-def write_deck(
-    program: Program, sources: Mapping[str, str], folder: Path, run: str, study: str
-) -> None:
-    """Write ``deck.in``, which lists what the solver is given, and ``layers/``; the deck last."""
+def render_deck(program: Program, sources: Mapping[str, str], run: str, study: str) -> Deck:
+    """Render the list of what the solver is given."""
     scenario = program.scenario
     d = scenario.dimension
     keys = [("gravity", "gravity_m_s2"), ("density", "sand.density_kg_m3")]
@@ -62,10 +60,18 @@ def write_deck(
         "inertia_factor": inertia_factor(scenario.sand, scenario.contact, scenario.time_step, d),
         "surfaces": surfaces_of(scenario).names,
     }
+    return Deck.render("reference", context)
+
+
+def write_deck(
+    program: Program, sources: Mapping[str, str], folder: Path, run: str, study: str
+) -> None:
+    """Write ``deck.in``, which lists what the solver is given, and ``layers/``; the deck last."""
     (folder / "layers").mkdir(parents=True, exist_ok=True)
     for number, layer in enumerate(program.layers, start=1):
-        _write_layer(layer, folder / "layers" / f"layer_{number}.tsv", d)
-    Deck.render("reference", context).write(folder)
+        path = folder / "layers" / f"layer_{number}.tsv"
+        _write_layer(layer, path, program.scenario.dimension)
+    render_deck(program, sources, run, study).write(folder)
 
 
 def _damping_keys(scenario: Scenario) -> list[tuple[str, str]]:

@@ -11,7 +11,6 @@ import numpy as np
 from sandmould.dem import source_hash
 from sandmould.dem.solver import NotANumberError
 from sandmould.engines.box_motion import displacements
-from sandmould.engines.deck_lines import obstacle_top_m
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program
 from sandmould.engines.reference.model import grains_of, scene_of, solver_of
@@ -37,8 +36,6 @@ class ReferenceSession(StagedSession):
         self.solver = solver_of(self._scenario, self.stage, self.step_s)
         self._loads: dict[str, Array] = {}
         if checkpoint is not None:
-            with np.load(checkpoint / "solver.npz") as arrays:
-                self.solver.restore(dict(arrays))
             self._take_up(checkpoint)
 
     @property
@@ -54,7 +51,7 @@ class ReferenceSession(StagedSession):
     def insert_layer(self, number: int) -> None:
         """Drop a planned layer from over the bed and all obstacles."""
         s = self._scenario
-        top = obstacle_top_m(s)
+        top = s.pouring_top_m
         if self.grains:
             grains = self.solver.grains
             top = max(top, float((grains.position[:, -1] + grains.radius).max()))
@@ -66,6 +63,16 @@ class ReferenceSession(StagedSession):
         """Place all grains now in the box exactly, without contact history."""
         spins = self.solver.grains.spin.shape[1]
         self.solver.place(position_m, velocity_m_s, spin_rad_s[:, 3 - spins :])
+
+    def _open(self, gate: str) -> None:
+        if self.grains:
+            self.solver.remove_surface(gate)
+        else:  # about to be restored: there is nothing to list yet
+            self.solver.surfaces.remove(gate)
+
+    def _restore(self, checkpoint: Path) -> None:
+        with np.load(checkpoint / "solver.npz") as arrays:
+            self.solver.restore(dict(arrays))
 
     def _begin_stage(self) -> None:
         self.solver.scene = scene_of(self._scenario, self.stage, self.step_s)
@@ -84,7 +91,8 @@ class ReferenceSession(StagedSession):
 
     def _rests(self) -> bool:
         """Apply the rest rule as the decks do."""
-        settling = self._scenario.fill.settling
+        settling = self.stage.settling
+        assert settling is not None
         if self.steps - self._stage_start < self._counts.steps(settling.shortest_s):
             return False
         mass = self.solver.grains.mass

@@ -1,0 +1,56 @@
+"""Whether sand that came to rest over an open outlet has flowed out or got stuck."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.scenario import Scenario
+
+STUCK_FRACTION = 0.3
+"""Solid fraction right over an outlet, or right under it, above which sand stands there: a bed has
+0.6 to 0.8, an outlet that has run empty nearly nothing."""
+
+
+def what_blocks(scenario: Scenario, snapshot: Snapshot) -> str:
+    """Say what holds the sand over an outlet; empty where it flowed out or the gate was upright.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With a discharge.
+    snapshot : Snapshot
+        At rest after it.
+    """
+    gate = scenario.gate
+    if gate is None or gate.size_m[-1] >= gate.size_m[0]:
+        return ""
+    centre, half = np.array(gate.centre_m), np.array(gate.size_m) / 2
+    width = 2 * float(half[:-1].min())
+    # The middle of the outlet, as high as it is wide.
+    above = (centre[-1] + half[-1], centre[-1] + half[-1] + width)
+    below = (centre[-1] - half[-1] - width, centre[-1] - half[-1])
+    if _solid_fraction(scenario, snapshot, centre, 0.8 * half, above) < STUCK_FRACTION:
+        return ""
+    largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
+    if _solid_fraction(scenario, snapshot, centre, 0.8 * half, below) >= STUCK_FRACTION:
+        return "the heap has grown up to the outlet: raise the hopper or fill in less sand"
+    return (
+        f"an arch holds the sand over the outlet, which is {width:g} m wide, "
+        f"{width / largest_m:.2g} of the largest grains"
+    )
+
+
+def _solid_fraction(
+    scenario: Scenario,
+    snapshot: Snapshot,
+    centre_m: np.ndarray,
+    half_m: np.ndarray,
+    height_m: tuple[float, float],
+) -> float:
+    """Share of a part of space that grains fill whose centres lie in it."""
+    position, d = snapshot.position_m, scenario.dimension
+    inside = (np.abs(position - centre_m)[:, :-1] < half_m[:-1]).all(axis=1)
+    inside &= (position[:, -1] > height_m[0]) & (position[:, -1] < height_m[1])
+    sand = scenario.sand.grain_measure(1.0, d) * ((2 * snapshot.radius_m[inside]) ** d).sum()
+    return float(sand / (np.prod(2 * half_m[:-1]) * (height_m[1] - height_m[0])))

@@ -1,0 +1,140 @@
+"""Measures of sand that flows out through a gate: angles, how much, how fast, how far."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.repose import Slope, free_surface, heap_slope, residue_slope, walls_touched
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.box import Plate
+from sandmould.scenario.scenario import FILLING, Scenario
+
+COLUMN_WIDTH = 1.0
+"""Columns that a surface is averaged over, in largest diameters."""
+HEAP_DEPTH = 1.5
+"""Sand deeper than this, in largest diameters, is a heap and no single grain that rolled away."""
+FLOWN_OUT = 0.95
+"""Share of all that flows out at which the flow counts as over: the last grains trickle."""
+
+
+def is_level(gate: Plate) -> bool:
+    """Whether a gate closes an outlet in a floor, rather than holds a column."""
+    return gate.size_m[-1] < gate.size_m[0]
+
+
+def slopes(scenario: Scenario, snapshot: Snapshot) -> tuple[Slope, Slope]:
+    """Slopes of the heap on the floor and of what stays in the hopper over a level gate."""
+    gate = scenario.gate
+    assert gate is not None
+    largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
+    low, high = _floor(scenario)
+    axis = np.array(gate.centre_m[:-1])
+    half_m, width_m = gate.size_m[-1] / 2, COLUMN_WIDTH * largest_m
+    position, radius = snapshot.position_m, snapshot.radius_m
+    fallen = position[:, -1] < gate.centre_m[-1] - half_m
+    heap = free_surface(position[fallen], radius[fallen], low, high, 0.0)
+    pouring = np.array(scenario.pouring_m)
+    hopper = free_surface(
+        position, radius, pouring[:, 0], pouring[:, 1], gate.centre_m[-1] + half_m
+    )
+    return heap_slope(heap, width_m, axis), residue_slope(hopper, width_m, axis)
+
+
+def measure_outflow(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
+    """Columns of one snapshot after the gate has opened; empty before, and without a gate."""
+    gate = scenario.gate
+    if gate is None or snapshot.stage.startswith(FILLING):
+        return {}
+    position, radius = snapshot.position_m, snapshot.radius_m
+    sand = radius**scenario.dimension
+    largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
+    low, high = _floor(scenario)
+    surface = free_surface(position, radius, low, high, 0.0)
+    touched = walls_touched(surface, low, high, HEAP_DEPTH * largest_m)
+    if not is_level(gate):
+        far_side = gate.centre_m[0] + gate.size_m[0] / 2
+        out = position[:, 0] > far_side
+        heap = surface.point_m[surface.height_m > HEAP_DEPTH * largest_m]
+        reach = float(heap[:, 0].max(initial=far_side)) - far_side
+        return {"outflow_fraction": float(sand[out].sum() / sand.sum()), "run_out_m": reach}
+    out = position[:, -1] < gate.centre_m[-1]
+    heap_found, stayed = slopes(scenario, snapshot)
+    row: dict[str, Any] = {
+        "outflow_fraction": float(sand[out].sum() / sand.sum()),
+        "heap_angle_deg": heap_found.angle_deg,
+        "heap_angle_se_deg": heap_found.se_deg,
+        "residue_angle_deg": stayed.angle_deg,
+        "residue_angle_se_deg": stayed.se_deg,
+    }
+    if scenario.dimension == 2:
+        for flank in heap_found.flanks:
+            row[f"heap_angle_{flank.name}_deg"] = flank.angle_deg
+    below = free_surface(position[out], radius[out], low, high, 0.0)
+    touched = walls_touched(below, low, high, HEAP_DEPTH * largest_m)
+    return row | {"heap_touches": " and ".join(touched)}
+
+
+def outflow_time_s(table: pd.DataFrame) -> float:
+    """Time from the opening of the gate until most of what flows out is out.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows of ``measures.tsv`` in order of time.
+
+    Returns
+    -------
+    float, s
+        NaN where nothing flowed.
+    """
+    flow = table[table["outflow_fraction"].notna()]
+    if flow.empty or not flow["outflow_fraction"].iloc[-1] > 0.0:
+        return float("nan")
+    before = table["time_s"][table.index < flow.index[0]]
+    opened_s = float(before.iloc[-1]) if len(before) else float(flow["time_s"].iloc[0])
+    time_s = np.concatenate([[opened_s], flow["time_s"]])
+    share = np.concatenate([[0.0], flow["outflow_fraction"] / flow["outflow_fraction"].iloc[-1]])
+    return float(np.interp(FLOWN_OUT, np.maximum.accumulate(share), time_s)) - opened_s
+
+
+def side_load_fraction(loads: pd.DataFrame) -> float:
+    """Horizontal force of the filled sand on all that holds it over its weight on the floors.
+
+    Parameters
+    ----------
+    loads : DataFrame
+        ``loads.tsv`` of a run; the last window before the gate opens is taken.
+    """
+    filled = loads[loads["stage"].str.startswith(FILLING)]
+    last = filled[filled["time_s"] == filled["time_s"].max()]
+    columns = [c for c in last.columns if c.startswith("force_")]
+    weight_n = -float(last[columns[-1]].sum())
+    return float(last[columns[0]].abs().sum()) / weight_n if weight_n > 0.0 else float("nan")
+
+
+def _floor(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the box's floor, (d - 1,) float64, m."""
+    size = np.array([scenario.box.width_m, scenario.box.depth_m])[: scenario.dimension - 1]
+    return np.zeros_like(size), size
+
+
+def add_outflow(table: pd.DataFrame, folder: Path) -> pd.DataFrame:
+    """Add what only the whole run tells to all rows of its measures.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows of ``measures.tsv``.
+    folder : Path
+        The run's folder.
+    """
+    if "outflow_fraction" not in table:
+        return table
+    loads = pd.read_csv(folder / "loads.tsv", sep="\t")
+    return table.assign(
+        outflow_time_s=outflow_time_s(table), side_load_fraction=side_load_fraction(loads)
+    )
