@@ -8,6 +8,9 @@ from typing import Any, get_args
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
+NAME = r"^[a-z][a-z0-9_]*$"
+"""Pattern of names that become files, columns or labels."""
+
 
 class Section(BaseModel):
     """A part of a scenario: unknown keys are refused, values never change once read."""

@@ -13,15 +13,18 @@ from pydantic import BaseModel
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
-from sandmould.scenario.quantity import fields_at
+from sandmould.scenario.quantity import NAME, fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study import comparing, sweep
-from sandmould.study.study import NAME, Material, Study
+from sandmould.study.calibration import asked
+from sandmould.study.study import Material, Study
 
 STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
-MATERIALS = (ROOT / "config" / "materials",)
-_OF_SWEEP = ("sweep", "equivalence", "cross_check")
+CALIBRATED = Path("results") / "materials"
+"""Where studies write the sands that they calibrate."""
+MATERIALS = (ROOT / "config" / "materials", CALIBRATED)
+_OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration")
 _MESH_FILE = r"\bobstacles(\.\d+)+\.file(\.value)?$"
 
 
@@ -95,7 +98,10 @@ def open_study(path: Path) -> OpenStudy:
         raise BadInputError(found)
     study = validated(Study, tree, origin)
     base = study.scenario.model_dump(mode="json")
-    found = sweep.problems(study.sweep, base, study.replicates) or comparing.problems(study)
+    found = sweep.problems(study.sweep, base, study.replicates) or [
+        *comparing.problems(study),
+        *asked.problems(study.calibration, study.sweep),
+    ]
     if found:
         raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found])
     return OpenStudy(path.stem, path, study, tree, origin)

@@ -7,13 +7,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from sandmould.scenario.contact import BackgroundDamping, Contact
-from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.calibration.asked import Calibration
 from sandmould.study.sweep import Sweep
-
-NAME = r"^[a-z][a-z0-9_]*$"
-"""Pattern of the names of studies, scenarios and materials: their file's stem."""
 
 
 class Objective(Section):
@@ -25,8 +23,10 @@ class Objective(Section):
         source=ARGUED,
         pattern=NAME,
     )
-    better: Literal["larger", "smaller"] = quantity(
-        "larger", "Which values of the measure are better.", source=ARGUED
+    better: Literal["larger", "smaller", "neither"] = quantity(
+        "larger",
+        "Which values of the measure are better; neither where it is only to be known.",
+        source=ARGUED,
     )
     at_vibration_s: float | None = quantity(
         None,
@@ -120,3 +120,11 @@ class Study(Section):
     cross_check: CrossCheck | None = Field(
         None, description="One point of the sweep computed on another engine too."
     )
+    calibration: Calibration = Field(
+        Calibration(), description="Sands whose swept keys are found from measured values."
+    )
+
+    @property
+    def seeks_best(self) -> bool:
+        """Whether the study looks for the best setting, not for agreement or for a value."""
+        return not self.equivalence.keys and self.objective.better != "neither"

@@ -22,7 +22,7 @@ from sandmould.study.settings import (
 )
 from sandmould.study.words import listed, name_of, number, value_text, with_margin
 
-Better = Literal["larger", "smaller"]
+Better = Literal["larger", "smaller", "neither"]
 _FEW = 3
 _DEEP = 0.05
 """Overlap over radius from which the reader is told of it."""

@@ -75,7 +75,7 @@ class _Page:
 
 def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
     objective, keys, summary = study.objective, collected.keys, collected.of_sweep.summary
-    seeks_best = not study.equivalence.keys
+    seeks_best = study.seeks_best
     scenarios = _scenarios(study_folder, [str(r) for r in summary["run"]])
     if not scenarios:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
@@ -119,7 +119,7 @@ def _scenarios(study_folder: Path, runs: Sequence[str]) -> dict[str, Scenario]:
 def _render(page: _Page, film_budget_bytes: int) -> str:
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
     summary, objective = page.collected.summary, page.study.objective
-    seeks_best = not page.study.equivalence.keys
+    seeks_best = page.study.seeks_best
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
     method: tuple[Row, ...] = (
         *sand_method(page.scenario, keys, summary),

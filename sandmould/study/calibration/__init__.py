@@ -1,0 +1,1 @@
+"""From measured angles and times to contact parameters: emulators, iso-lines, posteriors."""
