@@ -22,5 +22,6 @@ rule all:
     input:
         rules.report.output.html,
         rules.check.output.done,
+        [rules.calibrate.output.done] if STUDY.study.calibration.sands else [],
     message:
         f"The report of the study {STUDY.name} is {rules.report.output.html}"

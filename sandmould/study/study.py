@@ -14,6 +14,13 @@ from sandmould.study.calibration.asked import Calibration
 from sandmould.study.sweep import Sweep
 
 
+class Reported(Section):
+    """A value of the measure that someone else has reported."""
+
+    value: float = quantity(..., "Reported value.", unit="of the column", source="user")
+    by: str = quantity(..., "Who reports it, and where.", source="user")
+
+
 class Objective(Section):
     """What makes one setting better than another."""
 
@@ -28,6 +35,7 @@ class Objective(Section):
         "Which values of the measure are better; neither where it is only to be known.",
         source=ARGUED,
     )
+    reported: Reported | None = Field(None, description="What the measure is compared with.")
     at_vibration_s: float | None = quantity(
         None,
         "Time of vibration at which the measure is taken; its end unless given.",

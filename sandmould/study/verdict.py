@@ -81,7 +81,7 @@ def judge(
         Swept keys; a setting is a combination of their values.
     measure : str
         Column of the objective.
-    better : {"larger", "smaller"}
+    better : {"larger", "smaller", "neither"}
         Which values are better.
     notes : sequence of str
         Caveats that the caller knows of, put after those found here.
@@ -143,22 +143,24 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
     ----------
     summary : DataFrame
     measure : str
-    better : {"larger", "smaller"}
+    better : {"larger", "smaller", "neither"}
 
     Returns
     -------
     dict
-        ``best``, ``median`` and ``worst`` to the run's name; fewer where fewer runs finished. Of
-        an even number of runs the better of the two middle ones is the median.
+        ``best``, ``median`` and ``worst`` to the run's name, ``highest``, ``median`` and
+        ``lowest`` where neither is better; fewer where fewer runs finished. Of an even number of
+        runs the better of the two middle ones is the median.
     """
+    first, last = ("highest", "lowest") if better == "neither" else ("best", "worst")
     values = finished_values(summary, measure).dropna()
     values = values.sort_values(ascending=better == "smaller", kind="stable")
     runs = [str(r) for r in summary.loc[values.index, "run"]]
     ranks: dict[str, str] = {}
-    for role, place in (("best", 0), ("worst", -1), ("median", (len(runs) - 1) // 2)):
+    for role, place in ((first, 0), (last, -1), ("median", (len(runs) - 1) // 2)):
         if runs and runs[place] not in ranks.values():
             ranks[role] = runs[place]
-    return {role: ranks[role] for role in ("best", "median", "worst") if role in ranks}
+    return {role: ranks[role] for role in (first, "median", last) if role in ranks}
 
 
 def sand_notes(

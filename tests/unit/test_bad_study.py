@@ -21,7 +21,7 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "unknown key named like a type": (
         "based_on: tube\nstrength: 1",
-        "trial.yaml: strength = 1 cannot be used: valid is one of the keys based_on, "
+        "trial.yaml: strength = 1 cannot be used: valid is one of the keys based_on, calibration, "
         "cross_check, equivalence, kind, material, objective, replicates, scenario, sweep, title.",
     ),
     "swept mesh that is not there": (

@@ -36,10 +36,32 @@ rule collect:
         "../scripts/collect.py"
 
 
+rule calibrate:
+    input:
+        table=f"{FOLDER}/runs.tsv",
+        summary=rules.collect.output.summary,
+        also=ALSO,
+    output:
+        done=touch(f"{FOLDER}/sands_calibrated"),
+    log:
+        f"{FOLDER}/logs/calibrate.log",
+    conda:
+        "../envs/sandmould.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    message:
+        "Calibrate the sands of the study"
+    script:
+        "../scripts/calibrate.py"
+
+
 rule report:
     input:
         summary=rules.collect.output.summary,
         curves=rules.collect.output.curves,
+        also=ALSO,
         templates=REPORT_TEMPLATES,
     output:
         html=report(

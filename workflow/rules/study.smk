@@ -18,6 +18,8 @@ if workflow.is_main_process and "--lint" not in sys.argv:
 
 STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"
+# Studies whose runs help to calibrate: they are finished before this one is.
+ALSO = [f"results/{name}/summary.tsv" for name in STUDY.study.calibration.also]
 RUNS = [run.run for run in PLAN.runs]
 REPORT_TEMPLATES = sorted(str(p) for p in Path("templates/report").iterdir())
 

@@ -35,7 +35,8 @@ class AgreementPages:
     """What the section shows."""
 
     sentences: tuple[str, ...]
-    agreed: bool
+    sound: bool
+    """Whether all settings agree within the margins."""
     is_question: bool
     """Whether the study was made to compare, so that its report begins with the answer."""
     table: Table
@@ -66,7 +67,7 @@ def agreement_pages(collected: Collected, study: Study) -> AgreementPages | None
     percent = f"{100 * confidence:g} %"
     return AgreementPages(
         sentences=agreement_sentences(compared, confidence),
-        agreed=all(c.agreement.judged == "equivalent" for c in compared),
+        sound=all(c.agreement.judged == "equivalent" for c in compared),
         is_question=bool(study.equivalence.keys),
         table=_table(compared, percent),
         charts=tuple(_chart([c for c in compared if c.measure == m])

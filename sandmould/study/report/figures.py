@@ -25,7 +25,7 @@ from analysis.plots import draw_by_layer, draw_grains, draw_scene
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.box import Tube
 from sandmould.scenario.geometry import Block
-from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.scenario import FILLING, Scenario
 
 Array = NDArray[np.float64]
 _MM = 1e3
@@ -86,9 +86,12 @@ def cut_m(scenario: Scenario) -> float | None:
     return scenario.box.depth_m / 2
 
 
-def _draw_scene(scenario: Scenario, ax: Axes, height_m: float) -> None:
-    """Box, solids and bores, cut where all pictures of the scenario are."""
-    draw_scene(scenario.scene, ax, height_m, cut_m(scenario))
+def _draw_scene(scenario: Scenario, ax: Axes, height_m: float, stage: str = "") -> None:
+    """Box, solids and bores, cut where all pictures of the scenario are.
+
+    Without a stage of the run its last is shown: with the gate that was taken away only before.
+    """
+    draw_scene(scenario.scene_in(stage), ax, height_m, cut_m(scenario))
 
 
 def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
@@ -114,7 +117,7 @@ def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
     ax = figure.add_axes((0, 0, 1, 1))
     if bed_height_m is not None:
         _draw_bed(scenario, ax, bed_height_m * _MM)
-    _draw_scene(scenario, ax, scenario.box.height_m)
+    _draw_scene(scenario, ax, scenario.box.height_m, FILLING[0])
     _dimension(ax, (0, -far), (width, -far), f"{width:g}")
     _dimension(ax, (-far, 0), (-far, height), f"{height:g}")
     for tube in scenario.obstacles:
@@ -226,7 +229,7 @@ def draw_layers(
             # the page has one key for all pictures
             legend.remove()
 
-    return tuple(_panel(s, scenario, height_m, layers) for s in snapshots)
+    return tuple(panel(s, scenario, height_m, layers) for s in snapshots)
 
 
 def draw_densities(
@@ -252,7 +255,7 @@ def draw_densities(
     """
     found = [
         apparent_density(
-            s.position_m, s.radius_m, scenario.sand.density_kg_m3, scene=scenario.scene
+            s.position_m, s.radius_m, scenario.sand.density_kg_m3, scene=scenario.scene_in(s.stage)
         ).corrected_kg_m3
         for s in snapshots
     ]
@@ -270,12 +273,12 @@ def draw_densities(
             cut_m=cut_m(scenario),
         )
 
-    pictures = tuple(_panel(s, scenario, height_m, densities) for s in snapshots)
+    pictures = tuple(panel(s, scenario, height_m, densities) for s in snapshots)
     medians = tuple(float(np.nanmedian(f)) if len(f) else math.nan for f in found)
     return pictures, DensityScale(low, high), medians
 
 
-def _panel(
+def panel(
     snapshot: Snapshot,
     scenario: Scenario,
     height_m: float,
@@ -288,12 +291,12 @@ def _panel(
     figure = Figure(figsize=(8.0, 8.0 * span[1] / span[0]), dpi=_PANEL_PX / 8.0)
     ax = figure.add_axes((0, 0, 1, 1))
     draw(ax, snapshot)
-    _draw_scene(scenario, ax, height_m)
+    _draw_scene(scenario, ax, height_m, snapshot.stage)
     _scale_bar(ax, width, height)
     ax.set_xlim(-margin, width + margin)
     ax.set_ylim(-margin, height + margin)
     ax.set_axis_off()
-    return _png(figure)
+    return png(figure)
 
 
 def _scale_bar(ax: Axes, width: float, height: float) -> None:
@@ -308,7 +311,8 @@ def _scale_bar(ax: Axes, width: float, height: float) -> None:
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5, "alpha": 0.8})  # fmt: skip
 
 
-def _png(figure: Figure) -> str:
+def png(figure: Figure) -> str:
+    """A figure as a PNG of few colours, a ``data:`` address."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=figure.dpi)
     picture = Image.open(buffer).convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)

@@ -21,6 +21,7 @@ from sandmould.study.report.agreement import agreement_pages
 from sandmould.study.report.animation import BUDGET_BYTES
 from sandmould.study.report.chart import NARROW, SMALL, WIDE, lay_out
 from sandmould.study.report.curves import objective_charts, runs_of
+from sandmould.study.report.known import known_pages
 from sandmould.study.report.method import Row, provenance_rows, sand_method, statistics_method
 from sandmould.study.report.sand import sand_pages, shown_runs
 from sandmould.study.report.tables import data_files, key_numbers, runs_table, settings_table
@@ -120,6 +121,8 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
     summary, objective = page.collected.summary, page.study.objective
     seeks_best = page.study.seeks_best
+    agreement = agreement_pages(page.collected, page.study)
+    known = known_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
     method: tuple[Row, ...] = (
         *sand_method(page.scenario, keys, summary),
@@ -140,7 +143,9 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         measure_name=name_of(verdict.measure),
         keys=keys,
         seeks_best=seeks_best,
-        agreement=agreement_pages(page.collected, page.study),
+        agreement=agreement,
+        known=known,
+        statement=agreement if agreement and agreement.is_question else known,
         key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
         objective_charts=[
             _both_sizes(c) for c in objective_charts(of_sweep.summary, verdict, keys)
@@ -154,6 +159,7 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         both_sizes=_both_sizes,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
         dimension=page.scenario.dimension,
+        vibrates=bool(page.scenario.vibration),
     )
 
 

@@ -109,10 +109,10 @@ def sand_pages(
         shown_as=next(iter(roles), ""),
         panels=tuple(
             Panel(
-                f"{heading}, {max(moment.vibration_time_s, 0.0):.2f} s",
+                f"{heading}, {_clock_s(moment):.2f} s",
                 by_layer,
                 by_density,
-                f"The sand of run {run} {heading} of the vibration",
+                f"The sand of run {run} {heading}",
             )
             for (heading, moment), by_layer, by_density in zip(
                 chosen, layers, densities, strict=True
@@ -138,6 +138,11 @@ def sand_pages(
     )
 
 
+def _clock_s(moment: Moment) -> float:
+    """Time of vibration, or of the run where nothing vibrates."""
+    return moment.vibration_time_s if moment.vibration_time_s >= 0.0 else moment.time_s
+
+
 def shown_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
     """Runs to be looked at, by role: best, median and worst, or what there is.
 
@@ -158,7 +163,7 @@ def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Mo
     if not moments:
         return []
     if not duration_s:
-        return [("after filling", moments[-1])]
+        return [("at its end", moments[-1])]
     chosen: dict[Path, tuple[str, Moment]] = {}
     for heading, share in MOMENTS.items():
         moment = nearest(moments, share * duration_s)

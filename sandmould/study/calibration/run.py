@@ -1,0 +1,51 @@
+"""The calibration of a study from its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from sandmould.study.calibration.sands import Calibrated, calibrate, write_materials
+from sandmould.study.collect import gather, read_study
+from sandmould.study.plan import read_run
+from sandmould.study.study import Study
+
+
+def read_calibrated(
+    study_folder: Path, study: Study, summary: pd.DataFrame, keys: Sequence[str]
+) -> Calibrated | None:
+    """Calibrate what a study asks for; None where it asks for nothing.
+
+    Raises
+    ------
+    OSError
+        When a study that ``calibration.also`` names has no results.
+    """
+    if not study.calibration.sands:
+        return None
+    others = {
+        name: pd.read_csv(study_folder.parent / name / "summary.tsv", sep="\t")
+        for name in study.calibration.also
+    }
+    return calibrate(study.calibration, summary, (keys[0], keys[1]), others)
+
+
+def write_calibration(study_folder: Path, materials: Path) -> list[str]:
+    """Write the material files of a study's sands.
+
+    Returns
+    -------
+    list of str
+        One sentence a sand that was not found.
+    """
+    study = read_study(study_folder)
+    collected = gather(study_folder).of_sweep
+    result = read_calibrated(study_folder, study, collected.summary, collected.keys)
+    if result is None:
+        return []
+    run = str(collected.summary["run"].iloc[0])
+    scenario = read_run(study_folder / "runs" / run / "scenario.yaml").scenario
+    write_materials(result, scenario, study_folder.name, materials)
+    return [f"{one.sand.name}: {one.problem}" for one in result.sands if one.problem]

@@ -1,0 +1,12 @@
+"""Write the material files of a study's calibrated sands."""
+
+from pathlib import Path
+
+from sandmould.study.calibration.run import write_calibration
+from sandmould.study.job_log import to_log
+from sandmould.study.opening import CALIBRATED
+
+with to_log(snakemake.log[0]):
+    not_found = write_calibration(Path(snakemake.input.table).parent, CALIBRATED)
+    if not_found:
+        raise SystemExit("\n".join(not_found))
