@@ -8,8 +8,8 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 
 STUCK_FRACTION = 0.3
-"""Solid fraction right over an outlet, or right under it, above which sand stands there: a bed has
-0.6 to 0.8, an outlet that has run empty nearly nothing."""
+"""Sand over an outlet, or right under it, over what a space as high as the outlet is wide holds:
+above this sand stands there. A bed has 0.6 to 0.8, an outlet that has run empty nearly nothing."""
 
 
 def what_blocks(scenario: Scenario, snapshot: Snapshot) -> str:
@@ -23,17 +23,18 @@ def what_blocks(scenario: Scenario, snapshot: Snapshot) -> str:
         At rest after it.
     """
     gate = scenario.gate
-    if gate is None or gate.size_m[-1] >= gate.size_m[0]:
+    if gate is None or not gate.is_level:
         return ""
     centre, half = np.array(gate.centre_m), np.array(gate.size_m) / 2
     width = 2 * float(half[:-1].min())
-    # The middle of the outlet, as high as it is wide.
-    above = (centre[-1] + half[-1], centre[-1] + half[-1] + width)
+    stuck = STUCK_FRACTION * float(np.prod(1.6 * half[:-1])) * width
+    # Over the middle of the outlet at any height: an arch may rise higher than it is wide.
+    above = (centre[-1] + half[-1], np.inf)
     below = (centre[-1] - half[-1] - width, centre[-1] - half[-1])
-    if _solid_fraction(scenario, snapshot, centre, 0.8 * half, above) < STUCK_FRACTION:
+    if _sand(scenario, snapshot, centre, 0.8 * half, above) < stuck:
         return ""
     largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
-    if _solid_fraction(scenario, snapshot, centre, 0.8 * half, below) >= STUCK_FRACTION:
+    if _sand(scenario, snapshot, centre, 0.8 * half, below) >= stuck:
         return "the heap has grown up to the outlet: raise the hopper or fill in less sand"
     return (
         f"an arch holds the sand over the outlet, which is {width:g} m wide, "
@@ -41,16 +42,16 @@ def what_blocks(scenario: Scenario, snapshot: Snapshot) -> str:
     )
 
 
-def _solid_fraction(
+def _sand(
     scenario: Scenario,
     snapshot: Snapshot,
     centre_m: np.ndarray,
     half_m: np.ndarray,
     height_m: tuple[float, float],
 ) -> float:
-    """Share of a part of space that grains fill whose centres lie in it."""
+    """Area (m2) or volume (m3) of the grains whose centres lie in a part of space."""
     position, d = snapshot.position_m, scenario.dimension
     inside = (np.abs(position - centre_m)[:, :-1] < half_m[:-1]).all(axis=1)
     inside &= (position[:, -1] > height_m[0]) & (position[:, -1] < height_m[1])
-    sand = scenario.sand.grain_measure(1.0, d) * ((2 * snapshot.radius_m[inside]) ** d).sum()
-    return float(sand / (np.prod(2 * half_m[:-1]) * (height_m[1] - height_m[0])))
+    unit = scenario.sand.grain_measure(1.0, d)
+    return unit * float(((2 * snapshot.radius_m[inside]) ** d).sum())

@@ -42,6 +42,11 @@ class Plate(Section):
         0.0, "Turn in the plane of x and the vertical.", unit="deg", source="user", ge=-180, le=180
     )
 
+    @property
+    def is_level(self) -> bool:
+        """Whether it lies, as a floor does, rather than stands."""
+        return self.size_m[-1] < min(self.size_m[:-1])
+
 
 class Tube(Section):
     """A straight horizontal tube along x: two plates in 2D, flat facets or round in 3D."""

@@ -156,6 +156,8 @@ def _discharge(s: Scenario) -> Iterator[Problem]:
 
 
 def _pouring(s: Scenario) -> Iterator[Problem]:
+    if s.dimension == 2 and s.fill.over_y_m is not None:
+        yield Problem("fill.over_y_m", list(s.fill.over_y_m), "absent in 2D")
     largest = s.sand.classes(s.dimension)[-1].diameter_m
     sizes = (("over_x_m", s.box.width_m, "width_m"), ("over_y_m", s.box.depth_m, "depth_m"))
     for (key, size_m, name), (low, high) in zip(sizes, s.pouring_m, strict=False):
@@ -228,7 +230,10 @@ def _fill(s: Scenario) -> Iterator[Problem]:
         yield Problem("fill.layers", f"{sum(counts)} grains", "at most 20 million grains")
         return
     height = predicted_bed_height_m(s, counts)
-    if s.discharge is not None and height > s.scene.top_m:
+    floor = s.box.width_m * (s.box.depth_m if s.dimension == 3 else 1.0)
+    # The box's own walls hold sand that is poured over all of it.
+    over_part = s.floor_measure < (1 - 1e-9) * floor
+    if s.discharge is not None and over_part and height > s.scene.top_m:
         yield Problem(
             "fill.layers",
             f"a bed about {height:.4g} m high",

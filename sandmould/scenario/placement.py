@@ -86,17 +86,18 @@ def predicted_bed_height_m(s: Scenario, counts: list[int]) -> float:
     other sand has obstacles and empty bores in it.
     """
     sand = filled_measure(s, counts) / _nominal_fraction(s)
-    if s.fill.over_x_m or s.fill.over_y_m:
-        return _gate_under_sand_m(s) + sand / s.floor_measure
+    gate_m = _gate_under_sand_m(s)
+    if gate_m > 0.0 or s.fill.over_x_m or s.fill.over_y_m:
+        return gate_m + sand / s.floor_measure
     displaced = sum(solid.measure for solid in s.scene.solids)
     displaced += sum(bore.measure for bore in s.scene.bores)
     return (sand + displaced) / s.floor_measure
 
 
 def _gate_under_sand_m(s: Scenario) -> float:
-    """Height of the top of a gate that the sand stands on, 0 without one."""
+    """Height of the top of a level gate that the sand stands on, 0 without one."""
     gate = s.gate
-    if gate is None:
+    if gate is None or not gate.is_level:
         return 0.0
     over = zip(gate.centre_m, s.pouring_m, strict=False)
     under = all(low < centre < high for centre, (low, high) in over)

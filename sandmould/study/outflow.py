@@ -10,7 +10,6 @@ import pandas as pd
 
 from analysis.repose import Slope, free_surface, heap_slope, residue_slope, walls_touched
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.box import Plate
 from sandmould.scenario.scenario import FILLING, Scenario
 
 COLUMN_WIDTH = 1.0
@@ -19,11 +18,6 @@ HEAP_DEPTH = 1.5
 """Sand deeper than this, in largest diameters, is a heap and no single grain that rolled away."""
 FLOWN_OUT = 0.95
 """Share of all that flows out at which the flow counts as over: the last grains trickle."""
-
-
-def is_level(gate: Plate) -> bool:
-    """Whether a gate closes an outlet in a floor, rather than holds a column."""
-    return gate.size_m[-1] < gate.size_m[0]
 
 
 def slopes(scenario: Scenario, snapshot: Snapshot) -> tuple[Slope, Slope]:
@@ -53,13 +47,14 @@ def measure_outflow(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
     sand = radius**scenario.dimension
     largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
     low, high = _floor(scenario)
-    surface = free_surface(position, radius, low, high, 0.0)
-    touched = walls_touched(surface, low, high, HEAP_DEPTH * largest_m)
-    if not is_level(gate):
-        far_side = gate.centre_m[0] + gate.size_m[0] / 2
-        out = position[:, 0] > far_side
+    if not gate.is_level:
+        surface = free_surface(position, radius, low, high, 0.0)
         heap = surface.point_m[surface.height_m > HEAP_DEPTH * largest_m]
-        reach = float(heap[:, 0].max(initial=far_side)) - far_side
+        # Sand poured on the right of a gate runs out to the left.
+        way = 1.0 if sum(scenario.pouring_m[0]) < 2 * gate.centre_m[0] else -1.0
+        far_side = way * gate.centre_m[0] + gate.size_m[0] / 2
+        out = way * position[:, 0] > far_side
+        reach = float((way * heap[:, 0]).max(initial=far_side)) - far_side
         return {"outflow_fraction": float(sand[out].sum() / sand.sum()), "run_out_m": reach}
     out = position[:, -1] < gate.centre_m[-1]
     heap_found, stayed = slopes(scenario, snapshot)

@@ -15,9 +15,11 @@ from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import expand
 from sandmould.study.opening import open_study
+from tests.hopper import hopper_scene
 from tests.scenes import tube_scene
 
 GOLDEN = Path(__file__).parent / "golden"
+HOPPER = "hopper"
 STUDIES = ("tube_demo", "tube_3d_small")
 VARIANTS: dict[str, dict[str, object]] = {
     "laboratory_viscous_elastic": {
@@ -57,7 +59,9 @@ VARIANTS: dict[str, dict[str, object]] = {
 
 
 def deck_of(name: str) -> Deck:
-    """Render the first run of a shipped study, or a variant of the small scene."""
+    """Render the first run of a shipped study, a variant of the small scene or the hopper."""
+    if name == HOPPER:
+        return render_deck(build_program(hopper_scene("lammps")), {}, "test", "golden")
     if name in VARIANTS:
         program = build_program(tube_scene(**VARIANTS[name]))
         return render_deck(program, {}, "test", "golden")
@@ -65,7 +69,7 @@ def deck_of(name: str) -> Deck:
     return render_deck(build_program(run.scenario), run.sources, "first", run.study)
 
 
-@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS])
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER])
 def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) -> None:
     path = GOLDEN / f"{name}.in"
     text = deck_of(name).text
@@ -74,14 +78,14 @@ def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) 
     assert text == path.read_text(encoding="utf-8"), "pytest tests/decks --refresh-golden, and look"
 
 
-@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS])
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER])
 def test_every_number_has_its_unit_and_source(name: str) -> None:
     for line in deck_of(name).text.splitlines():
         if re.match(r"variable \w+ (index|equal) -?[\d.]", line) and "0.0  #" not in line:
             assert re.search(r"  # [^,]+, \S", line), line
 
 
-@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS])
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER])
 def test_background_damping_comes_after_every_other_force(name: str) -> None:
     text = deck_of(name).text
     fixes = re.findall(r"^fix (\w+) all (\S+)", text, re.M)

@@ -14,9 +14,11 @@ from sandmould.engines.liggghts.process import executable
 from sandmould.engines.liggghts.render import render_deck, write_deck
 from sandmould.engines.program import build_program
 from tests.decks.test_golden_decks import deck_of
+from tests.hopper import hopper_scene
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts, open_liggghts
 
 GOLDEN = Path(__file__).parent / "golden"
+HOPPER = "liggghts_hopper"
 VARIANTS: dict[str, dict[str, object]] = {
     "liggghts_tube_2d": {},
     "liggghts_plate_3d_laboratory_viscous_elastic": {
@@ -41,11 +43,13 @@ VARIANTS: dict[str, dict[str, object]] = {
 
 
 def liggghts_deck(name: str) -> Deck:
-    """Render a variant of the small scene."""
+    """Render a variant of the small scene, or the hopper."""
+    if name == HOPPER:
+        return render_deck(build_program(hopper_scene("liggghts")), {}, "test", "golden")
     return render_deck(build_program(liggghts_scene(**VARIANTS[name])), {}, "test", "golden")
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize("name", [*VARIANTS, HOPPER])
 def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) -> None:
     path = GOLDEN / f"{name}.in"
     text = liggghts_deck(name).text
@@ -54,14 +58,14 @@ def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) 
     assert text == path.read_text(encoding="utf-8"), "pytest tests/decks --refresh-golden, and look"
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize("name", [*VARIANTS, HOPPER])
 def test_every_number_has_its_unit_and_source(name: str) -> None:
     for line in liggghts_deck(name).text.splitlines():
         if re.match(r'variable \w+ (index|equal|string) "?-?[\d.]', line) and "0.0  #" not in line:
             assert re.search(r"  # [^,]+, \S", line), line
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize("name", [*VARIANTS, HOPPER])
 def test_background_damping_comes_after_every_other_force(name: str) -> None:
     fixes = re.findall(r"^fix \w+ all (\S+)", liggghts_deck(name).text, re.M)
     forces = [i for i, s in enumerate(fixes) if s in ("gravity", "wall/gran", "setforce")]
@@ -73,6 +77,7 @@ def test_blocks_are_named_as_in_the_dialect_of_lammps() -> None:
     assert list(liggghts_deck("liggghts_tube_2d").blocks) == [
         name for name in deck_of("plate_turned_no_rolling").blocks if not name.startswith("between")
     ]
+    assert list(liggghts_deck(HOPPER).blocks) == list(deck_of("hopper").blocks)
 
 
 def test_a_deck_without_rolling_names_no_rolling_model() -> None:

@@ -132,6 +132,50 @@ CASES: dict[str, tuple[str, str]] = {
         "trial.yaml: scenario.fill.layers = '1000000000 grains' cannot be used: "
         "valid is at most 20 million grains.",
     ),
+    "gate that is not there": (
+        "based_on: hopper\nscenario: {discharge: {gate: sluice}}",
+        "trial.yaml: scenario.discharge.gate = 'sluice' cannot be used: valid is a plate among "
+        "the obstacles: floor_left, gate, floor_right, side_left, side_right.",
+    ),
+    "gate that is no plate": (
+        "based_on: tube\nscenario: {discharge: {gate: tube}}",
+        "trial.yaml: scenario.discharge.gate = 'tube' cannot be used: "
+        "valid is a plate among the obstacles: there is none.",
+    ),
+    "discharge without a gate": (
+        "based_on: tube\nscenario: {discharge: {settling: {rms_speed_m_s: 0.01}}}",
+        "trial.yaml: scenario.discharge.gate = None cannot be used: "
+        "valid is a value: this key must be given.",
+    ),
+    "gate that is turned": (
+        "based_on: hopper\nscenario: {obstacles: [{kind: plate, name: gate, "
+        "centre_m: [0.6, 0.245], size_m: [0.06, 0.01], angle_deg: 10}]}",
+        "config/scenarios/hopper.yaml: scenario.discharge.gate = 'gate' cannot be used: "
+        "valid is a plate with angle_deg 0, level or upright.",
+    ),
+    "pouring over what is outside the box": (
+        "based_on: hopper\nscenario: {fill: {over_x_m: [0.45, 1.25]}}",
+        "trial.yaml: scenario.fill.over_x_m = [0.45, 1.25] cannot be used: valid is two numbers "
+        "between 0 and box.width_m, 1.2 m, at least three of the largest grains apart, "
+        "0.0116148 m.",
+    ),
+    "pouring from right to left": (
+        "based_on: hopper\nscenario: {fill: {over_x_m: [0.75, 0.45]}}",
+        "trial.yaml: scenario.fill.over_x_m = [0.75, 0.45] cannot be used: valid is two numbers "
+        "between 0 and box.width_m, 1.2 m, at least three of the largest grains apart, "
+        "0.0116148 m.",
+    ),
+    "pouring through less than three grains": (
+        "based_on: bracket\nscenario: {fill: {over_y_m: [0.05, 0.061]}}",
+        "trial.yaml: scenario.fill.over_y_m = [0.05, 0.061] cannot be used: valid is two numbers "
+        "between 0 and box.depth_m, 0.1 m, at least three of the largest grains apart, "
+        "0.0116148 m.",
+    ),
+    "layers higher than what holds them": (
+        "based_on: hopper\nscenario: {fill: {layers: [{count: 8000, repeat: 3}]}}",
+        "trial.yaml: scenario.fill.layers = 'a bed about 0.555 m high' cannot be used: "
+        "valid is layers that stay below 0.55 m, the top of what holds the sand.",
+    ),
     "unit of another key": (
         "based_on: tube\nscenario: {sand: {density_kg_m3: {value: 2.4, unit: g/cm3, source: x}}}",
         "trial.yaml: scenario.sand.density_kg_m3.unit = 'g/cm3' cannot be used: "

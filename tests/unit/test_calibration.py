@@ -120,6 +120,16 @@ def test_posteriors_hold_the_truth_as_often_as_they_claim() -> None:
     assert 0.90 <= held / 200 <= 1.0
 
 
+def test_what_is_taken_for_granted_picks_a_place_on_the_ridge() -> None:
+    emulators = {"heap_angle_deg": emulated()}
+    targets = {"heap_angle_deg": Target(value=28.0, sd=0.3)}
+    found = posterior(emulators, targets, [None, Target(value=0.1763, sd=0.01)])
+    friction, arm = found.mode
+    assert arm == pytest.approx(0.1763, abs=0.01)
+    assert angle_deg(np.array([[friction, arm]]))[0] == pytest.approx(28.0, abs=NOISE_DEG)
+    assert found.sd[1] < 0.015
+
+
 def test_a_target_off_the_map_is_told() -> None:
     with pytest.raises(OffTheMapError, match=r"heap_angle_deg = 60 cannot be calibrated: valid is"):
         posterior({"heap_angle_deg": emulated()}, {"heap_angle_deg": Target(value=60.0, sd=0.5)})

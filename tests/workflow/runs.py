@@ -8,13 +8,14 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+from sandmould.engines.choosing import engine_of
 from sandmould.engines.driver import Driver
-from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.outcome import RunOutcome
 from sandmould.engines.products import finish
-from sandmould.engines.program import build_program
+from sandmould.engines.program import Program, build_program
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import Run, scenario_hash
@@ -82,11 +83,15 @@ def kill_after_a_checkpoint(folder: Path) -> None:
     assert max(m["steps"] for m in marks) > 0
 
 
-def drive(scenario: Scenario, folder: Path) -> RunOutcome:
-    """Compute a run in this process."""
+def drive(
+    scenario: Scenario,
+    folder: Path,
+    driver_of: Callable[[Program, Path, str, str], Driver] = Driver,
+) -> RunOutcome:
+    """Compute a run in this process, with a driver of another kind where one is given."""
     program = build_program(scenario)
-    write_deck(program, {}, folder, "test", "test")
-    driver = Driver(program, folder, "test", scenario_hash(scenario))
+    engine_of(scenario).write_deck(program, {}, folder, "test", "test")
+    driver = driver_of(program, folder, "test", scenario_hash(scenario))
     outcome = driver.run()
     if not outcome.outcome.restartable:
         finish(folder, scenario.dimension, outcome, driver.cost, {})

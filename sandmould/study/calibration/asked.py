@@ -16,12 +16,12 @@ OF_MATERIAL = ("sand.", "contact.", "background_damping.")
 
 
 class Target(Section):
-    """A value measured on the real sand."""
+    """A value measured on the real sand, or assumed of it."""
 
-    value: float = quantity(..., "Measured value.", unit="of the column", source="user")
+    value: float = quantity(..., "The value.", unit="of the column or key", source="user")
     sd: float = quantity(
         ..., "Its standard deviation, of the mean of what was measured.",
-        unit="of the column", source="user", gt=0,
+        unit="of the column or key", source="user", gt=0,
     )  # fmt: skip
 
 
@@ -31,6 +31,11 @@ class Sand(Section):
     name: str = quantity(..., "Name of the material that is written.", source="user", pattern=NAME)
     targets: dict[Annotated[str, Field(pattern=NAME)], Target] = Field(
         ..., min_length=1, description="Columns of summary.tsv and what was measured of each."
+    )
+    assumed: dict[str, Target] = Field(
+        {},
+        description="Swept keys and what is taken for granted of each, such as a rolling angle of "
+        "10 degrees: where one measured value leaves a ridge, it picks a place on it.",
     )
 
 
@@ -66,3 +71,8 @@ def problems(calibration: Calibration, sweep: Sweep) -> Iterator[Problem]:
     for i, name in enumerate(names):
         if name in names[:i]:
             yield Problem(f"calibration.sands.{i}.name", name, "a name no other sand has")
+    for i, sand in enumerate(calibration.sands):
+        for key in sand.assumed:
+            if key not in keys:
+                valid = f"a swept key, {' or '.join(keys)}"
+                yield Problem(f"calibration.sands.{i}.assumed", key, valid)

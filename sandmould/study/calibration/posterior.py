@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -96,11 +96,22 @@ def surface(emulator: Emulator) -> tuple[Array, Array]:
     return mean.reshape(GRID, GRID), se.reshape(GRID, GRID)
 
 
-def posterior(emulators: Mapping[str, Emulator], targets: Mapping[str, Target]) -> Posterior:
+def posterior(
+    emulators: Mapping[str, Emulator],
+    targets: Mapping[str, Target],
+    assumed: Sequence[Target | None] = (),
+) -> Posterior:
     """Combine measured values, taken as independent, by Bayes' rule.
 
     Each says that the mean of its measure is its value, within its own deviation and the standard
     error of the emulator together.
+
+    Parameters
+    ----------
+    emulators : mapping of measure to Emulator
+    targets : mapping of measure to Target
+    assumed : sequence of Target or None
+        What is assumed of the two parameters themselves.
 
     Raises
     ------
@@ -109,6 +120,9 @@ def posterior(emulators: Mapping[str, Emulator], targets: Mapping[str, Target]) 
     """
     first, second = axes_of(emulators[next(iter(targets))])
     logarithm = np.zeros((len(first), len(second)))
+    for axis, prior in zip((first[:, None], second[None]), assumed, strict=False):
+        if prior is not None:
+            logarithm = logarithm - 0.5 * ((axis - prior.value) / prior.sd) ** 2
     for measure, target in targets.items():
         mean, se = surface(emulators[measure])
         variance = se**2 + target.sd**2

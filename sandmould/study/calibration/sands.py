@@ -91,7 +91,7 @@ def calibrate(
             continue
         # What the study's own runs tell beside their first measure costs nothing more.
         cpu_s[measure] = 0.0 if table is summary else float(table["cpu_s"].mean())
-    sands = tuple(_one(sand, emulators) for sand in calibration.sands)
+    sands = tuple(_one(sand, emulators, keys) for sand in calibration.sands)
     first = next((next(iter(s.sand.targets)) for s in sands if s.found is not None), "")
     found = tuple(worths(emulators, first, cpu_s)) if first else ()
     return Calibrated(keys, emulators, sands, found, tuple(left_out))
@@ -109,7 +109,7 @@ def _measures(
                 yield prefix + column, table, column
 
 
-def _one(sand: Sand, emulators: Mapping[str, Emulator]) -> CalibratedSand:
+def _one(sand: Sand, emulators: Mapping[str, Emulator], keys: tuple[str, str]) -> CalibratedSand:
     missing = [measure for measure in sand.targets if measure not in emulators]
     if missing:
         valid = f"valid is one of {', '.join(emulators) or 'none'}, what the runs tell"
@@ -118,9 +118,10 @@ def _one(sand: Sand, emulators: Mapping[str, Emulator]) -> CalibratedSand:
         )  # fmt: skip
     lines = {m: iso_line(emulators[m], target) for m, target in sand.targets.items()}
     first = next(iter(sand.targets))
+    assumed = [sand.assumed.get(key) for key in keys]
     try:
         by_first = posterior(emulators, {first: sand.targets[first]})
-        return CalibratedSand(sand, posterior(emulators, sand.targets), by_first, lines)
+        return CalibratedSand(sand, posterior(emulators, sand.targets, assumed), by_first, lines)
     except OffTheMapError as error:
         return CalibratedSand(sand, None, None, lines, str(error))
 
@@ -142,7 +143,8 @@ def material_text(
     assert one.found is not None
     parts = {"sand", "contact", "background_damping"}
     tree: dict[str, Any] = scenario.model_dump(mode="json", include=parts, exclude_none=True)
-    measured = ", ".join(f"{m} {t.value:g} with sd {t.sd:g}" for m, t in one.sand.targets.items())
+    known = [*one.sand.targets.items(), *one.sand.assumed.items()]
+    measured = ", ".join(f"{m} {t.value:g} with sd {t.sd:g}" for m, t in known)
     for key, value, sd in zip(keys, one.found.mode, one.found.sd, strict=True):
         *path, last = key.split(".")
         section = tree

@@ -17,7 +17,6 @@ from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.calibration.sands import Calibrated, CalibratedSand
 from sandmould.study.collect import Collected
 from sandmould.study.moments import list_moments
-from sandmould.study.outflow import is_level
 from sandmould.study.report.repose_figures import draw_heap, draw_map, draw_posterior, shown
 from sandmould.study.report.tables import Cell, Column, Table
 from sandmould.study.settings import Setting
@@ -149,7 +148,7 @@ def _heaps(
     study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: Scenario
 ) -> tuple[Heap, ...]:
     """Runs with the least, the middle and the steepest slope."""
-    if scenario.gate is None or not is_level(scenario.gate):
+    if scenario.gate is None or not scenario.gate.is_level:
         return ()
     values = finished_values(summary, verdict.measure).dropna().sort_values()
     places = np.unique(np.linspace(0, len(values) - 1, SHOWN_HEAPS).round().astype(int))
@@ -213,13 +212,13 @@ def _sand(one: CalibratedSand, calibrated: Calibrated) -> SandFound:
         for key, mode, sd in zip(calibrated.keys, one.found.mode, one.found.sd, strict=True)
     ]
     targets = listed([f"{name_of(m)} {t.value:g} ± {t.sd:g}" for m, t in one.sand.targets.items()])
+    taken = [f"{name_of(k)} {t.value:g} ± {t.sd:g}" for k, t in one.sand.assumed.items()]
+    granted = f", {listed(taken)} taken for granted" if taken else ""
     said = (
-        f"{name}, measured {targets}: most probable are {listed(values)} (standard deviations), "
-        f"which are correlated by {one.found.correlation:.2f}.",
-        f"All targets tell {one.found.bits:.1f} bits of the two values, the first alone "
-        f"{one.by_first.bits:.1f}."
-        if len(one.sand.targets) > 1
-        else f"One measured value leaves a ridge: it tells {one.found.bits:.1f} bits of the two.",
+        f"{name}, measured {targets}{granted}: most probable are {listed(values)} (standard "
+        f"deviations), which are correlated by {one.found.correlation:.2f}.",
+        f"The first measured value alone leaves a ridge, {one.by_first.bits:.1f} bits of the two; "
+        f"with all that is known they are {one.found.bits:.1f} bits.",
     )
     return SandFound(name, said, draw_posterior(one, calibrated.keys))
 

@@ -129,8 +129,9 @@ def draw_posterior(one: CalibratedSand, keys: tuple[str, str]) -> str:
     x, y = shown(keys[1], found.second), shown(keys[0], found.first)
     ax.contourf(x, y, found.share / found.share.max(), levels=np.linspace(0.02, 1.0, 12),
                 cmap="Blues")  # fmt: skip
-    first = [(one.by_first, "0.45", "first target alone")] if len(one.sand.targets) > 1 else []
-    for posterior, colour, label in (*first, (found, "#0b5cad", "all targets")):
+    more = len(one.sand.targets) + len(one.sand.assumed) > 1
+    first = [(one.by_first, "0.45", "first value alone")] if more else []
+    for posterior, colour, label in (*first, (found, "#0b5cad", "all that is known")):
         ax.contour(x, y, posterior.region().astype(float), levels=[0.5], colors=colour)
         ax.plot([], [], color=colour, label=f"95 %, {label}")
     mode = found.mode
