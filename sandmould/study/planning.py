@@ -9,7 +9,7 @@ import platform
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -34,6 +34,7 @@ from sandmould.study.plan import (
     write_study,
 )
 
+RESULTS = Path("results")
 DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
 CALIBRATION_GRAINS = 400
 CALIBRATION_FALL_WALL_S = 5.0
@@ -109,8 +110,14 @@ def study_path(configfiles: Sequence[Path], overrides: Mapping[str, Any]) -> Pat
     return Path(configfiles[0]) if configfiles else DEFAULT_STUDY
 
 
-def open_plan(path: Path) -> Plan:
+def open_plan(path: Path, results: Path = RESULTS) -> Plan:
     """Open, validate and expand a study.
+
+    Parameters
+    ----------
+    path : Path
+    results : Path
+        Where finished studies lie that this one may rest on.
 
     Raises
     ------
@@ -125,9 +132,20 @@ def open_plan(path: Path) -> Plan:
         if problem is not None:
             told = _told(study, run, problem)
             found[str(told)] = told
+    for problem in _unfinished(study, results):
+        found[str(problem)] = problem
     if found:
         raise BadInputError(list(found.values()))
     return Plan(study, tuple(runs))
+
+
+def _unfinished(study: OpenStudy, results: Path) -> Iterator[Problem]:
+    """Studies that help to calibrate and have not been run."""
+    for i, name in enumerate(study.study.calibration.also):
+        if not (results / name / "summary.tsv").is_file():
+            key = f"calibration.also.{i}"
+            valid = f"a study with results: make study STUDY=config/studies/{name}.yaml comes first"
+            yield Problem(key, name, valid, study.origin.file_of(key))
 
 
 def _told(study: OpenStudy, run: Run, problem: Problem) -> Problem:
@@ -187,7 +205,7 @@ def main(path: Path) -> int:
     except BadInputError as error:
         print(error, file=sys.stderr)
         return 1
-    print(announce(plan, Path("results"), os.cpu_count() or 1))
+    print(announce(plan, RESULTS, os.cpu_count() or 1))
     return 0
 
 

@@ -58,11 +58,24 @@ def checkout(tmp_path: Path, calibration: Path) -> Path:
 
 @pytest.mark.parametrize("study", STUDIES, ids=lambda p: p.stem)
 def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
+    for other in open_study(study).study.calibration.also:
+        (checkout / "results" / other).mkdir()
+        (checkout / "results" / other / "summary.tsv").touch()
     ran = snakemake("-n", "--configfile", str(study), folder=checkout)
     assert ran.returncode == 0, ran.stderr
     assert "grain-steps" in ran.stderr
     assert "wall time on 2 cores" in ran.stderr
     assert (checkout / "results" / study.stem / "runs.tsv").exists()
+
+
+def test_a_study_that_rests_on_another_says_what_comes_first(checkout: Path) -> None:
+    study = ROOT / "config" / "studies" / "calibrate_sand.yaml"
+    ran = snakemake("-n", "--configfile", str(study), folder=checkout)
+    assert ran.returncode != 0
+    assert (
+        "calibrate_sand.yaml: calibration.also.0 = 'repose_map' cannot be used: valid is a study "
+        "with results: make study STUDY=config/studies/repose_map.yaml comes first." in ran.stderr
+    )
 
 
 def test_single_values_and_second_files_are_refused(checkout: Path) -> None:

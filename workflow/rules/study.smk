@@ -4,7 +4,7 @@ import os
 import sys
 
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.planning import announce, open_plan, study_path
+from sandmould.study.planning import RESULTS, announce, open_plan, study_path
 
 try:
     PLAN = open_plan(study_path(workflow.configfiles, workflow.config_settings.config))
@@ -12,7 +12,7 @@ except BadInputError as error:
     sys.exit(str(error))
 if workflow.is_main_process and "--lint" not in sys.argv:
     print(
-        announce(PLAN, Path("results"), workflow._cores or os.cpu_count()),
+        announce(PLAN, RESULTS, workflow._cores or os.cpu_count()),
         file=sys.stderr,
     )
 
