@@ -2,7 +2,8 @@
 # make test   lint, types, import contract and all tests
 # The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, decks, schema, lock,
 # twins (the engines compared, docs/engine_twins.md), verification (docs/verification.md),
-# stability (docs/stability.md), benchmarks (docs/speed.md), results-check, clean.
+# stability (docs/stability.md), benchmarks (docs/speed.md), peers (docs/calibration_peers.md),
+# results-check, clean.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= $(shell nproc)
@@ -13,7 +14,7 @@ NAME = $(basename $(notdir $(STUDY)))
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
-.PHONY: demo study plan twins verification stability test lint decks schema lock results-check clean benchmarks
+.PHONY: demo study plan twins verification stability test lint decks schema lock results-check clean benchmarks peers
 
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
@@ -41,6 +42,15 @@ stability: $(INSTALLED)
 
 benchmarks: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.engines $(QUICK)
+
+# The peers need an older numpy, so they have an environment of their own.
+peers: $(INSTALLED) .venv-peers/installed
+	@$(BIN)/python -m benchmarks.calibration $(QUICK)
+
+.venv-peers/installed: benchmarks/peers/requirements.txt
+	$(PYTHON) -m venv .venv-peers
+	.venv-peers/bin/pip install --quiet --disable-pip-version-check --requirement $<
+	touch $@
 
 test: lint
 	$(BIN)/pytest -n 2 --dist loadfile

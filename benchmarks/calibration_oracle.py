@@ -1,0 +1,149 @@
+"""Where the runs of the calibration benchmark come from: the map's emulator, or DEM itself."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from sandmould import ROOT
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.calibration.emulator import Emulator, TooFewRunsError, fit_emulator
+from sandmould.study.collect import gather
+from sandmould.study.expand import Run, replicate_seed
+from sandmould.study.measure import write_measures
+from sandmould.study.opening import open_study
+from sandmould.study.plan import write_plan
+from sandmould.study.simulate import render_run, simulate
+from sandmould.study.verdict import finished_values
+
+Floats = NDArray[np.float64]
+Simulate = Callable[[Sequence[float]], float]
+"""One run at a point: its angle, degrees, NaN where it gave none."""
+STUDY = "repose_map"
+KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fraction")
+ANGLE = "heap_angle_deg"
+FIRST_REPLICATE = 1001
+"""Of runs by DEM: none shares its filling with a run of the map."""
+
+
+class NoMapError(ValueError):
+    """The map is missing or cannot be used."""
+
+
+@dataclass(frozen=True)
+class Map:
+    """The map of runs and the emulator through it, which stands for the truth."""
+
+    points: Floats
+    """(n, 2) float64: of each run."""
+    truth: Emulator
+    replicates: int
+    """Most runs of a point."""
+    freedom: int
+    """Degrees of freedom of the noise, 0 where no point has two runs."""
+
+    def mean(self, point: Sequence[float]) -> float:
+        """True mean angle at a point, degrees."""
+        return float(self.truth.at(np.array([point], dtype=np.float64))[0][0])
+
+    @property
+    def mean_se(self) -> float:
+        """Standard error of the mean of three heaps, degrees."""
+        return self.truth.noise_sd / math.sqrt(3)
+
+    @property
+    def tolerance(self) -> float:
+        """The larger of half a degree and two standard errors of the mean of three heaps."""
+        return max(0.5, 2 * self.mean_se)
+
+    def noise(self) -> dict[str, float | None]:
+        """Standard deviation of one heap, degrees, with its 95 % interval."""
+        sd, low, high = self.truth.noise_sd, None, None
+        if self.freedom:
+            low, high = (
+                sd * math.sqrt(self.freedom / float(chi2.ppf(p, self.freedom)))
+                for p in (0.975, 0.025)
+            )
+        return {"sd_deg": sd, "low_deg": low, "high_deg": high, "freedom": self.freedom}
+
+
+def map_file(record: bool) -> Path:
+    """Name the summary of the map: as just computed, or as kept in the record."""
+    return ROOT / ("docs/results" if record else "results") / STUDY / "summary.tsv"
+
+
+def read_map(path: Path) -> Map:
+    """Read a map.
+
+    Raises
+    ------
+    NoMapError
+        With one sentence of what is missing.
+    """
+    try:
+        table = pd.read_csv(path, sep="\t")
+    except FileNotFoundError:
+        raise NoMapError(
+            f"{path} is not there: make study STUDY=config/studies/{STUDY}.yaml writes it, and "
+            "--record takes the one that is kept in docs/results"
+        ) from None
+    except (ValueError, OSError) as error:
+        raise NoMapError(f"{path} cannot be read as a table: {error}") from None
+    lacking = [name for name in (*KEYS, ANGLE, "outcome_code") if name not in table]
+    if lacking:
+        raise NoMapError(f"{path} lacks the column {lacking[0]}, so it is no map of angles")
+    values = np.asarray(finished_values(table, ANGLE), dtype=np.float64)
+    points = table[list(KEYS)].to_numpy(dtype=np.float64)[np.isfinite(values)]
+    try:
+        truth = fit_emulator(ANGLE, points, values[np.isfinite(values)])
+    except TooFewRunsError as error:
+        raise NoMapError(f"{path} is too small a map: {error}") from None
+    _, counts = np.unique(points, axis=0, return_counts=True)
+    return Map(points, truth, int(counts.max()), int((counts - 1).sum()))
+
+
+def by_emulator(known: Map, seed: int | Sequence[int]) -> Simulate:
+    """Runs of the emulator: its mean, with the noise of one heap."""
+    rng = np.random.default_rng(seed)
+    return lambda point: known.mean(point) + float(rng.normal(0.0, known.truth.noise_sd))
+
+
+def by_dem(seed: int, study: Path = ROOT / "config" / "studies" / f"{STUDY}.yaml") -> Simulate:
+    """Runs of the engine that the map's study names, each heap of another filling.
+
+    A run goes the workflow's way, plan, deck, engine, measures, in a folder that is then removed.
+    """
+    base = open_study(study).study.scenario
+    number = FIRST_REPLICATE + 1000 * seed
+
+    def run(point: Sequence[float]) -> float:
+        nonlocal number
+        number += 1
+        tree = base.model_dump(mode="json")
+        for key, value in zip(KEYS, point, strict=True):
+            *path, last = key.split(".")
+            section = tree
+            for name in path:
+                section = section[name]
+            section[last] = float(value)
+        tree["seed"] = replicate_seed(base.seed, number)
+        parameters = dict(zip(KEYS, map(float, point), strict=True))
+        one = Run(STUDY, "one", parameters, number, Scenario.model_validate(tree), {})
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            write_plan([one], folder)
+            render_run(folder / "runs" / "one")
+            simulate(folder / "runs" / "one")
+            write_measures(folder / "runs" / "one", folder / "runs" / "one" / "measures.tsv")
+            summary = gather(folder).summary
+        return float(finished_values(summary, ANGLE).iloc[0])
+
+    return run
