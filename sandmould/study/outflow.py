@@ -7,9 +7,18 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from analysis.repose import Slope, free_surface, heap_slope, residue_slope, walls_touched
+from analysis.repose import (
+    Slope,
+    Surface,
+    free_surface,
+    heap_slope,
+    residue_slope,
+    walls_touched,
+)
 from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.box import Plate
 from sandmould.scenario.scenario import FILLING, Scenario
 
 COLUMN_WIDTH = 1.0
@@ -24,17 +33,16 @@ def slopes(scenario: Scenario, snapshot: Snapshot) -> tuple[Slope, Slope]:
     """Slopes of the heap on the floor and of what stays in the hopper over a level gate."""
     gate = scenario.gate
     assert gate is not None
-    largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
-    low, high = _floor(scenario)
-    axis = np.array(gate.centre_m[:-1])
-    half_m, width_m = gate.size_m[-1] / 2, COLUMN_WIDTH * largest_m
-    position, radius = snapshot.position_m, snapshot.radius_m
-    fallen = position[:, -1] < gate.centre_m[-1] - half_m
-    heap = free_surface(position[fallen], radius[fallen], low, high, 0.0)
+    axis, width_m = np.array(gate.centre_m[:-1]), COLUMN_WIDTH * _largest_m(scenario)
     pouring = np.array(scenario.pouring_m)
     hopper = free_surface(
-        position, radius, pouring[:, 0], pouring[:, 1], gate.centre_m[-1] + half_m
+        snapshot.position_m,
+        snapshot.radius_m,
+        pouring[:, 0],
+        pouring[:, 1],
+        gate.centre_m[-1] + gate.size_m[-1] / 2,
     )
+    heap = _surface_of(scenario, snapshot, _fallen(gate, snapshot))
     return heap_slope(heap, width_m, axis), residue_slope(hopper, width_m, axis)
 
 
@@ -43,34 +51,58 @@ def measure_outflow(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
     gate = scenario.gate
     if gate is None or snapshot.stage.startswith(FILLING):
         return {}
-    position, radius = snapshot.position_m, snapshot.radius_m
-    sand = radius**scenario.dimension
-    largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
-    low, high = _floor(scenario)
-    if not gate.is_level:
-        surface = free_surface(position, radius, low, high, 0.0)
-        heap = surface.point_m[surface.height_m > HEAP_DEPTH * largest_m]
-        # Sand poured on the right of a gate runs out to the left.
-        way = 1.0 if sum(scenario.pouring_m[0]) < 2 * gate.centre_m[0] else -1.0
-        far_side = way * gate.centre_m[0] + gate.size_m[0] / 2
-        out = way * position[:, 0] > far_side
-        reach = float((way * heap[:, 0]).max(initial=far_side)) - far_side
-        return {"outflow_fraction": float(sand[out].sum() / sand.sum()), "run_out_m": reach}
-    out = position[:, -1] < gate.centre_m[-1]
-    heap_found, stayed = slopes(scenario, snapshot)
+    return (_heap if gate.is_level else _run_out)(scenario, gate, snapshot)
+
+
+def _heap(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, Any]:
+    """What fell through an outlet, and what stayed round it."""
+    fallen = _fallen(gate, snapshot)
+    heap, stayed = slopes(scenario, snapshot)
     row: dict[str, Any] = {
-        "outflow_fraction": float(sand[out].sum() / sand.sum()),
-        "heap_angle_deg": heap_found.angle_deg,
-        "heap_angle_se_deg": heap_found.se_deg,
+        "outflow_fraction": _share(snapshot, fallen),
+        "heap_angle_deg": heap.angle_deg,
+        "heap_angle_se_deg": heap.se_deg,
         "residue_angle_deg": stayed.angle_deg,
         "residue_angle_se_deg": stayed.se_deg,
     }
     if scenario.dimension == 2:
-        for flank in heap_found.flanks:
-            row[f"heap_angle_{flank.name}_deg"] = flank.angle_deg
-    below = free_surface(position[out], radius[out], low, high, 0.0)
-    touched = walls_touched(below, low, high, HEAP_DEPTH * largest_m)
+        row |= {f"heap_angle_{flank.name}_deg": flank.angle_deg for flank in heap.flanks}
+    surface = _surface_of(scenario, snapshot, fallen)
+    touched = walls_touched(surface, *_floor(scenario), HEAP_DEPTH * _largest_m(scenario))
     return row | {"heap_touches": " and ".join(touched)}
+
+
+def _run_out(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, Any]:
+    """How far a column ran out beyond its gate; sand poured on its right runs to the left."""
+    way = 1.0 if sum(scenario.pouring_m[0]) < 2 * gate.centre_m[0] else -1.0
+    far_side = way * gate.centre_m[0] + gate.size_m[0] / 2
+    surface = _surface_of(scenario, snapshot, np.ones(len(snapshot.id), dtype=bool))
+    deep = surface.height_m > HEAP_DEPTH * _largest_m(scenario)
+    reach = float((way * surface.point_m[deep, 0]).max(initial=far_side)) - far_side
+    out = way * snapshot.position_m[:, 0] > far_side
+    return {"outflow_fraction": _share(snapshot, out), "run_out_m": reach}
+
+
+def _fallen(gate: Plate, snapshot: Snapshot) -> NDArray[np.bool_]:
+    """Which grains are below the middle of a level gate."""
+    below: NDArray[np.bool_] = snapshot.position_m[:, -1] < gate.centre_m[-1]
+    return below
+
+
+def _share(snapshot: Snapshot, chosen: NDArray[np.bool_]) -> float:
+    """Mass of some grains over that of all."""
+    sand = snapshot.radius_m ** snapshot.position_m.shape[1]
+    return float(sand[chosen].sum() / sand.sum())
+
+
+def _surface_of(scenario: Scenario, snapshot: Snapshot, chosen: NDArray[np.bool_]) -> Surface:
+    """Top of some grains over the whole floor."""
+    position, radius = snapshot.position_m[chosen], snapshot.radius_m[chosen]
+    return free_surface(position, radius, *_floor(scenario), 0.0)
+
+
+def _largest_m(scenario: Scenario) -> float:
+    return scenario.sand.classes(scenario.dimension)[-1].diameter_m
 
 
 def outflow_time_s(table: pd.DataFrame) -> float:
