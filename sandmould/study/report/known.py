@@ -133,7 +133,8 @@ def _touching(summary: pd.DataFrame) -> list[str]:
     """Name runs whose heap leans on a wall: their angle is no angle of repose."""
     if "heap_touches" not in summary:
         return []
-    leaning = summary[summary["heap_touches"].fillna("").astype(str) != ""]
+    # An empty cell is read as NaN.
+    leaning = summary[[isinstance(walls, str) for walls in summary["heap_touches"]]]
     if leaning.empty:
         return []
     walls = sorted({str(w) for w in leaning["heap_touches"]})
