@@ -116,7 +116,7 @@ def profiles(surface: Surface, width_m: float, axis_m: Array) -> dict[str, tuple
     ----------
     surface : Surface
     width_m : float, m
-        Of the columns or rings that the surface is averaged over: about two of the largest grains.
+        Of the columns or rings that the surface is averaged over: about one of the largest grains.
     axis_m : (d - 1,) float64, m
 
     Returns

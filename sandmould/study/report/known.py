@@ -215,13 +215,15 @@ def _sand(one: CalibratedSand, calibrated: Calibrated) -> SandFound:
     targets = listed([f"{name_of(m)} {t.value:g} ± {t.sd:g}" for m, t in one.sand.targets.items()])
     taken = [f"{name_of(k)} {t.value:g} ± {t.sd:g}" for k, t in one.sand.assumed.items()]
     granted = f", {listed(taken)} taken for granted" if taken else ""
-    said = (
+    said = [
         f"{name}, measured {targets}{granted}: most probable are {listed(values)} (standard "
-        f"deviations), which are correlated by {one.found.correlation:.2f}.",
-        f"The first measured value alone leaves a ridge, {one.by_first.bits:.1f} bits of the two; "
-        f"with all that is known they are {one.found.bits:.1f} bits.",
-    )
-    return SandFound(name, said, draw_posterior(one, calibrated.keys))
+        f"deviations), which are correlated by {one.found.correlation:.2f}."
+    ]
+    ridge = f"One measured value leaves a ridge, {one.by_first.bits:.1f} bits of the two"
+    more = len(one.sand.targets) + len(one.sand.assumed) > 1
+    all_told = f"; all that is known tells {one.found.bits:.1f}" if more else ""
+    said.append(f"{ridge}{all_told}.")
+    return SandFound(name, tuple(said), draw_posterior(one, calibrated.keys))
 
 
 def _worth_table(calibrated: Calibrated) -> Table:
