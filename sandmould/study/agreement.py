@@ -89,18 +89,19 @@ def sweep_part(summary: pd.DataFrame) -> pd.DataFrame:
 def compare_keys(
     summary: pd.DataFrame, keys: Sequence[str], equivalence: Equivalence
 ) -> tuple[Compared, ...]:
-    """Compare all settings that differ in one of the keys of the equivalence alone."""
+    """Compare all values of each key of the equivalence, at equal values of the others.
+
+    Keys that are averaged over do not make comparisons of their own: their values only pair runs.
+    """
     found: tuple[Compared, ...] = ()
-    groups = group_settings(summary, keys) if equivalence.keys else []
-    for (values, rows), (others, other_rows) in combinations(groups, 2):
-        apart = [key for key in keys if values[key] != others[key]]
-        if len(apart) != 1 or apart[0] not in equivalence.keys:
-            continue
-        (key,) = apart
-        pair = _shown(key, values[key]), _shown(key, others[key])
-        rest = {k: v for k, v in values.items() if k != key}
-        at = setting_text(rest) if rest else ""
-        found += _compare(key, pair, at, (rows, other_rows), equivalence)
+    for key in equivalence.keys:
+        others = [k for k in keys if k != key]
+        over = [k for k in others if k in equivalence.over]
+        for rest, alike in group_settings(summary, [k for k in others if k not in over]):
+            at = setting_text(rest) if rest else ""
+            for (a, rows), (b, other_rows) in combinations(group_settings(alike, [key]), 2):
+                pair = _shown(key, a[key]), _shown(key, b[key])
+                found += _compare(key, pair, at, (rows, other_rows), equivalence, over)
     return tuple(sorted(found, key=lambda c: list(equivalence.margins).index(c.measure)))
 
 
@@ -115,13 +116,13 @@ def _compare(
     at: str,
     rows: tuple[pd.DataFrame, pd.DataFrame],
     equivalence: Equivalence,
+    over: Sequence[str] = (),
 ) -> tuple[Compared, ...]:
     """One pair of settings in every measure that has a margin."""
     found = []
     for measure, margin in equivalence.margins.items():
-        first, second = (
-            by_block(r, values.dropna()) for r in rows for values in [finished_values(r, measure)]
-        )
+        values = [finished_values(r, measure).dropna() for r in rows]
+        first, second = (by_block(r, v, over) for r, v in zip(rows, values, strict=True))
         judged = agree(first, second, margin, equivalence.confidence)
         found.append(Compared(measure, key, *pair, at, judged))
     return tuple(found)

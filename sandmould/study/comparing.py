@@ -24,12 +24,13 @@ def problems(study: Study) -> list[Problem]:
 
 
 def _equivalence(equivalence: Equivalence, sweep: Sweep) -> Iterator[Problem]:
-    for i, key in enumerate(equivalence.keys):
-        if key not in sweep.swept:
-            valid = f"a swept key: {', '.join(sweep.swept) or 'none is'}"
-            yield Problem(f"equivalence.keys.{i}", key, valid)
-        elif key in equivalence.keys[:i]:
-            yield Problem(f"equivalence.keys.{i}", key, "each key once")
+    for name, keys in {"keys": equivalence.keys, "over": equivalence.over}.items():
+        for i, key in enumerate(keys):
+            if key not in sweep.swept:
+                valid = f"a swept key: {', '.join(sweep.swept) or 'none is'}"
+                yield Problem(f"equivalence.{name}.{i}", key, valid)
+            elif key in keys[:i]:
+                yield Problem(f"equivalence.{name}.{i}", key, "each key once")
 
 
 def _cross_check(check: CrossCheck, study: Study) -> Iterator[Problem]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -58,18 +59,23 @@ def _heap(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, Any]
     """What fell through an outlet, and what stayed round it."""
     fallen = _fallen(gate, snapshot)
     heap, stayed = slopes(scenario, snapshot)
+    surface = _surface_of(scenario, snapshot, fallen)
+    touched = walls_touched(surface, *_floor(scenario), HEAP_DEPTH * _largest_m(scenario))
     row: dict[str, Any] = {
         "outflow_fraction": _share(snapshot, fallen),
         "heap_angle_deg": heap.angle_deg,
         "heap_angle_se_deg": heap.se_deg,
-        "residue_angle_deg": stayed.angle_deg,
-        "residue_angle_se_deg": stayed.se_deg,
     }
     if scenario.dimension == 2:
         row |= {f"heap_angle_{flank.name}_deg": flank.angle_deg for flank in heap.flanks}
-    surface = _surface_of(scenario, snapshot, fallen)
-    touched = walls_touched(surface, *_floor(scenario), HEAP_DEPTH * _largest_m(scenario))
-    return row | {"heap_touches": " and ".join(touched)}
+    if touched:
+        # A wall holds this slope: it is no angle of repose.
+        row |= {column: math.nan for column in row if column.startswith("heap_angle")}
+    return row | {
+        "heap_touches": " and ".join(touched),
+        "residue_angle_deg": stayed.angle_deg,
+        "residue_angle_se_deg": stayed.se_deg,
+    }
 
 
 def _run_out(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, Any]:

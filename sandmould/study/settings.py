@@ -80,9 +80,11 @@ def setting_of(values: dict[str, Any], planned: int, found: pd.Series[float]) ->
     return Setting(values, setting_text(values), planned, n, mean, sd, half)
 
 
-def by_block(summary: pd.DataFrame, found: pd.Series[float]) -> pd.Series[float]:
-    """Values by replicate and seed, or by row where replicates are not told apart."""
-    blocks = [c for c in ("replicate", "seed") if c in summary]
+def by_block(
+    summary: pd.DataFrame, found: pd.Series[float], over: Sequence[str] = ()
+) -> pd.Series[float]:
+    """Values by replicate, seed and further keys, or by row where replicates are not told apart."""
+    blocks = [c for c in ("replicate", "seed", *over) if c in summary]
     if "replicate" not in blocks:
         return found.rename(index=lambda row: ("row", row))
     rows = summary.loc[found.index, blocks]

@@ -53,6 +53,11 @@ class Equivalence(Section):
         description="Swept keys, such as engine.name, whose values should agree: settings that "
         "differ in one of them alone are compared.",
     )
+    over: tuple[str, ...] = Field(
+        (),
+        description="Swept keys that are averaged over: values of a key are compared over all of "
+        "theirs at once, as the main effect of a factorial design.",
+    )
     margins: dict[Annotated[str, Field(pattern=NAME)], Annotated[float, Field(gt=0)]] = Field(
         {},
         description="Columns of measures.tsv and the largest difference of means, in the unit of "

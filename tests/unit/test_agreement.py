@@ -59,6 +59,21 @@ def test_settings_that_differ_in_one_chosen_key_are_compared() -> None:
     assert {c.agreement.judged for c in found} == {"equivalent"}
 
 
+def test_main_effect_compares_at_equal_values_of_what_it_is_averaged_over() -> None:
+    forms, scales = ["none", "viscous"], [4.0, 8.0]
+    table = summary(**{FORM: forms, "sand.size_scale": scales})
+    # The scale matters much, the form by 0.01: pairs at equal scales show it all the same.
+    table[FILL] += 0.2 * (table["sand.size_scale"] == 8.0) + 0.01 * (table[FORM] == "viscous")
+    keys = [FORM, "sand.size_scale"]
+    wanted = Equivalence(keys=(FORM,), over=tuple(keys), margins={FILL: 0.02})
+    (one,) = compare_keys(table, keys, wanted)
+    assert (one.first, one.second, one.at) == ("none", "viscous", "")
+    assert one.agreement.paired
+    assert one.agreement.n == 8
+    assert one.agreement.judged == "equivalent"
+    assert one.agreement.difference == pytest.approx(-0.01, abs=0.005)
+
+
 def test_numbers_are_named_and_words_stand_alone() -> None:
     table = summary(**{"contact.grain_grain.rolling_arm_fraction": [0.1, 0.0]})
     keys = list(table.columns[:1])

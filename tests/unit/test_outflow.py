@@ -116,6 +116,10 @@ def test_walls_that_the_heap_leans_on_are_named(
     scene = hopper_scene(**(DEEP if dimension == 3 else {}))
     row = measure_outflow(scene, grains_at(np.vstack([heap, stray]), R))
     assert row["heap_touches"] == named
+    angles = [v for column, v in row.items() if column.startswith("heap_angle")]
+    assert len(angles) >= 2
+    if named:
+        assert all(math.isnan(v) for v in angles)
 
 
 @pytest.mark.parametrize("mirrored", [False, True], ids=["to the right", "to the left"])

@@ -19,7 +19,7 @@ from sandmould.study.collect import Collected
 from sandmould.study.report.chart import PLAIN, Chart, Mark, Tint
 from sandmould.study.report.tables import Cell, Column, Table
 from sandmould.study.study import Study
-from sandmould.study.words import name_of, number, seconds, titled
+from sandmould.study.words import listed, name_of, number, seconds, titled
 
 _TINTS = {
     "equivalent": Tint("#00694b", "#5fd0a5"),
@@ -45,6 +45,8 @@ class AgreementPages:
     speeds: Table | None
     """Only where several engines computed."""
     percent: str
+    over: str
+    """Keys that comparisons are averaged over; empty where none is."""
 
 
 def agreement_pages(collected: Collected, study: Study) -> AgreementPages | None:
@@ -74,6 +76,7 @@ def agreement_pages(collected: Collected, study: Study) -> AgreementPages | None
                      for m in dict.fromkeys(c.measure for c in compared)),
         speeds=_speed_table(collected.summary),
         percent=percent,
+        over=listed([name_of(key) for key in study.equivalence.over]),
     )  # fmt: skip
 
 

@@ -130,7 +130,7 @@ def _value_sentences(known: Sequence[Setting], measure: str, study: Study) -> li
 
 
 def _touching(summary: pd.DataFrame) -> list[str]:
-    """Name runs whose heap leans on a wall: their angle is no angle of repose."""
+    """Name runs whose heap leans on a wall: they have no angle of repose."""
     if "heap_touches" not in summary:
         return []
     # An empty cell is read as NaN.
@@ -140,8 +140,8 @@ def _touching(summary: pd.DataFrame) -> list[str]:
     walls = sorted({str(w) for w in leaning["heap_touches"]})
     names = [str(run) for run in leaning["run"]]
     return [
-        f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall, so "
-        f"its angle is no angle of repose: {listed(names)}. Widen the box or fill in less sand."
+        f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and "
+        f"so has no angle of repose: {listed(names)}. Widen the box or fill in less sand."
     ]
 
 
