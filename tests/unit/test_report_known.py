@@ -50,7 +50,7 @@ def heap(angle_deg: float, time_s: float) -> Snapshot:
     """Grains on a square grid under two slopes."""
     axes = np.arange(R_M, 0.4, 2 * R_M), np.arange(R_M, 0.1, 2 * R_M)
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    under = 0.07 - np.abs(grid[:, 0] - 0.2) * np.tan(np.radians(angle_deg))
+    under = 0.055 - np.abs(grid[:, 0] - 0.2) * np.tan(np.radians(angle_deg))
     position = grid[grid[:, 1] < under]
     n = len(position)
     return Snapshot(
