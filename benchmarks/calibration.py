@@ -2,7 +2,8 @@
 
 ``make peers`` runs ``python -m benchmarks.calibration``: it writes results/benchmarks/
 calibration.json and docs/calibration_peers.md. Runs come from the emulator of the study
-repose_map; with ``--oracle dem`` they are DEM runs, of one seed unless ``--seeds`` says more.
+repose_map; with ``--oracle dem`` they are DEM runs, of one seed unless ``--seeds`` says more or 0,
+and truths are planted by DEM too, on this map and on that of calibrate_sand.
 ``--record`` takes the map that docs/results keeps. With ``--quick`` few seeds show that everything
 works, and their files go to results/benchmarks/quick/. ``--page`` writes the page of the json
 again.
@@ -35,7 +36,16 @@ from benchmarks.calibration_methods import (
     open_peers,
     problem_of,
 )
-from benchmarks.calibration_oracle import Map, NoMapError, by_dem, by_emulator, map_file, read_map
+from benchmarks.calibration_oracle import (
+    ANGLE,
+    SECOND,
+    Map,
+    NoMapError,
+    by_dem,
+    by_emulator,
+    map_file,
+    read_map,
+)
 from benchmarks.calibration_page import page
 from benchmarks.calibration_race import CAP, HELD_AFTER, run_race, summarised
 from sandmould import ROOT
@@ -60,10 +70,10 @@ class Settings:
 
 def settings_of(asked: argparse.Namespace) -> Settings:
     """What the command line asks for."""
-    seeds, truths = (1, 3) if asked.oracle == "dem" else (20, 200)
+    seeds, truths = (1, 5) if asked.oracle == "dem" else (20, 200)
     if asked.quick:
         seeds, truths = min(seeds, 2), min(truths, 10)
-    return Settings(asked.oracle, asked.seeds or seeds, truths)
+    return Settings(asked.oracle, seeds if asked.seeds is None else asked.seeds, truths)
 
 
 def race_all(known: Map, methods: Sequence[Method], settings: Settings) -> list[dict[str, Any]]:
@@ -96,8 +106,10 @@ def race_all(known: Map, methods: Sequence[Method], settings: Settings) -> list[
     return rows
 
 
-def measure(file: Path, methods: Sequence[Method], settings: Settings) -> dict[str, Any]:
-    """Measure everything, one after the other.
+def measure(
+    file: Path, methods: Sequence[Method], settings: Settings, second: Path | None = None
+) -> dict[str, Any]:
+    """Measure everything, one after the other; with a second map where truths come by DEM.
 
     Raises
     ------
@@ -109,8 +121,9 @@ def measure(file: Path, methods: Sequence[Method], settings: Settings) -> dict[s
     races = race_all(known, methods, settings)
     truths = planted(known, settings.truths)
     found: dict[str, Any] = {}
-    if settings.oracle == "dem":
-        found["dem_truths"] = dem_coverage(known, truths, by_dem)
+    if second is not None:
+        maps = {ANGLE: known, SECOND: read_map(second, SECOND)}
+        found["dem_truths"] = dem_coverage(maps, truths, by_dem)
     else:
         # coexist states no posterior.
         found["coverage"] = [our_coverage(known, truths)] + [
@@ -159,7 +172,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--oracle", choices=("emulator", "dem"), default="emulator")
     parser.add_argument("--record", action="store_true", help="the map that docs/results keeps")
-    parser.add_argument("--seeds", type=int, help="starts of each method")
+    parser.add_argument("--seeds", type=int, help="starts of each method, 0 for none")
     parser.add_argument("--quick", action="store_true", help="few seeds, to see that it works")
     parser.add_argument("--page", action="store_true", help="write the page again, measure nothing")
     parser.add_argument("--peers", type=Path, default=PEERS, help="Python with the peers in it")
@@ -167,11 +180,14 @@ def main() -> None:
     folder, docs = (KEPT / "quick",) * 2 if asked.quick else (KEPT, ROOT / "docs")
     if not asked.page:
         settings, file = settings_of(asked), map_file(asked.record)
+        second = map_file(asked.record, SECOND) if asked.oracle == "dem" else None
         try:
             read_map(file)  # told before the peers start
+            if second is not None:
+                read_map(second, SECOND)
             with ExitStack() as stack:
                 peers = [stack.enter_context(closing(peer)) for peer in open_peers(asked.peers)]
-                found = measure(file, [Ours(), *peers, Nearest()], settings)
+                found = measure(file, [Ours(), *peers, Nearest()], settings, second)
         except (NoMapError, PeerError) as error:
             raise SystemExit(str(error)) from None
         keep(found, asked.oracle, folder)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,17 @@ from benchmarks.calibration_oracle import ANGLE, Floats, Map, Simulate, by_emula
 from benchmarks.calibration_race import run_race
 from sandmould.study.calibration.asked import Target
 from sandmould.study.calibration.emulator import Emulator, fit_emulator
-from sandmould.study.calibration.posterior import CREDIBLE, OffTheMapError, posterior
+from sandmould.study.calibration.posterior import (
+    CREDIBLE,
+    OffTheMapError,
+    Posterior,
+    posterior,
+)
 
 MEASURED_SD_DEG = 0.5
 """Of the planted measurement, as config/studies/calibrate_sand.yaml has it."""
-DEM_HEAPS = 3
-"""Heaps whose mean angle is the measurement where the truth is planted by DEM."""
+DEM_RUNS = 3
+"""Runs whose mean is the measurement where the truth is planted by DEM."""
 PEER_CAP = 80
 """Runs of a posterior of GrainLearning: eight generations, as in its manual's example."""
 
@@ -31,11 +36,17 @@ def planted(known: Map, count: int, seed: int = 0) -> Floats:
     return truths
 
 
-def holds(emulator: Emulator, measured: float, sd: float, truth: Sequence[float]) -> bool:
-    """Whether the region of highest probability holds a truth; none does off the map."""
+def found_on(emulators: Mapping[str, Emulator], targets: Mapping[str, Target]) -> Posterior | None:
+    """Calibrate; None where a value lies off the map."""
     try:
-        found = posterior({ANGLE: emulator}, {ANGLE: Target(value=measured, sd=sd)})
+        return posterior(emulators, targets)
     except OffTheMapError:
+        return None
+
+
+def holds(found: Posterior | None, truth: Sequence[float]) -> bool:
+    """Whether the region of highest probability holds a truth; none does off the map."""
+    if found is None:
         return False
     i, j = (
         int(np.abs(axis - at).argmin())
@@ -79,7 +90,8 @@ def our_coverage(known: Map, truths: Floats) -> dict[str, Any]:
             ANGLE, known.points, mean + rng.normal(0.0, known.truth.noise_sd, len(mean))
         )
         measured = rng.normal(known.mean(truth), MEASURED_SD_DEG)
-        held.append(holds(again, measured, MEASURED_SD_DEG, truth))
+        target = Target(value=measured, sd=MEASURED_SD_DEG)
+        held.append(holds(found_on({ANGLE: again}, {ANGLE: target}), truth))
     return counted("sandmould", "region of highest probability on the map", held)
 
 
@@ -110,19 +122,45 @@ def peer_coverage(known: Map, method: Method, truths: Floats) -> dict[str, Any]:
 
 
 def dem_coverage(
-    known: Map, truths: Floats, heaps: Callable[[int], Simulate]
+    maps: Mapping[str, Map], truths: Floats, runs: Callable[[int, str], Simulate]
 ) -> list[dict[str, Any]]:
-    """Plant truths by DEM: the mean of some heaps is measured, the map of the study calibrates."""
+    """Plant truths by DEM and calibrate each on the maps: by the first measure, and by all.
+
+    Parameters
+    ----------
+    maps : mapping of measure to Map
+    truths : (n, 2) float64
+    runs : callable
+        Gives runs of a measure by the number of the truth; the mean of some is measured.
+    """
+    emulators = {measure: known.truth for measure, known in maps.items()}
     rows = []
-    sd = known.truth.noise_sd / math.sqrt(DEM_HEAPS)
     for number, truth in enumerate(truths):
-        simulate = heaps(number)
-        angles = [simulate(truth) for _ in range(DEM_HEAPS)]
-        measured = float(np.mean(angles))
+        values = {m: _measured(runs(number, m), truth) for m in maps}
+        targets = {
+            m: Target(value=value, sd=emulators[m].noise_sd / math.sqrt(DEM_RUNS))
+            for m, value in values.items()
+            if math.isfinite(value)
+        }
+        told = {}
+        for name, wanted in {"first": list(maps)[:1], "all": list(maps)}.items():
+            there = {m: targets[m] for m in wanted if m in targets}
+            found = found_on(emulators, there) if len(there) == len(wanted) else None
+            told[name] = {
+                "held": holds(found, truth),
+                "bits": found.bits if found else None,
+                "mode": list(found.mode) if found else None,
+                "sd": list(found.sd) if found else None,
+            }
         rows.append({
             "truth": truth.tolist(),
-            "measured_deg": measured,
-            "emulated_deg": known.mean(truth),
-            "held": math.isfinite(measured) and holds(known.truth, measured, sd, truth),
+            "measured": {m: v if math.isfinite(v) else None for m, v in values.items()},
+            "emulated": {m: known.mean(truth) for m, known in maps.items()},
+            "by": told,
         })  # fmt: skip
+        print(f"planted {truth}: {rows[-1]}", flush=True)
     return rows
+
+
+def _measured(simulate: Simulate, truth: Sequence[float]) -> float:
+    return float(np.mean([simulate(truth) for _ in range(DEM_RUNS)]))

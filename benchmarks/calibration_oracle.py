@@ -26,10 +26,13 @@ from sandmould.study.verdict import finished_values
 
 Floats = NDArray[np.float64]
 Simulate = Callable[[Sequence[float]], float]
-"""One run at a point: its angle, degrees, NaN where it gave none."""
+"""One run at a point: its measure, NaN where it gave none."""
 STUDY = "repose_map"
+SECOND_STUDY = "calibrate_sand"
 KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fraction")
 ANGLE = "heap_angle_deg"
+SECOND = "run_out_m"
+"""What breaks the ridge, measured by the second study."""
 FIRST_REPLICATE = 1001
 """Of runs by DEM: none shares its filling with a run of the map."""
 
@@ -75,12 +78,17 @@ class Map:
         return {"sd_deg": sd, "low_deg": low, "high_deg": high, "freedom": self.freedom}
 
 
-def map_file(record: bool) -> Path:
-    """Name the summary of the map: as just computed, or as kept in the record."""
-    return ROOT / ("docs/results" if record else "results") / STUDY / "summary.tsv"
+def study_of(measure: str) -> str:
+    """Name the study whose runs tell a measure."""
+    return STUDY if measure == ANGLE else SECOND_STUDY
 
 
-def read_map(path: Path) -> Map:
+def map_file(record: bool, measure: str = ANGLE) -> Path:
+    """Name the summary of a map: as just computed, or as kept in the record."""
+    return ROOT / ("docs/results" if record else "results") / study_of(measure) / "summary.tsv"
+
+
+def read_map(path: Path, measure: str = ANGLE) -> Map:
     """Read a map.
 
     Raises
@@ -92,18 +100,18 @@ def read_map(path: Path) -> Map:
         table = pd.read_csv(path, sep="\t")
     except FileNotFoundError:
         raise NoMapError(
-            f"{path} is not there: make study STUDY=config/studies/{STUDY}.yaml writes it, and "
-            "--record takes the one that is kept in docs/results"
+            f"{path} is not there: make study STUDY=config/studies/{study_of(measure)}.yaml writes "
+            "it, and --record takes the one that is kept in docs/results"
         ) from None
     except (ValueError, OSError) as error:
         raise NoMapError(f"{path} cannot be read as a table: {error}") from None
-    lacking = [name for name in (*KEYS, ANGLE, "outcome_code") if name not in table]
+    lacking = [name for name in (*KEYS, measure, "outcome_code") if name not in table]
     if lacking:
-        raise NoMapError(f"{path} lacks the column {lacking[0]}, so it is no map of angles")
-    values = np.asarray(finished_values(table, ANGLE), dtype=np.float64)
+        raise NoMapError(f"{path} lacks the column {lacking[0]}, so it is no map of it")
+    values = np.asarray(finished_values(table, measure), dtype=np.float64)
     points = table[list(KEYS)].to_numpy(dtype=np.float64)[np.isfinite(values)]
     try:
-        truth = fit_emulator(ANGLE, points, values[np.isfinite(values)])
+        truth = fit_emulator(measure, points, values[np.isfinite(values)])
     except TooFewRunsError as error:
         raise NoMapError(f"{path} is too small a map: {error}") from None
     _, counts = np.unique(points, axis=0, return_counts=True)
@@ -116,12 +124,13 @@ def by_emulator(known: Map, seed: int | Sequence[int]) -> Simulate:
     return lambda point: known.mean(point) + float(rng.normal(0.0, known.truth.noise_sd))
 
 
-def by_dem(seed: int, study: Path = ROOT / "config" / "studies" / f"{STUDY}.yaml") -> Simulate:
-    """Runs of the engine that the map's study names, each heap of another filling.
+def by_dem(seed: int, measure: str = ANGLE) -> Simulate:
+    """Runs of the engine that the study of a measure names, each of another filling.
 
     A run goes the workflow's way, plan, deck, engine, measures, in a folder that is then removed.
     """
-    base = open_study(study).study.scenario
+    study = study_of(measure)
+    base = open_study(ROOT / "config" / "studies" / f"{study}.yaml").study.scenario
     number = FIRST_REPLICATE + 1000 * seed
 
     def run(point: Sequence[float]) -> float:
@@ -136,7 +145,7 @@ def by_dem(seed: int, study: Path = ROOT / "config" / "studies" / f"{STUDY}.yaml
             section[last] = float(value)
         tree["seed"] = replicate_seed(base.seed, number)
         parameters = dict(zip(KEYS, map(float, point), strict=True))
-        one = Run(STUDY, "one", parameters, number, Scenario.model_validate(tree), {})
+        one = Run(study, "one", parameters, number, Scenario.model_validate(tree), {})
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             write_plan([one], folder)
@@ -144,6 +153,6 @@ def by_dem(seed: int, study: Path = ROOT / "config" / "studies" / f"{STUDY}.yaml
             simulate(folder / "runs" / "one")
             write_measures(folder / "runs" / "one", folder / "runs" / "one" / "measures.tsv")
             summary = gather(folder).summary
-        return float(finished_values(summary, ANGLE).iloc[0])
+        return float(finished_values(summary, measure).iloc[0])
 
     return run

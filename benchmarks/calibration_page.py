@@ -145,17 +145,29 @@ def _coverage(rows: list[dict[str, Any]]) -> str:
 
 
 def _dem_truths(rows: list[dict[str, Any]]) -> str:
+    def numbers(values: dict[str, float | None]) -> str:
+        return ", ".join("none" if v is None else f"{v:.4g}" for v in values.values())
+
+    def found(by: dict[str, Any]) -> list[str]:
+        if by["bits"] is None:
+            return ["off the map", "–"]
+        where = ", ".join(f"{m:.3f} ± {s:.3f}" for m, s in zip(by["mode"], by["sd"], strict=True))
+        return [where, f"{'yes' if by['held'] else '**no**'}, {by['bits']:.1f} bits"]
+
     cells = [
         [
             ", ".join(f"{x:.3f}" for x in row["truth"]),
-            f"{row['measured_deg']:.2f}",
-            f"{row['emulated_deg']:.2f}",
-            "yes" if row["held"] else "no",
+            numbers(row["measured"]),
+            numbers(row["emulated"]),
+            *found(row["by"]["first"]),
+            *found(row["by"]["all"]),
         ]
         for row in rows
     ]
-    head = ["truth: friction, arm", "measured, degrees", "emulator there, degrees",
-            "in the 95 % region"]  # fmt: skip
+    first, *others = rows[0]["measured"]
+    both = f"by both, {first} and {' and '.join(others)}"
+    head = ["truth: friction, arm", "measured", "emulators there", f"found by {first} alone",
+            "held, information", f"found {both}", "held, information"]  # fmt: skip
     return table(head, cells)
 
 
@@ -181,11 +193,16 @@ def page(kept: dict[str, Any]) -> str:
         ]
     if "dem" in kept:
         found = kept["dem"]
+        if found["races"]:
+            parts.append(
+                "## Runs needed, by DEM\n\nEvery run is a heap of the engine; a guess is judged by "
+                f"the map's emulator.\n\n{_races(found)}"
+            )
         parts += [
-            "## Runs needed, by DEM\n\nEvery run is a heap of the engine; a guess is judged by the "
-            f"map's emulator.\n\n{_races(found)}",
-            "## Truths planted by DEM\n\nThe mean of three heaps is the measured value.\n\n"
-            f"{_dem_truths(found['dem_truths'])}",
+            "## Truths planted by DEM\n\nThe mean of three runs is the measured value of either "
+            "measure, heaps of the study `repose_map` and columns of `calibrate_sand`; found is "
+            "the most probable point with its standard deviations, held says whether the 95 % "
+            f"region holds the truth.\n\n{_dem_truths(found['dem_truths'])}",
             f"## Machine and versions, DEM\n\n{_machine(found)}",
         ]
     return "\n".join([*parts, _NOT_MEASURED])

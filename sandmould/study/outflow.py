@@ -126,7 +126,7 @@ def outflow_time_s(table: pd.DataFrame) -> float:
     """
     flow = table[table["outflow_fraction"].notna()]
     if flow.empty or not flow["outflow_fraction"].iloc[-1] > 0.0:
-        return float("nan")
+        return math.nan
     before = table["time_s"][table.index < flow.index[0]]
     opened_s = float(before.iloc[-1]) if len(before) else float(flow["time_s"].iloc[0])
     time_s = np.concatenate([[opened_s], flow["time_s"]])
@@ -135,7 +135,7 @@ def outflow_time_s(table: pd.DataFrame) -> float:
 
 
 def side_load_fraction(loads: pd.DataFrame) -> float:
-    """Horizontal force of the filled sand on all that holds it over its weight on the floors.
+    """Horizontal forces of the filled sand on all that holds it over its weight on the floors.
 
     Parameters
     ----------
@@ -146,7 +146,8 @@ def side_load_fraction(loads: pd.DataFrame) -> float:
     last = filled[filled["time_s"] == filled["time_s"].max()]
     columns = [c for c in last.columns if c.startswith("force_")]
     weight_n = -float(last[columns[-1]].sum())
-    return float(last[columns[0]].abs().sum()) / weight_n if weight_n > 0.0 else float("nan")
+    sideways_n = float(last[columns[:-1]].abs().to_numpy().sum())
+    return sideways_n / weight_n if weight_n > 0.0 else math.nan
 
 
 def _floor(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:

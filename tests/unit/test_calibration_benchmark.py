@@ -15,7 +15,13 @@ import pytest
 
 from benchmarks import calibration_oracle
 from benchmarks.calibration import Settings, keep, measure
-from benchmarks.calibration_coverage import counted, ellipse_holds, our_coverage, planted
+from benchmarks.calibration_coverage import (
+    counted,
+    dem_coverage,
+    ellipse_holds,
+    our_coverage,
+    planted,
+)
 from benchmarks.calibration_methods import (
     Messages,
     Nearest,
@@ -29,7 +35,9 @@ from benchmarks.calibration_methods import (
 from benchmarks.calibration_oracle import (
     ANGLE,
     KEYS,
+    SECOND,
     NoMapError,
+    Simulate,
     by_dem,
     by_emulator,
     read_map,
@@ -132,7 +140,7 @@ def test_a_map_that_cannot_be_used_is_told_in_a_sentence(summary: Path, tmp_path
     table = pd.read_csv(summary, sep="\t")
     bad = tmp_path / "bad.tsv"
     table.drop(columns=ANGLE).to_csv(bad, sep="\t", index=False)
-    with pytest.raises(NoMapError, match="lacks the column heap_angle_deg"):
+    with pytest.raises(NoMapError, match="lacks the column heap_angle_deg, so"):
         read_map(bad)
     table.head(4).to_csv(bad, sep="\t", index=False)
     with pytest.raises(NoMapError, match=r"too small a map: .* known at 2 points"):
@@ -287,12 +295,41 @@ def test_the_page_says_what_was_measured(summary: Path, fake: Peer, tmp_path: Pa
     assert "| 25 | no method | nearest run |" in text
     assert "GrainLearning, 25 degrees, ended before the cap: two generations are enough." in text
     assert f"environment of GrainLearning | numpy {np.__version__}" in text
-    assert "| 0.400, 0.100 | 25.30 | 25.10 | yes |" in text
+    found_alone = "0.450 ± 0.200, 0.120 ± 0.050 | yes, 2.5 bits"
+    row = f"| 0.400, 0.100 | 25.3, none | 25.1, 0.2 | {found_alone} | off the map | – |"
+    assert row in text
     assert "summary.tsv" in text
     assert str(summary.parent) not in text
 
 
 def dem(found: dict[str, Any]) -> dict[str, Any]:
     """What a measurement by DEM adds."""
-    truth = {"truth": [0.4, 0.1], "measured_deg": 25.3, "emulated_deg": 25.1, "held": True}
+    one = {"held": True, "bits": 2.5, "mode": [0.45, 0.12], "sd": [0.2, 0.05]}
+    truth = {
+        "truth": [0.4, 0.1], "measured": {ANGLE: 25.3, SECOND: None},
+        "emulated": {ANGLE: 25.1, SECOND: 0.2},
+        "by": {"first": one, "all": {"held": False, "bits": None, "mode": None, "sd": None}},
+    }  # fmt: skip
     return {key: found[key] for key in found if key != "coverage"} | {"dem_truths": [truth]}
+
+
+def test_truths_planted_by_runs_are_found_by_one_measure_and_better_by_two(
+    summary: Path, tmp_path: Path
+) -> None:
+    table = pd.read_csv(summary, sep="\t")
+    # Where the angle rises with the arm, the run-out falls with friction alone.
+    table[SECOND] = 0.3 - 0.2 * table[KEYS[0]] + np.tile([0.002, -0.002], len(table) // 2)
+    table.to_csv(tmp_path / "second.tsv", sep="\t", index=False)
+    maps = {ANGLE: read_map(summary), SECOND: read_map(tmp_path / "second.tsv", SECOND)}
+
+    def runs(number: int, measure: str) -> Simulate:
+        if number == 1 and measure == SECOND:
+            return lambda point: math.nan
+        return by_emulator(maps[measure], seed=number)
+
+    found, lost = dem_coverage(maps, np.array([[0.4, 0.1], [0.5, 0.2]]), runs)
+    assert found["by"]["all"]["held"]
+    assert found["by"]["all"]["bits"] > found["by"]["first"]["bits"] + 1.0
+    assert found["by"]["all"]["mode"][0] == pytest.approx(0.4, abs=0.05)
+    assert lost["by"]["first"]["bits"] is not None
+    assert lost["by"]["all"] == {"held": False, "bits": None, "mode": None, "sd": None}

@@ -187,7 +187,8 @@ LOADS = loads_table([
 def test_side_load_is_that_of_the_last_window_of_the_fill_over_the_weight() -> None:
     assert side_load_fraction(LOADS) == pytest.approx((1.0 + 2.0) / (1.0 + 1.0 + 8.0))
     spheres = LOADS.assign(force_y_n=0.5, force_z_n=LOADS.force_y_n)
-    assert side_load_fraction(spheres) == pytest.approx(0.3)
+    # Three of its rows press 0.5 N each in the other horizontal direction.
+    assert side_load_fraction(spheres) == pytest.approx((1.0 + 2.0 + 3 * 0.5) / 10.0)
     assert math.isnan(side_load_fraction(LOADS.assign(force_y_n=0.0)))
     assert math.isnan(side_load_fraction(LOADS[LOADS.stage == "discharge"]))
 
