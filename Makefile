@@ -10,7 +10,6 @@ CORES ?= $(shell nproc)
 STUDY ?= config/studies/tube_demo.yaml
 BIN := .venv/bin
 INSTALLED := .venv/installed
-NAME = $(basename $(notdir $(STUDY)))
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
@@ -20,9 +19,7 @@ demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
 
 study: $(INSTALLED)
-	@$(BIN)/python -m sandmould.study.planning $(STUDY) > /dev/null
-	@$(BIN)/snakemake --cores $(CORES) --configfile $(STUDY) --quiet rules host; status=$$?; \
-	  test -f results/$(NAME)/report.html && echo "The report: results/$(NAME)/report.html"; exit $$status
+	@$(BIN)/python -m sandmould.study.drive $(STUDY) --cores $(CORES) --quiet rules host
 
 plan: $(INSTALLED)
 	@$(BIN)/python -m sandmould.study.planning $(STUDY)

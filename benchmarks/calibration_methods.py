@@ -21,8 +21,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from sandmould.study.calibration.asked import Target
-from sandmould.study.calibration.emulator import TooFewRunsError, fit_emulator
 from sandmould.study.calibration.refine import best_guess, design, next_point
+from sandmould.study.emulator import TooFewRunsError, fit_emulator
 
 Messages = Generator[dict[str, Any], float | None, None]
 START = 16

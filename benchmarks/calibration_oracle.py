@@ -15,8 +15,8 @@ from scipy.stats import chi2
 
 from sandmould import ROOT
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.calibration.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.study.collect import gather
+from sandmould.study.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.study.expand import Run, replicate_seed
 from sandmould.study.measure import write_measures
 from sandmould.study.opening import open_study

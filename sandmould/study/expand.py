@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -60,18 +60,20 @@ def replicate_seed(seed: int, replicate: int) -> int:
     return int(word) & 0x7FFFFFFF
 
 
-def expand(study: OpenStudy) -> list[Run]:
+def expand(study: OpenStudy, more: Sequence[tuple[Point, int]] = ()) -> list[Run]:
     """List the runs of a study.
 
     Parameters
     ----------
     study : OpenStudy
+    more : sequence of (point, replicate)
+        Runs that its rounds have added.
 
     Returns
     -------
     list of Run
         Points in the order of the sweep, the replicates of a point together; those of the cross
-        check after those of its point.
+        check after those of its point, those of the rounds last.
 
     Raises
     ------
@@ -81,7 +83,10 @@ def expand(study: OpenStudy) -> list[Run]:
     base = study.study.scenario.model_dump(mode="json")
     found: dict[str, Problem] = {}
     runs: dict[str, Run] = {}
-    for point in points(study.study.sweep, study.study.scenario.seed):
+    every = range(1, study.study.replicates + 1)
+    swept = [(point, every) for point in points(study.study.sweep, study.study.scenario.seed)]
+    added = [(point, range(replicate, replicate + 1)) for point, replicate in more]
+    for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point)
         for problem in at_point.problems:
             found[str(problem)] = problem
@@ -89,7 +94,8 @@ def expand(study: OpenStudy) -> list[Run]:
             break
         if found:
             continue
-        for run in (*at_point.runs(), *at_point.cross_check()):
+        checked = at_point.cross_check() if replicates is every else ()
+        for run in (*at_point.runs(replicates), *checked):
             if run.run in runs:
                 twice = Problem("sweep", point, "points that differ", study.file)
                 found[str(twice)] = twice
@@ -164,9 +170,9 @@ class _AtPoint:
         """Where a swept key stands in the file; an empty one stands for all."""
         return swept_key(self.study, self.point, key)
 
-    def runs(self) -> Iterator[Run]:
-        """The replicates of this point."""
-        yield from self._replicates(self.scenario, self.study.study.replicates, {}, "sweep")
+    def runs(self, replicates: Iterable[int]) -> Iterator[Run]:
+        """Some replicates of this point."""
+        yield from self._replicates(self.scenario, replicates, {}, "sweep")
 
     def cross_check(self) -> Iterator[Run]:
         """Replicates of this point on the engine that checks it, if this is the point to check."""
@@ -177,17 +183,17 @@ class _AtPoint:
         scenario = self.scenario.model_copy(update={"engine": engine})
         number = check.replicates or self.study.study.replicates
         source = {ENGINE: f"cross_check of {self.study.file}"}
-        yield from self._replicates(scenario, number, source, "cross_check")
+        yield from self._replicates(scenario, range(1, number + 1), source, "cross_check")
 
     def _replicates(
-        self, base: Scenario, number: int, source: dict[str, str], part: Part
+        self, base: Scenario, replicates: Iterable[int], source: dict[str, str], part: Part
     ) -> Iterator[Run]:
         dump = base.model_dump(mode="json")
         parameters = {key: value_at(dump, key) for key in self.point}
         label = run_label({ENGINE: base.engine.name, **parameters} if source else parameters)
         sources = {**dict(_sources(base, self.origin)), **source}
         own = base.seed
-        for replicate in range(1, number + 1):
+        for replicate in replicates:
             scenario = base.model_copy(update={"seed": replicate_seed(own, replicate)})
             yield Run(
                 self.study.name,
@@ -267,12 +273,12 @@ def scenario_hash(scenario: Scenario) -> str:
 
     What is absent is left out: a key that comes later, absent unless given, changes no hash.
     """
-    text = json.dumps(_present(scenario.model_dump(mode="json")), sort_keys=True)
+    text = json.dumps(present(scenario.model_dump(mode="json")), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _present(tree: Any) -> Any:
+def present(tree: Any) -> Any:
     """A tree without keys whose value is None or an empty list."""
     if isinstance(tree, dict):
-        return {key: _present(value) for key, value in tree.items() if value not in (None, [])}
-    return [_present(item) for item in tree] if isinstance(tree, list) else tree
+        return {key: present(value) for key, value in tree.items() if value not in (None, [])}
+    return [present(item) for item in tree] if isinstance(tree, list) else tree

@@ -17,14 +17,15 @@ from sandmould.scenario.quantity import NAME, fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study import comparing, sweep
-from sandmould.study.calibration import asked
+from sandmould.study.calibration import asked as calibration
+from sandmould.study.rounds import asked as rounds
 from sandmould.study.study import Material, Study
 
 STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
 """Where studies write the sands that they calibrate."""
 MATERIALS = (ROOT / "config" / "materials", CALIBRATED)
-_OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration")
+_OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine")
 _MESH_FILE = r"\bobstacles(\.\d+)+\.file(\.value)?$"
 
 
@@ -100,7 +101,8 @@ def open_study(path: Path) -> OpenStudy:
     base = study.scenario.model_dump(mode="json")
     found = sweep.problems(study.sweep, base, study.replicates) or [
         *comparing.problems(study),
-        *asked.problems(study.calibration, study.sweep),
+        *calibration.problems(study.calibration, study.sweep),
+        *rounds.problems(study.refine, study.sweep, study.objective.better, study.scenario.seed),
     ]
     if found:
         raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found])

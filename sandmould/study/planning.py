@@ -33,6 +33,7 @@ from sandmould.study.plan import (
     write_plan,
     write_study,
 )
+from sandmould.study.rounds.ledger import read_ledger
 
 RESULTS = Path("results")
 DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
@@ -125,7 +126,7 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         With one sentence a problem; a missing engine is one of them.
     """
     study = open_study(path)
-    runs = expand(study)
+    runs = expand(study, read_ledger(results / study.name, study.study).runs)
     found: dict[str, Problem] = {}
     for run in runs:
         problem = engine_problem(run.scenario)

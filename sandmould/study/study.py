@@ -11,6 +11,7 @@ from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.asked import Calibration
+from sandmould.study.rounds.asked import Refinement
 from sandmould.study.sweep import Sweep
 
 
@@ -116,8 +117,8 @@ class Study(Section):
     scenario: Scenario = Field(Scenario(), description="The scene of sand.")
     sweep: Sweep = Field(
         Sweep(),
-        description="What is varied; replaces the sweep of based_on, its equivalence and its "
-        "cross_check.",
+        description="What is varied; replaces the sweep of based_on, its equivalence, its rounds "
+        "and its cross_check.",
     )
     replicates: int = quantity(
         1,
@@ -132,6 +133,10 @@ class Study(Section):
     )
     cross_check: CrossCheck | None = Field(
         None, description="One point of the sweep computed on another engine too."
+    )
+    refine: Refinement = Field(
+        Refinement(),
+        description="Rounds of further runs round the optimum; replaced with the sweep.",
     )
     calibration: Calibration = Field(
         Calibration(), description="Sands whose swept keys are found from measured values."

@@ -12,9 +12,9 @@ import yaml
 
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.asked import Calibration, Target, problems
-from sandmould.study.calibration.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.study.calibration.posterior import OffTheMapError, iso_line, posterior
 from sandmould.study.calibration.sands import calibrate, write_materials
+from sandmould.study.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.study.sweep import Sweep
 
 KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fraction")

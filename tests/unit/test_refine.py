@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import norm
 
 from sandmould.study.calibration.asked import Target
-from sandmould.study.calibration.emulator import fit_emulator
 from sandmould.study.calibration.refine import best_guess, chance, design, next_point
+from sandmould.study.emulator import fit_emulator
 
 LOW, HIGH = (0.1, 0.0), (0.8, 0.3)
 TARGET = Target(value=25.0, sd=0.3)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sandmould.study.calibration.asked import Target
-from sandmould.study.calibration.emulator import Emulator
 from sandmould.study.calibration.posterior import posterior
+from sandmould.study.emulator import Emulator
 
 TRUTHS = 5
 """Planted truths along each axis, the edges of the map left out."""

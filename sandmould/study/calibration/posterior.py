@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.study.calibration.asked import Target
-from sandmould.study.calibration.emulator import Emulator
+from sandmould.study.emulator import Emulator
 
 Array = NDArray[np.float64]
 GRID = 121

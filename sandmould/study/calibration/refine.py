@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm, qmc
 
 from sandmould.study.calibration.asked import Target
-from sandmould.study.calibration.emulator import Emulator
+from sandmould.study.emulator import Emulator
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ import yaml
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.asked import Calibration, Sand
-from sandmould.study.calibration.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.study.calibration.information import Worth, worths
 from sandmould.study.calibration.posterior import (
     IsoLine,
@@ -24,6 +23,7 @@ from sandmould.study.calibration.posterior import (
     iso_line,
     posterior,
 )
+from sandmould.study.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.study.verdict import finished_values
 
 CANDIDATES = (

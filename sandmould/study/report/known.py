@@ -12,10 +12,10 @@ import pandas as pd
 
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.calibration.emulator import TooFewRunsError, fit_emulator
 from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.calibration.sands import Calibrated, CalibratedSand
 from sandmould.study.collect import Collected
+from sandmould.study.emulator import TooFewRunsError, fit_emulator
 from sandmould.study.moments import list_moments
 from sandmould.study.report.repose_figures import draw_heap, draw_map, draw_posterior, shown
 from sandmould.study.report.tables import Cell, Column, Table

@@ -13,9 +13,9 @@ from analysis.plots import draw_grains
 from analysis.repose import Slope
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.calibration.emulator import Emulator
 from sandmould.study.calibration.posterior import axes_of, surface
 from sandmould.study.calibration.sands import CalibratedSand
+from sandmould.study.emulator import Emulator
 from sandmould.study.outflow import slopes
 from sandmould.study.report.figures import cut_m, panel, png
 from sandmould.study.words import name_of, unit_of

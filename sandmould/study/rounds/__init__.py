@@ -1,0 +1,1 @@
+"""Rounds of runs that close in on the optimum of a sweep."""

@@ -1,0 +1,106 @@
+"""Whether a study has had enough rounds, and the next one where it has not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pandas as pd
+
+from sandmould.study.emulator import TooFewRunsError
+from sandmould.study.rounds.asked import Refinement
+from sandmould.study.rounds.ledger import Ledger, Round
+from sandmould.study.rounds.optimum import Optimum, find_optimum
+from sandmould.study.rounds.propose import propose
+from sandmould.study.study import Study
+from sandmould.study.words import listed, name_of, number, unit_of, value_text
+
+
+def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
+    """Add a round, or the reason why there is none.
+
+    Parameters
+    ----------
+    ledger : Ledger
+    study : Study
+    summary : DataFrame
+        One row a run of the sweep and of all rounds so far.
+    keys : list of str
+        Swept keys.
+    """
+    refine, done = study.refine, len(ledger.rounds)
+    spent_h = float(summary["cpu_s"].sum()) / 3600 if "cpu_s" in summary else 0.0
+    try:
+        optimum = find_optimum(
+            summary, keys, study.objective.measure, study.objective.better, seed=done
+        )
+    except TooFewRunsError as error:
+        return replace(ledger, ended=f"Too few runs finished: {error}.")
+    ended = why_enough(refine, optimum, done, spent_h, spent_h / max(len(summary), 1))
+    if ended:
+        return replace(ledger, ended=ended)
+    one = Round(
+        tuple(propose(optimum, summary, refine.runs, seed=done)),
+        optimum.setting,
+        {key: optimum.interval(key) for key in keys},
+        spent_h,
+    )
+    return replace(ledger, rounds=(*ledger.rounds, one), ended="")
+
+
+def why_enough(
+    refine: Refinement, optimum: Optimum, done: int, spent_h: float, run_h: float
+) -> str:
+    """Say why rounds end; empty where one more is due.
+
+    Parameters
+    ----------
+    refine : Refinement
+    optimum : Optimum
+    done : int
+        Rounds so far.
+    spent_h, run_h : float, h
+        Processor time of all runs so far, and of one on average.
+    """
+    wide = [key for key, width in refine.interval.items() if _width(optimum, key) > width]
+    if refine.interval and not wide:
+        return f"The optimum is as narrow as asked: {_intervals(optimum, list(refine.interval))}."
+    if done >= refine.rounds:
+        return f"All {refine.rounds} rounds are done."
+    if refine.budget_core_h is not None and spent_h + refine.runs * run_h > refine.budget_core_h:
+        return (
+            f"Of {refine.budget_core_h:g} h of processor time {number(spent_h, 2)} h are spent, "
+            f"and a round takes {number(refine.runs * run_h, 2)} h."
+        )
+    return ""
+
+
+def _width(optimum: Optimum, key: str) -> float:
+    low, high = optimum.interval(key)
+    return high - low
+
+
+def _intervals(optimum: Optimum, keys: list[str]) -> str:
+    said = []
+    for key in keys:
+        low, high = optimum.interval(key)
+        said.append(f"{name_of(key)} {number(low)} to {value_text(key, high)}")
+    return listed(said)
+
+
+def told(ledger: Ledger, study: Study) -> str:
+    """One line on the last decision, for the terminal."""
+    if ledger.ended:
+        return ledger.ended
+    last = ledger.rounds[-1]
+    where = listed(
+        [
+            f"{name_of(key)} {number(value)} ({number(last.interval[key][0])} to "
+            f"{number(last.interval[key][1])}) {unit_of(key)}".rstrip()
+            for key, value in last.setting.items()
+        ]
+    )
+    fresh = sum(replicate == 1 for _, replicate in last.runs)
+    return (
+        f"Round {len(ledger.rounds)} of at most {study.refine.rounds}: best so far is {where}; "
+        f"{fresh} new points and {len(last.runs) - fresh} more replicates."
+    )

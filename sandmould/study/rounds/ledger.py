@@ -1,0 +1,90 @@
+"""The rounds of a study on disk: which runs each added, and why they ended."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.study.expand import present
+from sandmould.study.study import Study
+from sandmould.study.sweep import Point
+
+LEDGER = "rounds.json"
+
+
+@dataclass(frozen=True)
+class Round:
+    """Runs that were added, and what was known before them."""
+
+    runs: tuple[tuple[Point, int], ...]
+    """Points and replicates."""
+    setting: dict[str, float]
+    """Best setting by the runs before."""
+    interval: dict[str, tuple[float, float]]
+    spent_core_h: float
+    """By all runs before."""
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """All rounds so far."""
+
+    basis: str
+    """Hash of what the rounds rest on."""
+    rounds: tuple[Round, ...] = ()
+    ended: str = ""
+    """Why there are no more, as a sentence; empty while they go on."""
+
+    @property
+    def runs(self) -> list[tuple[Point, int]]:
+        """Runs of all rounds."""
+        return [run for one in self.rounds for run in one.runs]
+
+
+def basis_of(study: Study) -> str:
+    """Hash of what a study's rounds rest on: all of it but how long they go on, and its words."""
+    tree = study.model_dump(mode="json", exclude={"title", "refine", "cross_check", "equivalence"})
+    return hashlib.sha256(json.dumps(present(tree), sort_keys=True).encode()).hexdigest()
+
+
+def read_ledger(folder: Path, study: Study) -> Ledger:
+    """Read the rounds of a study; none where it has none or they are those of another one.
+
+    Raises
+    ------
+    BadInputError
+        When the file was changed into something that is no list of rounds.
+    """
+    path, basis = folder / LEDGER, basis_of(study)
+    if not study.refine.rounds or not path.is_file():
+        return Ledger(basis)
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+        found = Ledger(tree["basis"], tuple(_round(one) for one in tree["rounds"]), tree["ended"])
+    except (ValueError, KeyError, TypeError, AttributeError):
+        valid = "a list of rounds as the study wrote it, or no such file: they then begin anew"
+        raise BadInputError([Problem("rounds", "as it is", valid, str(path))]) from None
+    return found if found.basis == basis else Ledger(basis)
+
+
+def _round(tree: dict[str, Any]) -> Round:
+    runs = tuple((dict(point), int(replicate)) for point, replicate in tree["runs"])
+    interval = {key: (float(low), float(high)) for key, (low, high) in tree["interval"].items()}
+    return Round(runs, dict(tree["setting"]), interval, float(tree["spent_core_h"]))
+
+
+def write_ledger(ledger: Ledger, folder: Path) -> None:
+    """Write the rounds; those of another study's past are kept beside under their own name."""
+    path = folder / LEDGER
+    if path.is_file():
+        earlier = json.loads(path.read_text(encoding="utf-8"))
+        if earlier["basis"] != ledger.basis:
+            os.replace(path, folder / f"rounds_{earlier['basis'][:6]}.json")
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(json.dumps(asdict(ledger), indent=1) + "\n", encoding="utf-8")
+    os.replace(partial, path)
