@@ -15,7 +15,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.expand import (
     MOST_PROBLEMS,
     Run,
-    _present,
+    present,
     expand,
     replicate_seed,
     scenario_hash,
@@ -268,4 +268,4 @@ def test_shipped_mesh_is_named_from_the_repository() -> None:
 
 def test_keys_that_are_absent_change_no_hash() -> None:
     tree = {"box": {"width_m": 0.1, "note": None}, "stages": [], "list": [{"key": None, "b": 0}]}
-    assert _present(tree) == {"box": {"width_m": 0.1}, "list": [{"b": 0}]}
+    assert present(tree) == {"box": {"width_m": 0.1}, "list": [{"b": 0}]}
