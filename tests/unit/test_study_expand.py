@@ -15,8 +15,8 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.expand import (
     MOST_PROBLEMS,
     Run,
-    present,
     expand,
+    present,
     replicate_seed,
     scenario_hash,
 )

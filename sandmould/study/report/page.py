@@ -23,6 +23,7 @@ from sandmould.study.report.chart import NARROW, SMALL, WIDE, lay_out
 from sandmould.study.report.curves import objective_charts, runs_of
 from sandmould.study.report.known import known_pages
 from sandmould.study.report.method import Row, provenance_rows, sand_method, statistics_method
+from sandmould.study.report.optimum import optimum_pages, with_surface
 from sandmould.study.report.sand import sand_pages, shown_runs
 from sandmould.study.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.study.study import Study
@@ -123,6 +124,10 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
     known = known_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
+    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary)
+    charts = objective_charts(of_sweep.summary, verdict, keys)
+    if optimum and optimum.optimum and len(keys) == 1:
+        charts = tuple(with_surface(c, optimum.optimum, verdict.measure) for c in charts)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
     method: tuple[Row, ...] = (
         *sand_method(page.scenario, keys, summary),
@@ -145,11 +150,10 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         seeks_best=seeks_best,
         agreement=agreement,
         known=known,
-        statement=agreement if agreement and agreement.is_question else known,
+        optimum=optimum,
+        statement=optimum or (agreement if agreement and agreement.is_question else known),
         key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
-        objective_charts=[
-            _both_sizes(c) for c in objective_charts(of_sweep.summary, verdict, keys)
-        ],
+        objective_charts=[_both_sizes(c) for c in charts],
         settings=settings_table(verdict, page.by_setting),
         runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
         method=method,

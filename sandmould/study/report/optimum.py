@@ -1,0 +1,148 @@
+"""The report's answer of a study with rounds: where the best setting lies, and how flat it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from sandmould.study.emulator import TooFewRunsError
+from sandmould.study.report.chart import PLAIN, Chart, Line, tints
+from sandmould.study.rounds.ledger import Ledger, read_ledger
+from sandmould.study.rounds.optimum import Optimum, find_optimum
+from sandmould.study.study import Study
+from sandmould.study.words import (
+    listed,
+    name_of,
+    number,
+    shown_scale,
+    unit_of,
+    value_text,
+    with_margin,
+)
+
+WRONG = {"frequency_hz": 10.0}
+"""By how much a key may be set wrong in a foundry; others by a tenth of their range."""
+SHARE_LOST = 0.05
+"""Of the best value, what counts as no worse where the study sets no margin."""
+_TWO_SIDED = 1.96
+
+
+@dataclass(frozen=True)
+class OptimumPages:
+    """What the report says of the optimum."""
+
+    sentences: tuple[str, ...]
+    sound: bool
+    """Whether the optimum lies inside the sweep, as narrow as asked."""
+    optimum: Optimum | None
+
+
+def optimum_pages(study_folder: Path, study: Study, summary: pd.DataFrame) -> OptimumPages | None:
+    """Say where the optimum of a study with rounds lies; None for a study without.
+
+    Parameters
+    ----------
+    study_folder : Path
+    study : Study
+    summary : DataFrame
+        One row a run of the sweep and its rounds.
+    """
+    if not study.refine.rounds:
+        return None
+    ledger, objective = read_ledger(study_folder, study), study.objective
+    keys = study.sweep.swept
+    try:
+        optimum = find_optimum(summary, keys, objective.measure, objective.better)
+    except TooFewRunsError as error:
+        return OptimumPages((f"No optimum can be told: {error}.",), False, None)
+    ends = [key for key in keys if optimum.at_end(key)]
+    wide = [
+        key
+        for key, width in study.refine.interval.items()
+        if optimum.interval(key)[1] - optimum.interval(key)[0] > width
+    ]
+    said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
+    said.append(_effort(ledger, study, summary))
+    return OptimumPages(tuple(said), not ends and not wide, optimum)
+
+
+def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
+    what = name_of(study.objective.measure)
+    most = "highest" if optimum.sign > 0 else "lowest"
+    mean, se = optimum.value
+    places = []
+    for key, value in optimum.setting.items():
+        low, high = optimum.interval(key)
+        places.append(
+            f"{name_of(key)} {value_text(key, float(number(value)))} "
+            f"(95 % interval {number(low)} to {value_text(key, float(number(high)))})"
+        )
+    where = f"{listed(places)}: {with_margin(mean, _TWO_SIDED * se)}"
+    if not ends:
+        return f"The {what} is {most} at {where}."
+    reached = [
+        f"the {end.replace(' and ', ' and the ')} {name_of(key)} swept"
+        for key in ends
+        for end in [optimum.at_end(key)]
+    ]
+    return (
+        f"Not resolved: among what was swept the {what} is {most} at {where}, but the interval "
+        f"reaches {listed(reached)}, so the optimum may lie beyond."
+    )
+
+
+def _flat(optimum: Optimum, study: Study, key: str) -> str:
+    """How far a key may be off without harm, and what a usual error costs."""
+    measure, name = study.objective.measure, name_of(key)
+    set_margin = study.equivalence.margins.get(measure)
+    margin = set_margin or SHARE_LOST * abs(optimum.value[0])
+    low, high = optimum.no_worse(key, margin)
+    how = "the margin set beforehand" if set_margin else "5 % of it"
+    said = (
+        f"From {number(low)} to {value_text(key, float(number(high)))} the mean loses less than "
+        f"{number(margin, 2)}, {how}"
+    )
+    off = WRONG.get(key.rsplit(".", 1)[-1])
+    if off is None:
+        values = optimum.points[:, optimum.keys.index(key)]
+        off = float(f"{0.1 * (values.max() - values.min()):.1g}")
+    costs = [
+        f"{value_text(key, off)} too {side} costs {number(loss, 2)}"
+        for side, loss in (("low", optimum.loss(key, -off)), ("high", optimum.loss(key, off)))
+        if not math.isnan(loss)
+    ]
+    return f"{said}; a {name} {listed(costs)}." if costs else f"{said}."
+
+
+def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
+    added = len(ledger.runs)
+    rounds = len(ledger.rounds)
+    spent_h = float(summary["cpu_s"].sum()) / 3600 if "cpu_s" in summary else math.nan
+    many = "round" if rounds == 1 else "rounds"
+    return (
+        f"{rounds} {many} added {added} runs to the {len(summary) - added} of the sweep, "
+        f"{number(spent_h, 2)} h of processor time in all. "
+        f"{ledger.ended or 'Rounds go on: make study continues them.'}"
+    )
+
+
+def with_surface(chart: Chart, optimum: Optimum, measure: str) -> Chart:
+    """The objective's chart over one key with the fitted curve, its error and the interval."""
+    mean, se = optimum.surface
+    factor = shown_scale(measure)[0]
+    x, tint = optimum.points[:, 0], tints(1, False)[0]
+    lines = [Line(np.column_stack([x, factor * mean]), tint, True, title="fitted mean")]
+    for sign in (-1.0, 1.0):
+        edge = factor * (mean + sign * _TWO_SIDED * se)
+        lines.append(Line(np.column_stack([x, edge]), PLAIN, title="95 % of the fitted mean"))
+    key = optimum.keys[0]
+    low, high = optimum.interval(key)
+    alt = (
+        f"{chart.alt} The fitted curve is best at {number(optimum.setting[key])} {unit_of(key)}, "
+        f"95 % interval {number(low)} to {number(high)}."
+    )
+    return replace(chart, lines=tuple(lines), band=(low, high), alt=alt)

@@ -1,0 +1,83 @@
+"""The report of a study with rounds: optimum with interval, how flat it is, what rounds cost."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sandmould.study.collect import gather, read_study
+from sandmould.study.report.optimum import optimum_pages
+from sandmould.study.report.page import write_report
+from sandmould.study.rounds.decide import next_round
+from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
+from tests.unit.report_study import KEY, write_study
+
+BEST_HZ = 48.0
+SWEPT = (20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0)
+
+
+def write_refined(folder: Path, best_hz: float = BEST_HZ, width_hz: float = 40.0) -> Path:
+    planted = {f: max(0.6 - 0.3 * float(np.log(f / best_hz)) ** 2, 0.05) for f in SWEPT}
+    write_study(folder, planted, failed=())
+    swept = ", ".join(f"{f:g}" for f in SWEPT)
+    (folder / "study.yaml").write_text(
+        "title: Which frequency fills the tube best?\n"
+        f"sweep: {{keys: {{{KEY}: [{swept}]}}}}\nreplicates: 3\n"
+        f"refine: {{rounds: 2, runs: 5, interval: {{{KEY}: {width_hz:g}}}}}\n"
+        "equivalence: {margins: {tube_fill_fraction: 0.02}}\n"
+    )
+    return folder
+
+
+def test_the_report_begins_with_the_optimum(tmp_path: Path) -> None:
+    folder = write_refined(tmp_path / "refined")
+    study = read_study(folder)
+    ledger = Ledger(basis_of(study), ended="All 2 rounds are done.")
+    write_ledger(ledger, folder)
+    write_report(folder, folder / "report.html")
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    first = text.index('class="verdict resolved"')
+    said = re.sub(r"<[^>]+>", "", text[first : first + 900]).replace("\xa0", " ")
+    assert re.search(
+        r"The fill of the tube is highest at frequency 4\d(\.\d)? Hz \(95 % inter", said
+    )
+    # 0.3 ln(f/48)^2 = 0.02 at a ratio of 1.29: from 37 to 62 Hz
+    low, high = map(float, re.search(r"From (\S+) to (\S+) Hz the mean loses", said).groups())  # type: ignore[union-attr]
+    assert low == pytest.approx(37.0, abs=3.0)
+    assert high == pytest.approx(62.0, abs=4.0)
+    assert re.search(
+        r"a frequency 10 Hz too low costs 0\.0[12]\d* and 10 Hz too high costs 0\.0", said
+    )
+    assert "All 2 rounds are done." in said
+    assert "The curve is the Gaussian process" in text
+
+
+def test_an_interval_at_the_end_of_the_sweep_is_not_resolved(tmp_path: Path) -> None:
+    folder = write_refined(tmp_path / "edge", best_hz=130.0)
+    study, found = read_study(folder), gather(folder)
+    pages = optimum_pages(folder, study, found.summary)
+    assert pages is not None
+    assert not pages.sound
+    assert pages.sentences[0].startswith("Not resolved: among what was swept")
+    assert "reaches the highest frequency swept, so" in pages.sentences[0]
+    assert "Rounds go on" in pages.sentences[-1]
+
+
+def test_wider_than_asked_is_not_sound_and_the_cost_is_told(tmp_path: Path) -> None:
+    folder = write_refined(tmp_path / "wide", width_hz=0.1)
+    study, found = read_study(folder), gather(folder)
+    ledger = next_round(Ledger(basis_of(study)), study, found.summary, [KEY])
+    write_ledger(replace(ledger, ended=""), folder)
+    pages = optimum_pages(folder, study, found.summary)
+    assert pages is not None
+    assert not pages.sound
+    assert pages.sentences[-1].startswith("1 round added 5 runs to the 16 of the sweep")
+
+
+def test_a_study_without_rounds_has_no_such_answer(tmp_path: Path) -> None:
+    folder = write_study(tmp_path / "plain")
+    assert optimum_pages(folder, read_study(folder), gather(folder).summary) is None
