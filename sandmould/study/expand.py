@@ -96,6 +96,8 @@ def expand(study: OpenStudy, more: Sequence[tuple[Point, int]] = ()) -> list[Run
             continue
         checked = at_point.cross_check() if replicates is every else ()
         for run in (*at_point.runs(replicates), *checked):
+            if run.run in runs and replicates is not every:
+                continue  # the sweep has come to hold it
             if run.run in runs:
                 twice = Problem("sweep", point, "points that differ", study.file)
                 found[str(twice)] = twice

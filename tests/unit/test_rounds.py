@@ -159,12 +159,13 @@ def test_rounds_are_appended_to_the_runs_and_redo_none(tmp_path: Path) -> None:
     study = opened(tmp_path)
     first = expand(study)
     assert len(first) == 10
-    more = [({FREQUENCY: 45.0}, 3), ({FREQUENCY: 52.0}, 1)]
+    more = [({FREQUENCY: 45.0}, 3), ({FREQUENCY: 52.0}, 1), ({FREQUENCY: 30.0}, 2)]
     runs = expand(study, more)
     assert [r.run for r in runs[:10]] == [r.run for r in first]
     new = runs[len(first) :]
     assert [(r.parameters[FREQUENCY], r.replicate) for r in new] == [(45.0, 3), (52.0, 1)]
-    # Replicate 1 of a new point has the grains of replicate 1 of all points.
+    # One that the sweep has come to hold is there once. Replicate 1 of a new point has the grains
+    # of replicate 1 of all points.
     assert new[1].seed == first[0].seed
 
 
@@ -177,9 +178,9 @@ def test_a_ledger_is_read_back_and_another_studys_is_kept_aside(tmp_path: Path) 
     write_ledger(ledger, tmp_path)
     assert read_ledger(tmp_path, study) == ledger
     # More rounds go on with those that are there; another scene begins anew and loses nothing.
-    longer = opened(tmp_path, refine={"rounds": 9}).study
-    assert read_ledger(tmp_path, longer) == ledger
-    other = opened(tmp_path, replicates=4).study
+    for more in ({"refine": {"rounds": 9}}, {"replicates": 4}):
+        assert read_ledger(tmp_path, opened(tmp_path, **more).study) == ledger
+    other = opened(tmp_path, scenario={"sand": {"size_scale": 9}}).study
     fresh = read_ledger(tmp_path, other)
     assert fresh.rounds == ()
     write_ledger(fresh, tmp_path)

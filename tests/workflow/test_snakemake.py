@@ -127,6 +127,27 @@ def test_tiny_study_end_to_end(checkout: Path) -> None:
     assert (checkout / "report.zip").stat().st_size > 1e5
 
 
+def test_one_command_computes_a_sweep_and_its_rounds(checkout: Path) -> None:
+    study = checkout / "refined.yaml"
+    study.write_text(
+        TINY.replace("scenario:", "scenario:\n  engine: {name: reference}")
+        + "sweep: {keys: {vibration.0.frequency_hz: [25, 50, 100, 200]}}\n"
+        "refine: {rounds: 1, runs: 2}\n"
+    )
+    command = [sys.executable, "-m", "sandmould.study.drive", str(study), "--cores", "2"]
+    ran = subprocess.run(command, cwd=checkout, capture_output=True, text=True, timeout=300)
+    assert ran.returncode == 0, ran.stderr
+    assert "Round 1 of at most 1: best so far is frequency" in ran.stderr
+    assert "The one round is done." in ran.stderr
+    assert "The report: results/refined/report.html" in ran.stdout
+    results = checkout / "results" / "refined"
+    runs = pd.read_csv(results / "summary.tsv", sep="\t")
+    assert len(runs) == 6
+    written = [(results / "runs" / r / "outcome.json").stat().st_mtime_ns for r in runs.run]
+    # The sweep's runs were all there before the first of the round.
+    assert max(written[:4]) < min(written[4:])
+
+
 def test_point_of_a_sweep_on_two_engines(checkout: Path) -> None:
     study = checkout / "checked.yaml"
     study.write_text(

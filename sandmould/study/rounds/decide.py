@@ -65,7 +65,7 @@ def why_enough(
     if refine.interval and not wide:
         return f"The optimum is as narrow as asked: {_intervals(optimum, list(refine.interval))}."
     if done >= refine.rounds:
-        return f"All {refine.rounds} rounds are done."
+        return "The one round is done." if refine.rounds == 1 else f"All {done} rounds are done."
     if refine.budget_core_h is not None and spent_h + refine.runs * run_h > refine.budget_core_h:
         return (
             f"Of {refine.budget_core_h:g} h of processor time {number(spent_h, 2)} h are spent, "

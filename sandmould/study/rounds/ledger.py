@@ -47,9 +47,10 @@ class Ledger:
 
 
 def basis_of(study: Study) -> str:
-    """Hash of what a study's rounds rest on: all of it but how long they go on, and its words."""
-    tree = study.model_dump(mode="json", exclude={"title", "refine", "cross_check", "equivalence"})
-    return hashlib.sha256(json.dumps(present(tree), sort_keys=True).encode()).hexdigest()
+    """Hash of what a study's rounds rest on: its scene, its objective and which keys it sweeps."""
+    tree = study.model_dump(mode="json", include={"scenario", "objective"})
+    text = json.dumps([present(tree), study.sweep.swept], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def read_ledger(folder: Path, study: Study) -> Ledger:
