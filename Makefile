@@ -1,6 +1,6 @@
 # make demo   the main job on real input: sand flows into a tube at six frequencies
 # make test   lint, types, import contract and all tests
-# The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, decks, schema, lock,
+# The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, status, decks, schema, lock,
 # twins (the engines compared, docs/engine_twins.md), verification (docs/verification.md),
 # stability (docs/stability.md), benchmarks (docs/speed.md), peers (docs/calibration_peers.md),
 # results-check, clean.
@@ -13,7 +13,7 @@ INSTALLED := .venv/installed
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
-.PHONY: demo study plan twins verification stability test lint decks schema lock results-check clean benchmarks peers
+.PHONY: demo study plan status twins verification stability test lint decks schema lock results-check clean benchmarks peers
 
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
@@ -23,6 +23,9 @@ study: $(INSTALLED)
 
 plan: $(INSTALLED)
 	@$(BIN)/python -m sandmould.study.planning $(STUDY)
+
+status: $(INSTALLED)
+	@$(BIN)/python -m sandmould.study.status $(STUDY)
 
 twins: $(INSTALLED)
 	@for name in $(TWINS); do \

@@ -1,0 +1,97 @@
+"""What is said of a study that is being computed."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from pathlib import Path
+
+import pytest
+import yaml
+
+from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.study.plan import planned_grain_steps, write_plan
+from sandmould.study.planning import Plan, open_plan
+from sandmould.study.status import main, run_status, status_text
+
+FREQUENCY = "vibration.0.frequency_hz"
+
+
+@pytest.fixture
+def plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Plan:
+    """Six runs of one kind, none begun."""
+    monkeypatch.chdir(tmp_path)
+    tree = {
+        "based_on": "tube", "scenario": {"engine": {"name": "reference"}},
+        "sweep": {"keys": {FREQUENCY: [25, 50, 100]}}, "replicates": 2,
+    }  # fmt: skip
+    Path("trial.yaml").write_text(yaml.safe_dump(tree), encoding="utf-8")
+    plan = open_plan(Path("trial.yaml"))
+    write_plan(plan.runs, Path("results/trial"))
+    return plan
+
+
+def ended(plan: Plan, place: int, outcome: Outcome, wall_s: float) -> None:
+    """Let a run end; it took so long."""
+    run = plan.runs[place]
+    folder = Path("results/trial/runs") / run.run
+    RunOutcome(outcome, "why it is so", 1.0, 1.0).write(folder / "outcome.json")
+    steps = planned_grain_steps(run.scenario)
+    (folder / "cost.tsv").write_text(f"wall_s\tcpu_s\tgrain_steps\n{wall_s}\t{wall_s}\t{steps}\n")
+
+
+def begun(plan: Plan, place: int, ago_s: float) -> Path:
+    """Let a run have written its progress a while ago."""
+    folder = Path("results/trial/runs") / plan.runs[place].run
+    (folder / "work").mkdir()
+    progress = {"stage": "settle_1", "time_s": 0.5, "percent": 40.0, "left_s": 90.0}
+    path = folder / "work" / "progress.json"
+    path.write_text(json.dumps(progress))
+    now = path.stat().st_mtime
+    os.utime(path, (now, now - ago_s))
+    return folder
+
+
+def test_nothing_begun_has_no_time_left_that_is_known(plan: Plan) -> None:
+    said = status_text(plan, Path("results"), 2)
+    assert said.startswith("trial: 6 waiting of 6 runs\nprocessor time so far: 0 s; ")
+    assert "time left unknown: no run like 6 of them is done" in said
+
+
+def test_every_state_is_told(plan: Plan) -> None:
+    ended(plan, 0, Outcome.FINISHED, 600.0)
+    ended(plan, 1, Outcome.OVERLAP_TOO_LARGE, 300.0)
+    running, stopped = begun(plan, 2, ago_s=500.0), begun(plan, 3, ago_s=500.0)
+    elsewhere = begun(plan, 4, ago_s=1.0)
+    with (running / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        said = status_text(plan, Path("results"), 2)
+    first, second, *lines = said.splitlines()
+    assert first == "trial: 1 done, 1 failed, 2 running, 1 stopped, 1 waiting of 6 runs"
+    # Twice 90 s of those that run, and one stopped and one waiting of 600 s or 300 s, on two cores.
+    assert second.startswith("processor time so far: 15.0 min; time left: about ")
+    assert lines == [
+        f"  running: {running.name}  40 %, settle_1, 0.5 s simulated",
+        f"  running: {elsewhere.name}  40 %, settle_1, 0.5 s simulated",
+        f"  stopped: {stopped.name}  40 %, settle_1, 0.5 s simulated",
+        f"  failed: {plan.runs[1].run}  overlap too large. why it is so",
+    ]
+
+
+def test_a_finished_study_has_nothing_left(plan: Plan, capsys: pytest.CaptureFixture[str]) -> None:
+    for place in range(6):
+        ended(plan, place, Outcome.FINISHED, 60.0)
+    assert main(["trial.yaml"]) == 0
+    said = capsys.readouterr().out
+    assert said == "trial: 6 done of 6 runs\nprocessor time so far: 6.0 min; nothing left\n"
+
+
+def test_broken_files_count_as_not_there(plan: Plan) -> None:
+    ended(plan, 0, Outcome.FINISHED, 60.0)
+    folder = Path("results/trial/runs") / plan.runs[0].run
+    (folder / "cost.tsv").write_text("")
+    assert run_status(folder).state == "waiting"
+    progress = begun(plan, 1, ago_s=0.0) / "work" / "progress.json"
+    progress.write_text("{")
+    assert run_status(progress.parents[1]).state == "waiting"
