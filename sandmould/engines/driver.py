@@ -74,20 +74,23 @@ class Driver:
         outcome, detail = Outcome.FINISHED, ""
         self._begin_clocks()
         try:
-            session = engine_of(self._scenario).open_session(
-                self._program,
-                self._folder,
-                self._work / "engine.log",
-                newest[0] if newest else None,
-            )
-            self.is_root = session.is_root
-            if session.is_root:
-                self._recorder = Recorder(self._work, self._scenario.dimension, mark)
-            self._go(session, mark)
+            try:
+                session = engine_of(self._scenario).open_session(
+                    self._program,
+                    self._folder,
+                    self._work / "engine.log",
+                    newest[0] if newest else None,
+                )
+                self.is_root = session.is_root
+                if session.is_root:
+                    self._recorder = Recorder(self._work, self._scenario.dimension, mark)
+                self._go(session, mark)
+            finally:
+                self._end(session)
         except EngineStop as stop:
             outcome, detail = stop.outcome, stop.detail
-        finally:
-            self._end(session)
+        except OSError as error:
+            outcome, detail = Outcome.DISK_REFUSED, f"{error.strerror}: {error.filename}"
         simulated_s = self.cost.steps * self.cost.time_step_s
         detail = "; ".join([detail, *notes] if detail else notes)
         return RunOutcome(outcome, detail, simulated_s, self._program.expected_s)

@@ -22,6 +22,7 @@ class Outcome(IntEnum):
     NOT_SETTLED = 314
     ENGINE_FAILED = 320
     OUT_OF_WALL_TIME = 400
+    DISK_REFUSED = 401
 
     @property
     def label(self) -> str:
@@ -50,6 +51,7 @@ _MEANING = {
     Outcome.NOT_SETTLED: "A layer did not come to rest within the longest time its rule allows.",
     Outcome.ENGINE_FAILED: "The engine stopped with an error of its own.",
     Outcome.OUT_OF_WALL_TIME: "The wall-time limit came first; the same command continues.",
+    Outcome.DISK_REFUSED: "The disk took no more; with room on it the same command continues.",
 }
 
 

@@ -162,10 +162,20 @@ def _told(study: OpenStudy, run: Run, problem: Problem) -> Problem:
 
 
 def announce(plan: Plan, results: Path, cores: int) -> str:
-    """Write the plan to disk and say what it will take."""
+    """Write the plan to disk and say what it will take.
+
+    Raises
+    ------
+    BadInputError
+        When the results cannot be written.
+    """
     folder = results / plan.study.name
-    write_plan(plan.runs, folder)
-    write_study(plan.study.study, folder)
+    try:
+        write_plan(plan.runs, folder)
+        write_study(plan.study.study, folder)
+    except OSError as error:
+        valid = f"a folder that takes files: {error.filename} does not ({error.strerror})"
+        raise BadInputError([Problem("results", str(folder), valid)]) from None
     one_each = {kind_of(run.scenario): run.scenario for run in plan.runs}
     rates = {kind: calibrated_rate(one, results) for kind, one in one_each.items()}
     title = plan.study.study.title or plan.study.name
@@ -202,11 +212,10 @@ def calibrated_rate(scenario: Scenario, results: Path) -> float | None:
 def main(path: Path) -> int:
     """Check a study and print its plan; nothing starts."""
     try:
-        plan = open_plan(path)
+        print(announce(open_plan(path), RESULTS, os.cpu_count() or 1))
     except BadInputError as error:
         print(error, file=sys.stderr)
         return 1
-    print(announce(plan, RESULTS, os.cpu_count() or 1))
     return 0
 
 

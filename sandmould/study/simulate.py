@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import subprocess
@@ -80,7 +81,8 @@ def simulate(folder: Path) -> int:
         return 0
     print(f"{run.run}: {outcome.outcome.label}. {outcome.detail}".strip(), file=sys.stderr)
     if outcome.outcome.restartable:
-        outcome.write(folder / "work" / "outcome.json")
+        with contextlib.suppress(OSError):  # the disk that refused more may refuse this too
+            outcome.write(folder / "work" / "outcome.json")
         return RESTARTABLE_EXIT
     finish(folder, run.scenario.dimension, outcome, driver.cost, provenance(run.scenario))
     return 0

@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sandmould import ROOT
 from sandmould.engines.program import REST_AFTER_FALL_S, build_program
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
@@ -22,6 +23,7 @@ from sandmould.study.plan import (
     read_run,
     write_plan,
 )
+from sandmould.study.planning import announce, open_plan
 
 LAMMPS = ("lammps", 2)
 THREE = """\
@@ -90,6 +92,13 @@ def test_run_reads_back_as_it_was(demo: list[Run], tmp_path: Path) -> None:
     write_plan(demo, tmp_path)
     for run in demo:
         assert read_run(tmp_path / "runs" / run.run / "scenario.yaml") == run
+
+
+def test_results_that_cannot_be_written_are_told(tmp_path: Path) -> None:
+    plan = open_plan(ROOT / "config" / "studies" / "tube_demo.yaml")
+    (tmp_path / "results").write_text("a file where a folder should be")
+    with pytest.raises(BadInputError, match=r"valid is a folder that takes files: .* \(Not a dir"):
+        announce(plan, tmp_path / "results", 1)
 
 
 def test_damaged_run_file_is_bad_input(demo: list[Run], tmp_path: Path) -> None:

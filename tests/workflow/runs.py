@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -36,9 +37,15 @@ def simulating(folder: Path) -> list[str]:
     return [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
 
 
-def simulate(folder: Path) -> int:
-    """Compute a run in a process of its own."""
-    return subprocess.run(simulating(folder), capture_output=True, text=True).returncode
+def simulate(folder: Path, largest_file_bytes: int | None = None) -> int:
+    """Compute a run in a process of its own; no file may grow larger than asked."""
+
+    def limit() -> None:
+        if largest_file_bytes is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file_bytes,) * 2)
+
+    ran = subprocess.run(simulating(folder), capture_output=True, text=True, preexec_fn=limit)
+    return ran.returncode
 
 
 def computed(scenario: Scenario, folder: Path) -> Path:

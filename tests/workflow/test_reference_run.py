@@ -15,6 +15,7 @@ from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.launch import RESTARTABLE_EXIT
 from tests.scenes import tube_scene
 from tests.workflow.runs import (
     computed,
@@ -53,6 +54,23 @@ def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
     assert pd.read_csv(straight / "cost.tsv", sep="\t").engine[0] == "reference"
     loads = pd.read_csv(straight / "loads.tsv", sep="\t")
     assert {"floor", "left", "right", "tube_lower", "tube_upper"} == set(loads.surface)
+
+
+def test_disk_that_takes_no_more_is_told_and_the_run_goes_on_with_room(
+    straight: Path, tmp_path: Path
+) -> None:
+    folder = run_folder(scene(), tmp_path)
+    largest = max(p.stat().st_size for p in (straight / "snapshots").iterdir())
+    assert simulate(folder, largest_file_bytes=largest // 2) == RESTARTABLE_EXIT
+    outcome = RunOutcome.read(folder / "work" / "outcome.json")
+    assert outcome.outcome is Outcome.DISK_REFUSED
+    assert "File too large" in outcome.detail
+    assert not (folder / "outcome.json").exists()
+    assert simulate(folder) == 0
+    np.testing.assert_array_equal(
+        last_snapshot(folder).position_m, last_snapshot(straight).position_m
+    )
+    assert (folder / "series.tsv").read_text() == (straight / "series.tsv").read_text()
 
 
 def test_killed_run_resumes_and_ends_as_if_never_stopped(tmp_path: Path) -> None:

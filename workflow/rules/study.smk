@@ -8,13 +8,13 @@ from sandmould.study.planning import RESULTS, announce, open_plan, study_path
 
 try:
     PLAN = open_plan(study_path(workflow.configfiles, workflow.config_settings.config))
+    if workflow.is_main_process and "--lint" not in sys.argv:
+        print(
+            announce(PLAN, RESULTS, workflow._cores or os.cpu_count()),
+            file=sys.stderr,
+        )
 except BadInputError as error:
     sys.exit(str(error))
-if workflow.is_main_process and "--lint" not in sys.argv:
-    print(
-        announce(PLAN, RESULTS, workflow._cores or os.cpu_count()),
-        file=sys.stderr,
-    )
 
 STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"
