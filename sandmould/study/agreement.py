@@ -82,8 +82,8 @@ def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> t
 
 
 def sweep_part(summary: pd.DataFrame) -> pd.DataFrame:
-    """Runs of the sweep alone, without those that check one of its points on another engine."""
-    return summary[summary["part"] != "cross_check"] if "part" in summary else summary
+    """Runs of the sweep alone, without cross checks and controls."""
+    return summary[summary["part"] == "sweep"] if "part" in summary else summary
 
 
 def compare_keys(

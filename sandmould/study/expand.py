@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -16,12 +16,15 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, with_hash
+from sandmould.study.certificate.asked import frequency_key
+from sandmould.study.certificate.controls import Case, cases
 from sandmould.study.comparing import ENGINE
-from sandmould.study.labels import run_label
+from sandmould.study.labels import letters, run_label
 from sandmould.study.opening import OpenStudy
 from sandmould.study.sweep import Point, points, value_at
 
-Part = Literal["sweep", "cross_check"]
+Part = str
+"""``sweep``, ``cross_check``, or a case of the certificate's controls."""
 MOST_PROBLEMS = 10
 """Problems told at once; the first few are those that teach."""
 ROOT_KEY = "scenario"
@@ -42,7 +45,7 @@ class Run:
     sources: dict[str, str]
     """Where each leaf of the scenario came from, by key path."""
     part: Part = "sweep"
-    """Of the sweep, or a point of it on the engine that checks it."""
+    """What it belongs to."""
 
     @property
     def seed(self) -> int:
@@ -60,7 +63,11 @@ def replicate_seed(seed: int, replicate: int) -> int:
     return int(word) & 0x7FFFFFFF
 
 
-def expand(study: OpenStudy, more: Sequence[tuple[Point, int]] = ()) -> list[Run]:
+def expand(
+    study: OpenStudy,
+    more: Sequence[tuple[Point, int]] = (),
+    certified_hz: Sequence[float] = (),
+) -> list[Run]:
     """List the runs of a study.
 
     Parameters
@@ -68,12 +75,14 @@ def expand(study: OpenStudy, more: Sequence[tuple[Point, int]] = ()) -> list[Run
     study : OpenStudy
     more : sequence of (point, replicate)
         Runs that its rounds have added.
+    certified_hz : sequence of float, Hz
+        Frequencies of its certificate, the best in the middle; none before that is known.
 
     Returns
     -------
     list of Run
         Points in the order of the sweep, the replicates of a point together; those of the cross
-        check after those of its point, those of the rounds last.
+        check after those of its point, those of the rounds and of the certificate last.
 
     Raises
     ------
@@ -86,6 +95,11 @@ def expand(study: OpenStudy, more: Sequence[tuple[Point, int]] = ()) -> list[Run
     every = range(1, study.study.replicates + 1)
     swept = [(point, every) for point in points(study.study.sweep, study.study.scenario.seed)]
     added = [(point, range(replicate, replicate + 1)) for point, replicate in more]
+    certificate = study.study.certificate
+    key = frequency_key(study.study.sweep)
+    controlled = [{key: f} for f in certified_hz] if certificate.controls else []
+    seeds = range(1, certificate.replicates + 1)
+    added += [(point, seeds) for point in controlled]
     for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point)
         for problem in at_point.problems:
@@ -103,6 +117,14 @@ def expand(study: OpenStudy, more: Sequence[tuple[Point, int]] = ()) -> list[Run
                 found[str(twice)] = twice
                 break
             runs[run.run] = run
+    for place, point in enumerate(controlled):
+        at_point = _AtPoint(study, base, point)
+        for case in cases(certificate, study.study.scenario, certified_hz[1]):
+            if place not in case.places:
+                continue
+            scenario, wrong = at_point.changed(case)
+            found |= {str(problem): problem for problem in wrong}
+            runs |= {run.run: run for run in at_point.control(case, scenario, seeds)}
     if found:
         raise BadInputError(list(found.values())[:MOST_PROBLEMS])
     return list(runs.values())
@@ -187,12 +209,34 @@ class _AtPoint:
         source = {ENGINE: f"cross_check of {self.study.file}"}
         yield from self._replicates(scenario, range(1, number + 1), source, "cross_check")
 
+    def changed(self, case: Case) -> tuple[Scenario, list[Problem]]:
+        """The scenario of a control at this point, and why it cannot be run."""
+        scenario = case.change(self.scenario)
+        try:
+            scenario = validated(Scenario, scenario.model_dump(mode="json"), Origin(), ROOT_KEY)
+            wrong = self._misfits(scenario)
+        except BadInputError as error:
+            wrong = list(error.problems)
+        key, shown = "certificate.controls", f"{case.control} {case.value}"
+        return scenario, [
+            Problem(key, shown, f"one with which {p.key}, here {p.value}, is {p.valid}",
+                    self.study.file)
+            for p in wrong
+        ]  # fmt: skip
+
+    def control(self, case: Case, scenario: Scenario, replicates: Iterable[int]) -> Iterator[Run]:
+        """Replicates of a control at this point."""
+        source = {"certificate.controls": f"{case.part} of {self.study.file}"}
+        yield from self._replicates(scenario, replicates, source, case.part)
+
     def _replicates(
         self, base: Scenario, replicates: Iterable[int], source: dict[str, str], part: Part
     ) -> Iterator[Run]:
         dump = base.model_dump(mode="json")
         parameters = {key: value_at(dump, key) for key in self.point}
         label = run_label({ENGINE: base.engine.name, **parameters} if source else parameters)
+        if part.startswith("control"):
+            label = f"{letters(part)}_{run_label(parameters)}"
         sources = {**dict(_sources(base, self.origin)), **source}
         own = base.seed
         for replicate in replicates:

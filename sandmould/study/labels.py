@@ -20,15 +20,16 @@ def run_label(parameters: Point) -> str:
         if key == ENGINE:
             parent, name = "", "engine"
         value = parameters[key]
-        words.append(_letters(parent + name.removesuffix(_unit_suffix(key)))[:16])
+        words.append(letters(parent + name.removesuffix(_unit_suffix(key)))[:16])
         if isinstance(value, int | float):
             words.append(f"{value:.4g}".replace("-", "m").replace(".", "p").replace("+", ""))
         elif isinstance(value, str):
-            words.append(_letters(value)[:12])
+            words.append(letters(value)[:12])
     return "_".join(words) or "base"
 
 
-def _letters(text: str) -> str:
+def letters(text: str) -> str:
+    """A text in small letters, digits and single underscores."""
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
 
 

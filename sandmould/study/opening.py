@@ -18,6 +18,7 @@ from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study import comparing, sweep
 from sandmould.study.calibration import asked as calibration
+from sandmould.study.certificate import asked as certificate
 from sandmould.study.rounds import asked as rounds
 from sandmould.study.study import Material, Study
 
@@ -25,7 +26,7 @@ STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
 """Where studies write the sands that they calibrate."""
 MATERIALS = (ROOT / "config" / "materials", CALIBRATED)
-_OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine")
+_OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
 _MESH_FILE = r"\bobstacles(\.\d+)+\.file(\.value)?$"
 
 
@@ -103,6 +104,9 @@ def open_study(path: Path) -> OpenStudy:
         *comparing.problems(study),
         *calibration.problems(study.calibration, study.sweep),
         *rounds.problems(study.refine, study.sweep, study.objective.better, study.scenario.seed),
+        *certificate.problems(
+            study.certificate, study.sweep, study.scenario, study.objective.better
+        ),
     ]
     if found:
         raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found])

@@ -126,7 +126,8 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         With one sentence a problem; a missing engine is one of them.
     """
     study = open_study(path)
-    runs = expand(study, read_ledger(results / study.name, study.study).runs)
+    ledger = read_ledger(results / study.name, study.study)
+    runs = expand(study, ledger.runs, ledger.certified_hz)
     found: dict[str, Problem] = {}
     for run in runs:
         problem = engine_problem(run.scenario)

@@ -11,6 +11,7 @@ from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.asked import Calibration
+from sandmould.study.certificate.asked import Certificate
 from sandmould.study.rounds.asked import Refinement
 from sandmould.study.sweep import Sweep
 
@@ -117,8 +118,8 @@ class Study(Section):
     scenario: Scenario = Field(Scenario(), description="The scene of sand.")
     sweep: Sweep = Field(
         Sweep(),
-        description="What is varied; replaces the sweep of based_on, its equivalence, its rounds "
-        "and its cross_check.",
+        description="What is varied; replaces the sweep of based_on, its equivalence, its rounds, "
+        "its certificate and its cross_check.",
     )
     replicates: int = quantity(
         1,
@@ -137,6 +138,10 @@ class Study(Section):
     refine: Refinement = Field(
         Refinement(),
         description="Rounds of further runs round the optimum; replaced with the sweep.",
+    )
+    certificate: Certificate = Field(
+        Certificate(),
+        description="Controls round the best frequency; replaced with the sweep.",
     )
     calibration: Calibration = Field(
         Calibration(), description="Sands whose swept keys are found from measured values."

@@ -44,7 +44,24 @@ def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[s
         {key: optimum.interval(key) for key in keys},
         spent_h,
     )
-    return replace(ledger, rounds=(*ledger.rounds, one), ended="")
+    # A certificate is of the optimum that was best then: with more runs it is chosen anew.
+    return replace(ledger, rounds=(*ledger.rounds, one), ended="", certified_hz=())
+
+
+def choose_certified(
+    ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]
+) -> Ledger:
+    """Choose the frequencies of the certificate: the best, one below and one above.
+
+    Raises
+    ------
+    TooFewRunsError
+    """
+    objective, ratio = study.objective, study.certificate.ratio
+    optimum = find_optimum(summary, keys, objective.measure, objective.better)
+    best_hz = optimum.setting[keys[0]]
+    certified = tuple(float(f"{best_hz * by:.3g}") for by in (1 / ratio, 1.0, ratio))
+    return replace(ledger, certified_hz=certified)
 
 
 def why_enough(

@@ -39,6 +39,8 @@ class Ledger:
     rounds: tuple[Round, ...] = ()
     ended: str = ""
     """Why there are no more, as a sentence; empty while they go on."""
+    certified_hz: tuple[float, ...] = ()
+    """Frequencies of the certificate, the best in the middle; none before it is known."""
 
     @property
     def runs(self) -> list[tuple[Point, int]]:
@@ -62,11 +64,16 @@ def read_ledger(folder: Path, study: Study) -> Ledger:
         When the file was changed into something that is no list of rounds.
     """
     path, basis = folder / LEDGER, basis_of(study)
-    if not study.refine.rounds or not path.is_file():
+    if not (study.refine.rounds or study.certificate.controls) or not path.is_file():
         return Ledger(basis)
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
-        found = Ledger(tree["basis"], tuple(_round(one) for one in tree["rounds"]), tree["ended"])
+        found = Ledger(
+            tree["basis"],
+            tuple(_round(one) for one in tree["rounds"]),
+            tree["ended"],
+            tuple(float(f) for f in tree["certified_hz"]),
+        )
     except (ValueError, KeyError, TypeError, AttributeError):
         valid = "a list of rounds as the study wrote it, or no such file: they then begin anew"
         raise BadInputError([Problem("rounds", "as it is", valid, str(path))]) from None
