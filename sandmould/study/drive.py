@@ -1,7 +1,8 @@
 """A study from its file to its report: ``python -m sandmould.study.drive STUDY.yaml [options]``.
 
 Snakemake computes the runs; where the study asks for rounds, its results choose the runs of the
-next one, which are appended until there is reason to end. Options go on to Snakemake.
+next one, which are appended until there is reason to end, then those of its certificate. Options
+go on to Snakemake.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from pathlib import Path
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.collect import gather
 from sandmould.study.planning import RESULTS, open_plan
-from sandmould.study.rounds.decide import next_round, told
+from sandmould.study.rounds.decide import next_runs, told
 from sandmould.study.rounds.ledger import read_ledger, write_ledger
 
 
 def drive(path: Path, options: Sequence[str]) -> int:
-    """Compute a study and all its rounds.
+    """Compute a study, all its rounds and its certificate.
 
     Parameters
     ----------
@@ -41,12 +42,12 @@ def drive(path: Path, options: Sequence[str]) -> int:
     """
     plan = open_plan(path)
     folder, study = RESULTS / plan.study.name, plan.study.study
-    while study.refine.rounds:
+    while study.refine.rounds or study.certificate.controls:
         if _snakemake(path, options, [str(folder / "summary.tsv")]):
             # Stopped, or broken outside the runs: a run that fails by itself leaves its outcome.
             return 1
         found = gather(folder, study.objective.at_vibration_s).of_sweep
-        ledger = next_round(read_ledger(folder, study), study, found.summary, list(found.keys))
+        ledger = next_runs(read_ledger(folder, study), study, found.summary, list(found.keys))
         write_ledger(ledger, folder)
         print(f"\n{told(ledger, study)}", file=sys.stderr, flush=True)
         if ledger.ended:

@@ -242,7 +242,6 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
         return 0
 
     monkeypatch.setattr(driving, "_snakemake", snakemake)
-    monkeypatch.setattr(driving, "calibrated_rate", lambda *_: None, raising=False)
     monkeypatch.setattr("sandmould.study.planning.calibrated_rate", lambda *_: 1e7)
     assert driving.main(["trial.yaml"]) == 0
     # Three rounds of four runs after the ten of the sweep, each computed once.

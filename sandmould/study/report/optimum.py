@@ -1,4 +1,4 @@
-"""The report's answer of a study with rounds: where the best setting lies, and how flat it is."""
+"""The report's answer of a study that looks for an optimum: where it lies, how flat it is."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from sandmould.study.emulator import TooFewRunsError
+from sandmould.study.report.certificate import CertificatePages, opening_sentences
 from sandmould.study.report.chart import PLAIN, Chart, Line, tints
 from sandmould.study.rounds.ledger import Ledger, read_ledger
 from sandmould.study.rounds.optimum import Optimum, find_optimum
@@ -41,8 +42,13 @@ class OptimumPages:
     optimum: Optimum | None
 
 
-def optimum_pages(study_folder: Path, study: Study, summary: pd.DataFrame) -> OptimumPages | None:
-    """Say where the optimum of a study with rounds lies; None for a study without.
+def optimum_pages(
+    study_folder: Path,
+    study: Study,
+    summary: pd.DataFrame,
+    certificate: CertificatePages | None = None,
+) -> OptimumPages | None:
+    """Say where the optimum of a study with rounds or a certificate lies; None for others.
 
     Parameters
     ----------
@@ -50,8 +56,10 @@ def optimum_pages(study_folder: Path, study: Study, summary: pd.DataFrame) -> Op
     study : Study
     summary : DataFrame
         One row a run of the sweep and its rounds.
+    certificate : CertificatePages, optional
+        Its verdict comes first where the optimum is an artefact.
     """
-    if not study.refine.rounds:
+    if not (study.refine.rounds or study.certificate.controls):
         return None
     ledger, objective = read_ledger(study_folder, study), study.objective
     keys = study.sweep.swept
@@ -66,8 +74,15 @@ def optimum_pages(study_folder: Path, study: Study, summary: pd.DataFrame) -> Op
         if optimum.interval(key)[1] - optimum.interval(key)[0] > width
     ]
     said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
-    said.append(_effort(ledger, study, summary))
-    return OptimumPages(tuple(said), not ends and not wide, optimum)
+    if study.refine.rounds:
+        said.append(_effort(ledger, study, summary))
+    sound = not ends and not wide
+    if certificate is not None:
+        opening = opening_sentences(certificate, objective.measure)
+        artefact = certificate.certified.is_artefact
+        said = [*opening, *said] if artefact else [said[0], *opening, *said[1:]]
+        sound = sound and certificate.certified.kind == "rearrangement of grains"
+    return OptimumPages(tuple(said), sound, optimum)
 
 
 def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:

@@ -19,6 +19,7 @@ from sandmould.study.collect import Collected, gather, read_provenance, read_stu
 from sandmould.study.plan import STUDY_FILE, read_run
 from sandmould.study.report.agreement import agreement_pages
 from sandmould.study.report.animation import BUDGET_BYTES
+from sandmould.study.report.certificate import certificate_pages
 from sandmould.study.report.chart import NARROW, SMALL, WIDE, lay_out
 from sandmould.study.report.curves import objective_charts, runs_of
 from sandmould.study.report.known import known_pages
@@ -26,6 +27,7 @@ from sandmould.study.report.method import Row, provenance_rows, sand_method, sta
 from sandmould.study.report.optimum import optimum_pages, with_surface
 from sandmould.study.report.sand import sand_pages, shown_runs
 from sandmould.study.report.tables import data_files, key_numbers, runs_table, settings_table
+from sandmould.study.rounds.ledger import read_ledger
 from sandmould.study.study import Study
 from sandmould.study.verdict import Verdict, judge, sand_notes
 from sandmould.study.words import name_of, number
@@ -84,7 +86,8 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     any_scenario = next(iter(scenarios.values()))
     stage = any_scenario.vibration[0] if any_scenario.vibration else None
     deepest = _deepest_overlap_fraction(collected.summary)
-    notes = sand_notes(keys, stage, deepest, seeks_best)
+    certified = bool(read_ledger(study_folder, study).certified_hz)
+    notes = sand_notes(keys, stage, deepest, seeks_best, certified)
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
     verdict = judge(summary, keys, objective.measure, objective.better, notes, seeks_best)
@@ -124,7 +127,8 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
     known = known_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
-    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary)
+    certificate = certificate_pages(page.study_folder, page.study, page.collected, page.scenario)
+    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, certificate)
     charts = objective_charts(of_sweep.summary, verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
         charts = tuple(with_surface(c, optimum.optimum, verdict.measure) for c in charts)
@@ -151,6 +155,7 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         agreement=agreement,
         known=known,
         optimum=optimum,
+        certificate=certificate,
         statement=optimum or (agreement if agreement and agreement.is_question else known),
         key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
         objective_charts=[_both_sizes(c) for c in charts],

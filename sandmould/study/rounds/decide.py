@@ -15,6 +15,30 @@ from sandmould.study.study import Study
 from sandmould.study.words import listed, name_of, number, unit_of, value_text
 
 
+def next_runs(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
+    """Add what comes next: a round, or, once they have ended, the certificate.
+
+    Parameters
+    ----------
+    ledger : Ledger
+    study : Study
+    summary : DataFrame
+        One row a run of the sweep and of all rounds so far.
+    keys : list of str
+        Swept keys.
+    """
+    if study.refine.rounds:
+        ledger = next_round(ledger, study, summary, keys)
+    else:
+        ledger = replace(ledger, ended="The sweep is done.")
+    if not ledger.ended or not study.certificate.controls or ledger.certified_hz:
+        return ledger
+    try:
+        return choose_certified(ledger, study, summary, keys)
+    except TooFewRunsError as error:
+        return replace(ledger, ended=f"No certificate: {error}.")
+
+
 def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
     """Add a round, or the reason why there is none.
 
@@ -106,6 +130,10 @@ def _intervals(optimum: Optimum, keys: list[str]) -> str:
 
 def told(ledger: Ledger, study: Study) -> str:
     """One line on the last decision, for the terminal."""
+    if ledger.ended and ledger.certified_hz:
+        shown = listed([number(f) for f in ledger.certified_hz])
+        controls = listed([c.replace("_", " ") for c in study.certificate.controls], most=8)
+        return f"{ledger.ended} The certificate's controls at {shown} Hz: {controls}."
     if ledger.ended:
         return ledger.ended
     last = ledger.rounds[-1]
