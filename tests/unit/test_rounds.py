@@ -216,7 +216,7 @@ def test_what_cannot_be_refined_is_told(tmp_path: Path, changes: dict[str, Any],
 def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The runs are planted instead of computed: Snakemake itself is tested in tests/workflow."""
     monkeypatch.chdir(tmp_path)
-    opened(tmp_path)
+    opened(tmp_path, certificate={"controls": ["hold"], "replicates": 2})
     calls: list[list[str]] = []
     computed: list[str] = []
 
@@ -244,13 +244,20 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(driving, "_snakemake", snakemake)
     monkeypatch.setattr("sandmould.study.planning.calibrated_rate", lambda *_: 1e7)
     assert driving.main(["trial.yaml"]) == 0
-    # Three rounds of four runs after the ten of the sweep, each computed once.
-    assert len(computed) == len(set(computed)) == 10 + 3 * 4
+    # Three rounds of four runs after the ten of the sweep, then the controls, each computed once.
     assert calls == [["results/trial/summary.tsv"]] * 4 + [[]]
+    assert len(computed) == len(set(computed))
     ledger = json.loads((tmp_path / "results" / "trial" / LEDGER).read_text())
     assert ledger["ended"] == "All 3 rounds are done."
+    low, best, high = ledger["certified_hz"]
     rows = pd.read_csv("results/trial/runs.tsv", sep="\t")
     assert rows["run"].tolist() == computed
+    assert (rows["part"][:22] == "sweep").all()
+    held = rows[rows["part"] == "control: hold velocity"]
+    assert sorted(held[FREQUENCY]) == [low, low, high, high]
+    swept = rows[rows["part"] == "sweep"]
+    assert all((swept[FREQUENCY] == f).sum() >= 2 for f in (low, best, high))
     # Again: nothing is left to compute.
+    many = len(computed)
     assert driving.main(["trial.yaml"]) == 0
-    assert len(computed) == 22
+    assert len(computed) == many
