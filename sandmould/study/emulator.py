@@ -14,6 +14,8 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from threadpoolctl import threadpool_limits
 
+from sandmould.study.sweep import fewest_points
+
 Array = NDArray[np.float64]
 
 
@@ -78,11 +80,6 @@ class Emulator:
 def _one_thread() -> threadpool_limits:
     """Keep matrices of ten rows off the other cores: waiting for them takes ten times as long."""
     return threadpool_limits(1)
-
-
-def fewest_points(keys: int) -> int:
-    """Different points that a surface over some keys needs."""
-    return 2 + 2 * keys
 
 
 def fit_emulator(measure: str, points: Array, values: Array) -> Emulator:

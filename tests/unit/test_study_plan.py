@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -174,3 +176,11 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
     lines = plan_table(expand(open_study(path)), {LAMMPS: 1e6}, 2).splitlines()
     assert len(lines) == 23
     assert lines[-2] == "... and 10 more points"
+
+
+def test_jobs_do_not_wait_for_libraries_of_the_report() -> None:
+    # Every run pays for what its process imports: scikit-learn alone takes a second.
+    heavy = "sklearn", "matplotlib", "snakemake"
+    says = f"import sys, sandmould.study.simulate; print([m for m in {heavy} if m in sys.modules])"
+    ran = subprocess.run([sys.executable, "-c", says], capture_output=True, text=True, check=True)
+    assert ran.stdout == "[]\n"

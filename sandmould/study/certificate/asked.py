@@ -10,8 +10,7 @@ from sandmould.scenario.box import Tube
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.emulator import fewest_points
-from sandmould.study.sweep import Sweep
+from sandmould.study.sweep import Sweep, fewest_points
 
 Control = Literal[
     "hold", "stiffness", "bed_depth", "grain_scale", "tube_length", "time_step", "engine",

@@ -10,8 +10,7 @@ from pydantic import Field
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
-from sandmould.study.emulator import fewest_points
-from sandmould.study.sweep import Range, Sweep, points
+from sandmould.study.sweep import Range, Sweep, fewest_points, points
 
 
 class Refinement(Section):
