@@ -52,8 +52,8 @@ def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> Non
         if (folder / "outcome.json").exists():
             return  # finished meanwhile by a process that outlived its own snakemake
         status, tail = _watch(_under_mpi(command, ranks, mpi), log_file)
-        if status == 0:
-            return
+        if status == 0 or (folder / "outcome.json").exists():
+            return  # killed after its outcome was there: nothing is left to do
         if status == RESTARTABLE_EXIT:
             raise SystemExit(f"{folder} stopped early: the same command continues it.")
         if -status in _ASKED_TO_END:

@@ -66,6 +66,18 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
     return row | measure_outflow(scenario, snapshot)
 
 
+LAST_MEASURED = "final.png"
+"""Written after all else that is measured."""
+
+
+def measure_run(folder: Path) -> None:
+    """Write all that is measured on a run's snapshots."""
+    write_measures(folder, folder / "measures.tsv")
+    write_exports(folder, folder / "exports")
+    write_profile(folder, folder / "profile.tsv")
+    write_picture(folder, folder / LAST_MEASURED)
+
+
 def write_picture(folder: Path, out: Path) -> None:
     """Draw the last snapshot of a run by layer; the empty scene where there is none."""
     scenario = read_run(folder / "scenario.yaml").scenario

@@ -23,6 +23,7 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.batches import Batch, plan_batches
 from sandmould.study.comparing import ENGINE
 from sandmould.study.expand import Run, expand, swept_key
 from sandmould.study.opening import OpenStudy, open_study
@@ -57,6 +58,10 @@ class Plan:
     def _by_name(self) -> dict[str, Run]:
         return {run.run: run for run in self.runs}
 
+    def batches(self, wall_s: float) -> list[Batch]:
+        """Runs that share a job until it lasts so long; none for 0, when every run has its own."""
+        return plan_batches(self.runs, wall_s) if wall_s > 0 else []
+
     def threads(self, name: str) -> int:
         """Cores that a run keeps busy, as MPI ranks or as threads."""
         return self._by_name[name].scenario.engine.ranks
@@ -80,10 +85,12 @@ class Plan:
         """Memory to ask for: several times the 126 MB measured at 1 134 discs, 144 at 8 000."""
         return BASE_MEMORY_MB + sum(plan_counts(self._by_name[name].scenario)) // GRAINS_PER_MB
 
-    def runtime_min(self, name: str) -> int:
-        """Wall time to ask for: that of a machine a few times slower than any measured."""
-        scenario = self._by_name[name].scenario
-        seconds = planned_grain_steps(scenario) / SLOW_RATE / scenario.engine.ranks
+    def runtime_min(self, *names: str) -> int:
+        """Wall time to ask for some runs: that of a machine slower than any measured."""
+        seconds = 0.0
+        for name in names:
+            scenario = self._by_name[name].scenario
+            seconds += planned_grain_steps(scenario) / SLOW_RATE / scenario.engine.ranks
         return 10 + math.ceil(seconds / 60)
 
     def labels(self, name: str) -> dict[str, str]:

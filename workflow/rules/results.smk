@@ -5,9 +5,15 @@ rule collect:
     input:
         study=f"{FOLDER}/study.yaml",
         table=f"{FOLDER}/runs.tsv",
-        outcomes=expand(rules.simulate.output.outcome, run=RUNS),
-        costs=expand(rules.simulate.output.cost, run=RUNS),
-        measures=expand(rules.measure.output.measures, run=RUNS),
+        runs=(
+            expand(rules.batch.output.done, batch=BATCHES)
+            if BATCHES
+            else [
+                *expand(rules.simulate.output.outcome, run=RUNS),
+                *expand(rules.simulate.output.cost, run=RUNS),
+                *expand(rules.measure.output.measures, run=RUNS),
+            ]
+        ),
     output:
         summary=report(
             f"{FOLDER}/summary.tsv",

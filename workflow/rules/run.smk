@@ -1,4 +1,4 @@
-# One run: its deck, its computation, its measures. {run} is the only wildcard.
+# One run: its deck, its computation, its measures; or several runs in one job.
 
 
 rule render:
@@ -43,7 +43,7 @@ rule simulate:
     threads: threads_of
     resources:
         tasks=ranks_of,
-        mpi="mpiexec",
+        mpi=mpi_of,
         mem_mb=memory_mb_of,
         runtime=runtime_min_of,
     message:
@@ -85,3 +85,27 @@ rule measure:
         "Measure tube fill, density and contacts of {wildcards.run}"
     script:
         "../scripts/measure.py"
+
+
+rule batch:
+    input:
+        scenarios=scenarios_of,
+        sources=batch_sources_of,
+    output:
+        done=touch(f"{FOLDER}/batches/{{batch}}.done"),
+    log:
+        f"{FOLDER}/logs/batch_{{batch}}.log",
+    benchmark:
+        f"{FOLDER}/logs/batch_{{batch}}.benchmark.tsv"
+    conda:
+        "../envs/sandmould.yaml"
+    threads: batch_threads_of
+    resources:
+        tasks=batch_ranks_of,
+        mpi=batch_mpi_of,
+        mem_mb=batch_memory_mb_of,
+        runtime=batch_runtime_min_of,
+    message:
+        "Compute and measure the runs from {wildcards.batch} on"
+    script:
+        "../scripts/batch.py"

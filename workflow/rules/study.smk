@@ -6,8 +6,13 @@ import sys
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.planning import RESULTS, announce, open_plan, study_path
 
+OVERRIDES = dict(workflow.config_settings.config)
+# Set by a profile: how long a job should last at least, where jobs cost more than short runs; and
+# what starts the ranks of a run.
+BATCH_WALL_S = float(OVERRIDES.pop("batch_wall_s", 0))
+MPI = OVERRIDES.pop("mpi", "mpiexec")
 try:
-    PLAN = open_plan(study_path(workflow.configfiles, workflow.config_settings.config))
+    PLAN = open_plan(study_path(workflow.configfiles, OVERRIDES))
     if workflow.is_main_process and "--lint" not in sys.argv:
         print(
             announce(PLAN, RESULTS, workflow._cores or os.cpu_count()),
@@ -21,6 +26,7 @@ FOLDER = f"results/{STUDY.name}"
 # Studies whose runs help to calibrate: they are finished before this one is.
 ALSO = [f"results/{name}/summary.tsv" for name in STUDY.study.calibration.also]
 RUNS = [run.run for run in PLAN.runs]
+BATCHES = {batch.name: batch.runs for batch in PLAN.batches(BATCH_WALL_S)}
 REPORT_TEMPLATES = sorted(str(p) for p in Path("templates/report").iterdir())
 
 
@@ -36,6 +42,11 @@ def ranks_of(wildcards):
     return PLAN.ranks(wildcards.run)
 
 
+def mpi_of(wildcards):
+    # Slurm's jobs of one task must not be told of it.
+    return MPI if PLAN.ranks(wildcards.run) > 1 else ""
+
+
 def memory_mb_of(wildcards):
     return PLAN.memory_mb(wildcards.run)
 
@@ -48,5 +59,36 @@ def labels_of(wildcards):
     return PLAN.labels(wildcards.run)
 
 
+def scenarios_of(wildcards):
+    return [
+        f"{FOLDER}/runs/{run.run}/scenario.yaml" for run in BATCHES[wildcards.batch]
+    ]
+
+
+def batch_sources_of(wildcards):
+    return PLAN.deck_sources(wildcards.batch)
+
+
+def batch_threads_of(wildcards):
+    return PLAN.threads(wildcards.batch)
+
+
+def batch_ranks_of(wildcards):
+    return PLAN.ranks(wildcards.batch)
+
+
+def batch_mpi_of(wildcards):
+    return MPI if PLAN.ranks(wildcards.batch) > 1 else ""
+
+
+def batch_memory_mb_of(wildcards):
+    return max(PLAN.memory_mb(run.run) for run in BATCHES[wildcards.batch])
+
+
+def batch_runtime_min_of(wildcards, attempt):
+    return attempt * PLAN.runtime_min(*(run.run for run in BATCHES[wildcards.batch]))
+
+
 wildcard_constraints:
     run="|".join(RUNS),
+    batch="|".join(BATCHES) or "none",

@@ -1,0 +1,64 @@
+"""The job that computes a batch of runs, one after the other."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from sandmould.engines.choosing import deck_hash
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.expand import scenario_hash
+from sandmould.study.launch import launch
+from sandmould.study.measure import LAST_MEASURED, measure_run
+from sandmould.study.plan import read_run
+from sandmould.study.simulate import render_run
+
+
+def is_current(folder: Path) -> bool:
+    """Whether a run's folder holds an outcome, of its scenario and deck as they are now."""
+    try:
+        origin: dict[str, Any] = json.loads((folder / "provenance.json").read_text("utf-8"))
+        scenario = read_run(folder / "scenario.yaml").scenario
+        there = (folder / "outcome.json").exists()
+    except (OSError, ValueError, BadInputError):
+        return False
+    wanted = scenario_hash(scenario), deck_hash(scenario)
+    return there and (origin.get("scenario_sha256"), origin.get("template_sha256")) == wanted
+
+
+def compute_batch(folders: Sequence[Path], logs: Path, ranks: int, mpi: str) -> None:
+    """Compute and measure runs, those left out that are there already.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Of the runs, each with its ``scenario.yaml``.
+    logs : Path
+    ranks : int
+    mpi : str
+
+    Raises
+    ------
+    SystemExit
+        At the end, when a run stopped early: the same job continues it and redoes none.
+    """
+    stopped = []
+    for folder in folders:
+        if is_current(folder):
+            print(f"{folder.name}: computed already", file=sys.stderr)
+        else:
+            for old in ("outcome.json", LAST_MEASURED):
+                (folder / old).unlink(missing_ok=True)  # of another scenario or deck
+            try:
+                render_run(folder)
+                launch(folder, logs / f"simulate_{folder.name}.log", ranks, mpi)
+            except SystemExit as stop:
+                stopped.append(str(stop))
+                continue
+        if not (folder / LAST_MEASURED).exists():
+            measure_run(folder)
+    if stopped:
+        raise SystemExit("\n".join(stopped))

@@ -1,0 +1,130 @@
+"""Runs that share a job: which, and that none is computed again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from sandmould.engines.choosing import deck_hash
+from sandmould.study import batch_job
+from sandmould.study.batch_job import compute_batch, is_current
+from sandmould.study.batches import IN_3D, RATE, plan_batches
+from sandmould.study.expand import Run, expand, scenario_hash
+from sandmould.study.measure import LAST_MEASURED
+from sandmould.study.opening import open_study
+from sandmould.study.plan import planned_grain_steps, write_plan
+
+FREQUENCY = "vibration.0.frequency_hz"
+STUDY: dict[str, Any] = {
+    "based_on": "tube",
+    "scenario": {"engine": {"name": "reference"}},
+    "sweep": {"keys": {FREQUENCY: [25, 50, 100]}},
+    "replicates": 3,
+}
+
+
+def runs_of(folder: Path, **changes: Any) -> list[Run]:
+    path = folder / "trial.yaml"
+    path.write_text(yaml.safe_dump(STUDY | changes), encoding="utf-8")
+    return expand(open_study(path))
+
+
+def one_s(run: Run) -> float:
+    in_3d = IN_3D if run.scenario.dimension == 3 else 1.0
+    return planned_grain_steps(run.scenario) / (RATE[run.scenario.engine.name] * in_3d)
+
+
+def test_short_runs_share_a_job_until_it_lasts_long_enough(tmp_path: Path) -> None:
+    runs = runs_of(tmp_path)
+    found = plan_batches(runs, 3.5 * one_s(runs[0]))
+    assert [len(batch.runs) for batch in found] == [4, 4, 1]
+    assert [run for batch in found for run in batch.runs] == runs
+    assert [batch.name for batch in found] == [runs[0].run, runs[4].run, runs[8].run]
+    # A long run has a job of its own.
+    assert len(plan_batches(runs, 0.5 * one_s(runs[0]))) == 9
+
+
+def test_appended_runs_leave_full_jobs_as_they_were(tmp_path: Path) -> None:
+    runs = runs_of(tmp_path)
+    wall_s = 3.5 * one_s(runs[0])
+    before, after = plan_batches(runs[:6], wall_s), plan_batches(runs, wall_s)
+    assert after[0] == before[0]
+
+
+def test_runs_of_other_engines_or_more_cores_have_jobs_of_their_own(tmp_path: Path) -> None:
+    keys = {"engine.name": ["lammps", "reference"], "engine.ranks": [1, 2]}
+    found = plan_batches(runs_of(tmp_path, sweep={"keys": keys}), 1e9)
+    kinds = [{(r.scenario.engine.name, r.scenario.engine.ranks) for r in b.runs} for b in found]
+    assert all(len(kind) == 1 for kind in kinds)
+    assert len(found) == 4
+
+
+class Jobs:
+    """What a batch did, in place of an engine."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, stops: str = "") -> None:
+        self.computed: list[str] = []
+        self.measured: list[str] = []
+        self.stops = stops
+        monkeypatch.setattr(batch_job, "render_run", lambda folder: None)
+        monkeypatch.setattr(batch_job, "launch", self.launch)
+        monkeypatch.setattr(batch_job, "measure_run", self.measure)
+
+    def launch(self, folder: Path, log: Path, ranks: int, mpi: str) -> None:
+        if folder.name == self.stops:
+            raise SystemExit(f"{folder} stopped early: the same command continues it.")
+        self.computed.append(folder.name)
+        run = batch_job.read_run(folder / "scenario.yaml")
+        origin = {"scenario_sha256": scenario_hash(run.scenario),
+                  "template_sha256": deck_hash(run.scenario)}  # fmt: skip
+        (folder / "provenance.json").write_text(json.dumps(origin))
+        (folder / "outcome.json").write_text("{}")
+
+    def measure(self, folder: Path) -> None:
+        self.measured.append(folder.name)
+        (folder / LAST_MEASURED).touch()
+
+
+def planned(folder: Path, **changes: Any) -> list[Path]:
+    runs = runs_of(folder, **changes)[:3]
+    write_plan(runs, folder)
+    return [folder / "runs" / run.run for run in runs]
+
+
+def test_a_batch_goes_on_past_a_run_that_stopped_and_redoes_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders = planned(tmp_path)
+    names = [folder.name for folder in folders]
+    first = Jobs(monkeypatch, stops=names[1])
+    with pytest.raises(SystemExit, match="stopped early"):
+        compute_batch(folders, tmp_path, 1, "mpiexec")
+    assert first.computed == first.measured == [names[0], names[2]]
+    again = Jobs(monkeypatch)
+    compute_batch(folders, tmp_path, 1, "mpiexec")
+    assert again.computed == again.measured == [names[1]]
+    # What was computed and not measured is measured alone.
+    (folders[0] / LAST_MEASURED).unlink()
+    last = Jobs(monkeypatch)
+    compute_batch(folders, tmp_path, 1, "mpiexec")
+    assert (last.computed, last.measured) == ([], [names[0]])
+
+
+def test_a_changed_scenario_or_solver_is_computed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = planned(tmp_path)[0]
+    assert not is_current(folder)
+    jobs = Jobs(monkeypatch)
+    compute_batch([folder], tmp_path, 1, "mpiexec")
+    assert is_current(folder)
+    origin = json.loads((folder / "provenance.json").read_text())
+    for key in ("scenario_sha256", "template_sha256"):
+        (folder / "provenance.json").write_text(json.dumps(origin | {key: "another"}))
+        assert not is_current(folder)
+    compute_batch([folder], tmp_path, 1, "mpiexec")
+    assert jobs.computed == jobs.measured == [folder.name] * 2

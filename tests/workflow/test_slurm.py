@@ -1,0 +1,115 @@
+"""A study on a Slurm of one node: it survives what a cluster does to jobs, and redoes nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sandmould import ROOT
+from tests.workflow.slurm_node import SlurmNode, missing
+
+pytestmark = pytest.mark.skipif(bool(missing()), reason=f"needs Debian's slurmd: {missing()}")
+STUDY = """\
+based_on: tube
+scenario:
+  engine: {name: reference}
+  sand: {size_scale: 9, size_classes: 3}
+  time_step: {fraction: 0.8}
+  vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 1.5}]
+  record: {snapshot_every_s: 0.1}
+sweep: {keys: {vibration.0.frequency_hz: [25, 50, 100, 200]}}
+replicates: 2
+"""
+LIMIT_S = 240.0
+
+
+@pytest.fixture
+def slurm(tmp_path: Path) -> Iterator[SlurmNode]:
+    node = SlurmNode(tmp_path / "slurm")
+    node.start()
+    yield node
+    node.stop()
+
+
+def wait_for(what: Callable[[], bool], process: subprocess.Popen[bytes], log: Path) -> None:
+    deadline = time.monotonic() + LIMIT_S
+    while not what():
+        assert time.monotonic() < deadline, log.read_text()[-3000:]
+        assert process.poll() is None, log.read_text()[-3000:]
+        time.sleep(0.05)
+
+
+def simulating(folder: Path) -> list[int]:
+    """Processes that compute a run below a folder."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words, where = path.read_bytes().split(b"\0"), path.with_name("cwd").readlink()
+        except OSError:
+            continue
+        if b"sandmould.study.simulate" in words and where == folder:
+            found.append(int(path.parent.name))
+    return found
+
+
+@pytest.mark.slow
+def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished_run(
+    slurm: SlurmNode, tmp_path: Path
+) -> None:
+    folder = tmp_path / "study"
+    folder.mkdir()
+    for name in ("Snakefile", "workflow", "templates", "config", "profiles"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "small.yaml").write_text(STUDY)
+    # Two or so runs share a job, and the queue of an empty node is asked more often.
+    command = [
+        sys.executable, "-m", "sandmould.study.drive", "small.yaml",
+        "--workflow-profile", "profiles/slurm", "--config", "batch_wall_s=8",
+        "--slurm-init-seconds-before-status-checks", "1", "--latency-wait", "5",
+        "--default-resources", "mem_mb=500", "runtime=5",
+    ]  # fmt: skip
+    log = tmp_path / "first.log"
+    outcomes = folder / "results" / "small" / "runs"
+
+    def done() -> dict[str, int]:
+        return {p.parent.name: p.stat().st_mtime_ns for p in outcomes.glob("*/outcome.json")}
+
+    with log.open("wb") as file:
+        process = subprocess.Popen(
+            command, cwd=folder, env=slurm.environment, stdout=file, stderr=file,
+            start_new_session=True,
+        )  # fmt: skip
+    wait_for(lambda: bool(simulating(folder)), process, log)
+    running = [job for job, state in slurm.jobs().items() if state == "RUNNING"]
+    slurm.cancel(running[0])
+    wait_for(lambda: len(done()) >= 1 and bool(simulating(folder)), process, log)
+    os.kill(simulating(folder)[0], signal.SIGKILL)
+    wait_for(lambda: len(done()) >= 2 and bool(simulating(folder)), process, log)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    finished = done()
+    assert len(finished) < 8
+
+    ran = subprocess.run(
+        command, cwd=folder, env=slurm.environment, capture_output=True, text=True, timeout=LIMIT_S
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    summary = pd.read_csv(folder / "results" / "small" / "summary.tsv", sep="\t")
+    assert list(summary.outcome) == ["finished"] * 8
+    assert summary.tube_fill_fraction.notna().all()
+    assert {run: time_ns for run, time_ns in done().items() if run in finished} == finished
+    # No job and no process is left behind.
+    assert slurm.jobs() == {}
+    assert simulating(folder) == []
+    # Eight runs in no more than a handful of jobs.
+    assert len(list((folder / "results" / "small" / "batches").iterdir())) <= 4
+    shutil.rmtree(folder / "results")

@@ -1,0 +1,13 @@
+"""Compute and measure several runs in one job."""
+
+from pathlib import Path
+
+from sandmould.study.batch_job import compute_batch
+
+compute_batch(
+    [Path(scenario).parent for scenario in snakemake.input.scenarios],
+    Path(snakemake.log[0]).parent,
+    snakemake.resources.tasks,
+    snakemake.resources.mpi,
+)
+Path(snakemake.log[0]).touch()
