@@ -118,7 +118,7 @@ def write_study(
     noise = np.random.default_rng(7)
     for run in runs:
         value = planted[run.parameters[KEY]] + float(noise.normal(0, spread))
-        _write_run(folder / "runs" / run.run, run, value, run.run in failed, grains, count)
+        write_run(folder / "runs" / run.run, run, value, run.run in failed, grains, count)
     return folder
 
 
@@ -154,7 +154,7 @@ def write_twins(
         engine = run.scenario.engine.name
         value = fill[engine] + float(noise.normal(0, 0.012))
         dense = packing[engine] + float(noise.normal(0, 0.0015))
-        _write_run(
+        write_run(
             folder / "runs" / run.run,
             run,
             value,
@@ -196,11 +196,11 @@ def write_cross_check(folder: Path, engine: str = "lammps", replicates: int = 3)
         value += float(noise.normal(0, 0.005))
         dense = 0.78 + float(noise.normal(0, 0.0015))
         speed = ENGINES[run.scenario.engine.name]
-        _write_run(folder / "runs" / run.run, run, value, False, 200, 12, dense, speed)
+        write_run(folder / "runs" / run.run, run, value, False, 200, 12, dense, speed)
     return folder
 
 
-def _write_run(
+def write_run(
     path: Path,
     run: Run,
     value: float,

@@ -1,0 +1,125 @@
+"""The report of a certificate: its verdict, its table, and the bed's own spectrum."""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sandmould.study.certificate.controls import SHAKE_G, SHAKEN_HZ, cases
+from sandmould.study.collect import gather, read_study
+from sandmould.study.expand import Run
+from sandmould.study.plan import write_plan
+from sandmould.study.report.certificate import certificate_pages
+from sandmould.study.report.page import write_report
+from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
+from tests.unit.report_study import KEY, scenario, write_run
+
+CERTIFIED_HZ = (35.7, 50.0, 70.0)
+SWEPT_HZ = (25.0, *CERTIFIED_HZ, 100.0)
+ASKED = ("hold", "stiffness", "bed_depth", "time_step", "engine", "spectrum")
+OWN_HZ, DAMPING = 110.0, 0.15
+WEIGHT_N = 3.0
+
+
+def hill(frequency_hz: float, best_hz: float) -> float:
+    return 0.6 - 0.3 * float(np.log(frequency_hz / best_hz)) ** 2
+
+
+def write_certified(folder: Path, moved: dict[str, float]) -> Path:
+    """Write a study and its controls, of which some move the optimum to another frequency."""
+    (folder).mkdir(parents=True)
+    (folder / "study.yaml").write_text(
+        "title: Is it the sand's?\nscenario: {engine: {name: reference}}\n"
+        f"sweep: {{keys: {{{KEY}: [25, 35.7, 50, 70, 100]}}}}\nreplicates: 3\n"
+        f"certificate: {{controls: [{', '.join(ASKED)}]}}\n"
+        "equivalence: {margins: {tube_fill_fraction: 0.03}}\n"
+    )
+    study = read_study(folder)
+    runs = []
+    for case in (None, *cases(study.certificate, scenario(50.0), CERTIFIED_HZ[1])):
+        places = SWEPT_HZ if case is None else [CERTIFIED_HZ[i] for i in case.places]
+        for f in places:
+            for replicate in (1, 2, 3):
+                at = scenario(f).model_copy(update={"seed": 1000 + replicate})
+                part = "sweep" if case is None else case.part
+                at = at if case is None else case.change(at)
+                name = re.sub(r"[^a-z0-9]+", "_", f"{part}_f{f:g}_r{replicate}")
+                runs.append(Run(folder.name, name, {KEY: f}, replicate, at, {}, part))
+    write_plan(runs, folder)
+    noise = np.random.default_rng(4)
+    for run in runs:
+        best_hz = moved.get(run.part.removeprefix("control: "), 50.0)
+        value = hill(run.parameters[KEY], best_hz) + float(noise.normal(0.0, 0.004))
+        write_run(folder / "runs" / run.run, run, value, False, 60, 8)
+        if "spectrum" in run.part:
+            shaken_loads(run).to_csv(folder / "runs" / run.run / "loads.tsv", sep="\t", index=False)
+    write_ledger(Ledger(basis_of(study), (), "The sweep is done.", CERTIFIED_HZ), folder)
+    return folder
+
+
+def shaken_loads(run: Run) -> pd.DataFrame:
+    """Loads of a mass on a spring: at rest its weight, then what each frequency adds."""
+    window_s = run.scenario.record.series_every_s
+    time_s, rows = 0.0, []
+    for _ in range(40):
+        time_s += window_s
+        rows.append((time_s, "settle_1", "floor", 0.0, -WEIGHT_N))
+    for place, stage in enumerate(run.scenario.vibration, start=1):
+        r = stage.frequency_hz / OWN_HZ
+        gain = np.hypot(1, 2 * DAMPING * r) / np.hypot(1 - r * r, 2 * DAMPING * r)
+        begun = time_s
+        while time_s - begun < stage.whole_duration_s:
+            time_s += window_s
+            phase = stage.angular_frequency_rad_s * (time_s - 0.5 * window_s)
+            rows.append((time_s, f"vibrate_{place}", "floor", 0.0,
+                         -WEIGHT_N * (1 + SHAKE_G * gain * np.sin(phase))))  # fmt: skip
+    columns = ["time_s", "stage", "surface", "force_x_n", "force_y_n"]
+    return pd.DataFrame(rows, columns=columns).assign(vibration_time_s=-1.0)
+
+
+def test_an_artefact_is_the_first_sentence_of_the_report(tmp_path: Path) -> None:
+    moved = {"hold velocity": 75.0, "hold displacement": 110.0}
+    folder = write_certified(tmp_path / "held", moved)
+    write_report(folder, folder / "report.html")
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    said = re.sub(r"<[^>]+>", "", text[text.index('class="verdict') :][:1500]).replace("\xa0", " ")
+    said = html.unescape(said[said.index(">") + 1 :].strip())
+    assert said.startswith("The optimum at 50 Hz is an artefact of what is held constant: it moves")
+    assert "Do not take it for a property of the sand's fill of the tube." in said
+    assert 'class="verdict unresolved"' in text
+    assert "Does the optimum belong to the sand?" in text
+    # The controls were run, so the report no longer says that they were not.
+    assert "have not been run" not in text
+
+
+def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Path) -> None:
+    folder = write_certified(tmp_path / "sound", {})
+    collected = gather(folder)
+    pages = certificate_pages(folder, read_study(folder), collected, scenario(50.0))
+    assert pages is not None
+    assert pages.certified.kind == "rearrangement of grains"
+    names = [row[0].text for row in pages.table.rows]
+    assert names == [
+        "the sweep itself", "displacement held", "velocity held", "stiffness x0.1", "stiffness x10",
+        "bed depth x0.5", "bed depth x2", "time step x0.5", "engine lammps",
+    ]  # fmt: skip
+    assert {row[-1].text for row in pages.table.rows[1:]} == {"stays"}
+    assert pages.spectrum is not None
+    assert len(pages.spectrum.lines) == 4
+    frequency, gain = pages.spectrum.lines[-1].xy.T
+    np.testing.assert_allclose(frequency, SHAKEN_HZ)
+    assert gain[0] == pytest.approx(1.0, abs=0.05)
+    own_hz = float(re.search(r"first resonance is at ([\d.]+) Hz", pages.column).group(1))  # type: ignore[union-attr]
+    assert own_hz == pytest.approx(OWN_HZ, rel=0.1)
+
+
+def test_there_is_no_certificate_before_its_frequencies_are_chosen(tmp_path: Path) -> None:
+    folder = write_certified(tmp_path / "early", {})
+    study = read_study(folder)
+    write_ledger(Ledger(basis_of(study)), folder)
+    assert certificate_pages(folder, study, gather(folder), scenario(50.0)) is None
