@@ -11,9 +11,10 @@ from scipy.stats import theilslopes
 
 Array = NDArray[np.float64]
 
-FOOT, CREST = 0.2, 0.8
+HEAP_FOOT, FOOT, CREST = 0.35, 0.2, 0.8
 """Shares of a slope's height between which it is fitted: grains that rolled away lie below, the
-crest that falling grains hit is round above."""
+crest that falling grains hit is round above. Sand that falls on a heap splashes: at its foot an
+apron lies flatter than its slope, up to a third of its height."""
 FEWEST_POINTS = 5
 SECTORS = 8
 """Flanks of a cone, each an equal part of the circle."""
@@ -143,7 +144,7 @@ def profiles(surface: Surface, width_m: float, axis_m: Array) -> dict[str, tuple
     return found
 
 
-def fit_flank(name: str, distance_m: Array, height_m: Array) -> Flank:
+def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT) -> Flank:
     """Fit a line to a slope that rises along the given points.
 
     The slope is the median of those of all pairs of points (Theil 1950, Sen 1968), so that a few
@@ -153,12 +154,13 @@ def fit_flank(name: str, distance_m: Array, height_m: Array) -> Flank:
     ----------
     name : str
     distance_m, height_m : (k,) float64, m
-        Profile from foot to crest; only heights between ``FOOT`` and ``CREST`` of its largest,
+        Profile from foot to crest; only heights between ``foot`` and ``CREST`` of its largest,
         from the last point below that range on, are fitted.
+    foot : float
     """
     crest_m = float(height_m.max(initial=0.0))
     top = int(np.argmax(height_m >= CREST * crest_m)) if len(height_m) else 0
-    below = np.flatnonzero(height_m[:top] < FOOT * crest_m)
+    below = np.flatnonzero(height_m[:top] < foot * crest_m)
     fitted = slice(int(below[-1]) + 1 if len(below) else 0, top)
     x, z = distance_m[fitted], height_m[fitted]
     if len(x) < FEWEST_POINTS:
@@ -203,7 +205,7 @@ def heap_slope(surface: Surface, width_m: float, axis_m: Array) -> Slope:
         # The crest of a cone is not looked for: a few grains high up would turn all sectors.
         axis_m = surface.point_m[crest] if height_m > 0.0 else axis_m
     found = profiles(surface, width_m, axis_m)
-    flanks = (fit_flank(name, r[::-1], z[::-1]) for name, (r, z) in found.items())
+    flanks = (fit_flank(name, r[::-1], z[::-1], HEAP_FOOT) for name, (r, z) in found.items())
     return Slope(axis_m, tuple(flanks))
 
 

@@ -48,6 +48,15 @@ def test_a_pile_of_known_angle_is_measured(dimension: int, angle_deg: float) -> 
     assert walls_touched(surface, np.zeros(axes), np.full(axes, 0.2), 3 * radius_m) == []
 
 
+def test_a_splashed_apron_does_not_flatten_the_slope_above_it() -> None:
+    steep, grid = pile(2, 30.0), lattice(2, 0.5e-3, (0.2, 0.016))
+    # 15 mm high at the slope's foot, a third of what is left of the height, and half as steep.
+    apron = grid[grid[:, 1] <= 0.015 - (np.abs(grid[:, 0] - 0.1) - 0.0606) * math.tan(0.27)]
+    both = np.unique(np.vstack([steep, apron]).round(7), axis=0)
+    surface = free_surface(both, np.full(len(both), 0.5e-3), np.zeros(1), np.full(1, 0.2), 0.0)
+    assert heap_slope(surface, 2e-3, np.array([0.1])).angle_deg == pytest.approx(30.0, abs=0.6)
+
+
 def test_a_flat_top_and_stray_grains_turn_no_flank() -> None:
     whole = pile(2, 30.0)
     strays = np.array([[0.005, 0.5e-3], [0.195, 0.5e-3], [0.19, 1.5e-3]])
