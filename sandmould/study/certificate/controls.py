@@ -14,11 +14,6 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.certificate.asked import Certificate, Control
 
-STIFFNESS = (0.1, 10.0)
-BED_DEPTH = (0.5, 2.0)
-GRAIN_SCALE = (0.75, 1.5)
-TUBE_LENGTH = (0.6, 1.5)
-TIME_STEP = 0.5
 SHAKEN_HZ = tuple(float(f"{f:.3g}") for f in np.geomspace(12.0, 400.0, 16))
 """Frequencies of the small shake."""
 SHAKE_G = 0.05
@@ -61,20 +56,10 @@ def cases(certificate: Certificate, scenario: Scenario, best_hz: float) -> Itera
             others = {"acceleration", "velocity", "displacement"} - {scenario.vibration[0].hold}
             for hold in sorted(others):
                 yield Case(control, hold, _holding(hold, best_hz), (0, 2))
-        elif control == "stiffness":
-            for factor in STIFFNESS:
-                yield Case(control, f"x{factor:g}", _stiffer(factor))
-        elif control == "bed_depth":
-            for factor in BED_DEPTH:
-                yield Case(control, f"x{factor:g}", _deeper(factor))
-        elif control == "grain_scale":
-            for factor in GRAIN_SCALE:
-                yield Case(control, f"x{factor:g}", _coarser(factor))
-        elif control == "tube_length":
-            for factor in TUBE_LENGTH:
-                yield Case(control, f"x{factor:g}", _longer(factor))
-        elif control == "time_step":
-            yield Case(control, f"x{TIME_STEP:g}", _finer)
+        elif control in BY_FACTOR:
+            factors, changed = BY_FACTOR[control]
+            for factor in factors:
+                yield Case(control, f"x{factor:g}", changed(factor))
         elif control == "engine":
             yield Case(control, certificate.engine, _on(certificate.engine))
         else:
@@ -167,10 +152,23 @@ def _longer(factor: float) -> Change:
     )
 
 
-def _finer(scenario: Scenario) -> Scenario:
-    fraction = TIME_STEP * scenario.time_step.fraction
-    step = scenario.time_step.model_copy(update={"fraction": fraction})
-    return scenario.model_copy(update={"time_step": step})
+def _finer(factor: float) -> Change:
+    def change(scenario: Scenario) -> Scenario:
+        fraction = factor * scenario.time_step.fraction
+        step = scenario.time_step.model_copy(update={"fraction": fraction})
+        return scenario.model_copy(update={"time_step": step})
+
+    return change
+
+
+BY_FACTOR: dict[str, tuple[tuple[float, ...], Callable[[float], Change]]] = {
+    "stiffness": ((0.1, 10.0), _stiffer),
+    "bed_depth": ((0.5, 2.0), _deeper),
+    "grain_scale": ((0.75, 1.5), _coarser),
+    "tube_length": ((0.6, 1.5), _longer),
+    "time_step": ((0.5,), _finer),
+}
+"""Controls that multiply a property of the scene: by which factors, and how."""
 
 
 def _on(engine: str) -> Change:

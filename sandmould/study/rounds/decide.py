@@ -40,17 +40,7 @@ def next_runs(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[st
 
 
 def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
-    """Add a round, or the reason why there is none.
-
-    Parameters
-    ----------
-    ledger : Ledger
-    study : Study
-    summary : DataFrame
-        One row a run of the sweep and of all rounds so far.
-    keys : list of str
-        Swept keys.
-    """
+    """Add a round, or the reason why there is none; parameters as in ``next_runs``."""
     refine, done = study.refine, len(ledger.rounds)
     spent_h = float(summary["cpu_s"].sum()) / 3600 if "cpu_s" in summary else 0.0
     try:
