@@ -3,7 +3,7 @@
 ``make peers`` runs ``python -m benchmarks.calibration``: it writes results/benchmarks/
 calibration.json and docs/calibration_peers.md. Runs come from the emulator of the study
 repose_map; with ``--oracle dem`` they are DEM runs, of one seed unless ``--seeds`` says more or 0,
-and truths are planted by DEM too, on this map and on that of calibrate_sand.
+and truths are planted by DEM too, in two measures of the same runs.
 ``--record`` takes the map that docs/results keeps. With ``--quick`` few seeds show that everything
 works, and their files go to results/benchmarks/quick/. ``--page`` writes the page of the json
 again.
@@ -45,6 +45,7 @@ from benchmarks.calibration_oracle import (
     by_emulator,
     map_file,
     read_map,
+    rows_by_dem,
 )
 from benchmarks.calibration_page import page
 from benchmarks.calibration_race import CAP, HELD_AFTER, run_race, summarised
@@ -106,10 +107,8 @@ def race_all(known: Map, methods: Sequence[Method], settings: Settings) -> list[
     return rows
 
 
-def measure(
-    file: Path, methods: Sequence[Method], settings: Settings, second: Path | None = None
-) -> dict[str, Any]:
-    """Measure everything, one after the other; with a second map where truths come by DEM.
+def measure(file: Path, methods: Sequence[Method], settings: Settings) -> dict[str, Any]:
+    """Measure everything, one after the other.
 
     Raises
     ------
@@ -121,9 +120,9 @@ def measure(
     races = race_all(known, methods, settings)
     truths = planted(known, settings.truths)
     found: dict[str, Any] = {}
-    if second is not None:
-        maps = {ANGLE: known, SECOND: read_map(second, SECOND)}
-        found["dem_truths"] = dem_coverage(maps, truths, by_dem)
+    if settings.oracle == "dem":
+        maps = {ANGLE: known, SECOND: read_map(file, SECOND)}
+        found["dem_truths"] = dem_coverage(maps, truths, rows_by_dem)
     else:
         # coexist states no posterior.
         found["coverage"] = [our_coverage(known, truths)] + [
@@ -180,14 +179,11 @@ def main() -> None:
     folder, docs = (KEPT / "quick",) * 2 if asked.quick else (KEPT, ROOT / "docs")
     if not asked.page:
         settings, file = settings_of(asked), map_file(asked.record)
-        second = map_file(asked.record, SECOND) if asked.oracle == "dem" else None
         try:
             read_map(file)  # told before the peers start
-            if second is not None:
-                read_map(second, SECOND)
             with ExitStack() as stack:
                 peers = [stack.enter_context(closing(peer)) for peer in open_peers(asked.peers)]
-                found = measure(file, [Ours(), *peers, Nearest()], settings, second)
+                found = measure(file, [Ours(), *peers, Nearest()], settings)
         except (NoMapError, PeerError) as error:
             raise SystemExit(str(error)) from None
         keep(found, asked.oracle, folder)

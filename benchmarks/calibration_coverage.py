@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.stats import binomtest, chi2
 
 from benchmarks.calibration_methods import Method, problem_of
-from benchmarks.calibration_oracle import ANGLE, Floats, Map, Simulate, by_emulator
+from benchmarks.calibration_oracle import ANGLE, Floats, Map, by_emulator
 from benchmarks.calibration_race import run_race
 from sandmould.study.calibration.asked import Target
 from sandmould.study.calibration.posterior import (
@@ -122,7 +123,9 @@ def peer_coverage(known: Map, method: Method, truths: Floats) -> dict[str, Any]:
 
 
 def dem_coverage(
-    maps: Mapping[str, Map], truths: Floats, runs: Callable[[int, str], Simulate]
+    maps: Mapping[str, Map],
+    truths: Floats,
+    runs: Callable[[int], Callable[[Sequence[float]], dict[str, float]]],
 ) -> list[dict[str, Any]]:
     """Plant truths by DEM and calibrate each on the maps: by the first measure, and by all.
 
@@ -131,12 +134,14 @@ def dem_coverage(
     maps : mapping of measure to Map
     truths : (n, 2) float64
     runs : callable
-        Gives runs of a measure by the number of the truth; the mean of some is measured.
+        Gives runs by the number of the truth; the mean of some is measured.
     """
     emulators = {measure: known.truth for measure, known in maps.items()}
     rows = []
     for number, truth in enumerate(truths):
-        values = {m: _measured(runs(number, m), truth) for m in maps}
+        simulate = runs(number)
+        computed = pd.DataFrame([simulate(truth) for _ in range(DEM_RUNS)])
+        values = {m: float(computed[m].mean(skipna=False)) for m in maps}
         targets = {
             m: Target(value=value, sd=emulators[m].noise_sd / math.sqrt(DEM_RUNS))
             for m, value in values.items()
@@ -160,7 +165,3 @@ def dem_coverage(
         })  # fmt: skip
         print(f"planted {truth}: {rows[-1]}", flush=True)
     return rows
-
-
-def _measured(simulate: Simulate, truth: Sequence[float]) -> float:
-    return float(np.mean([simulate(truth) for _ in range(DEM_RUNS)]))

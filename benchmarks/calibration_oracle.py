@@ -28,11 +28,10 @@ Floats = NDArray[np.float64]
 Simulate = Callable[[Sequence[float]], float]
 """One run at a point: its measure, NaN where it gave none."""
 STUDY = "repose_map"
-SECOND_STUDY = "calibrate_sand"
 KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fraction")
 ANGLE = "heap_angle_deg"
-SECOND = "run_out_m"
-"""What breaks the ridge, measured by the second study."""
+SECOND = "outflow_fraction"
+"""What the same run tells besides and breaks the ridge best (docs/results)."""
 FIRST_REPLICATE = 1001
 """Of runs by DEM: none shares its filling with a run of the map."""
 
@@ -78,14 +77,9 @@ class Map:
         return {"sd_deg": sd, "low_deg": low, "high_deg": high, "freedom": self.freedom}
 
 
-def study_of(measure: str) -> str:
-    """Name the study whose runs tell a measure."""
-    return STUDY if measure == ANGLE else SECOND_STUDY
-
-
-def map_file(record: bool, measure: str = ANGLE) -> Path:
-    """Name the summary of a map: as just computed, or as kept in the record."""
-    return ROOT / ("docs/results" if record else "results") / study_of(measure) / "summary.tsv"
+def map_file(record: bool) -> Path:
+    """Name the summary of the map: as just computed, or as kept in the record."""
+    return ROOT / ("docs/results" if record else "results") / STUDY / "summary.tsv"
 
 
 def read_map(path: Path, measure: str = ANGLE) -> Map:
@@ -100,8 +94,8 @@ def read_map(path: Path, measure: str = ANGLE) -> Map:
         table = pd.read_csv(path, sep="\t")
     except FileNotFoundError:
         raise NoMapError(
-            f"{path} is not there: make study STUDY=config/studies/{study_of(measure)}.yaml writes "
-            "it, and --record takes the one that is kept in docs/results"
+            f"{path} is not there: make study STUDY=config/studies/{STUDY}.yaml writes it, "
+            "and --record takes the one that is kept in docs/results"
         ) from None
     except (ValueError, OSError) as error:
         raise NoMapError(f"{path} cannot be read as a table: {error}") from None
@@ -124,16 +118,21 @@ def by_emulator(known: Map, seed: int | Sequence[int]) -> Simulate:
     return lambda point: known.mean(point) + float(rng.normal(0.0, known.truth.noise_sd))
 
 
-def by_dem(seed: int, measure: str = ANGLE) -> Simulate:
-    """Runs of the engine that the study of a measure names, each of another filling.
+def by_dem(seed: int) -> Simulate:
+    """Heaps of the engine that the map's study names, each of another filling."""
+    run = rows_by_dem(seed)
+    return lambda point: float(run(point)[ANGLE])
+
+
+def rows_by_dem(seed: int) -> Callable[[Sequence[float]], dict[str, float]]:
+    """Both measures of such runs, NaN where a run gave none.
 
     A run goes the workflow's way, plan, deck, engine, measures, in a folder that is then removed.
     """
-    study = study_of(measure)
-    base = open_study(ROOT / "config" / "studies" / f"{study}.yaml").study.scenario
+    base = open_study(ROOT / "config" / "studies" / f"{STUDY}.yaml").study.scenario
     number = FIRST_REPLICATE + 1000 * seed
 
-    def run(point: Sequence[float]) -> float:
+    def run(point: Sequence[float]) -> dict[str, float]:
         nonlocal number
         number += 1
         tree = base.model_dump(mode="json")
@@ -145,7 +144,7 @@ def by_dem(seed: int, measure: str = ANGLE) -> Simulate:
             section[last] = float(value)
         tree["seed"] = replicate_seed(base.seed, number)
         parameters = dict(zip(KEYS, map(float, point), strict=True))
-        one = Run(study, "one", parameters, number, Scenario.model_validate(tree), {})
+        one = Run(STUDY, "one", parameters, number, Scenario.model_validate(tree), {})
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             write_plan([one], folder)
@@ -153,6 +152,6 @@ def by_dem(seed: int, measure: str = ANGLE) -> Simulate:
             simulate(folder / "runs" / "one")
             write_measures(folder / "runs" / "one", folder / "runs" / "one" / "measures.tsv")
             summary = gather(folder).summary
-        return float(finished_values(summary, measure).iloc[0])
+        return {m: float(finished_values(summary, m).iloc[0]) for m in (ANGLE, SECOND)}
 
     return run

@@ -200,9 +200,8 @@ def page(kept: dict[str, Any]) -> str:
             )
         parts += [
             "## Truths planted by DEM\n\nThe mean of three runs is the measured value of either "
-            "measure, heaps of the study `repose_map` and columns of `calibrate_sand`; found is "
-            "the most probable point with its standard deviations, held says whether the 95 % "
-            f"region holds the truth.\n\n{_dem_truths(found['dem_truths'])}",
+            "measure; found is the most probable point with its standard deviations, held says "
+            f"whether the 95 % region holds the truth.\n\n{_dem_truths(found['dem_truths'])}",
             f"## Machine and versions, DEM\n\n{_machine(found)}",
         ]
     return "\n".join([*parts, _NOT_MEASURED])

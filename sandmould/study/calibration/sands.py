@@ -79,7 +79,7 @@ def calibrate(
         Summaries of the studies that ``calibration.also`` names.
     """
     emulators: dict[str, Emulator] = {}
-    cpu_s: dict[str, float] = {}
+    tables: dict[str, pd.DataFrame] = {}
     left_out = []
     for measure, table, column in _measures(calibration, summary, others or {}):
         points = table[list(keys)].to_numpy(dtype=np.float64)
@@ -89,10 +89,15 @@ def calibrate(
         except TooFewRunsError as error:
             left_out.append(str(error))
             continue
-        # What the study's own runs tell beside their first measure costs nothing more.
-        cpu_s[measure] = 0.0 if table is summary else float(table["cpu_s"].mean())
+        tables[measure] = table
     sands = tuple(_one(sand, emulators, keys) for sand in calibration.sands)
     first = next((next(iter(s.sand.targets)) for s in sands if s.found is not None), "")
+    # What the runs that give the first measure tell besides costs nothing more.
+    cpu_s = {
+        measure: 0.0 if table is tables[first] else float(table["cpu_s"].mean())
+        for measure, table in tables.items()
+        if first
+    }
     found = tuple(worths(emulators, first, cpu_s)) if first else ()
     return Calibrated(keys, emulators, sands, found, tuple(left_out))
 
