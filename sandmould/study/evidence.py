@@ -22,6 +22,7 @@ from sandmould.study.agreement import speeds
 from sandmould.study.expand import Run, expand, scenario_hash
 from sandmould.study.opening import OpenStudy, open_study
 from sandmould.study.plan import planned_grain_steps
+from sandmould.study.rounds.ledger import LEDGER, read_ledger
 from sandmould.study.study import Study
 
 RECORDS = ROOT / "docs" / "results"
@@ -39,6 +40,12 @@ def study_hash(runs: list[Run]) -> str:
     return digest.hexdigest()
 
 
+def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
+    """All runs of a study, with those of the rounds that a folder keeps."""
+    ledger = read_ledger(folder, study.study)
+    return expand(study, ledger.runs, ledger.certified_hz)
+
+
 def record(path: Path, results: Path) -> Path:
     """Keep a finished study: its tables, what was run, on what, and the hash of the study.
 
@@ -51,9 +58,10 @@ def record(path: Path, results: Path) -> Path:
     folder = results / study.name
     if not (folder / "all_runs_finished").exists():
         raise SystemExit(f"{folder} has no all_runs_finished: run the study first.")
-    runs = expand(study)
+    runs = runs_in(study, folder)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
     names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
+    names += [LEDGER] if (folder / LEDGER).exists() else []
     provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
     kept: dict[str, Any] = {
         "study": str(path),
@@ -89,13 +97,13 @@ def stale_records() -> list[tuple[str, str]]:
         if not study.exists():
             found.append((path.parent.name, f"its study {kept['study']} is gone"))
         else:
-            found.append((path.parent.name, _what_changed(open_study(study), kept)))
+            found.append((path.parent.name, _what_changed(open_study(study), kept, path.parent)))
     return found
 
 
-def _what_changed(study: OpenStudy, kept: dict[str, Any]) -> str:
+def _what_changed(study: OpenStudy, kept: dict[str, Any], folder: Path) -> str:
     """Say what parts a study from its record; margins count where the record has them."""
-    if study_hash(expand(study)) != kept["study_sha256"]:
+    if study_hash(runs_in(study, folder)) != kept["study_sha256"]:
         return "the study, its decks or our solver have changed since"
     margins = study.study.equivalence.margins
     return "its margins were set after the runs" if kept.get("margins", margins) != margins else ""
@@ -115,7 +123,7 @@ def recompute_smallest(results: Path) -> list[str]:
                for path in RECORDS.glob("*/record.json")}  # fmt: skip
     cost = {}
     for name, study in studies.items():
-        runs = expand(open_study(ROOT / study))
+        runs = runs_in(open_study(ROOT / study), RECORDS / name)
         if not any(engine_problem(run.scenario) for run in runs):
             cost[name] = sum(planned_grain_steps(run.scenario) for run in runs)
     if not cost:
@@ -123,6 +131,9 @@ def recompute_smallest(results: Path) -> list[str]:
     name = min(cost, key=lambda n: cost[n])
     print(f"computing {name} again", flush=True)
     shutil.rmtree(results / name, ignore_errors=True)
+    if (RECORDS / name / LEDGER).exists():
+        (results / name).mkdir(parents=True)
+        shutil.copy(RECORDS / name / LEDGER, results / name / LEDGER)
     snakemake = Path(sys.executable).parent / "snakemake"
     command = [str(snakemake), "--cores", "all", "--configfile", studies[name], "--quiet", "rules"]
     subprocess.run(command, cwd=ROOT, check=True)

@@ -17,6 +17,7 @@ from sandmould.study.expand import Run, expand
 from sandmould.study.measure import write_exports, write_measures, write_picture, write_profile
 from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
+from sandmould.study.rounds.ledger import LEDGER, Ledger, Round, basis_of, write_ledger
 from tests.scenes import tube_scene
 
 R = 0.002
@@ -98,6 +99,26 @@ def test_record_is_stale_when_its_study_changes(
     assert told["good"] == ""
     assert "changed" in told["old"]
     assert "gone" in told["gone"]
+
+
+def test_record_of_a_study_with_rounds_rests_on_the_runs_they_added(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = "config/studies/tube_certified.yaml"
+    opened = open_study(ROOT / study)
+    folder = tmp_path / "tube_certified"
+    folder.mkdir()
+    one = Round((({"vibration.0.frequency_hz": 62.0}, 1),), {}, {}, 0.1)
+    ledger = Ledger(basis_of(opened.study), (one,), "All is done.", (43.0, 60.0, 84.0))
+    write_ledger(ledger, folder)
+    runs = evidence.runs_in(opened, folder)
+    assert len(runs) > len(expand(opened)) + 1
+    kept = {"study": study, "study_sha256": evidence.study_hash(runs)}
+    (folder / "record.json").write_text(json.dumps(kept))
+    monkeypatch.setattr(evidence, "RECORDS", tmp_path)
+    assert evidence.stale_records() == [("tube_certified", "")]
+    (folder / LEDGER).unlink()
+    assert "changed" in evidence.stale_records()[0][1]
 
 
 def test_unfinished_study_is_not_recorded(tmp_path: Path) -> None:
