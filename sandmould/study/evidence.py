@@ -18,6 +18,7 @@ import pandas as pd
 
 from sandmould import ROOT
 from sandmould.engines.choosing import computed_hash, engine_problem
+from sandmould.engines.outcome import Outcome
 from sandmould.study.agreement import speeds
 from sandmould.study.expand import Run, expand, scenario_hash
 from sandmould.study.opening import OpenStudy, open_study
@@ -47,19 +48,23 @@ def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
 
 
 def record(path: Path, results: Path) -> Path:
-    """Keep a finished study: its tables, what was run, on what, and the hash of the study.
+    """Keep a study: its tables, what was run, on what, and the hash of the study.
+
+    Runs that failed are named in the record.
 
     Raises
     ------
     SystemExit
-        When the study has not finished.
+        While runs have no outcome.
     """
     study = open_study(path)
     folder = results / study.name
-    if not (folder / "all_runs_finished").exists():
-        raise SystemExit(f"{folder} has no all_runs_finished: run the study first.")
     runs = runs_in(study, folder)
+    missing = [r for r in runs if not (folder / "runs" / r.run / "outcome.json").exists()]
+    if missing or not (folder / "report.html").exists():
+        raise SystemExit(f"{folder} is not whole, {len(missing)} runs are missing: run the study.")
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
+    failed = summary[summary["outcome"] != Outcome.FINISHED.label]
     names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
     names += [LEDGER] if (folder / LEDGER).exists() else []
     provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
@@ -72,6 +77,7 @@ def record(path: Path, results: Path) -> Path:
         "engines": {speed.engine: speed.version for speed in speeds(summary)},
         "machine": provenance["machine"],
         "margins": study.study.equivalence.margins,
+        "failed": dict(zip(failed["run"], failed["outcome"], strict=True)),
         "wall_s_of_all_runs": round(float(summary.wall_s.sum()), 1),
         "grain_steps": float(summary.grain_steps.sum()),
     }

@@ -122,7 +122,7 @@ def test_record_of_a_study_with_rounds_rests_on_the_runs_they_added(
 
 
 def test_unfinished_study_is_not_recorded(tmp_path: Path) -> None:
-    with pytest.raises(SystemExit, match="run the study first"):
+    with pytest.raises(SystemExit, match=r"is not whole, 42 runs are missing: run the study"):
         evidence.record(ROOT / "config" / "studies" / "tube_demo.yaml", tmp_path)
 
 
@@ -134,7 +134,8 @@ def test_committed_records_are_whole() -> None:
         assert {"command", "commit", "versions", "machine", "study_sha256"} <= set(kept)
         assert "dirty" not in kept["commit"]
         summary = pd.read_csv(path.with_name("summary.tsv"), sep="\t")
-        assert (summary.outcome == "finished").all()
+        failed = summary[summary.outcome != "finished"]
+        assert dict(zip(failed.run, failed.outcome, strict=True)) == kept.get("failed", {})
 
 
 def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
@@ -147,10 +148,15 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
     first.mkdir(parents=True)
     said = {"commit": "abc1234", "versions": {}, "machine": {}}
     (first / "provenance.json").write_text(json.dumps(said))
-    rows = [{"engine": r.scenario.engine.name, "version": "7", "outcome_code": 0, "wall_s": 2.0,
-             "grain_steps": 1e6, "grain_steps_per_s": 5e5} for r in runs]  # fmt: skip
+    rows = [{"run": r.run, "engine": r.scenario.engine.name, "version": "7", "outcome_code": 0,
+             "outcome": "finished", "wall_s": 2.0, "grain_steps": 1e6, "grain_steps_per_s": 5e5}
+            for r in runs]  # fmt: skip
+    rows[5]["outcome"] = "lost grains"
+    for run in runs:
+        (folder / "runs" / run.run).mkdir(exist_ok=True)
+        (folder / "runs" / run.run / "outcome.json").touch()
     pd.DataFrame(rows).to_csv(folder / "summary.tsv", sep="\t", index=False)
-    for name in ("runs.tsv", "agreement.tsv", "all_runs_finished"):
+    for name in ("runs.tsv", "agreement.tsv", "report.html"):
         (folder / name).write_text("")
     monkeypatch.setattr(evidence, "RECORDS", tmp_path / "records")
     # Hundreds of decks: another test hashes a study.
@@ -159,6 +165,7 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
     assert (kept / "agreement.tsv").exists()
     record = json.loads((kept / "record.json").read_text())
     assert set(record["engines"]) == {"lammps", "liggghts", "reference"}
+    assert record["failed"] == {runs[5].run: "lost grains"}
     record["study"] = "config/studies/engine_twins.yaml"
     (kept / "record.json").write_text(json.dumps(record))
     assert evidence.stale_records() == [("engine_twins", "")]
