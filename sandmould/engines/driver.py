@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import signal
 import time
 from pathlib import Path
@@ -19,6 +20,9 @@ from sandmould.engines.progress import Progress
 from sandmould.engines.recording import Recorder
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.step_counts import StepCounts
+
+DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
+"""What a disk says that takes no more; other errors of the system are errors of a program."""
 
 
 class Driver:
@@ -90,6 +94,8 @@ class Driver:
         except EngineStop as stop:
             outcome, detail = stop.outcome, stop.detail
         except OSError as error:
+            if error.errno not in DISK_ERRORS:
+                raise
             outcome, detail = Outcome.DISK_REFUSED, f"{error.strerror}: {error.filename}"
         simulated_s = self.cost.steps * self.cost.time_step_s
         detail = "; ".join([detail, *notes] if detail else notes)

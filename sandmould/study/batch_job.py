@@ -43,22 +43,26 @@ def compute_batch(folders: Sequence[Path], logs: Path, ranks: int, mpi: str) -> 
     Raises
     ------
     SystemExit
-        At the end, when a run stopped early: the same job continues it and redoes none.
+        At the end, when a run stopped or broke: the same job continues it and redoes none.
     """
     stopped = []
     for folder in folders:
-        if is_current(folder):
-            print(f"{folder.name}: computed already", file=sys.stderr)
-        else:
-            for old in ("outcome.json", LAST_MEASURED):
-                (folder / old).unlink(missing_ok=True)  # of another scenario or deck
-            try:
-                render_run(folder)
-                launch(folder, logs / f"simulate_{folder.name}.log", ranks, mpi)
-            except SystemExit as stop:
-                stopped.append(str(stop))
-                continue
-        if not (folder / LAST_MEASURED).exists():
-            measure_run(folder)
+        try:
+            _compute(folder, logs / f"simulate_{folder.name}.log", ranks, mpi)
+        except (Exception, SystemExit) as stop:  # one bad run must not stop the others
+            stopped.append(f"{folder.name}: {stop}")
     if stopped:
         raise SystemExit("\n".join(stopped))
+
+
+def _compute(folder: Path, log: Path, ranks: int, mpi: str) -> None:
+    """Do what is missing of one run."""
+    if is_current(folder):
+        print(f"{folder.name}: computed already", file=sys.stderr)
+    else:
+        for old in ("outcome.json", LAST_MEASURED):
+            (folder / old).unlink(missing_ok=True)  # of another scenario or deck
+        render_run(folder)
+        launch(folder, log, ranks, mpi)
+    if not (folder / LAST_MEASURED).exists():
+        measure_run(folder)

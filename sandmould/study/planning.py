@@ -24,6 +24,7 @@ from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.batches import Batch, plan_batches
+from sandmould.study.certificate.asked import provisional_hz
 from sandmould.study.comparing import ENGINE
 from sandmould.study.expand import Run, expand, swept_key
 from sandmould.study.opening import OpenStudy, open_study
@@ -136,7 +137,11 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
     ledger = read_ledger(results / study.name, study.study)
     runs = expand(study, ledger.runs, ledger.certified_hz)
     found: dict[str, Problem] = {}
-    for run in runs:
+    # Controls come hours later, at frequencies that are not known yet: they are tried at others.
+    asked = study.study.certificate
+    trial_hz = provisional_hz(asked, study.study.sweep, study.study.scenario.seed)
+    trial = expand(study, (), trial_hz) if trial_hz and not ledger.certified_hz else []
+    for run in (*runs, *trial):
         problem = engine_problem(run.scenario)
         if problem is not None:
             told = _told(study, run, problem)

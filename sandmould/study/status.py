@@ -21,7 +21,7 @@ from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.progress import duration_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.plan import kind_of, planned_grain_steps
-from sandmould.study.planning import RESULTS, Plan, open_plan
+from sandmould.study.planning import DEFAULT_STUDY, RESULTS, Plan, open_plan
 from sandmould.study.rounds.ledger import read_ledger
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
@@ -147,7 +147,7 @@ def _left(plan: Plan, found: dict[str, RunStatus], cores: int) -> str:
 def main(arguments: Sequence[str]) -> int:
     """Print where a study stands; nothing starts."""
     try:
-        plan = open_plan(Path(arguments[0]))
+        plan = open_plan(Path(arguments[0]) if arguments else DEFAULT_STUDY)
     except BadInputError as error:
         print(error, file=sys.stderr)
         return 1

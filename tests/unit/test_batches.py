@@ -114,6 +114,23 @@ def test_a_batch_goes_on_past_a_run_that_stopped_and_redoes_none(
     assert (last.computed, last.measured) == ([], [names[0]])
 
 
+def test_a_run_that_breaks_does_not_stop_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders = planned(tmp_path)
+    jobs = Jobs(monkeypatch)
+
+    def measure(folder: Path) -> None:
+        if folder == folders[0]:
+            raise OSError("no space left")
+        jobs.measure(folder)
+
+    monkeypatch.setattr(batch_job, "measure_run", measure)
+    with pytest.raises(SystemExit, match=f"{folders[0].name}: no space left"):
+        compute_batch(folders, tmp_path, 1, "mpiexec")
+    assert jobs.measured == [folder.name for folder in folders[1:]]
+
+
 def test_a_changed_scenario_or_solver_is_computed_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

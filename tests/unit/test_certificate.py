@@ -21,6 +21,7 @@ from sandmould.study.certificate.controls import SHAKEN_HZ, Case, cases
 from sandmould.study.certificate.judge import Certified, certify
 from sandmould.study.expand import expand
 from sandmould.study.opening import OpenStudy, open_study
+from sandmould.study.planning import open_plan
 from sandmould.study.rounds.decide import choose_certified, next_round
 from sandmould.study.rounds.ledger import Ledger, basis_of, read_ledger, write_ledger
 
@@ -131,6 +132,22 @@ def test_a_control_that_cannot_be_run_is_told_before_anything_starts(tmp_path: P
     study = opened(tmp_path, scenario=wide, certificate={"controls": ["tube_length"]})
     with pytest.raises(BadInputError, match=r"certificate.controls = 'tube_length x1.5' cannot"):
         expand(study, (), CERTIFIED_HZ)
+
+
+def test_a_refused_control_is_told_before_the_first_run_not_after_the_rounds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    long = {"obstacles": [{"kind": "tube", "diameter_m": 0.024, "length_m": 0.11,
+                           "left_end_x_m": 0.01, "axis_height_m": 0.035,
+                           "closed_end": "right"}]}  # fmt: skip
+    opened(tmp_path, scenario=STUDY["scenario"] | long, refine={"rounds": 2})
+    with pytest.raises(BadInputError, match=r"certificate.controls = 'tube_length x1.5' cannot"):
+        open_plan(tmp_path / "trial.yaml")
+    # An engine that refuses a control's scene is told too: liggghts has no background damping (37).
+    opened(tmp_path, certificate={"controls": ["engine"], "engine": "liggghts"})
+    with pytest.raises(BadInputError, match=r"on engine liggghts"):
+        open_plan(tmp_path / "trial.yaml")
 
 
 @pytest.mark.parametrize(

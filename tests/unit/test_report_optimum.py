@@ -14,6 +14,7 @@ from sandmould.study.report.optimum import optimum_pages
 from sandmould.study.report.page import write_report
 from sandmould.study.rounds.decide import next_round
 from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
+from sandmould.study.study import Study
 from tests.unit.report_study import KEY, write_study
 
 BEST_HZ = 48.0
@@ -75,7 +76,20 @@ def test_wider_than_asked_is_not_sound_and_the_cost_is_told(tmp_path: Path) -> N
     pages = optimum_pages(folder, study, found.summary)
     assert pages is not None
     assert not pages.sound
-    assert pages.sentences[-1].startswith("1 round added 5 runs to the 16 of the sweep")
+    assert pages.sentences[-1].startswith("1 round added 5 runs to the 21 of the sweep")
+
+
+def test_settings_above_a_thousand_are_told_in_words(tmp_path: Path) -> None:
+    folder = write_refined(tmp_path / "stiff")
+    key = "contact.grain_grain.normal_stiffness_n_m"
+    found = gather(folder).summary.rename(columns={KEY: key})
+    found[key] *= 1000.0
+    tree = read_study(folder).model_dump(mode="json")
+    tree["sweep"]["keys"] = {key: [1000.0 * f for f in SWEPT]}
+    tree["refine"]["interval"] = {}
+    pages = optimum_pages(folder, Study.model_validate(tree), found)
+    assert pages is not None
+    assert "normal stiffness 4" in pages.sentences[0]
 
 
 def test_a_study_without_rounds_has_no_such_answer(tmp_path: Path) -> None:

@@ -203,6 +203,10 @@ def test_a_ledger_is_read_back_and_another_studys_is_kept_aside(tmp_path: Path) 
         ({"refine": {"rounds": 0, "budget_core_h": 2.0}}, r"refine.rounds = 0 .* at least 1"),
         ({"refine": {"rounds": 1, "interval": {GRAVITY: 1.0}}}, rf"a swept key, {FREQUENCY}"),
         (
+            {"sweep": {"keys": {GRAVITY: [1.5], FREQUENCY: [20, 30, 40, 50, 60, 70]}}},
+            rf"sweep.keys.{GRAVITY} = 1.5 .* two values or more, with rounds",
+        ),
+        (
             {"sweep": {"keys": {"frame": ["box", "laboratory"], FREQUENCY: [20, 50, 90]}}},
             r"sweep.keys.frame = 'box' .* numbers, in a study with rounds",
         ),

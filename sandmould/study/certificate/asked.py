@@ -10,7 +10,7 @@ from sandmould.scenario.box import Tube
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.sweep import Sweep, fewest_points
+from sandmould.study.sweep import Sweep, fewest_points, points
 
 Control = Literal[
     "hold", "stiffness", "bed_depth", "grain_scale", "tube_length", "time_step", "engine",
@@ -45,6 +45,19 @@ def frequency_key(sweep: Sweep) -> str:
     """The one swept key, a frequency; empty where a sweep is of anything else."""
     (key,) = sweep.swept if len(sweep.swept) == 1 else ("",)
     return key if key.endswith(".frequency_hz") else ""
+
+
+def round_best_hz(best_hz: float, ratio: float) -> tuple[float, ...]:
+    """Frequencies of a certificate: the best in the middle."""
+    return tuple(float(f"{best_hz * by:.3g}") for by in (1 / ratio, 1.0, ratio))
+
+
+def provisional_hz(certificate: Certificate, sweep: Sweep, seed: int) -> tuple[float, ...]:
+    """Frequencies for a trial of the controls before the best is known; none without controls."""
+    if not certificate.controls:
+        return ()
+    swept = sorted(float(p[frequency_key(sweep)]) for p in points(sweep, seed))
+    return round_best_hz(swept[len(swept) // 2], certificate.ratio)
 
 
 def problems(

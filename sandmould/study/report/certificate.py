@@ -58,13 +58,13 @@ def certificate_pages(
     responses = _responses(study_folder, shaken_runs(collected.summary))
     return CertificatePages(
         certified,
-        _table(certified, certified_hz, study),
+        _table(certified, certified_hz),
         _chart(responses) if responses else None,
         _column(scenario, collected.summary, responses),
     )
 
 
-def _table(certified: Certified, certified_hz: Sequence[float], study: Study) -> Table:
+def _table(certified: Certified, certified_hz: Sequence[float]) -> Table:
     columns = (
         Column("control", False),
         *(Column(f"{f:g} Hz") for f in certified_hz),

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.stats import norm
 
 from sandmould.study.emulator import TooFewRunsError
 from sandmould.study.report.certificate import CertificatePages, opening_sentences
 from sandmould.study.report.chart import PLAIN, Chart, Line, tints
 from sandmould.study.rounds.ledger import Ledger, read_ledger
 from sandmould.study.rounds.optimum import Optimum, find_optimum
+from sandmould.study.settings import CONFIDENCE
 from sandmould.study.study import Study
 from sandmould.study.words import (
     listed,
@@ -29,7 +31,7 @@ WRONG = {"frequency_hz": 10.0}
 """By how much a key may be set wrong in a foundry; others by a tenth of their range."""
 SHARE_LOST = 0.05
 """Of the best value, what counts as no worse where the study sets no margin."""
-_TWO_SIDED = 1.96
+_TWO_SIDED = float(norm.ppf(0.5 + CONFIDENCE / 2))
 
 
 @dataclass(frozen=True)
@@ -93,8 +95,8 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
     for key, value in optimum.setting.items():
         low, high = optimum.interval(key)
         places.append(
-            f"{name_of(key)} {value_text(key, float(number(value)))} "
-            f"(95 % interval {number(low)} to {value_text(key, float(number(high)))})"
+            f"{name_of(key)} {value_text(key, _rounded(value))} "
+            f"(95 % interval {number(low)} to {value_text(key, _rounded(high))})"
         )
     where = f"{listed(places)}: {with_margin(mean, _TWO_SIDED * se)}"
     if not ends:
@@ -118,7 +120,7 @@ def _flat(optimum: Optimum, study: Study, key: str) -> str:
     low, high = optimum.no_worse(key, margin)
     how = "the margin set beforehand" if set_margin else "5 % of it"
     said = (
-        f"From {number(low)} to {value_text(key, float(number(high)))} the mean loses less than "
+        f"From {number(low)} to {value_text(key, _rounded(high))} the mean loses less than "
         f"{number(margin, 2)}, {how}"
     )
     off = WRONG.get(key.rsplit(".", 1)[-1])
@@ -133,13 +135,17 @@ def _flat(optimum: Optimum, study: Study, key: str) -> str:
     return f"{said}; a {name} {listed(costs)}." if costs else f"{said}."
 
 
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
 def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
-    added = len(ledger.runs)
+    added, swept = len(ledger.runs), study.sweep.number_of_points * study.replicates
     rounds = len(ledger.rounds)
     spent_h = float(summary["cpu_s"].sum()) / 3600 if "cpu_s" in summary else math.nan
     many = "round" if rounds == 1 else "rounds"
     return (
-        f"{rounds} {many} added {added} runs to the {len(summary) - added} of the sweep, "
+        f"{rounds} {many} added {added} runs to the {swept} of the sweep, "
         f"{number(spent_h, 2)} h of processor time in all. "
         f"{ledger.ended or 'Rounds go on: make study continues them.'}"
     )

@@ -62,6 +62,8 @@ def problems(refine: Refinement, sweep: Sweep, better: str, seed: int) -> Iterat
         if isinstance(sweep.keys.get(key), Range) or all(
             isinstance(v, int | float) and not isinstance(v, bool) for v in values
         ):
+            if len(set(values)) == 1:
+                yield Problem(f"sweep.keys.{key}", values[0], "two values or more, with rounds")
             continue
         yield Problem(f"sweep.keys.{key}", values[0], "numbers, in a study with rounds")
     for key in refine.interval:

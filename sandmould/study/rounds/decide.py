@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pandas as pd
 
+from sandmould.study.certificate.asked import round_best_hz
 from sandmould.study.emulator import TooFewRunsError
 from sandmould.study.rounds.asked import Refinement
 from sandmould.study.rounds.ledger import Ledger, Round
@@ -71,11 +72,10 @@ def choose_certified(
     ------
     TooFewRunsError
     """
-    objective, ratio = study.objective, study.certificate.ratio
+    objective = study.objective
     optimum = find_optimum(summary, keys, objective.measure, objective.better)
     best_hz = optimum.setting[keys[0]]
-    certified = tuple(float(f"{best_hz * by:.3g}") for by in (1 / ratio, 1.0, ratio))
-    return replace(ledger, certified_hz=certified)
+    return replace(ledger, certified_hz=round_best_hz(best_hz, study.certificate.ratio))
 
 
 def why_enough(

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from sandmould.study.emulator import Array, Emulator, fit_emulator
+from sandmould.study.settings import CONFIDENCE
 from sandmould.study.verdict import Better, finished_values
 
 DRAWS = 2000
-CONFIDENCE = 0.95
 LOG_RATIO = 4.0
 """A key whose values span more than this ratio is looked at by its logarithm."""
 _ACROSS = {1: 241, 2: 41}
