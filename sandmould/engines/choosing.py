@@ -55,8 +55,12 @@ class EngineModule(Protocol):
 
 def engine_of(scenario: Scenario) -> EngineModule:
     """Import the module of a scenario's engine, and only that one."""
-    module = importlib.import_module(f"sandmould.engines.{scenario.engine.name}.engine")
-    return cast(EngineModule, module)
+    return engine_module(scenario.engine.name)
+
+
+def engine_module(name: str) -> EngineModule:
+    """Import the module of an engine by its name."""
+    return cast(EngineModule, importlib.import_module(f"sandmould.engines.{name}.engine"))
 
 
 def deck_hash(scenario: Scenario) -> str:

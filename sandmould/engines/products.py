@@ -7,12 +7,12 @@ import json
 import os
 import resource
 import shutil
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from sandmould.engines.outcome import RunOutcome
-from sandmould.engines.recording import create_tables
 from sandmould.scenario.scenario import Scenario
 
 
@@ -47,6 +47,16 @@ class Cost:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class Computed:
+    """What the computation of a run came to."""
+
+    outcome: RunOutcome
+    cost: Cost
+    is_root: bool
+    """Whether this process writes the products."""
+
+
 def cpu_time_s() -> float:
     """Processor time of this process and of the engines it has started and seen end."""
     return sum(os.times()[:4])
@@ -58,17 +68,32 @@ def peak_memory_bytes() -> int:
     return sum(resource.getrusage(who).ru_maxrss for who in whose) * 1024
 
 
+SAND_PRODUCTS = ("series.tsv", "loads.tsv", "snapshots", "engine.log")
+
+
 def finish(
-    folder: Path, dimension: int, outcome: RunOutcome, cost: Cost, provenance: dict[str, Any]
+    folder: Path,
+    products: Sequence[str],
+    outcome: RunOutcome,
+    cost: Cost,
+    provenance: dict[str, Any],
 ) -> None:
     """Move a run's products from its work folder into place.
 
-    A finished run's work folder is removed; any other keeps its last checkpoint there. Products
-    that a broken run never wrote are left as empty tables, so that collection finds them.
+    A finished run's work folder is removed; any other keeps its last checkpoint there.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the run.
+    products : sequence of str
+        Files and folders of ``folder/work`` that are kept.
+    outcome : RunOutcome
+    cost : Cost
+    provenance : dict
     """
     work = folder / "work"
-    create_tables(work, dimension)
-    for name in ("series.tsv", "loads.tsv", "snapshots", "engine.log"):
+    for name in products:
         target = folder / name
         if target.is_dir():
             shutil.rmtree(target)

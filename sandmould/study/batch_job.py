@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sandmould.engines.choosing import deck_hash
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.expand import scenario_hash
+from sandmould.study.hashes import scenario_hash
+from sandmould.study.kinds.kind import kind_of
 from sandmould.study.launch import launch
-from sandmould.study.measure import LAST_MEASURED, measure_run
+from sandmould.study.moments import LAST_MEASURED
 from sandmould.study.plan import read_run
-from sandmould.study.simulate import render_run
+from sandmould.study.simulate import measure_run, render_run
 
 
 def is_current(folder: Path) -> bool:
@@ -25,7 +25,7 @@ def is_current(folder: Path) -> bool:
         there = (folder / "outcome.json").exists()
     except (OSError, ValueError, BadInputError):
         return False
-    wanted = scenario_hash(scenario), deck_hash(scenario)
+    wanted = scenario_hash(scenario), kind_of(scenario).template_hash(scenario)
     return there and (origin.get("scenario_sha256"), origin.get("template_sha256")) == wanted
 
 

@@ -6,13 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sandmould.study.expand import Run
-from sandmould.study.plan import planned_grain_steps
-
-RATE = {"reference": 1.5e7, "lammps": 2.5e6, "liggghts": 3e6}
-"""Grain-steps per second of one core in 2D that batches are filled by (docs/speed.md); fixed, so
-that a study has the same batches on every machine."""
-IN_3D = 0.4
-"""Share of that in 3D."""
+from sandmould.study.kinds.kind import kind_of
 
 
 @dataclass(frozen=True)
@@ -38,20 +32,18 @@ def plan_batches(runs: Sequence[Run], wall_s: float) -> list[Batch]:
     kept: dict[tuple[str, int], list[Run]] = {}
     filled: dict[tuple[str, int], float] = {}
 
-    def close(kind: tuple[str, int]) -> None:
-        chosen = kept.pop(kind)
-        filled.pop(kind)
+    def close(alike: tuple[str, int]) -> None:
+        chosen = kept.pop(alike)
+        filled.pop(alike)
         batches.append(Batch(chosen[0].run, tuple(chosen)))
 
     for run in runs:
-        engine = run.scenario.engine
-        kind = (str(engine.name), engine.ranks)
-        kept.setdefault(kind, []).append(run)
-        rate = RATE[engine.name] * engine.ranks * (IN_3D if run.scenario.dimension == 3 else 1.0)
-        one_s = planned_grain_steps(run.scenario) / rate
-        filled[kind] = filled.get(kind, 0.0) + one_s
-        if filled[kind] >= wall_s:
-            close(kind)
-    for kind in list(kept):
-        close(kind)
+        kind, engine = kind_of(run.scenario), run.scenario.engine
+        alike = (str(engine.name), engine.ranks)
+        kept.setdefault(alike, []).append(run)
+        filled[alike] = filled.get(alike, 0.0) + kind.predicted_s(run.scenario)
+        if filled[alike] >= wall_s:
+            close(alike)
+    for alike in list(kept):
+        close(alike)
     return batches

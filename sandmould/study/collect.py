@@ -16,7 +16,7 @@ from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.scenario.reading import Origin, read_yaml, validated
 from sandmould.study.agreement import agreement_table, compare_study, sweep_part
 from sandmould.study.plan import STUDY_FILE
-from sandmould.study.study import Study
+from sandmould.study.study import Study, study_model
 
 NO_OUTCOME = "no outcome written"
 _OUTCOME_COLUMNS = ("outcome_code", "outcome", "detail", "simulated_s", "planned_s")
@@ -76,7 +76,8 @@ def read_study(study_folder: Path) -> Study:
     path = study_folder / STUDY_FILE
     if not path.exists():
         return Study(title=study_folder.name.replace("_", " "))
-    return validated(Study, read_yaml(path, str(path)), Origin({"": str(path)}))
+    tree = read_yaml(path, str(path))
+    return validated(study_model(tree.get("kind", "sand")), tree, Origin({"": str(path)}))
 
 
 def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected:

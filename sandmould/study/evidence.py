@@ -17,12 +17,12 @@ from typing import Any
 import pandas as pd
 
 from sandmould import ROOT
-from sandmould.engines.choosing import computed_hash, engine_problem
 from sandmould.engines.outcome import Outcome
 from sandmould.study.agreement import speeds
-from sandmould.study.expand import Run, expand, scenario_hash
+from sandmould.study.expand import Run, expand
+from sandmould.study.hashes import scenario_hash
+from sandmould.study.kinds.kind import kind_of
 from sandmould.study.opening import OpenStudy, open_study
-from sandmould.study.plan import planned_grain_steps
 from sandmould.study.rounds.ledger import LEDGER, read_ledger
 from sandmould.study.study import Study
 
@@ -36,9 +36,13 @@ after a few collisions, so only means are compared, with margins of a few times 
 def study_hash(runs: list[Run]) -> str:
     """Hash of all scenarios of a study and of what their decks command."""
     digest = hashlib.sha256()
-    for text in sorted(scenario_hash(r.scenario) + computed_hash(r.scenario) for r in runs):
+    for text in sorted(scenario_hash(r.scenario) + _computed_hash(r) for r in runs):
         digest.update(text.encode())
     return digest.hexdigest()
+
+
+def _computed_hash(run: Run) -> str:
+    return kind_of(run.scenario).computed_hash(run.scenario)
 
 
 def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
@@ -130,8 +134,9 @@ def recompute_smallest(results: Path) -> list[str]:
     cost = {}
     for name, study in studies.items():
         runs = runs_in(open_study(ROOT / study), RECORDS / name)
-        if not any(engine_problem(run.scenario) for run in runs):
-            cost[name] = sum(planned_grain_steps(run.scenario) for run in runs)
+        kind = kind_of(runs[0].scenario)
+        if not any(kind.engine_problem(run.scenario) for run in runs):
+            cost[name] = sum(kind.predicted_s(run.scenario) for run in runs)
     if not cost:
         return []
     name = min(cost, key=lambda n: cost[n])

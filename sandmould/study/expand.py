@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from sandmould.scenario import checks
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import SolidMesh, with_hash
 from sandmould.study.certificate.asked import frequency_key
 from sandmould.study.certificate.controls import Case, cases
 from sandmould.study.comparing import ENGINE
+from sandmould.study.hashes import scenario_hash
+from sandmould.study.kinds.kind import AnyScenario, kind_named
 from sandmould.study.labels import letters, run_label
 from sandmould.study.opening import OpenStudy
 from sandmould.study.sweep import Point, points, value_at
@@ -41,7 +39,8 @@ class Run:
     """Value of each swept key, by key path."""
     replicate: int
     """Number of the replicate, from 1; a block, see ``replicate_seed``."""
-    scenario: Scenario
+    scenario: Any
+    """Of the study's kind, see ``sandmould.study.kinds``."""
     sources: dict[str, str]
     """Where each leaf of the scenario came from, by key path."""
     part: Part = "sweep"
@@ -50,7 +49,7 @@ class Run:
     @property
     def seed(self) -> int:
         """The scenario's seed."""
-        return self.scenario.seed
+        return int(self.scenario.seed)
 
 
 def replicate_seed(seed: int, replicate: int) -> int:
@@ -135,6 +134,7 @@ class _AtPoint:
 
     def __init__(self, study: OpenStudy, base: Tree, point: Point) -> None:
         self.study, self.base, self.point = study, base, point
+        self.kind = kind_named(study.study.kind)
         self.origin = Origin(dict(study.origin.file), dict(study.origin.source))
         try:
             self.scenario = self._scenario(point, self.origin)
@@ -143,17 +143,17 @@ class _AtPoint:
         else:
             self.problems = [self._told(p) for p in self._misfits(self.scenario)]
 
-    def _scenario(self, point: Point, origin: Origin) -> Scenario:
+    def _scenario(self, point: Point, origin: Origin) -> Any:
         tree = self.base
         for key, value in point.items():
             tree = _put(tree, key.split("."), value, origin, f"sweep of {self.study.file}")
-        return _with_mesh_hashes(validated(Scenario, tree, origin, ROOT_KEY))
+        return self.kind.resolved(validated(self.kind.MODEL, tree, origin, ROOT_KEY))
 
-    def _misfits(self, scenario: Scenario) -> list[Problem]:
+    def _misfits(self, scenario: AnyScenario) -> list[Problem]:
         """What is wrong with a well-typed scenario of this study, keys from the study's root."""
-        found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in checks.problems(scenario)]
+        found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in self.kind.problems(scenario)]
         at = self.study.study.objective.at_vibration_s
-        lasts = sum(stage.whole_duration_s for stage in scenario.vibration)
+        lasts = self.kind.lasts_s(scenario)
         if at is not None and at > lasts:
             valid = f"at most {lasts:g} s, the end of the vibration"
             found.append(Problem("objective.at_vibration_s", at, valid))
@@ -230,7 +230,7 @@ class _AtPoint:
         yield from self._replicates(scenario, replicates, source, case.part)
 
     def _replicates(
-        self, base: Scenario, replicates: Iterable[int], source: dict[str, str], part: Part
+        self, base: AnyScenario, replicates: Iterable[int], source: dict[str, str], part: Part
     ) -> Iterator[Run]:
         dump = base.model_dump(mode="json")
         parameters = {key: value_at(dump, key) for key in self.point}
@@ -260,12 +260,6 @@ def swept_key(study: OpenStudy, point: Point, key: str) -> str:
         number = next((i for i, p in enumerate(sweep.points) if p == point), "")
         place = f"sweep.points.{number}".rstrip(".")
     return f"{place}.{key}".rstrip(".")
-
-
-def _with_mesh_hashes(scenario: Scenario) -> Scenario:
-    """The scenario with the hashes of its meshes, so that a changed mesh makes another run."""
-    obstacles = tuple(with_hash(o) if isinstance(o, SolidMesh) else o for o in scenario.obstacles)
-    return scenario.model_copy(update={"obstacles": obstacles})
 
 
 def _holds(swept: str, problem_key: str) -> bool:
@@ -312,19 +306,3 @@ def _sources(section: Section, origin: Origin, above: str = "", group: str | Non
             stated = origin.source_of(f"{ROOT_KEY}.{key}")
             # What the user alone can give has no source while it is not given.
             yield key, stated or (declared if declared not in (None, "user") else "default")
-
-
-def scenario_hash(scenario: Scenario) -> str:
-    """Hash of everything that a scenario says, whatever the order of its keys.
-
-    What is absent is left out: a key that comes later, absent unless given, changes no hash.
-    """
-    text = json.dumps(present(scenario.model_dump(mode="json")), sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def present(tree: Any) -> Any:
-    """A tree without keys whose value is None or an empty list."""
-    if isinstance(tree, dict):
-        return {key: present(value) for key, value in tree.items() if value not in (None, [])}
-    return [present(item) for item in tree] if isinstance(tree, list) else tree

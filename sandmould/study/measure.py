@@ -23,7 +23,7 @@ from analysis.solid_fraction import (
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.moments import MOMENTS, list_moments, nearest
+from sandmould.study.moments import LAST_MEASURED, MOMENTS, list_moments, nearest
 from sandmould.study.outflow import add_outflow, measure_outflow
 from sandmould.study.plan import read_run
 
@@ -66,11 +66,7 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
     return row | measure_outflow(scenario, snapshot)
 
 
-LAST_MEASURED = "final.png"
-"""Written after all else that is measured."""
-
-
-def measure_run(folder: Path) -> None:
+def measure_sand(folder: Path) -> None:
     """Write all that is measured on a run's snapshots."""
     write_measures(folder, folder / "measures.tsv")
     write_exports(folder, folder / "exports")

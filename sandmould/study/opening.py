@@ -15,19 +15,22 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
 from sandmould.scenario.quantity import NAME, fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
-from sandmould.scenario.scenario import Scenario
 from sandmould.study import comparing, sweep
 from sandmould.study.calibration import asked as calibration
 from sandmould.study.certificate import asked as certificate
+from sandmould.study.kinds.kind import kind_named
 from sandmould.study.rounds import asked as rounds
-from sandmould.study.study import Material, Study
+from sandmould.study.study import ONLY_SAND, DeckStudy, Material, Study, study_model
 
 STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
 """Where studies write the sands that they calibrate."""
 MATERIALS = (ROOT / "config" / "materials", CALIBRATED)
 _OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
-_MESH_FILE = r"\bobstacles(\.\d+)+\.file(\.value)?$"
+_FILE_KEY = (
+    r"(\bobstacles(\.\d+)+\.file|\b(scenario|sweep\.keys|sweep\.points\.\d+)\.template"
+    r"|\bscenario\.files\.\d+)(\.value)?$"
+)
 
 
 @dataclass(frozen=True)
@@ -78,9 +81,11 @@ def open_study(path: Path) -> OpenStudy:
         valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
         raise BadInputError([Problem("file name", path.name, valid, shown)])
     files = _files(path)
-    found = [p for f in files for p in _wrong_units(Study, f)]
+    model = _model(files)
+    found = [p for f in files for p in _wrong_units(model, f)]
     origin = Origin(file={"": shown})
-    tree: Tree = {"scenario": Scenario().model_dump(mode="json")}
+    kind = "deck" if model is DeckStudy else "sand"
+    tree: Tree = {"scenario": kind_named(kind).defaults()}
     material = _material(files)
     if material is not None:
         found += _wrong_units(Material, material)
@@ -93,12 +98,10 @@ def open_study(path: Path) -> OpenStudy:
             for section in _OF_SWEEP:
                 tree.pop(section, None)
         tree = merge(tree, file.tree, origin, file.shown)
-    if tree.get("kind") in ("solidification", "flow"):
-        valid = "sand; solidification and flow come with their own solvers"
-        raise BadInputError([Problem("kind", tree["kind"], valid, origin.file_of("kind"))])
+    found += [replace(p, file=origin.file_of(p.key)) for p in _not_of_its_kind(tree)]
     if found:
         raise BadInputError(found)
-    study = validated(Study, tree, origin)
+    study = validated(model, tree, origin)
     base = study.scenario.model_dump(mode="json")
     found = sweep.problems(study.sweep, base, study.replicates) or [
         *comparing.problems(study),
@@ -111,6 +114,23 @@ def open_study(path: Path) -> OpenStudy:
     if found:
         raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found])
     return OpenStudy(path.stem, path, study, tree, origin)
+
+
+def _model(files: list[_File]) -> type[Study]:
+    """Type of the study, by the last file that states its kind."""
+    stated = [f for f in files if "kind" in f.tree]
+    kind = stated[-1].tree["kind"] if stated else "sand"
+    if kind in ("solidification", "flow"):
+        valid = "sand or deck; solidification and flow come with their own solvers"
+        raise BadInputError([Problem("kind", kind, valid, stated[-1].shown)])
+    return study_model(str(kind))
+
+
+def _not_of_its_kind(tree: Tree) -> Iterator[Problem]:
+    """Sections that only studies of sand have."""
+    for name in ONLY_SAND if tree.get("kind", "sand") != "sand" else ():
+        if tree.get(name):
+            yield Problem(name, tree[name], f"absent in a study of kind {tree['kind']}")
 
 
 def _files(path: Path) -> list[_File]:
@@ -152,7 +172,7 @@ def _read(path: Path) -> _File:
 
 
 def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
-    """A file's tree with the meshes that it names as seen from itself named as seen from ROOT.
+    """A file's tree with the files that it names as seen from itself named as seen from ROOT.
 
     So a run finds them from any working directory, and no path of this machine enters its
     scenario as long as the file lies in the repository.
@@ -161,9 +181,9 @@ def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
         return {n: _from_root(v, folder, f"{key}.{n}") for n, v in tree.items()}
     if isinstance(tree, list):
         # the values of a swept key stand at the key, entries of other lists below it
-        swept = re.search(_MESH_FILE, key)
+        swept = re.search(_FILE_KEY, key)
         return [_from_root(v, folder, key if swept else f"{key}.{i}") for i, v in enumerate(tree)]
-    if isinstance(tree, str) and re.search(_MESH_FILE, key):
+    if isinstance(tree, str) and re.search(_FILE_KEY, key):
         return Path(os.path.relpath(folder / tree, ROOT)).as_posix()
     return tree
 

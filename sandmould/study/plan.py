@@ -11,13 +11,13 @@ from typing import Any
 
 import yaml
 
-from sandmould.engines.program import build_program
 from sandmould.engines.progress import duration_text
-from sandmould.scenario.placement import plan_counts
+from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import Part, Run
+from sandmould.study.kinds.kind import SpeedClass, kind_of
 from sandmould.study.study import Study
 
 STUDY_FILE = "study.yaml"
@@ -37,6 +37,12 @@ class _RunFile(Section):
     scenario: Scenario
     sources: dict[str, str]
     part: Part = "sweep"
+
+
+class _DeckRunFile(_RunFile):
+    """The same of a deck of the user's own."""
+
+    scenario: OwnDeck  # type: ignore[assignment]
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
@@ -81,7 +87,8 @@ def _write(path: Path, text: str) -> None:
 
 
 def _scenario_text(run: Run) -> str:
-    file = _RunFile(**{name: getattr(run, name) for name in _RunFile.model_fields})
+    model = _DeckRunFile if isinstance(run.scenario, OwnDeck) else _RunFile
+    file = model(**{name: getattr(run, name) for name in _RunFile.model_fields})
     tree = file.model_dump(mode="json")
     text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
     return f"# Written by the plan of the study; change the study instead.\n{text}"
@@ -115,66 +122,48 @@ def read_run(path: Path) -> Run:
         When the file is missing or was changed into something that is no run.
     """
     shown = str(path)
-    file = validated(_RunFile, read_yaml(path, shown), Origin({"": shown}))
+    tree = read_yaml(path, shown)
+    is_deck = "template" in (tree.get("scenario") or ())
+    file = validated(_DeckRunFile if is_deck else _RunFile, tree, Origin({"": shown}))
     return Run(**{name: getattr(file, name) for name in _RunFile.model_fields})
 
 
-def planned_steps(scenario: Scenario) -> int:
-    """Time steps of a run: its fill, estimated, and its vibration."""
-    stages = build_program(scenario).stages
-    return sum(math.ceil(stage.expected_s / scenario.step_s) for stage in stages)
-
-
-def planned_grain_steps(scenario: Scenario) -> float:
-    """Steps times grains in the box at the time: what a run costs."""
-    return build_program(scenario).expected_grain_steps
-
-
-Kind = tuple[str, int]
-"""Engine and dimension: what the speed of a core depends on most."""
-
-
-def kind_of(scenario: Scenario) -> Kind:
-    """Kind of scenario that a calibration holds for."""
-    return scenario.engine.name, scenario.dimension
-
-
 def plan_table(
-    runs: Sequence[Run], rate_grain_steps_per_s: Mapping[Kind, float | None], cores: int
+    runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float | None], cores: int
 ) -> str:
     """What the runs of a study will take, as text.
 
     Parameters
     ----------
     runs : sequence of Run
-    rate_grain_steps_per_s : mapping of Kind to float or None
-        Speed of one core, from the calibration; None or missing before it.
+    rate_per_s : mapping of SpeedClass to float or None
+        Work a second of one core, from the calibration; None or missing before it.
     cores : int
         Cores that share the runs.
     """
     points: dict[str, list[Run]] = {}
     for run in runs:
         points.setdefault(f"{run.part} {json.dumps(run.parameters)}", []).append(run)
-    rows = [["point", "runs", "grains", "time step", "steps", "grain-steps", "wall time a run"]]
+    kind = kind_of(runs[0].scenario)
+    heads = [*kind.plan_cells(runs[0].scenario), kind.WORK]
+    rows = [["point", "runs", *heads, "wall time a run"]]
     work = core_s = longest_s = 0.0
     for alike in points.values():
         scenario = alike[0].scenario
-        one = planned_grain_steps(scenario)
-        rate = rate_grain_steps_per_s.get(kind_of(scenario))
+        one, threads = kind.planned_work(scenario), kind.threads(scenario)
+        rate = rate_per_s.get(kind.speed_class(scenario))
         one_s = one / rate if rate else math.nan
         work += one * len(alike)
         core_s += one_s * len(alike)
-        longest_s = max(longest_s, one_s / scenario.engine.ranks)
+        longest_s = max(longest_s, one_s / threads)
         if len(rows) <= SHOWN_POINTS:
             rows.append(
                 [
                     alike[0].run.rsplit("_r", 1)[0],
                     str(len(alike)),
-                    f"{sum(plan_counts(scenario)):,}",
-                    f"{scenario.step_s:.3g} s",
-                    f"{planned_steps(scenario):,}",
+                    *kind.plan_cells(scenario).values(),
                     f"{one:.3g}",
-                    _wall_text(one_s / scenario.engine.ranks),
+                    _wall_text(one_s / threads),
                 ]
             )
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
@@ -183,7 +172,7 @@ def plan_table(
         lines.append(f"... and {len(points) - SHOWN_POINTS} more points")
     # No schedule is shorter than its longest run.
     whole = _wall_text(max(core_s / cores, longest_s))
-    lines.append(f"{len(runs)} runs, {work:.3g} grain-steps, wall time on {cores} cores: {whole}")
+    lines.append(f"{len(runs)} runs, {work:.3g} {kind.WORK}, wall time on {cores} cores: {whole}")
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 

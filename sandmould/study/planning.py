@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
-import platform
 import sys
-import tempfile
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,36 +12,18 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
-from sandmould.engines.choosing import deck_sources, engine_of, engine_problem
-from sandmould.engines.program import build_program
-from sandmould.engines.session import EngineStop
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.fill import Fill, Layer
-from sandmould.scenario.placement import plan_counts
-from sandmould.scenario.scenario import Scenario
 from sandmould.study.batches import Batch, plan_batches
 from sandmould.study.certificate.asked import provisional_hz
 from sandmould.study.comparing import ENGINE
 from sandmould.study.expand import Run, expand, swept_key
+from sandmould.study.kinds.kind import Kind, kind_named
 from sandmould.study.opening import OpenStudy, open_study
-from sandmould.study.plan import (
-    kind_of,
-    plan_table,
-    planned_grain_steps,
-    write_plan,
-    write_study,
-)
+from sandmould.study.plan import plan_table, write_plan, write_study
 from sandmould.study.rounds.ledger import read_ledger
 
 RESULTS = Path("results")
 DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
-CALIBRATION_GRAINS = 400
-CALIBRATION_FALL_WALL_S = 5.0
-CALIBRATION_WALL_S = 1.0
-BASE_MEMORY_MB = 600
-GRAINS_PER_MB = 50
-SLOW_RATE = 1e6
-"""Grain-steps per second of a slow core; benchmarks/ has those measured."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +32,11 @@ class Plan:
 
     study: OpenStudy
     runs: tuple[Run, ...]
+
+    @property
+    def kind(self) -> Kind:
+        """What is simulated."""
+        return kind_named(self.study.study.kind)
 
     @cached_property
     def _by_name(self) -> dict[str, Run]:
@@ -65,12 +48,11 @@ class Plan:
 
     def threads(self, name: str) -> int:
         """Cores that a run keeps busy, as MPI ranks or as threads."""
-        return self._by_name[name].scenario.engine.ranks
+        return self.kind.threads(self._by_name[name].scenario)
 
     def ranks(self, name: str) -> int:
-        """MPI ranks of a run; the reference engine's ranks are threads of one process."""
-        engine = self._by_name[name].scenario.engine
-        return 1 if engine.name == "reference" else engine.ranks
+        """MPI ranks of a run."""
+        return self.kind.ranks(self._by_name[name].scenario)
 
     def deck_sources(self, name: str) -> list[str]:
         """Files of the repository that a run's deck is made from, and its solver if it is ours.
@@ -78,20 +60,17 @@ class Plan:
         Decks name the state of the solver, so a changed kernel changes the decks of its runs and
         they are computed again.
         """
-        files = deck_sources(self._by_name[name].scenario)
+        files = self.kind.sources(self._by_name[name].scenario)
         # As seen from here: another place of the repository is no reason to compute again.
         return [os.path.relpath(path) for path in files]
 
     def memory_mb(self, name: str) -> int:
-        """Memory to ask for: several times the 126 MB measured at 1 134 discs, 144 at 8 000."""
-        return BASE_MEMORY_MB + sum(plan_counts(self._by_name[name].scenario)) // GRAINS_PER_MB
+        """Memory to ask for."""
+        return self.kind.memory_mb(self._by_name[name].scenario)
 
     def runtime_min(self, *names: str) -> int:
-        """Wall time to ask for some runs: that of a machine slower than any measured."""
-        seconds = 0.0
-        for name in names:
-            scenario = self._by_name[name].scenario
-            seconds += planned_grain_steps(scenario) / SLOW_RATE / scenario.engine.ranks
+        """Wall time to ask for some runs, one after the other."""
+        seconds = sum(self.kind.allowed_s(self._by_name[name].scenario) for name in names)
         return 10 + math.ceil(seconds / 60)
 
     def labels(self, name: str) -> dict[str, str]:
@@ -141,8 +120,9 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
     asked = study.study.certificate
     trial_hz = provisional_hz(asked, study.study.sweep, study.study.scenario.seed)
     trial = expand(study, (), trial_hz) if trial_hz and not ledger.certified_hz else []
+    kind = kind_named(study.study.kind)
     for run in (*runs, *trial):
-        problem = engine_problem(run.scenario)
+        problem = kind.engine_problem(run.scenario)
         if problem is not None:
             told = _told(study, run, problem)
             found[str(told)] = told
@@ -189,37 +169,11 @@ def announce(plan: Plan, results: Path, cores: int) -> str:
     except OSError as error:
         valid = f"a folder that takes files: {error.filename} does not ({error.strerror})"
         raise BadInputError([Problem("results", str(folder), valid)]) from None
-    one_each = {kind_of(run.scenario): run.scenario for run in plan.runs}
-    rates = {kind: calibrated_rate(one, results) for kind, one in one_each.items()}
+    kind = plan.kind
+    one_each = {kind.speed_class(run.scenario): run.scenario for run in plan.runs}
+    rates = {each: kind.rate(one, results) for each, one in one_each.items()}
     title = plan.study.study.title or plan.study.name
     return f"\n{title}\n{plan_table(plan.runs, rates, cores)}"
-
-
-def calibrated_rate(scenario: Scenario, results: Path) -> float | None:
-    """Grain-steps per second of one core of this machine, measured once and kept.
-
-    Returns
-    -------
-    float or None
-        None when the engine could not run the calibration; the study's own runs will say why.
-    """
-    path = results / "calibration.json"
-    version = engine_of(scenario).installed_version()
-    key = f"{platform.node()} {scenario.engine.name} {version} {scenario.dimension}D"
-    known: dict[str, Any] = {}
-    if path.is_file():
-        try:
-            known = json.loads(path.read_text(encoding="utf-8"))
-        except ValueError:
-            known = {}
-    if key not in known:
-        rate = _measure_rate(scenario)
-        if rate is None:
-            return None
-        known[key] = rate
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(known, indent=1), encoding="utf-8")
-    return float(known[key])
 
 
 def main(path: Path) -> int:
@@ -230,44 +184,6 @@ def main(path: Path) -> int:
         print(error, file=sys.stderr)
         return 1
     return 0
-
-
-def _measure_rate(scenario: Scenario) -> float | None:
-    """Let a few hundred grains of the scene fall and settle, and time the end of it.
-
-    Falling grains touch nothing and are too cheap to count, so they fall first, as far as a few
-    seconds of this machine take them.
-    """
-    trial = scenario.model_copy(
-        update={
-            "fill": Fill(layers=(Layer(count=CALIBRATION_GRAINS),)),
-            "obstacles": (),
-            "vibration": (),
-            "engine": scenario.engine.model_copy(update={"ranks": 1}),
-        }
-    )
-    program = build_program(trial)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        engine = engine_of(trial)
-        engine.write_deck(program, {}, folder, "calibration", "calibration")
-        try:
-            session = engine.open_session(program, folder, folder / "engine.log")
-            session.insert_layer(1)
-            session.start_stage(program.stages[0])
-            begun, rest_s = time.perf_counter(), program.expected_s / 2
-            while session.time_s < rest_s and (
-                time.perf_counter() - begun < CALIBRATION_FALL_WALL_S
-            ):
-                session.advance()
-            steps, begun = session.steps, time.perf_counter()
-            while time.perf_counter() - begun < CALIBRATION_WALL_S:
-                session.advance()
-            rate = session.grains * (session.steps - steps) / (time.perf_counter() - begun)
-            session.close()
-        except EngineStop:
-            return None
-    return rate
 
 
 if __name__ == "__main__":

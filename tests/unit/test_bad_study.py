@@ -85,7 +85,7 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "kind of a later solver": (
         "based_on: tube\nkind: flow\nmetal: aluminium",
         "trial.yaml: kind = 'flow' cannot be used: "
-        "valid is sand; solidification and flow come with their own solvers.",
+        "valid is sand or deck; solidification and flow come with their own solvers.",
     ),
     "measure after the end": (
         "based_on: tube\nobjective: {at_vibration_s: 60}",

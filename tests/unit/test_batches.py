@@ -12,11 +12,13 @@ import yaml
 from sandmould.engines.choosing import deck_hash
 from sandmould.study import batch_job
 from sandmould.study.batch_job import compute_batch, is_current
-from sandmould.study.batches import IN_3D, RATE, plan_batches
-from sandmould.study.expand import Run, expand, scenario_hash
-from sandmould.study.measure import LAST_MEASURED
+from sandmould.study.batches import plan_batches
+from sandmould.study.expand import Run, expand
+from sandmould.study.hashes import scenario_hash
+from sandmould.study.kinds.sand import IN_3D, RATE, planned_work
+from sandmould.study.moments import LAST_MEASURED
 from sandmould.study.opening import open_study
-from sandmould.study.plan import planned_grain_steps, write_plan
+from sandmould.study.plan import write_plan
 
 FREQUENCY = "vibration.0.frequency_hz"
 STUDY: dict[str, Any] = {
@@ -35,7 +37,7 @@ def runs_of(folder: Path, **changes: Any) -> list[Run]:
 
 def one_s(run: Run) -> float:
     in_3d = IN_3D if run.scenario.dimension == 3 else 1.0
-    return planned_grain_steps(run.scenario) / (RATE[run.scenario.engine.name] * in_3d)
+    return planned_work(run.scenario) / (RATE[run.scenario.engine.name] * in_3d)
 
 
 def test_short_runs_share_a_job_until_it_lasts_long_enough(tmp_path: Path) -> None:

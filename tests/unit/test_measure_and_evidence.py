@@ -160,7 +160,7 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
         (folder / name).write_text("")
     monkeypatch.setattr(evidence, "RECORDS", tmp_path / "records")
     # Hundreds of decks: another test hashes a study.
-    monkeypatch.setattr(evidence, "computed_hash", lambda scenario: scenario.engine.name)
+    monkeypatch.setattr(evidence, "_computed_hash", lambda run: run.scenario.engine.name)
     kept = evidence.record(path, tmp_path / "results")
     assert (kept / "agreement.tsv").exists()
     record = json.loads((kept / "record.json").read_text())

@@ -11,7 +11,8 @@ import pytest
 import yaml
 
 from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.study.plan import planned_grain_steps, write_plan
+from sandmould.study.kinds.sand import planned_work
+from sandmould.study.plan import write_plan
 from sandmould.study.planning import Plan, open_plan
 from sandmould.study.status import main, run_status, status_text
 
@@ -37,7 +38,7 @@ def ended(plan: Plan, place: int, outcome: Outcome, wall_s: float) -> None:
     run = plan.runs[place]
     folder = Path("results/trial/runs") / run.run
     RunOutcome(outcome, "why it is so", 1.0, 1.0).write(folder / "outcome.json")
-    steps = planned_grain_steps(run.scenario)
+    steps = planned_work(run.scenario)
     (folder / "cost.tsv").write_text(f"wall_s\tcpu_s\tgrain_steps\n{wall_s}\t{wall_s}\t{steps}\n")
 
 

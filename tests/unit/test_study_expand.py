@@ -12,14 +12,8 @@ import yaml
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.expand import (
-    MOST_PROBLEMS,
-    Run,
-    expand,
-    present,
-    replicate_seed,
-    scenario_hash,
-)
+from sandmould.study.expand import MOST_PROBLEMS, Run, expand, replicate_seed
+from sandmould.study.hashes import present, scenario_hash
 from sandmould.study.opening import open_study
 from sandmould.study.plan import read_run, write_plan
 from tests.bracket import BRACKET

@@ -17,14 +17,9 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import Run, expand
+from sandmould.study.kinds.sand import planned_steps, planned_work
 from sandmould.study.opening import open_study
-from sandmould.study.plan import (
-    plan_table,
-    planned_grain_steps,
-    planned_steps,
-    read_run,
-    write_plan,
-)
+from sandmould.study.plan import plan_table, read_run, write_plan
 from sandmould.study.planning import announce, open_plan
 
 LAMMPS = ("lammps", 2)
@@ -134,7 +129,7 @@ def test_stages_are_falls_and_vibrations() -> None:
     assert [stage.expected_s for stage in stages] == pytest.approx(expected)
     steps = [time / scene.step_s for time in expected]
     assert planned_steps(scene) == pytest.approx(sum(steps), abs=4)
-    assert planned_grain_steps(scene) == pytest.approx(300 * sum(steps[:2]) + 500 * sum(steps[2:]))
+    assert planned_work(scene) == pytest.approx(300 * sum(steps[:2]) + 500 * sum(steps[2:]))
 
 
 def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
@@ -153,7 +148,7 @@ def test_price_before_calibration_is_unknown(demo: list[Run]) -> None:
 
 
 def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
-    total = sum(planned_grain_steps(r.scenario) for r in demo)
+    total = sum(planned_work(r.scenario) for r in demo)
     # times well inside the range of their unit: the sums above carry round-off
     lines = plan_table(demo, {LAMMPS: total / 9000}, 1).splitlines()
     grains = sum(plan_counts(demo[0].scenario))
@@ -162,7 +157,7 @@ def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
     assert lines[-1].endswith("wall time on 1 cores: 2.5 h")
     assert plan_table(demo, {LAMMPS: total / 9000}, 2).endswith("on 2 cores: 75.0 min\n")
     # On more cores than runs the longest run decides.
-    longest = max(planned_grain_steps(r.scenario) for r in demo)
+    longest = max(planned_work(r.scenario) for r in demo)
     assert plan_table(demo, {LAMMPS: longest / 30}, 99).endswith("on 99 cores: 30 s\n")
 
 

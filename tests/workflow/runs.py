@@ -19,7 +19,9 @@ from sandmould.engines.products import finish
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import Run, scenario_hash
+from sandmould.study.expand import Run
+from sandmould.study.hashes import scenario_hash
+from sandmould.study.kinds.sand import PRODUCTS, complete
 from sandmould.study.plan import write_plan
 from sandmould.study.simulate import render_run
 
@@ -101,7 +103,8 @@ def drive(
     driver = driver_of(program, folder, "test", scenario_hash(scenario))
     outcome = driver.run()
     if not outcome.outcome.restartable:
-        finish(folder, scenario.dimension, outcome, driver.cost, {})
+        complete(scenario, folder / "work")
+        finish(folder, PRODUCTS, outcome, driver.cost, {})
     return outcome
 
 

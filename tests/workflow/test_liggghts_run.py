@@ -12,7 +12,7 @@ from sandmould.engines.driver import Driver
 from sandmould.engines.liggghts.render import write_deck
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.program import build_program
-from sandmould.study.expand import scenario_hash
+from sandmould.study.hashes import scenario_hash
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.workflow.runs import (
     computed,

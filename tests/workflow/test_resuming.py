@@ -14,7 +14,8 @@ from sandmould.engines.checkpoint import newest_checkpoint
 from sandmould.engines.driver import Driver
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.program import build_program
-from sandmould.study.expand import expand, scenario_hash
+from sandmould.study.expand import expand
+from sandmould.study.hashes import scenario_hash
 from sandmould.study.launch import RESTARTABLE_EXIT
 from sandmould.study.opening import open_study
 from tests.scenes import open_lammps, tube_scene

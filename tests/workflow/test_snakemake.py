@@ -13,9 +13,8 @@ import pytest
 from sandmould import ROOT
 from sandmould.engines.outcome import Outcome
 from sandmould.study.expand import expand
+from sandmould.study.kinds.kind import kind_of
 from sandmould.study.opening import open_study
-from sandmould.study.plan import kind_of
-from sandmould.study.planning import calibrated_rate
 from tests.workflow.runs import kill_at_a_checkpoint
 
 SNAKEMAKE = Path(sys.executable).parent / "snakemake"
@@ -41,8 +40,9 @@ def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Measure the engines' speeds once for all tests."""
     results = tmp_path_factory.mktemp("results")
     runs = [run for path in STUDIES for run in expand(open_study(path))]
-    for scenario in {kind_of(run.scenario): run.scenario for run in runs}.values():
-        calibrated_rate(scenario, results)
+    each = {kind_of(run.scenario).speed_class(run.scenario): run for run in runs}
+    for run in each.values():
+        kind_of(run.scenario).rate(run.scenario, results)
     return results / "calibration.json"
 
 

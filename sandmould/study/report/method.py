@@ -9,8 +9,10 @@ from typing import Any
 import pandas as pd
 
 from sandmould.scenario.contact import ContactLaw
+from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
+from sandmould.study.study import Objective
 from sandmould.study.words import listed, name_of, number, seconds
 
 _NO_TENSION = {
@@ -71,15 +73,30 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
     )
 
 
-def statistics_method(measure: str, at_vibration_s: float | None, better: str) -> Row:
-    """How the verdict was reached."""
-    at = "the end of vibration" if at_vibration_s is None else f"{at_vibration_s:g} s of vibration"
+def deck_method(scenario: OwnDeck, keys: Sequence[str], summary: pd.DataFrame) -> tuple[Row, ...]:
+    """What is known of the runs of a user's deck; see ``sand_method``."""
+    read = [f"{name_of(name)} from {column}" for name, column in scenario.measures.items()]
+    given = [f"{name} = {value}" for name, value in scenario.values.items() if
+             f"values.{name}" not in keys]  # fmt: skip
+    return (
+        Row("Engine", _engines(summary)),
+        Row("Deck", f"{scenario.template}, with {listed(given, most=20) or 'no fixed values'}"),
+        Row("Measures", listed(read, most=20) or "none"),
+        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
+        Row("Seeds", _seeds(summary)),
+    )
+
+
+def statistics_method(objective: Objective, ends: str) -> Row:
+    """How the verdict was reached; ``ends`` says when measures are taken without a time."""
+    at_s = objective.at_vibration_s
+    at = ends if at_s is None else f"{at_s:g} s of vibration"
     return Row(
         "Statistics",
-        f"{name_of(measure)} at {at}, {better} is better; a setting's ± is the 95 % interval of "
-        "its mean (Student). Settings with the same finished replicates are compared by paired "
-        "differences, others by Welch's test; intervals and p values of the best against the "
-        "others carry Bonferroni's factor.",
+        f"{name_of(objective.measure)} at {at}, {objective.better} is better; a setting's ± is the "
+        "95 % interval of its mean (Student). Settings with the same finished replicates are "
+        "compared by paired differences, others by Welch's test; intervals and p values of the "
+        "best against the others carry Bonferroni's factor.",
     )
 
 

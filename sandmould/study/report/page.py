@@ -9,27 +9,28 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, gather, read_provenance, read_study
+from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.plan import STUDY_FILE, read_run
 from sandmould.study.report.agreement import agreement_pages
 from sandmould.study.report.animation import BUDGET_BYTES
 from sandmould.study.report.certificate import certificate_pages
 from sandmould.study.report.chart import NARROW, SMALL, WIDE, lay_out
 from sandmould.study.report.curves import objective_charts, runs_of
+from sandmould.study.report.kinds import drives_of, kind_pages, notes_of
 from sandmould.study.report.known import known_pages
-from sandmould.study.report.method import Row, provenance_rows, sand_method, statistics_method
+from sandmould.study.report.method import Row, provenance_rows, statistics_method
 from sandmould.study.report.optimum import optimum_pages, with_surface
-from sandmould.study.report.sand import sand_pages, shown_runs
+from sandmould.study.report.sand import shown_runs
 from sandmould.study.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.study.rounds.ledger import read_ledger
 from sandmould.study.study import Study
-from sandmould.study.verdict import Verdict, judge, sand_notes
+from sandmould.study.verdict import Verdict, judge
 from sandmould.study.words import name_of, number
 
 TEMPLATES = ROOT / "templates" / "report"
@@ -72,9 +73,9 @@ class _Page:
     study: Study
     collected: Collected
     verdict: Verdict
-    scenario: Scenario
+    scenario: AnyScenario
     """Of the run that is shown."""
-    by_setting: dict[str, Scenario]
+    by_setting: dict[str, AnyScenario]
 
 
 def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
@@ -84,10 +85,8 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     if not scenarios:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
     any_scenario = next(iter(scenarios.values()))
-    stage = any_scenario.vibration[0] if any_scenario.vibration else None
-    deepest = _deepest_overlap_fraction(collected.summary)
     certified = bool(read_ledger(study_folder, study).certified_hz)
-    notes = sand_notes(keys, stage, deepest, seeks_best, certified)
+    notes = notes_of(any_scenario, collected, seeks_best, certified)
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
     verdict = judge(summary, keys, objective.measure, objective.better, notes, seeks_best)
@@ -104,13 +103,7 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     return _Page(study_folder, href, study, collected, verdict, scenario, by_setting)
 
 
-def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
-    column = "largest_overlap_fraction"
-    found = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
-    return float(found) if found > 0 else 0.0
-
-
-def _scenarios(study_folder: Path, runs: Sequence[str]) -> dict[str, Scenario]:
+def _scenarios(study_folder: Path, runs: Sequence[str]) -> dict[str, AnyScenario]:
     """Scenario of each run whose file can be read."""
     found = {}
     for run in runs:
@@ -123,19 +116,26 @@ def _scenarios(study_folder: Path, runs: Sequence[str]) -> dict[str, Scenario]:
 
 def _render(page: _Page, film_budget_bytes: int) -> str:
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
-    summary, objective = page.collected.summary, page.study.objective
+    summary = page.collected.summary
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
     known = known_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
-    certificate = certificate_pages(page.study_folder, page.study, page.collected, page.scenario)
+    certificate = None
+    if isinstance(page.scenario, Scenario):
+        certificate = certificate_pages(
+            page.study_folder, page.study, page.collected, page.scenario
+        )
     optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, certificate)
     charts = objective_charts(of_sweep.summary, verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
         charts = tuple(with_surface(c, optimum.optimum, verdict.measure) for c in charts)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
+    of_kind = kind_pages(
+        page.study_folder, page.scenario, page.collected, verdict, film_budget_bytes
+    )
     method: tuple[Row, ...] = (
-        *sand_method(page.scenario, keys, summary),
-        statistics_method(objective.measure, objective.at_vibration_s, objective.better),
+        *of_kind.method,
+        statistics_method(page.study.objective, of_kind.ends),
     )
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
@@ -145,7 +145,7 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
-    return environment.get_template("sand.html").render(
+    return environment.get_template(of_kind.template).render(
         title=page.study.title or page.study_folder.name,
         study_name=page.study_folder.name,
         verdict=verdict,
@@ -159,16 +159,14 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         statement=optimum or (agreement if agreement and agreement.is_question else known),
         key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
         objective_charts=[_both_sizes(c) for c in charts],
-        settings=settings_table(verdict, page.by_setting),
+        settings=settings_table(verdict, drives_of(page.by_setting)),
         runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
         method=method,
         provenance=provenance_rows(provenance),
         files=data_files(page.study_folder, page.href),
-        pages=sand_pages(page.study_folder, page.scenario, of_sweep, verdict, film_budget_bytes),
         both_sizes=_both_sizes,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
-        dimension=page.scenario.dimension,
-        vibrates=bool(page.scenario.vibration),
+        **of_kind.context,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,10 +19,15 @@ from sandmould.study.collect import Collected
 from sandmould.study.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.study.report import figures
 from sandmould.study.report.animation import Film, make_film
-from sandmould.study.report.chart import Chart
-from sandmould.study.report.curves import best_passage, runs_of, time_chart
+from sandmould.study.report.curves import runs_of
+from sandmould.study.report.measured import (
+    Curve,
+    late_conclusion,
+    measure_curves,
+    whole_conclusion,
+)
 from sandmould.study.verdict import Verdict, rank_runs
-from sandmould.study.words import listed, name_of, number, shown_scale
+from sandmould.study.words import listed, number
 
 _SECONDARY = (
     "solid_fraction", "apparent_density_corrected_kg_m3", "coordination", "bed_height_m",
@@ -37,15 +42,6 @@ class Panel:
     by_layer: str
     by_density: str
     alt: str
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A chart against time with the sentence that concludes it."""
-
-    chart: Chart
-    measure: str
-    conclusion: str
 
 
 @dataclass(frozen=True)
@@ -126,14 +122,14 @@ def sand_pages(
         layer_conclusion=_layer_conclusion(snapshots, scenario),
         films=films,
         film_scene=_film_scene(scenario, height_m),
-        tubes=_curves(
+        tubes=measure_curves(
             collected,
             verdict,
             _tube_measures(collected.curves, scenario, verdict),
-            _late_conclusion,
+            late_conclusion,
         ),
-        others=_curves(
-            collected, verdict, [m for m in _SECONDARY if m != verdict.measure], _whole_conclusion
+        others=measure_curves(
+            collected, verdict, [m for m in _SECONDARY if m != verdict.measure], whole_conclusion
         ),
     )
 
@@ -242,46 +238,6 @@ def _tube_measures(curves: pd.DataFrame, scenario: Scenario, verdict: Verdict) -
     """The objective first, then the filling of every tube."""
     fills = [f"{bore.name}_fill_fraction" for bore in scenario.scene.bores]
     return list(dict.fromkeys([verdict.measure, *(f for f in fills if f in curves)]))
-
-
-def _curves(
-    collected: Collected,
-    verdict: Verdict,
-    measures: Sequence[str],
-    conclude: Callable[[Collected, Verdict, str], str],
-) -> tuple[Curve, ...]:
-    found = []
-    for measure in measures:
-        chart = time_chart(collected.curves, collected.summary, verdict, collected.keys, measure)
-        if chart is not None:
-            found.append(Curve(chart, measure, conclude(collected, verdict, measure)))
-    return tuple(found)
-
-
-def _late_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:
-    """Whether the measure still changed at the end, at the best setting."""
-    passage = best_passage(collected, verdict, measure)
-    if verdict.best is None or passage is None or passage[1] == 0:
-        return ""
-    where, what = verdict.best.label, name_of(measure)
-    change = passage[2] / passage[1] - 1
-    if abs(change) < 0.02:
-        return f"At {where} it changed by less than 2 % in the last quarter of the vibration."
-    way = "rose" if change > 0 else "fell"
-    return (
-        f"At {where} the {what} still {way} by {100 * abs(change):.0f} % in the last quarter of "
-        "the vibration: a longer one may change the ranking."
-    )
-
-
-def _whole_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:
-    """How the measure changed over the vibration, at the best setting."""
-    passage = best_passage(collected, verdict, measure)
-    if verdict.best is None or passage is None:
-        return ""
-    first, _, last = (shown_scale(measure)[0] * v for v in passage)
-    way = "rose" if last > first else "fell"
-    return f"At {verdict.best.label} it {way} from {number(first)} to {number(last)}."
 
 
 def _density_conclusion(median_kg_m3: Sequence[float]) -> str:

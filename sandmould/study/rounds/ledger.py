@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.expand import present
+from sandmould.study.hashes import present
 from sandmould.study.study import Study
 from sandmould.study.sweep import Point
 

@@ -1,0 +1,129 @@
+"""The user's template: what keeps it from being rendered, and its deck."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import jinja2
+from jinja2 import meta
+
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.own_deck import RESERVED, OwnDeck
+
+RESTART_FILES = ("restart.a", "restart.b")
+"""Written in turn beside the folder that a deck runs in."""
+
+
+def with_hashes(scenario: OwnDeck) -> OwnDeck:
+    """The same run with the hashes of its files; without those that cannot be read."""
+    if scenario.sha256:
+        return scenario
+    return scenario.model_copy(update={"sha256": dict(_hashes(scenario))})
+
+
+def _hashes(scenario: OwnDeck) -> Iterator[tuple[str, str]]:
+    for name, path in scenario.paths.items():
+        if path.is_file():
+            yield name, hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def problems(scenario: OwnDeck) -> list[Problem]:
+    """List what keeps a template from being rendered with its values.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+    """
+    found = [
+        Problem("template" if n == scenario.template else "files", n, "a file that can be read")
+        for n, path in scenario.paths.items()
+        if not path.is_file()
+    ]
+    names = [Path(n).name for n in scenario.paths]
+    if len(set(names)) < len(names):
+        found.append(Problem("files", list(scenario.files), "files of different names"))
+    for name in set(RESERVED) & set(scenario.values):
+        found.append(
+            Problem(f"values.{name}", scenario.values[name], f"another name: {name} is given")
+        )
+    if scenario.engine.name == "liggghts" and scenario.engine.ranks > 1:
+        found.append(Problem("engine.ranks", scenario.engine.ranks, "1 on engine liggghts"))
+    return found or [*_template_problems(scenario)]
+
+
+def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
+    try:
+        used = names_used(scenario)
+        render(scenario, "run", "study", "restart")
+    except (jinja2.TemplateError, TypeError, ValueError, ArithmeticError) as error:
+        line = getattr(error, "lineno", None)
+        where = f"line {line}: " if line else ""
+        given = ", ".join(sorted({*scenario.values, *RESERVED}))
+        yield Problem(
+            "template", scenario.template, f"a template that renders ({where}{error}); it is "
+            f"given {given}"
+        )  # fmt: skip
+        return
+    for name in scenario.values:
+        if name not in used:
+            valid = f"a name that the template uses: {', '.join(sorted(used - set(RESERVED)))}"
+            yield Problem(f"values.{name}", scenario.values[name], valid)
+
+
+def names_used(scenario: OwnDeck) -> set[str]:
+    """Names that a template takes from outside.
+
+    Raises
+    ------
+    jinja2.TemplateSyntaxError
+    """
+    text = scenario.paths[scenario.template].read_text(encoding="utf-8")
+    return meta.find_undeclared_variables(_environment().parse(text))
+
+
+def render(scenario: OwnDeck, run: str, study: str, restart: str = "") -> str:
+    """Render the deck of a run.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+    run, study : str
+    restart : str
+        Restart file that the deck is to go on from; empty at the beginning.
+
+    Raises
+    ------
+    jinja2.TemplateError
+    """
+    text = scenario.paths[scenario.template].read_text(encoding="utf-8")
+    return _environment().from_string(text).render(
+        **scenario.values,
+        seed=scenario.seed,
+        run=run,
+        study=study,
+        restart=restart,
+        restart_files=" ".join(f"../{name}" for name in RESTART_FILES),
+    )  # fmt: skip
+
+
+def check_unchanged(scenario: OwnDeck) -> None:
+    """See that template and files are those of the plan.
+
+    Raises
+    ------
+    BadInputError
+    """
+    now = dict(_hashes(scenario))
+    changed = [n for n, planned in scenario.sha256.items() if now.get(n) != planned]
+    if changed:
+        valid = "the file as it was planned: plan the study again to run it as it is now"
+        raise BadInputError([Problem("file", name, valid) for name in changed])
+
+
+def _environment() -> jinja2.Environment:
+    # Without a loader: what a template includes from elsewhere no hash would know.
+    return jinja2.Environment(
+        undefined=jinja2.StrictUndefined, keep_trailing_newline=True, autoescape=False
+    )

@@ -1,0 +1,74 @@
+"""A run that the user's own template commands: what it is given, and what is read from it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from sandmould import ROOT
+from sandmould.scenario.quantity import NAME, Section, quantity
+from sandmould.scenario.sand import ARGUED
+
+RESERVED = ("seed", "run", "study", "restart", "restart_files")
+"""Names that a template is given beside the user's own values."""
+CLOCK = "Time"
+"""Column of the log that a deck must print: ``thermo_style custom step time ...``."""
+
+
+class DeckEngine(Section):
+    """Which program reads the deck, and with how many ranks."""
+
+    name: Literal["lammps", "liggghts"] = quantity(
+        "lammps", "Engine that reads the deck.", source=ARGUED
+    )
+    ranks: int = quantity(1, "MPI ranks of one run; 1 on liggghts.", source=ARGUED, ge=1, le=4096)
+
+
+class OwnDeck(Section):
+    """One run of a template of the user's, complete."""
+
+    engine: DeckEngine = Field(DeckEngine(), description="The engine.")
+    template: str = quantity(
+        ...,
+        "Jinja template of the deck, seen from the file that names it; in a resolved run, from "
+        "the repository.",
+        source="user",
+        min_length=1,
+    )
+    files: tuple[Annotated[str, Field(min_length=1)], ...] = quantity(
+        (), "Further files that the deck reads; they lie beside it when it runs.", source="user"
+    )
+    sha256: dict[str, str] = Field(
+        {}, description="Hash of template and files; the plan of a study writes it."
+    )
+    values: dict[Annotated[str, Field(pattern=NAME)], Any] = Field(
+        {}, description="Names that the template is given; any of them can be swept."
+    )
+    measures: dict[Annotated[str, Field(pattern=NAME)], str] = Field(
+        {},
+        description="Measures by name, and the column of the engine's log that each is read from, "
+        "such as fill_fraction: v_fill (LIGGGHTS heads it fill).",
+    )
+    steps: int | None = quantity(
+        None, "Time steps that the deck runs; progress and time left need it.", source="user", ge=1
+    )
+    expected_core_s: float = quantity(
+        600.0,
+        "Guess of the processor time of a run, for the plan and for a cluster's limits.",
+        unit="s",
+        source=ARGUED,
+        gt=0,
+        le=1e9,
+    )
+    memory_mb: int = quantity(
+        2000, "Memory that a cluster is asked for.", unit="MB", source=ARGUED, ge=100, le=10**7
+    )
+    seed: int = quantity(1, "Seed that the template is given.", source="user", ge=0, le=2**31 - 1)
+
+    @property
+    def paths(self) -> dict[str, Path]:
+        """Where template and files lie, by their names in the scenario."""
+        return {n: Path(os.path.normpath(ROOT / n)) for n in (self.template, *self.files)}

@@ -1,0 +1,1 @@
+"""Kinds of studies: what is simulated, and what each kind can be asked."""

@@ -1,0 +1,107 @@
+"""What the report of each kind of study shows beside verdict, settings and runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.collect import Collected
+from sandmould.study.kinds.kind import AnyScenario
+from sandmould.study.report.measured import Curve, measure_curves, whole_conclusion
+from sandmould.study.report.method import Row, deck_method, sand_method
+from sandmould.study.report.sand import sand_pages
+from sandmould.study.verdict import Verdict, sand_notes
+
+
+@dataclass(frozen=True)
+class KindPages:
+    """The part of a report that depends on what is simulated."""
+
+    template: str
+    """File of ``templates/report``."""
+    method: tuple[Row, ...]
+    ends: str
+    """When measures are taken, where the objective names no time."""
+    context: Mapping[str, Any]
+    """What the template is given beside what all are given."""
+
+
+def notes_of(
+    scenario: AnyScenario, collected: Collected, seeks_best: bool, is_certified: bool
+) -> tuple[str, ...]:
+    """What the kind of simulation leaves open.
+
+    Parameters
+    ----------
+    scenario : scenario of any kind
+    collected : Collected
+    seeks_best, is_certified : bool
+        Whether the study looks for the best setting; whether its controls have been run.
+    """
+    if isinstance(scenario, OwnDeck):
+        return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
+    stage = scenario.vibration[0] if scenario.vibration else None
+    deepest = _deepest_overlap_fraction(collected.summary)
+    return sand_notes(collected.keys, stage, deepest, seeks_best, is_certified)
+
+
+def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
+    column = "largest_overlap_fraction"
+    found = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
+    return float(found) if found > 0 else 0.0
+
+
+def kind_pages(
+    study_folder: Path,
+    scenario: AnyScenario,
+    collected: Collected,
+    verdict: Verdict,
+    film_budget_bytes: int,
+) -> KindPages:
+    """Draw what the kind of study shows.
+
+    Parameters
+    ----------
+    study_folder : Path
+    scenario : scenario of any kind
+        Of the run that is shown.
+    collected : Collected
+    verdict : Verdict
+    film_budget_bytes : int
+        Most that the film of one run may weigh.
+    """
+    of_sweep = collected.of_sweep
+    if isinstance(scenario, OwnDeck):
+        return KindPages(
+            "deck.html",
+            deck_method(scenario, collected.keys, collected.summary),
+            "the end of the deck's log",
+            {"curves": _deck_curves(scenario, of_sweep, verdict)},
+        )
+    return KindPages(
+        "sand.html",
+        sand_method(scenario, collected.keys, collected.summary),
+        "the end of vibration" if scenario.vibration else "the end",
+        {
+            "pages": sand_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes),
+            "dimension": scenario.dimension,
+            "vibrates": bool(scenario.vibration),
+        },
+    )
+
+
+def _deck_curves(scenario: OwnDeck, collected: Collected, verdict: Verdict) -> tuple[Curve, ...]:
+    """The objective first, then the other measures."""
+    measures = dict.fromkeys([verdict.measure, *scenario.measures])
+    return measure_curves(collected, verdict, list(measures), whole_conclusion)
+
+
+def drives_of(by_setting: Mapping[str, AnyScenario]) -> dict[str, Scenario]:
+    """Scenarios of sand among those of the settings, for the drive of the vibrating table."""
+    return {label: s for label, s in by_setting.items() if isinstance(s, Scenario)}

@@ -1,0 +1,209 @@
+"""Decks of the user's own: what is refused before anything starts, and what their logs say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+import yaml
+
+from sandmould.engines.own_deck.deck import check_unchanged, render, with_hashes
+from sandmould.engines.own_deck.thermo import read_thermo
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.own_deck import OwnDeck
+from sandmould.study.collect import collect
+from sandmould.study.expand import expand
+from sandmould.study.kinds import deck
+from sandmould.study.opening import open_study
+from sandmould.study.plan import plan_table, read_run, write_plan, write_study
+from sandmould.study.report.page import write_report
+
+TEMPLATE = """\
+variable a equal {{ angle_deg }}
+{% if restart %}read_restart {{ restart }}{% endif %}
+restart 10 {{ restart_files }}
+run {{ number }}
+"""
+STUDY: dict[str, Any] = {
+    "kind": "deck",
+    "scenario": {
+        "template": "chute.in.j2",
+        "values": {"angle_deg": 20, "number": 100},
+        "measures": {"speed_m_s": "v_speed"},
+        "expected_core_s": 30,
+    },
+    "sweep": {"keys": {"values.angle_deg": [10, 20]}},
+    "replicates": 2,
+    "objective": {"measure": "speed_m_s"},
+}
+LOG = """\
+LAMMPS (22 Jul 2025)
+run 100
+   Step          Time          v_speed
+         0   0              0
+WARNING: something 3 words long
+        50   0.5            1.5
+       100   1              2.5
+Loop time of 4.0 on 1 procs for 100 steps with 10 atoms
+
+Step 7 of a sentence
+"""
+
+
+def opened(folder: Path, text: str = TEMPLATE, /, **scenario: Any) -> Path:
+    """Write a template and a study of it."""
+    (folder / "chute.in.j2").write_text(text)
+    study = {**STUDY, "scenario": {**STUDY["scenario"], **scenario}}
+    path = folder / "trial.yaml"
+    path.write_text(yaml.safe_dump(study))
+    return path
+
+
+def test_every_point_gets_its_deck(tmp_path: Path) -> None:
+    runs = expand(open_study(opened(tmp_path)))
+    assert len(runs) == 4
+    text = render(runs[-1].scenario, "r", "s", "../restart.b")
+    assert "variable a equal 20" in text
+    assert "read_restart ../restart.b" in text
+    assert "restart 10 ../restart.a ../restart.b" in text
+    assert "read_restart" not in render(runs[0].scenario, "r", "s")
+    assert runs[0].run.startswith("angle_deg_10_r1_")
+
+
+@pytest.mark.parametrize(
+    ("template", "scenario", "told"),
+    [
+        (TEMPLATE, {"template": "other.in.j2"}, r"scenario.template = '.*other.in.j2' .* can be r"),
+        (TEMPLATE, {"files": ["grains.data"]}, r"scenario.files = '.*grains.data' .* can be read"),
+        (TEMPLATE + "{{ friction }}", {}, r"'friction' is undefined\); it is given angle_deg, n"),
+        ("{% if %}", {}, r"template that renders \(line 1: "),
+        (TEMPLATE + "{% include 'other' %}", {}, "no loader"),
+        (
+            TEMPLATE,
+            {"values": {"angle_deg": 20, "number": 1, "anlge": 3}},
+            r"scenario.values.anlge = 3 .* uses: angle_deg, number",
+        ),
+        (
+            TEMPLATE,
+            {"values": {"angle_deg": 20, "number": 1, "seed": 3}},
+            "scenario.values.seed = 3 cannot be used: valid is another name",
+        ),
+        (
+            TEMPLATE,
+            {"engine": {"name": "liggghts", "ranks": 2}},
+            r"scenario.engine.ranks = 2 .* 1 on engine liggghts",
+        ),
+        (TEMPLATE, {"engine": {"name": "reference"}}, "one of 'lammps' or 'liggghts'"),
+        (TEMPLATE, {"box": {}}, "one of the keys engine, expected_core_s, files"),
+        (TEMPLATE, {"files": ["sub/chute.in.j2"]}, "files of different names"),
+    ],
+)
+def test_what_cannot_run_is_told_in_one_sentence(
+    tmp_path: Path, template: str, scenario: dict[str, Any], told: str
+) -> None:
+    if scenario.get("files") == ["sub/chute.in.j2"]:
+        (tmp_path / "sub").mkdir()
+        (tmp_path / "sub" / "chute.in.j2").touch()
+    with pytest.raises(BadInputError, match=told):
+        expand(open_study(opened(tmp_path, template, **scenario)))
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        {"material": "rojek_2004"},
+        {"certificate": {"controls": ["hold"]}},
+        {"cross_check": {"engine": "liggghts", "at": {"values.angle_deg": 10}}},
+    ],
+)
+def test_sections_of_sand_are_refused(tmp_path: Path, section: dict[str, Any]) -> None:
+    path = opened(tmp_path)
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | section))
+    name = next(iter(section))
+    with pytest.raises(BadInputError, match=f"{name} = .* absent in a study of kind deck"):
+        open_study(path)
+
+
+def test_a_changed_template_is_another_run_and_stops_a_planned_one(tmp_path: Path) -> None:
+    before = expand(open_study(opened(tmp_path)))[0]
+    after = expand(open_study(opened(tmp_path, TEMPLATE + "# changed\n")))[0]
+    assert before.run != after.run
+    check_unchanged(after.scenario)
+    with pytest.raises(BadInputError, match="plan the study again"):
+        check_unchanged(before.scenario)
+    assert deck.computed_hash(before.scenario) == deck.computed_hash(after.scenario)
+    assert with_hashes(before.scenario) == before.scenario
+
+
+def test_the_plan_is_read_back_and_priced(tmp_path: Path) -> None:
+    study = open_study(opened(tmp_path))
+    runs = expand(study)
+    write_plan(runs, tmp_path / "results")
+    back = read_run(tmp_path / "results" / "runs" / runs[0].run / "scenario.yaml")
+    assert back == runs[0]
+    assert isinstance(back.scenario, OwnDeck)
+    text = plan_table(runs, {("lammps", 0): 1.0}, 2)
+    assert "4 runs, 120 core-seconds, wall time on 2 cores: 60 s" in text
+
+
+def test_a_log_is_read_past_warnings(tmp_path: Path) -> None:
+    (tmp_path / "one.log").write_text(LOG)
+    thermo = read_thermo([tmp_path / "one.log"])
+    assert thermo.table["v_speed"].tolist() == [0.0, 1.5, 2.5]
+    assert (thermo.steps, thermo.grains, thermo.grain_steps, thermo.loop_s) == (100, 10, 1e3, 4.0)
+
+
+def test_a_run_that_went_on_has_each_step_once(tmp_path: Path) -> None:
+    (tmp_path / "one.log").write_text(LOG.split("Loop")[0])
+    (tmp_path / "two.log").write_text(
+        "  Step Time v_speed\n 50 0.5 1.6\n 150 1.5 3\n"
+        "Loop time of 2.0 on 1 procs for 100 steps with 10 atoms\n"
+    )
+    table = read_thermo([tmp_path / "one.log", tmp_path / "two.log"]).table
+    assert table["Step"].tolist() == [0, 50, 150]
+    assert table["v_speed"].tolist() == [0, 1.6, 3]
+
+
+def test_a_log_without_a_table_is_empty(tmp_path: Path) -> None:
+    (tmp_path / "one.log").write_text("ERROR: something\n")
+    assert read_thermo([tmp_path / "one.log"]).table.empty
+
+
+def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
+    study = open_study(opened(tmp_path))
+    runs = expand(study)
+    folder = tmp_path / "results"
+    write_plan(runs, folder)
+    write_study(study.study, folder)
+    for run in runs:
+        angle_deg = run.parameters["values.angle_deg"]
+        speed = angle_deg / 10 + 0.0001 * angle_deg * run.replicate
+        of_run = folder / "runs" / run.run
+        pd.DataFrame({"time_s": [0.0, 1.0], "speed_m_s": [0.0, speed]}).to_csv(
+            of_run / "series.tsv", sep="\t", index=False
+        )
+        (of_run / "outcome.json").write_text(
+            '{"code": 0, "detail": "", "simulated_s": 1.0, "planned_s": 0.0}'
+        )
+        (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
+        deck.measure(run, of_run)
+        assert (of_run / "final.png").stat().st_size > 5000
+    collect(folder)
+    summary = pd.read_csv(folder / "summary.tsv", sep="\t")
+    assert summary["speed_m_s"].tolist() == pytest.approx([1.001, 1.002, 2.002, 2.004])
+    write_report(folder, folder / "report.html")
+    page = (folder / "report.html").read_text()
+    assert "Recommended among the settings swept: <b>20" in page
+    assert "speed from v_speed" in page
+    assert "vibration" not in page.split("<style>")[0] + page.split("</style>")[1]
+
+
+def test_at_a_time_of_vibration_nothing_is_measured(tmp_path: Path) -> None:
+    path = opened(tmp_path)
+    tree = yaml.safe_load(path.read_text())
+    tree["objective"]["at_vibration_s"] = 1.0
+    path.write_text(yaml.safe_dump(tree))
+    with pytest.raises(BadInputError, match=r"objective\.at_vibration_s = 1\.0"):
+        expand(open_study(path))

@@ -1,0 +1,183 @@
+"""Decks of the user's own on their engines: to the end, killed and gone on, broken."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import yaml
+
+from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.study.expand import expand
+from sandmould.study.opening import open_study
+from sandmould.study.plan import write_plan
+from sandmould.study.simulate import measure_run, render_run
+
+FALLING = """\
+{% if restart %}
+units si
+read_restart {{ restart }}
+{% else %}
+units si
+dimension 2
+atom_style sphere
+atom_modify map array
+boundary f f p
+newton off
+comm_modify vel yes
+region box block 0 0.02 -0.002 0.03 -0.001 0.001 units box
+create_box 1 box
+lattice sq 0.0022
+region sand block 0.001 0.019 0.002 0.014 -0.0005 0.0005 units box
+create_atoms 1 region sand
+set type 1 diameter 0.002
+set type 1 density/disc 2.4
+{% endif %}
+pair_style granular
+pair_coeff * * hooke 1000.0 0.5 tangential linear_history 700.0 0.5 0.3 damping coeff_restitution
+fix floor all wall/gran granular hooke 1000.0 0.5 tangential linear_history 700.0 0.5 0.3 &
+  damping coeff_restitution yplane 0.0 NULL
+fix sides all wall/gran granular hooke 1000.0 0.5 tangential linear_history 700.0 0.5 0.3 &
+  damping coeff_restitution xplane 0.0 0.02
+fix gravity all gravity {{ gravity_m_s2 }} vector 0 -1 0
+fix motion all nve/sphere disc
+fix plane all enforce2d
+timestep 2e-6
+variable height equal xcm(all,y)
+thermo_style custom step time v_height
+thermo 1000
+dump grains all custom 10000 grains.dump id x y
+restart 4000 {{ restart_files }}
+run {{ number }} upto
+"""
+FALLING_IN_LIGGGHTS = """\
+units si
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+region box block 0 0.02 0 0.02 -0.002 0.03 units box
+create_box 1 box
+create_atoms 1 single 0.01 0.01 0.01 units box
+set group all diameter 0.002 density {{ density_kg_m3 }}
+neighbor 0.001 bin
+fix young all property/global youngsModulus peratomtype 5e6
+fix poisson all property/global poissonsRatio peratomtype 0.45
+fix bounce all property/global coefficientRestitution peratomtypepair 1 0.5
+fix rub all property/global coefficientFriction peratomtypepair 1 0.3
+pair_style gran model hertz tangential history
+pair_coeff * *
+fix floor all wall/gran model hertz tangential history primitive type 1 zplane 0.0
+fix gravity all gravity 9.81 vector 0 0 -1
+fix motion all nve/sphere
+timestep 1e-5
+variable height equal xcm(all,z)
+thermo_style custom step time v_height
+thermo 100
+run 500
+"""
+
+
+def planned(folder: Path, template: str, **scenario: Any) -> Path:
+    """Plan and render a study of one run; its folder."""
+    (folder / "deck.in.j2").write_text(template)
+    study = {"kind": "deck", "scenario": {"template": "deck.in.j2", **scenario}}
+    (folder / "trial.yaml").write_text(yaml.safe_dump(study))
+    (run,) = expand(open_study(folder / "trial.yaml"))
+    write_plan([run], folder / "results")
+    of_run = folder / "results" / "runs" / run.run
+    render_run(of_run)
+    return of_run
+
+
+def compute(folder: Path) -> int:
+    """Compute a run as its job does; the exit status."""
+    return subprocess.run([*_command(folder)], capture_output=True).returncode
+
+
+def _command(folder: Path) -> list[str]:
+    return [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
+
+
+LAMMPS = {
+    "values": {"gravity_m_s2": 9.81, "number": 60000},
+    "measures": {"height_m": "v_height"},
+    "steps": 60000,
+}
+
+
+def test_a_killed_run_goes_on_from_its_restart_file(tmp_path: Path) -> None:
+    folder = planned(tmp_path, FALLING, **LAMMPS)
+    process = subprocess.Popen(_command(folder), stderr=subprocess.DEVNULL)
+    newest, log = folder / "work" / "restart.b", folder / "work" / "engine_1.log"
+    deadline = time.monotonic() + 60
+    while not (newest.exists() and "\n      8000 " in log.read_text()):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not (folder / "outcome.json").exists()
+    # The newest may be cut short; then the one before it serves.
+    os.truncate(newest, newest.stat().st_size // 2)
+    assert compute(folder) == 0
+    outcome = RunOutcome.read(folder / "outcome.json")
+    assert outcome.outcome is Outcome.FINISHED
+    assert "restart.b could not be gone on from" in outcome.detail
+    series = pd.read_csv(folder / "series.tsv", sep="\t")
+    assert series["log_Step"].tolist() == list(range(0, 60001, 1000))
+    assert outcome.simulated_s == series["time_s"].iloc[-1] == 0.12
+    # Columns of six discs of 2 mm fall straight down and stand: their middle is at 6 mm, less what
+    # the springs give.
+    assert 0.00595 < series["height_m"].iloc[-1] < 0.006
+    cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[0]
+    assert cost["steps"] < 60000  # of the attempt that ended
+    assert (folder / "output" / "grains.dump").is_file()
+    assert not (folder / "work").exists()
+    measure_run(folder)
+    assert "height_m" in pd.read_csv(folder / "measures.tsv", sep="\t")
+
+
+def test_a_deck_runs_on_liggghts(tmp_path: Path) -> None:
+    folder = planned(
+        tmp_path, FALLING_IN_LIGGGHTS, engine={"name": "liggghts"},
+        values={"density_kg_m3": 2400}, measures={"height_m": "height"},
+    )  # fmt: skip
+    assert compute(folder) == 0
+    outcome = RunOutcome.read(folder / "outcome.json")
+    assert outcome.outcome is Outcome.FINISHED, outcome.detail
+    height_m = pd.read_csv(folder / "series.tsv", sep="\t")["height_m"]
+    time_s = 0.005
+    # Velocity Verlet is exact in free fall; the log has seven digits.
+    assert abs(height_m.iloc[-1] - (0.01 - 9.81 * time_s**2 / 2)) < 1e-8
+
+
+def test_an_error_of_the_engine_is_quoted(tmp_path: Path) -> None:
+    lammps = planned(tmp_path, "units si\nbogus {{ a }}\n", values={"a": 1})
+    assert compute(lammps) == 0
+    outcome = RunOutcome.read(lammps / "outcome.json")
+    assert outcome.outcome is Outcome.ENGINE_FAILED
+    assert "LAMMPS says: ERROR: Unknown command: bogus 1" in outcome.detail
+    liggghts = planned(
+        tmp_path, "units si\nbogus {{ a }}\n", values={"a": 2}, engine={"name": "liggghts"}
+    )
+    assert compute(liggghts) == 0
+    assert "LIGGGHTS says: ERROR: Unknown command: bogus 2" in (
+        RunOutcome.read(liggghts / "outcome.json").detail
+    )
+
+
+def test_a_measure_that_the_log_lacks_is_told(tmp_path: Path) -> None:
+    few = {**LAMMPS, "values": {"gravity_m_s2": 9.81, "number": 1000}}
+    folder = planned(tmp_path, FALLING, **{**few, "measures": {"speed_m_s": "v_speed"}})
+    assert compute(folder) == 0
+    outcome = RunOutcome.read(folder / "outcome.json")
+    assert outcome.outcome is Outcome.BAD_INPUT
+    assert "lacks the column v_speed (measures.speed_m_s): it has Step, Time, v_h" in outcome.detail
+    measure_run(folder)  # what there is
