@@ -105,6 +105,7 @@ def open_study(path: Path) -> OpenStudy:
     base = study.scenario.model_dump(mode="json")
     found = sweep.problems(study.sweep, base, study.replicates) or [
         *comparing.problems(study),
+        *_reported(study),
         *calibration.problems(study.calibration, study.sweep),
         *rounds.problems(study.refine, study.sweep, study.objective.better, study.scenario.seed),
         *certificate.problems(
@@ -131,6 +132,13 @@ def _not_of_its_kind(tree: Tree) -> Iterator[Problem]:
     for name in ONLY_SAND if tree.get("kind", "sand") != "sand" else ():
         if tree.get(name):
             yield Problem(name, tree[name], f"absent in a study of kind {tree['kind']}")
+
+
+def _reported(study: Study) -> Iterator[Problem]:
+    """Best values by others need the one key that they are values of."""
+    if study.objective.reported_best and len(study.sweep.swept) != 1:
+        shown = [one.value for one in study.objective.reported_best]
+        yield Problem("objective.reported_best", shown, "absent unless one key is swept")
 
 
 def _files(path: Path) -> list[_File]:

@@ -18,7 +18,7 @@ from sandmould.study.sweep import Sweep
 
 
 class Reported(Section):
-    """A value of the measure that someone else has reported."""
+    """A value that someone else has reported."""
 
     value: float = quantity(..., "Reported value.", unit="of the column", source="user")
     by: str = quantity(..., "Who reports it, and where.", source="user")
@@ -39,6 +39,9 @@ class Objective(Section):
         source=ARGUED,
     )
     reported: Reported | None = Field(None, description="What the measure is compared with.")
+    reported_best: tuple[Reported, ...] = Field(
+        (), description="Values of the one swept key that others have found best."
+    )
     at_vibration_s: float | None = quantity(
         None,
         "Time of vibration at which the measure is taken; its end unless given.",

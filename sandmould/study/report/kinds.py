@@ -13,9 +13,11 @@ from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected
 from sandmould.study.kinds.kind import AnyScenario
+from sandmould.study.report.filling import filling_pages
 from sandmould.study.report.measured import Curve, measure_curves, whole_conclusion
 from sandmould.study.report.method import Row, deck_method, sand_method
 from sandmould.study.report.sand import sand_pages
+from sandmould.study.study import Study
 from sandmould.study.verdict import Verdict, sand_notes
 
 
@@ -28,6 +30,8 @@ class KindPages:
     method: tuple[Row, ...]
     ends: str
     """When measures are taken, where the objective names no time."""
+    advice: tuple[str, ...]
+    """What follows the verdict."""
     context: Mapping[str, Any]
     """What the template is given beside what all are given."""
 
@@ -59,6 +63,7 @@ def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
 
 def kind_pages(
     study_folder: Path,
+    study: Study,
     scenario: AnyScenario,
     collected: Collected,
     verdict: Verdict,
@@ -69,6 +74,7 @@ def kind_pages(
     Parameters
     ----------
     study_folder : Path
+    study : Study
     scenario : scenario of any kind
         Of the run that is shown.
     collected : Collected
@@ -82,16 +88,21 @@ def kind_pages(
             "deck.html",
             deck_method(scenario, collected.keys, collected.summary),
             "the end of the deck's log",
+            (),
             {"curves": _deck_curves(scenario, of_sweep, verdict)},
         )
+    filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),
         "the end of vibration" if scenario.vibration else "the end",
+        filling.advice if filling else (),
         {
             "pages": sand_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes),
             "dimension": scenario.dimension,
             "vibrates": bool(scenario.vibration),
+            "filling": filling,
+            "reported_best": study.objective.reported_best,
         },
     )
 

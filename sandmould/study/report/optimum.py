@@ -76,6 +76,7 @@ def optimum_pages(
         if optimum.interval(key)[1] - optimum.interval(key)[0] > width
     ]
     said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
+    said += _beside(optimum, study)
     if study.refine.rounds:
         said.append(_effort(ledger, study, summary))
     sound = not ends and not wide
@@ -137,6 +138,19 @@ def _flat(optimum: Optimum, study: Study, key: str) -> str:
 
 def _rounded(value: float) -> float:
     return float(f"{value:.3g}")
+
+
+def _beside(optimum: Optimum, study: Study) -> list[str]:
+    """What others have found best, beside the interval."""
+    if len(optimum.keys) > 1:
+        return []
+    (key,) = optimum.keys
+    low, high = optimum.interval(key)
+    return [
+        f"{value_text(key, one.value)} by {one.by} "
+        f"{'lies' if low <= one.value <= high else 'does not lie'} in the interval."
+        for one in study.objective.reported_best
+    ]
 
 
 def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:

@@ -131,7 +131,7 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         charts = tuple(with_surface(c, optimum.optimum, verdict.measure) for c in charts)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
     of_kind = kind_pages(
-        page.study_folder, page.scenario, page.collected, verdict, film_budget_bytes
+        page.study_folder, page.study, page.scenario, page.collected, verdict, film_budget_bytes
     )
     method: tuple[Row, ...] = (
         *of_kind.method,
@@ -166,6 +166,7 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         files=data_files(page.study_folder, page.href),
         both_sizes=_both_sizes,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
+        advice=of_kind.advice,
         **of_kind.context,
     )
 

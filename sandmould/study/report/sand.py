@@ -129,7 +129,7 @@ def sand_pages(
             late_conclusion,
         ),
         others=measure_curves(
-            collected, verdict, [m for m in _SECONDARY if m != verdict.measure], whole_conclusion
+            collected, verdict, _other_measures(scenario, verdict), whole_conclusion
         ),
     )
 
@@ -238,6 +238,12 @@ def _tube_measures(curves: pd.DataFrame, scenario: Scenario, verdict: Verdict) -
     """The objective first, then the filling of every tube."""
     fills = [f"{bore.name}_fill_fraction" for bore in scenario.scene.bores]
     return list(dict.fromkeys([verdict.measure, *(f for f in fills if f in curves)]))
+
+
+def _other_measures(scenario: Scenario, verdict: Verdict) -> list[str]:
+    """How deep the sand has come into every tube, and what the bed does."""
+    fronts = [f"{bore.name}_front_depth_m" for bore in scenario.scene.bores]
+    return [m for m in (*fronts, *_SECONDARY) if m != verdict.measure]
 
 
 def _density_conclusion(median_kg_m3: Sequence[float]) -> str:

@@ -1,0 +1,89 @@
+"""What the report says of the filling of a cavity, against planted curves."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sandmould.study.collect import gather, read_study
+from sandmould.study.report.filling import FillingPages, filling_pages
+from sandmould.study.report.page import write_report
+from sandmould.study.study import Study
+from sandmould.study.verdict import judge
+from tests.unit.report_study import DURATION_S, KEY, scenario, write_study
+
+BEST_HZ = 40.0
+HZ = (10.0, 20.0, BEST_HZ, 80.0, 160.0)
+
+
+def planted(height: float) -> dict[float, float]:
+    """Fill at the end: up as the frequency, down as its square root."""
+    return {
+        f: height * (f / BEST_HZ if f <= BEST_HZ else math.sqrt(BEST_HZ / f)) for f in HZ
+    }  # fmt: skip
+
+
+def pages(folder: Path, height: float, spread: float, **objective: object) -> FillingPages:
+    """A study on disk with what its report says."""
+    write_study(folder, planted(height), failed=(), spread=spread)
+    tree = read_study(folder).model_dump(mode="json")
+    tree["objective"] |= objective
+    tree["sweep"]["keys"] = {KEY: list(HZ)}
+    study = Study.model_validate(tree)
+    collected = gather(folder)
+    verdict = judge(collected.summary, collected.keys, "tube_fill_fraction", "larger", ())
+    found = filling_pages(study, collected, verdict, scenario(BEST_HZ))
+    assert found is not None
+    return found
+
+
+def test_limbs_and_time_are_found_again(tmp_path: Path) -> None:
+    found = pages(tmp_path / "fast", 0.9, 1e-4)
+    rise, fall = (float(x.replace("−", "-")) for x in re.findall(r"of (\S+) ±", found.limbs))
+    assert rise == pytest.approx(1.0, abs=0.01)
+    assert fall == pytest.approx(-0.5, abs=0.01)
+    assert "fastest over the first 0.50 s at 40 Hz" in found.limbs
+    # Fill and solid fraction as the runs were planted; records come a quarter of a second apart.
+    end = 1 - math.exp(-2 * DURATION_S)
+    level = 0.95 * (0.78 + 0.04 * end)
+    reached_s = -math.log(1 - level * end / 0.9) / 2
+    told = float(re.search(r"at 40 Hz after (\S+)", found.advice[1]).group(1))  # type: ignore[union-attr]
+    assert told == pytest.approx(reached_s, abs=0.05)
+    assert found.advice[0] == (
+        "At 40 Hz the box moves 0.233 mm to either side at 40 Hz: 58.5 mm/s and 1.50 g at most."
+    )
+
+
+def test_a_cavity_that_does_not_fill_is_told(tmp_path: Path) -> None:
+    found = pages(tmp_path / "slow", 0.5, 0.002)
+    assert found.advice[1].startswith("0 of 3 runs at 40 Hz reach 95 % of what the cavity holds")
+    assert "after 2 s it holds 61 % of it" in found.advice[1]
+
+
+def test_the_chart_has_a_curve_a_time_and_what_others_found(tmp_path: Path) -> None:
+    reported = [{"value": 65.0, "by": "someone"}]
+    chart = pages(tmp_path / "chart", 0.5, 0.002, reported_best=reported).chart
+    assert chart is not None
+    assert [line.label for line in chart.lines] == ["0 s", "0.25 s", "0.50 s", "1 s", "2 s", ""]
+    assert chart.lines[-1].title == "best by someone"
+    assert np.allclose(chart.lines[-1].xy[:, 0], 65.0)
+    assert chart.lines[4].xy[:, 1].argmax() == 2
+
+
+def test_the_page_shows_it(tmp_path: Path) -> None:
+    folder = write_study(tmp_path / "tube")
+    write_report(folder, folder / "report.html")
+    page = (folder / "report.html").read_text()
+    assert "Filling over what is swept" in page
+    assert "the box moves" in page
+
+
+def test_other_measures_have_no_filling(tmp_path: Path) -> None:
+    folder = write_study(tmp_path / "tube")
+    collected = gather(folder)
+    verdict = judge(collected.summary, collected.keys, "solid_fraction", "larger", ())
+    assert filling_pages(read_study(folder), collected, verdict, scenario(50.0)) is None
