@@ -21,11 +21,17 @@ def run_label(parameters: Point) -> str:
             parent, name = "", "engine"
         value = parameters[key]
         words.append(letters(parent + name.removesuffix(_unit_suffix(key)))[:16])
-        if isinstance(value, int | float):
-            words.append(f"{value:.4g}".replace("-", "m").replace(".", "p").replace("+", ""))
+        if isinstance(value, list) and all(isinstance(v, int | float) for v in value):
+            words += [_digits(v) for v in value]
+        elif isinstance(value, int | float):
+            words.append(_digits(value))
         elif isinstance(value, str):
             words.append(letters(value)[:12])
     return "_".join(words) or "base"
+
+
+def _digits(value: float) -> str:
+    return f"{value:.4g}".replace("-", "m").replace(".", "p").replace("+", "")
 
 
 def letters(text: str) -> str:

@@ -94,7 +94,26 @@ def test_labels_are_short_and_safe(runs_of: Runs) -> None:
                                    "contact.grain_wall.friction": [0.1]}})  # fmt: skip
     assert runs[0].run.startswith("grain_grain_fric_0p25_grain_wall_frict_0p1_r1_")
     assert runs_of(sweep=swept(fill__drop_height_m=[1e-5]))[0].run.startswith("drop_height_1em05_")
+    sideways = runs_of(sweep=swept(vibration__0__direction=[[1, 0.5]]))
+    assert sideways[0].run.startswith("direction_1_0p5_r1_")
     assert runs_of()[0].run.startswith("base_r1_")
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("vibration.0.acceleration_g", [1.0, 2.0]),
+        ("vibration.0.direction", ["vertical", "horizontal", [1.0, 1.0]]),
+        ("vibration.0.duration_s", [1.0, 3.0]),
+        ("fill.layers.0.height_m", [0.02, 0.027]),
+        ("obstacles.0.diameter_m", [0.02, 0.024]),
+        ("obstacles.0.length_m", [0.04, 0.05]),
+    ],
+)
+def test_any_key_of_the_scene_can_be_swept(runs_of: Runs, key: str, values: list[Any]) -> None:
+    runs = runs_of(sweep={"keys": {key: values}})
+    assert [run.parameters[key] for run in runs] == values
+    assert len({run.run.rsplit("_r", 1)[0] for run in runs}) == len(values)
 
 
 def test_replicates_are_blocks_with_the_same_seed_at_every_point(runs_of: Runs) -> None:
