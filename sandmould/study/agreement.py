@@ -100,12 +100,12 @@ def compare_keys(
         for rest, alike in group_settings(summary, [k for k in others if k not in over]):
             at = setting_text(rest) if rest else ""
             for (a, rows), (b, other_rows) in combinations(group_settings(alike, [key]), 2):
-                pair = _shown(key, a[key]), _shown(key, b[key])
+                pair = shown_value(key, a[key]), shown_value(key, b[key])
                 found += _compare(key, pair, at, (rows, other_rows), equivalence, over)
     return tuple(sorted(found, key=lambda c: list(equivalence.margins).index(c.measure)))
 
 
-def _shown(key: str, value: Any) -> str:
+def shown_value(key: str, value: Any) -> str:
     """A value by itself where it is a word, with what it is a value of where it is a number."""
     return value_text(key, value) if isinstance(value, str) else setting_text({key: value})
 

@@ -44,6 +44,8 @@ class Recorded:
     replicates: int
     confidence: float
     record: dict[str, Any]
+    keys: tuple[str, ...]
+    """Keys whose values are compared."""
     compared: tuple[Compared, ...]
     speeds: tuple[Speed, ...]
 
@@ -71,6 +73,7 @@ def read_recorded(folder: Path) -> Recorded:
         study.replicates,
         study.equivalence.confidence,
         record,
+        study.equivalence.keys,
         compare_study(summary, keys, study),
         speeds(summary),
     )
@@ -89,21 +92,27 @@ def page_text(records: Path = RECORDS) -> str:
     if missing:
         raise SystemExit(f"no record of {', '.join(missing)} in {records}: make twins")
     twins, *effects = (read_recorded(records / name) for name in names)
-    environment = Environment(
+    template = environment().get_template("engine_twins.md.j2")
+    return template.render(twins=twins, effects=effects)
+
+
+def environment() -> Environment:
+    """Templates of the documentation's pages, with the words that they use."""
+    made = Environment(
         loader=FileSystemLoader(TEMPLATES),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.globals = {
-        **environment.globals,
+    made.globals = {
+        **made.globals,
         "number": number,
         "seconds": seconds,
         "name_of": name_of,
         "interval_text": interval_text,
     }
-    return environment.get_template("engine_twins.md.j2").render(twins=twins, effects=effects)
+    return made
 
 
 def main() -> int:
