@@ -34,7 +34,7 @@ def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> Non
     ranks : int
         MPI ranks; 1 for an engine whose ranks are threads of one process.
     mpi : str
-        Command that starts ranks, such as ``srun --mpi=pmix``.
+        Command that starts ranks, such as ``srun --mpi=pmi2``.
 
     Raises
     ------

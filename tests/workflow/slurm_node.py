@@ -100,6 +100,10 @@ class SlurmNode:
         known = dict(line.split() for line in lines)
         return {job: state for job, state in known.items() if state in ("PENDING", "RUNNING")}
 
+    def cores(self, job: str) -> int:
+        """Cores that a job asks for."""
+        return int(self._run("squeue", "-h", "-j", job, "-o", "%C"))
+
     def cancel(self, job: str) -> None:
         """Cancel a job, as a user or an operator does."""
         self._run("scancel", job)

@@ -29,6 +29,15 @@ scenario:
 sweep: {keys: {vibration.0.frequency_hz: [25, 50, 100, 200]}}
 replicates: 2
 """
+RANKS = """\
+based_on: tube
+scenario:
+  engine: {name: lammps, ranks: 2}
+  sand: {size_scale: 12, size_classes: 3}
+  fill: {layers: [{count: 40}]}
+  time_step: {fraction: 0.8}
+  vibration: []
+"""
 LIMIT_S = 240.0
 
 
@@ -61,22 +70,45 @@ def simulating(folder: Path) -> list[int]:
     return found
 
 
+def study_folder(folder: Path, study: str) -> Path:
+    """A place to run a study in, with all that the workflow needs."""
+    folder.mkdir()
+    for name in ("Snakefile", "workflow", "templates", "config", "profiles"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "small.yaml").write_text(study)
+    return folder
+
+
+# Two or so runs share a job, and the queue of an empty node is asked more often.
+COMMAND = [
+    sys.executable, "-m", "sandmould.study.drive", "small.yaml",
+    "--workflow-profile", "profiles/slurm", "--config", "batch_wall_s=8",
+    "--slurm-init-seconds-before-status-checks", "1", "--latency-wait", "5",
+    "--default-resources", "mem_mb=500", "runtime=5",
+]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_run_of_two_ranks_gets_two_cores(slurm: SlurmNode, tmp_path: Path) -> None:
+    folder = study_folder(tmp_path / "study", RANKS)
+    with (tmp_path / "log").open("wb") as file:
+        process = subprocess.Popen(
+            COMMAND, cwd=folder, env=slurm.environment, stdout=file, stderr=file,
+            start_new_session=True,
+        )  # fmt: skip
+    wait_for(lambda: bool(slurm.jobs()), process, tmp_path / "log")
+    (job,) = slurm.jobs()
+    assert slurm.cores(job) == 2  # a rank has one core, not as many as the run has
+    assert process.wait(LIMIT_S) == 0, (tmp_path / "log").read_text()[-3000:]
+    (cost,) = (folder / "results" / "small" / "runs").glob("*/cost.tsv")
+    assert pd.read_csv(cost, sep="\t")["ranks"].tolist() == [2]
+
+
 @pytest.mark.slow
 def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished_run(
     slurm: SlurmNode, tmp_path: Path
 ) -> None:
-    folder = tmp_path / "study"
-    folder.mkdir()
-    for name in ("Snakefile", "workflow", "templates", "config", "profiles"):
-        (folder / name).symlink_to(ROOT / name)
-    (folder / "small.yaml").write_text(STUDY)
-    # Two or so runs share a job, and the queue of an empty node is asked more often.
-    command = [
-        sys.executable, "-m", "sandmould.study.drive", "small.yaml",
-        "--workflow-profile", "profiles/slurm", "--config", "batch_wall_s=8",
-        "--slurm-init-seconds-before-status-checks", "1", "--latency-wait", "5",
-        "--default-resources", "mem_mb=500", "runtime=5",
-    ]  # fmt: skip
+    folder = study_folder(tmp_path / "study", STUDY)
     log = tmp_path / "first.log"
     outcomes = folder / "results" / "small" / "runs"
 
@@ -85,7 +117,7 @@ def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished
 
     with log.open("wb") as file:
         process = subprocess.Popen(
-            command, cwd=folder, env=slurm.environment, stdout=file, stderr=file,
+            COMMAND, cwd=folder, env=slurm.environment, stdout=file, stderr=file,
             start_new_session=True,
         )  # fmt: skip
     wait_for(lambda: bool(simulating(folder)), process, log)
@@ -100,7 +132,7 @@ def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished
     assert len(finished) < 8
 
     ran = subprocess.run(
-        command, cwd=folder, env=slurm.environment, capture_output=True, text=True, timeout=LIMIT_S
+        COMMAND, cwd=folder, env=slurm.environment, capture_output=True, text=True, timeout=LIMIT_S
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
     summary = pd.read_csv(folder / "results" / "small" / "summary.tsv", sep="\t")

@@ -39,6 +39,7 @@ rule simulate:
     threads: threads_of
     resources:
         tasks=ranks_of,
+        cpus_per_task=cpus_per_task_of,
         mpi=mpi_of,
         mem_mb=memory_mb_of,
         runtime=runtime_min_of,
@@ -96,6 +97,7 @@ rule batch:
     threads: batch_threads_of
     resources:
         tasks=batch_ranks_of,
+        cpus_per_task=batch_cpus_per_task_of,
         mpi=batch_mpi_of,
         mem_mb=batch_memory_mb_of,
         runtime=batch_runtime_min_of,

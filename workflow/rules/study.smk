@@ -42,6 +42,11 @@ def ranks_of(wildcards):
     return PLAN.ranks(wildcards.run)
 
 
+def cpus_per_task_of(wildcards):
+    # Slurm would take threads for the cores of every rank.
+    return PLAN.threads(wildcards.run) // PLAN.ranks(wildcards.run)
+
+
 def mpi_of(wildcards):
     # Slurm's jobs of one task must not be told of it.
     return MPI if PLAN.ranks(wildcards.run) > 1 else ""
@@ -75,6 +80,10 @@ def batch_threads_of(wildcards):
 
 def batch_ranks_of(wildcards):
     return PLAN.ranks(wildcards.batch)
+
+
+def batch_cpus_per_task_of(wildcards):
+    return PLAN.threads(wildcards.batch) // PLAN.ranks(wildcards.batch)
 
 
 def batch_mpi_of(wildcards):
