@@ -3,7 +3,7 @@
 # The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, status, decks, schema, lock,
 # twins (the engines compared, docs/engine_twins.md), verification (docs/verification.md),
 # stability (docs/stability.md), benchmarks (docs/speed.md), peers (docs/calibration_peers.md),
-# results-check, clean.
+# scaling (docs/scaling.md), results-check, clean.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= $(shell nproc)
@@ -13,7 +13,7 @@ INSTALLED := .venv/installed
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
-.PHONY: demo study plan status twins verification stability test lint decks schema lock results-check clean benchmarks peers
+.PHONY: demo study plan status twins verification stability test lint decks schema lock results-check clean benchmarks peers scaling
 
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
@@ -46,6 +46,9 @@ benchmarks: $(INSTALLED)
 # The peers need an older numpy, so they have an environment of their own.
 peers: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.calibration $(QUICK)
+
+scaling: $(INSTALLED) .venv-peers/installed
+	@$(BIN)/python -m benchmarks.scaling $(QUICK)
 
 .venv-peers/installed: benchmarks/peers/requirements.txt
 	$(PYTHON) -m venv .venv-peers

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import theilslopes
 
 Array = NDArray[np.float64]
 
@@ -166,6 +165,9 @@ def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT)
     if len(x) < FEWEST_POINTS:
         nowhere = (math.nan, math.nan)
         return Flank(name, math.nan, math.nan, nowhere, nowhere)
+    # scipy.stats takes most of a second to import, and most runs have no heap.
+    from scipy.stats import theilslopes
+
     slope, intercept = theilslopes(z, x)[:2]
     angle = math.atan(abs(slope))
     se = math.degrees(_slope_error(x, z - intercept - slope * x) * math.cos(angle) ** 2)

@@ -1,20 +1,27 @@
-"""The job that computes a batch of runs, one after the other."""
+"""The job that computes a batch of runs, one after the other or several at a time."""
 
 from __future__ import annotations
 
+import itertools
 import json
+import multiprocessing
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.batches import is_done
 from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import kind_of
-from sandmould.study.launch import launch
+from sandmould.study.launch import die_with_parent, launch
 from sandmould.study.moments import LAST_MEASURED
 from sandmould.study.plan import read_run
 from sandmould.study.simulate import measure_run, render_run
+from sandmould.study.words import listed
 
 
 def is_current(folder: Path) -> bool:
@@ -29,7 +36,9 @@ def is_current(folder: Path) -> bool:
     return there and (origin.get("scenario_sha256"), origin.get("template_sha256")) == wanted
 
 
-def compute_batch(folders: Sequence[Path], logs: Path, ranks: int, mpi: str) -> None:
+def compute_batch(
+    folders: Sequence[Path], logs: Path, ranks: int, mpi: str, side_by_side: int = 1
+) -> None:
     """Compute and measure runs, those left out that are there already.
 
     Parameters
@@ -39,20 +48,70 @@ def compute_batch(folders: Sequence[Path], logs: Path, ranks: int, mpi: str) -> 
     logs : Path
     ranks : int
     mpi : str
+    side_by_side : int
+        Runs at a time.
 
     Raises
     ------
     SystemExit
         At the end, when a run stopped or broke: the same job continues it and redoes none.
     """
-    stopped = []
-    for folder in folders:
-        try:
-            _compute(folder, logs / f"simulate_{folder.name}.log", ranks, mpi)
-        except (Exception, SystemExit) as stop:  # one bad run must not stop the others
-            stopped.append(f"{folder.name}: {stop}")
+    stop = _Stop()
+
+    def work(place_of_next: Callable[[], int]) -> None:
+        """Take the next run until none is left or the job is asked to end."""
+        while not stop.asked and (place := place_of_next()) < len(folders):
+            folder = folders[place]
+            try:
+                _compute(folder, logs / f"simulate_{folder.name}.log", ranks, mpi)
+            except (Exception, SystemExit) as broken:  # one bad run must not stop the others
+                print(f"{folder.name}: {broken}", file=sys.stderr, flush=True)
+
+    before = signal.signal(signal.SIGTERM, stop)
+    if side_by_side == 1:
+        work(itertools.count().__next__)
+    else:
+        _side_by_side(side_by_side, work, stop)
+    signal.signal(signal.SIGTERM, before)
+    stopped = [folder.name for folder in folders if not is_done(folder)]
     if stopped:
-        raise SystemExit("\n".join(stopped))
+        raise SystemExit(f"{len(stopped)} of {len(folders)} stopped or broke: {listed(stopped)}")
+
+
+def _side_by_side(number: int, work: Callable[[Callable[[], int]], None], stop: _Stop) -> None:
+    """Let processes work that share the libraries, which are loaded, and the list of runs."""
+    fork = multiprocessing.get_context("fork")
+    taken = fork.Value("i", 0)
+
+    def place_of_next() -> int:
+        with taken.get_lock():
+            taken.value += 1
+            return int(taken.value) - 1
+
+    def work_beside() -> None:
+        die_with_parent()
+        stop.workers = []  # those are the parent's
+        work(place_of_next)
+
+    for _ in range(number):
+        worker = fork.Process(target=work_beside)
+        worker.start()
+        stop.workers.append(worker)
+    for started in stop.workers:
+        started.join()
+
+
+class _Stop:
+    """Hears that the job is asked to end, and tells those that work beside it."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self.workers: list[BaseProcess] = []
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        self.asked = True
+        for worker in self.workers:
+            worker.terminate()
 
 
 def _compute(folder: Path, log: Path, ranks: int, mpi: str) -> None:

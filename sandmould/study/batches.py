@@ -4,20 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
 
 from sandmould.study.expand import Run
 from sandmould.study.kinds.kind import kind_of
+from sandmould.study.moments import LAST_MEASURED
+
+START_S = 2.0
+"""What a run takes beside its steps: its process and its measures (docs/scaling.md)."""
+
+
+def is_done(run_folder: Path) -> bool:
+    """Whether a run is computed and measured; a failed one is, too."""
+    return all((run_folder / name).exists() for name in ("outcome.json", LAST_MEASURED))
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs that one job computes one after the other; all need as many cores."""
+    """Runs that one job computes, so many at a time; all need as many cores."""
 
     name: str
     runs: tuple[Run, ...]
+    side_by_side: int = 1
 
 
-def plan_batches(runs: Sequence[Run], wall_s: float) -> list[Batch]:
+class _Alike(NamedTuple):
+    """What runs of one batch have in common."""
+
+    engine: str
+    threads: int
+    ranks: int
+
+
+def planned_wall_s(run: Run) -> float:
+    """Wall time that batches count on for a run, in a job that is there already."""
+    return START_S + kind_of(run.scenario).predicted_s(run.scenario)
+
+
+def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Batch]:
     """Share runs out among jobs.
 
     A batch is closed once it is predicted to last long enough. Its name is that of its first run,
@@ -27,23 +52,35 @@ def plan_batches(runs: Sequence[Run], wall_s: float) -> list[Batch]:
     ----------
     runs : sequence of Run
     wall_s : float, s
+    cores : int
+        That a job should have; runs that leave some of them free are computed side by side. One
+        run under MPI has a job's cores for itself.
     """
     batches: list[Batch] = []
-    kept: dict[tuple[str, int], list[Run]] = {}
-    filled: dict[tuple[str, int], float] = {}
+    kept: dict[_Alike, list[Run]] = {}
+    filled: dict[_Alike, float] = {}
 
-    def close(alike: tuple[str, int]) -> None:
+    def beside(alike: _Alike) -> int:
+        return 1 if alike.ranks > 1 else max(1, cores // alike.threads)
+
+    def close(alike: _Alike) -> None:
         chosen = kept.pop(alike)
         filled.pop(alike)
-        batches.append(Batch(chosen[0].run, tuple(chosen)))
+        batches.append(Batch(chosen[0].run, tuple(chosen), min(beside(alike), len(chosen))))
 
     for run in runs:
-        kind, engine = kind_of(run.scenario), run.scenario.engine
-        alike = (str(engine.name), engine.ranks)
+        kind, scenario = kind_of(run.scenario), run.scenario
+        alike = _Alike(str(scenario.engine.name), kind.threads(scenario), kind.ranks(scenario))
         kept.setdefault(alike, []).append(run)
-        filled[alike] = filled.get(alike, 0.0) + kind.predicted_s(run.scenario)
-        if filled[alike] >= wall_s:
+        filled[alike] = filled.get(alike, 0.0) + planned_wall_s(run)
+        if filled[alike] >= wall_s * beside(alike):
             close(alike)
     for alike in list(kept):
         close(alike)
     return batches
+
+
+def alone(runs: Sequence[Run], batches: Sequence[Batch]) -> list[str]:
+    """Names of runs that are in no batch."""
+    shared = {run.run for batch in batches for run in batch.runs}
+    return [run.run for run in runs if run.run not in shared]

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.scenario.reading import Origin, read_yaml, validated
+from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.study.agreement import agreement_table, compare_study, sweep_part
 from sandmould.study.plan import STUDY_FILE
 from sandmould.study.study import Study, study_model
@@ -76,7 +76,7 @@ def read_study(study_folder: Path) -> Study:
     path = study_folder / STUDY_FILE
     if not path.exists():
         return Study(title=study_folder.name.replace("_", " "))
-    tree = read_yaml(path, str(path))
+    tree = read_planned(path, str(path))
     return validated(study_model(tree.get("kind", "sand")), tree, Origin({"": str(path)}))
 
 

@@ -26,6 +26,8 @@ Part = str
 MOST_PROBLEMS = 10
 """Problems told at once; the first few are those that teach."""
 ROOT_KEY = "scenario"
+RUN_NAME = "[a-z0-9_]+_r[0-9]+_[0-9a-f]{6}"
+"""Pattern of the name of any run."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import FrameType
 from typing import TextIO
 
 RESTARTABLE_EXIT = 75
@@ -46,7 +47,7 @@ def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> Non
     A run whose outcome is already there is left as it is: Snakemake removes the outcome of a run
     that must be computed again.
     """
-    _die_with_parent()
+    die_with_parent()
     command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
     with log.open("a", encoding="utf-8") as log_file, _only_one(folder):
         if (folder / "outcome.json").exists():
@@ -70,7 +71,7 @@ def _under_mpi(command: list[str], ranks: int, mpi: str) -> list[str]:
     return [str(own) if own.exists() else launcher, *options, "-n", str(ranks), *command]
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
     """Ask Linux to end this process softly when the one that started it is killed."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
@@ -94,15 +95,35 @@ def _only_one(folder: Path) -> Iterator[None]:
 
 def _watch(command: list[str], log: TextIO) -> tuple[int, str]:
     """Run a command, pass on what it prints, and keep its last words."""
-    words: collections.deque[str] = collections.deque(maxlen=3)
     process = subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        preexec_fn=_die_with_parent,
+        preexec_fn=die_with_parent,
     )
-    signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
+    with _passed_on(process):
+        return _listen(process, log)
+
+
+@contextlib.contextmanager
+def _passed_on(process: subprocess.Popen[str]) -> Iterator[None]:
+    """Let the process end softly when this one is asked to, which may know more to do then."""
+    before = signal.getsignal(signal.SIGTERM)
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        process.terminate()
+        if callable(before):
+            before(number, frame)
+
+    signal.signal(signal.SIGTERM, stop)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def _listen(process: subprocess.Popen[str], log: TextIO) -> tuple[int, str]:
+    """Pass on what a process prints until it ends."""
+    words: collections.deque[str] = collections.deque(maxlen=3)
     assert process.stdout is not None
     for line in process.stdout:
         log.write(line)

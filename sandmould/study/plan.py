@@ -14,7 +14,7 @@ import yaml
 from sandmould.engines.progress import duration_text
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
-from sandmould.scenario.reading import Origin, read_yaml, validated
+from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import Part, Run
 from sandmould.study.kinds.kind import SpeedClass, kind_of
@@ -122,7 +122,7 @@ def read_run(path: Path) -> Run:
         When the file is missing or was changed into something that is no run.
     """
     shown = str(path)
-    tree = read_yaml(path, shown)
+    tree = read_planned(path, shown)
     is_deck = "template" in (tree.get("scenario") or ())
     file = validated(_DeckRunFile if is_deck else _RunFile, tree, Origin({"": shown}))
     return Run(**{name: getattr(file, name) for name in _RunFile.model_fields})

@@ -42,9 +42,13 @@ class Plan:
     def _by_name(self) -> dict[str, Run]:
         return {run.run: run for run in self.runs}
 
-    def batches(self, wall_s: float) -> list[Batch]:
-        """Runs that share a job until it lasts so long; none for 0, when every run has its own."""
-        return plan_batches(self.runs, wall_s) if wall_s > 0 else []
+    def batches(self, wall_s: float, least: int = 1, cores: int = 1) -> list[Batch]:
+        """Runs that share a job of so many cores until it lasts so long; none for 0.
+
+        Batches of fewer than ``least`` runs are left out: those runs have jobs of their own.
+        """
+        found = plan_batches(self.runs, wall_s, cores) if wall_s > 0 else []
+        return [batch for batch in found if len(batch.runs) >= least]
 
     def threads(self, name: str) -> int:
         """Cores that a run keeps busy, as MPI ranks or as threads."""
@@ -68,9 +72,11 @@ class Plan:
         """Memory to ask for."""
         return self.kind.memory_mb(self._by_name[name].scenario)
 
-    def runtime_min(self, *names: str) -> int:
-        """Wall time to ask for some runs, one after the other."""
-        seconds = sum(self.kind.allowed_s(self._by_name[name].scenario) for name in names)
+    def runtime_min(self, *names: str, side_by_side: int = 1) -> int:
+        """Wall time to ask for some runs, so many at a time."""
+        each_s = [self.kind.allowed_s(self._by_name[name].scenario) for name in names]
+        # the last run may begin when all others have ended
+        seconds = sum(each_s) / side_by_side + (max(each_s) if side_by_side > 1 else 0.0)
         return 10 + math.ceil(seconds / 60)
 
     def labels(self, name: str) -> dict[str, str]:

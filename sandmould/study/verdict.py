@@ -109,7 +109,7 @@ def judge(
     caveats = [
         *_run_caveats(settings, len(summary), int(values.notna().sum())),
         *(_edge_caveats(best, settings, keys) if seeks_best else ()),
-        *(_identical(c) for c in comparisons if _is_identical(c, found, best)),
+        *_identical([c.other for c in comparisons if _is_identical(c, found, best)]),
         *notes,
     ]
     return Verdict(
@@ -211,11 +211,13 @@ def _is_identical(
     return enough and not comparison.tested
 
 
-def _identical(comparison: Comparison) -> str:
-    return (
-        f"The replicates of the best setting and of {comparison.other} differ by no more than "
+def _identical(others: list[str]) -> list[str]:
+    if not others:
+        return []
+    return [
+        f"The replicates of the best setting and of {listed(others)} differ by no more than "
         "round-off, so they say nothing about chance: check that the seed reaches the sand."
-    )
+    ]
 
 
 def _run_caveats(settings: Sequence[Setting], planned: int, used: int) -> list[str]:

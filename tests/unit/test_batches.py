@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +14,13 @@ import yaml
 from sandmould.engines.choosing import deck_hash
 from sandmould.study import batch_job
 from sandmould.study.batch_job import compute_batch, is_current
-from sandmould.study.batches import plan_batches
+from sandmould.study.batches import START_S, alone, is_done, plan_batches, planned_wall_s
 from sandmould.study.expand import Run, expand
 from sandmould.study.hashes import scenario_hash
-from sandmould.study.kinds.sand import IN_3D, RATE, planned_work
 from sandmould.study.moments import LAST_MEASURED
 from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
+from sandmould.study.planning import Plan
 
 FREQUENCY = "vibration.0.frequency_hz"
 STUDY: dict[str, Any] = {
@@ -35,24 +37,19 @@ def runs_of(folder: Path, **changes: Any) -> list[Run]:
     return expand(open_study(path))
 
 
-def one_s(run: Run) -> float:
-    in_3d = IN_3D if run.scenario.dimension == 3 else 1.0
-    return planned_work(run.scenario) / (RATE[run.scenario.engine.name] * in_3d)
-
-
 def test_short_runs_share_a_job_until_it_lasts_long_enough(tmp_path: Path) -> None:
     runs = runs_of(tmp_path)
-    found = plan_batches(runs, 3.5 * one_s(runs[0]))
+    found = plan_batches(runs, 3.5 * planned_wall_s(runs[0]))
     assert [len(batch.runs) for batch in found] == [4, 4, 1]
     assert [run for batch in found for run in batch.runs] == runs
     assert [batch.name for batch in found] == [runs[0].run, runs[4].run, runs[8].run]
     # A long run has a job of its own.
-    assert len(plan_batches(runs, 0.5 * one_s(runs[0]))) == 9
+    assert len(plan_batches(runs, 0.5 * planned_wall_s(runs[0]))) == 9
 
 
 def test_appended_runs_leave_full_jobs_as_they_were(tmp_path: Path) -> None:
     runs = runs_of(tmp_path)
-    wall_s = 3.5 * one_s(runs[0])
+    wall_s = 3.5 * planned_wall_s(runs[0])
     before, after = plan_batches(runs[:6], wall_s), plan_batches(runs, wall_s)
     assert after[0] == before[0]
 
@@ -63,6 +60,30 @@ def test_runs_of_other_engines_or_more_cores_have_jobs_of_their_own(tmp_path: Pa
     kinds = [{(r.scenario.engine.name, r.scenario.engine.ranks) for r in b.runs} for b in found]
     assert all(len(kind) == 1 for kind in kinds)
     assert len(found) == 4
+
+
+def test_the_shortest_run_takes_its_start(tmp_path: Path) -> None:
+    runs = runs_of(tmp_path, scenario={"fill": {"layers": [{"count": 1}]}})
+    assert START_S < planned_wall_s(runs[0]) < START_S + 0.5
+
+
+def test_a_job_of_several_cores_lasts_as_long_with_more_runs(tmp_path: Path) -> None:
+    runs = runs_of(tmp_path)
+    found = plan_batches(runs, 1.7 * planned_wall_s(runs[0]), cores=2)
+    assert [(len(b.runs), b.side_by_side) for b in found] == [(4, 2), (4, 2), (1, 1)]
+    # Runs of two threads leave room for one beside them, one of two MPI ranks for none.
+    for engine, beside in (("reference", 2), ("lammps", 1)):
+        runs = runs_of(tmp_path, scenario={"engine": {"name": engine, "ranks": 2}})
+        assert plan_batches(runs, 1e9, cores=4)[0].side_by_side == beside
+
+
+def test_batches_of_too_few_runs_are_left_to_jobs_of_their_own(tmp_path: Path) -> None:
+    runs = tuple(runs_of(tmp_path))
+    plan = Plan(open_study(tmp_path / "trial.yaml"), runs)
+    batches = plan.batches(3.5 * planned_wall_s(runs[0]), least=2)
+    assert [len(batch.runs) for batch in batches] == [4, 4]
+    assert alone(runs, batches) == [runs[8].run]
+    assert plan.batches(0.5 * planned_wall_s(runs[0]), least=2) == []
 
 
 class Jobs:
@@ -98,13 +119,14 @@ def planned(folder: Path, **changes: Any) -> list[Path]:
 
 
 def test_a_batch_goes_on_past_a_run_that_stopped_and_redoes_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     folders = planned(tmp_path)
     names = [folder.name for folder in folders]
     first = Jobs(monkeypatch, stops=names[1])
-    with pytest.raises(SystemExit, match="stopped early"):
+    with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {names[1]}"):
         compute_batch(folders, tmp_path, 1, "mpiexec")
+    assert "stopped early" in capfd.readouterr().err
     assert first.computed == first.measured == [names[0], names[2]]
     again = Jobs(monkeypatch)
     compute_batch(folders, tmp_path, 1, "mpiexec")
@@ -117,7 +139,7 @@ def test_a_batch_goes_on_past_a_run_that_stopped_and_redoes_none(
 
 
 def test_a_run_that_breaks_does_not_stop_the_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     folders = planned(tmp_path)
     jobs = Jobs(monkeypatch)
@@ -128,9 +150,41 @@ def test_a_run_that_breaks_does_not_stop_the_others(
         jobs.measure(folder)
 
     monkeypatch.setattr(batch_job, "measure_run", measure)
-    with pytest.raises(SystemExit, match=f"{folders[0].name}: no space left"):
+    with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {folders[0].name}"):
         compute_batch(folders, tmp_path, 1, "mpiexec")
+    assert f"{folders[0].name}: no space left" in capfd.readouterr().err
     assert jobs.measured == [folder.name for folder in folders[1:]]
+
+
+def test_a_job_that_is_asked_to_end_begins_no_other_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders = planned(tmp_path)
+    jobs = Jobs(monkeypatch)
+
+    def measure(folder: Path) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        jobs.measure(folder)
+
+    monkeypatch.setattr(batch_job, "measure_run", measure)
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(SystemExit, match="2 of 3 stopped or broke"):
+        compute_batch(folders, tmp_path, 1, "mpiexec")
+    assert jobs.measured == [folders[0].name]
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_runs_side_by_side_are_computed_once_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders = planned(tmp_path)
+    Jobs(monkeypatch, stops=folders[1].name)
+    with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {folders[1].name}"):
+        compute_batch(folders, tmp_path, 1, "mpiexec", side_by_side=2)
+    assert [is_done(folder) for folder in folders] == [True, False, True]
+    Jobs(monkeypatch)
+    compute_batch(folders, tmp_path, 1, "mpiexec", side_by_side=2)
+    assert all(is_done(folder) for folder in folders)
 
 
 def test_a_changed_scenario_or_solver_is_computed_again(

@@ -8,7 +8,7 @@ import pytest
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import fields_at, known_keys
-from sandmould.scenario.reading import Origin, merge, read_yaml, validated
+from sandmould.scenario.reading import Origin, merge, read_planned, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
 
 
@@ -37,6 +37,8 @@ def test_numbers_are_read_as_engineers_write_them(text: str, value: object, tmp_
     found = read(tmp_path, f"a: {text}")["a"]
     assert found == value
     assert type(found) is type(value)
+    planned = read_planned(tmp_path / "trial.yaml", "trial.yaml")["a"]
+    assert (planned, type(planned)) == (value, type(value))
 
 
 def test_key_that_stands_twice_is_refused_at_any_depth(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ from sandmould.engines.program import REST_AFTER_FALL_S, build_program
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import Run, expand
+from sandmould.study.expand import RUN_NAME, Run, expand
 from sandmould.study.kinds.sand import planned_steps, planned_work
 from sandmould.study.opening import open_study
 from sandmould.study.plan import plan_table, read_run, write_plan
@@ -173,9 +174,21 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
     assert lines[-2] == "... and 10 more points"
 
 
-def test_jobs_do_not_wait_for_libraries_of_the_report() -> None:
-    # Every run pays for what its process imports: scikit-learn alone takes a second.
-    heavy = "sklearn", "matplotlib", "snakemake"
-    says = f"import sys, sandmould.study.simulate; print([m for m in {heavy} if m in sys.modules])"
+@pytest.mark.parametrize(
+    ("module", "heavy"),
+    [
+        # scikit-learn and scipy.stats take a second each.
+        ("sandmould.study.simulate", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
+        ("sandmould.study.batch_job", ("sklearn", "scipy.stats", "snakemake")),
+        ("sandmould.study.planning", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
+    ],
+)
+def test_jobs_do_not_wait_for_libraries_of_the_report(module: str, heavy: tuple[str, ...]) -> None:
+    # Every run pays for what its processes import.
+    says = f"import sys, {module}; print([m for m in {heavy} if m in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", says], capture_output=True, text=True, check=True)
     assert ran.stdout == "[]\n"
+
+
+def test_every_name_of_a_run_fits_the_pattern_of_the_workflow(demo: list[Run]) -> None:
+    assert all(re.fullmatch(RUN_NAME, run.run) for run in demo)

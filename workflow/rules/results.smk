@@ -5,15 +5,10 @@ rule collect:
     input:
         study=f"{FOLDER}/study.yaml",
         table=f"{FOLDER}/runs.tsv",
-        runs=(
-            expand(rules.batch.output.done, batch=BATCHES)
-            if BATCHES
-            else [
-                *expand(rules.simulate.output.outcome, run=RUNS),
-                *expand(rules.simulate.output.cost, run=RUNS),
-                *expand(rules.measure.output.measures, run=RUNS),
-            ]
-        ),
+        batches=expand(rules.batch.output.done, batch=BATCHES),
+        outcomes=expand(rules.simulate.output.outcome, run=ALONE),
+        costs=expand(rules.simulate.output.cost, run=ALONE),
+        measures=expand(rules.measure.output.measures, run=ALONE),
     output:
         summary=report(
             f"{FOLDER}/summary.tsv",

@@ -101,6 +101,8 @@ rule batch:
         mpi=batch_mpi_of,
         mem_mb=batch_memory_mb_of,
         runtime=batch_runtime_min_of,
+    params:
+        side_by_side=side_by_side_of,
     message:
         "Compute and measure the runs from {wildcards.batch} on"
     script:

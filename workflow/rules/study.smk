@@ -4,15 +4,21 @@ import os
 import sys
 
 from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.batches import alone
+from sandmould.study.expand import RUN_NAME
 from sandmould.study.planning import RESULTS, announce, open_plan, study_path
 
 OVERRIDES = dict(workflow.config_settings.config)
-# Set by a profile: how long a job should last at least, where jobs cost more than short runs; and
-# what starts the ranks of a run.
+# Set by a profile: how long a job should last at least, where jobs cost more than short runs, how
+# many runs are worth a batch, and how many cores a job of them should have; and what starts the
+# ranks of a run.
 BATCH_WALL_S = float(OVERRIDES.pop("batch_wall_s", 0))
+BATCH_LEAST = int(OVERRIDES.pop("batch_least", 1))
+BATCH_CORES = int(OVERRIDES.pop("batch_cores", 1))
 MPI = OVERRIDES.pop("mpi", "mpiexec")
 try:
     PLAN = open_plan(study_path(workflow.configfiles, OVERRIDES))
+    BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
     if workflow.is_main_process and "--lint" not in sys.argv:
         print(
             announce(PLAN, RESULTS, workflow._cores or os.cpu_count()),
@@ -25,8 +31,9 @@ STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"
 # Studies whose runs help to calibrate: they are finished before this one is.
 ALSO = [f"results/{name}/summary.tsv" for name in STUDY.study.calibration.also]
-RUNS = [run.run for run in PLAN.runs]
-BATCHES = {batch.name: batch.runs for batch in PLAN.batches(BATCH_WALL_S)}
+BATCHES = {batch.name: [run.run for run in batch.runs] for batch in BATCHED}
+SIDE_BY_SIDE = {batch.name: batch.side_by_side for batch in BATCHED}
+ALONE = alone(PLAN.runs, BATCHED)
 REPORT_TEMPLATES = sorted(str(p) for p in Path("templates/report").iterdir())
 
 
@@ -65,17 +72,19 @@ def labels_of(wildcards):
 
 
 def scenarios_of(wildcards):
-    return [
-        f"{FOLDER}/runs/{run.run}/scenario.yaml" for run in BATCHES[wildcards.batch]
-    ]
+    return [f"{FOLDER}/runs/{run}/scenario.yaml" for run in BATCHES[wildcards.batch]]
 
 
 def batch_sources_of(wildcards):
     return PLAN.deck_sources(wildcards.batch)
 
 
+def side_by_side_of(wildcards):
+    return SIDE_BY_SIDE[wildcards.batch]
+
+
 def batch_threads_of(wildcards):
-    return PLAN.threads(wildcards.batch)
+    return PLAN.threads(wildcards.batch) * SIDE_BY_SIDE[wildcards.batch]
 
 
 def batch_ranks_of(wildcards):
@@ -91,13 +100,18 @@ def batch_mpi_of(wildcards):
 
 
 def batch_memory_mb_of(wildcards):
-    return max(PLAN.memory_mb(run.run) for run in BATCHES[wildcards.batch])
+    most = max(PLAN.memory_mb(run) for run in BATCHES[wildcards.batch])
+    return most * SIDE_BY_SIDE[wildcards.batch]
 
 
 def batch_runtime_min_of(wildcards, attempt):
-    return attempt * PLAN.runtime_min(*(run.run for run in BATCHES[wildcards.batch]))
+    beside = SIDE_BY_SIDE[wildcards.batch]
+    runs = BATCHES[wildcards.batch]
+    return attempt * PLAN.runtime_min(*runs, side_by_side=beside)
 
 
+# Not the names themselves: Snakemake tries a pattern on every file of every run, and ten thousand
+# alternatives took it half of all its time.
 wildcard_constraints:
-    run="|".join(RUNS),
-    batch="|".join(BATCHES) or "none",
+    run=RUN_NAME,
+    batch=RUN_NAME,

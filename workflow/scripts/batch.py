@@ -9,5 +9,6 @@ compute_batch(
     Path(snakemake.log[0]).parent,
     snakemake.resources.tasks,
     snakemake.resources.mpi,
+    snakemake.params.side_by_side,
 )
 Path(snakemake.log[0]).touch()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,9 +58,10 @@ def filling_pages(
     best, measure = verdict.best, verdict.measure
     if best is None or not scenario.vibration or not measure.endswith("_fill_fraction"):
         return None
-    curves = _shaken(collected)
-    if measure not in curves or curves.empty:
+    shaken = _shaken(collected)
+    if measure not in shaken or shaken.empty:
         return None
+    curves = {str(run): rows for run, rows in shaken.groupby("run")}
     keys = collected.keys
     one_key = len(keys) == 1 and all(
         isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
@@ -91,12 +93,14 @@ def _drive(scenario: Scenario, best: Setting) -> str:
     )
 
 
-def _time_to_fill(summary: pd.DataFrame, curves: pd.DataFrame, best: Setting, measure: str) -> str:
+def _time_to_fill(
+    summary: pd.DataFrame, curves: Mapping[str, pd.DataFrame], best: Setting, measure: str
+) -> str:
     """When the cavity holds nearly what it holds when it is packed as the bed is."""
     times_s, lasts_s, ends = [], [], []
     for run in runs_of(summary, best)["run"]:
-        rows = curves[curves["run"] == run]
-        if rows.empty or "solid_fraction" not in rows:
+        rows = curves.get(str(run))
+        if rows is None or "solid_fraction" not in rows:
             continue
         full = float(rows["solid_fraction"].iloc[-1])
         time_s = rows["vibration_time_s"].to_numpy(dtype=np.float64)
@@ -132,17 +136,21 @@ class _AtTimes:
 
 
 def _fill_at_times(
-    summary: pd.DataFrame, curves: pd.DataFrame, known: list[Setting], key: str, measure: str
+    summary: pd.DataFrame,
+    curves: Mapping[str, pd.DataFrame],
+    known: list[Setting],
+    key: str,
+    measure: str,
 ) -> _AtTimes:
-    last_s = float(curves.groupby("run")["vibration_time_s"].max().min())
+    last_s = min(float(rows["vibration_time_s"].max()) for rows in curves.values())
     time_s = last_s * np.array([0.0, *SHARES])
     settings = sorted(known, key=lambda s: float(s.values[key]))
     mean, error = [], []
     for setting in settings:
         runs = []
         for run in runs_of(summary, setting)["run"]:
-            rows = curves[curves["run"] == run]
-            if len(rows):
+            rows = curves.get(str(run))
+            if rows is not None:
                 runs.append(np.interp(time_s, rows["vibration_time_s"], rows[measure]))
         values = np.array(runs)
         gained = values - values[:, :1]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from sandmould.study.collect import Collected
 from sandmould.study.report.chart import Chart
 from sandmould.study.report.curves import best_passage, time_chart
+from sandmould.study.report.many import drawn_part
 from sandmould.study.verdict import Verdict
 from sandmould.study.words import name_of, number, shown_scale
 
@@ -39,8 +40,9 @@ def measure_curves(
         Gives the sentence of a measure.
     """
     found = []
+    drawn, part = drawn_part(collected, verdict)
     for measure in measures:
-        chart = time_chart(collected.curves, collected.summary, verdict, collected.keys, measure)
+        chart = time_chart(drawn.curves, drawn.summary, part, collected.keys, measure)
         if chart is not None:
             found.append(Curve(chart, measure, conclude(collected, verdict, measure)))
     return tuple(found)

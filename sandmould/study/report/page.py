@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,17 +22,19 @@ from sandmould.study.report.agreement import agreement_pages
 from sandmould.study.report.animation import BUDGET_BYTES
 from sandmould.study.report.certificate import certificate_pages
 from sandmould.study.report.chart import NARROW, SMALL, WIDE, lay_out
-from sandmould.study.report.curves import objective_charts, runs_of
+from sandmould.study.report.curves import objective_charts
 from sandmould.study.report.kinds import drives_of, kind_pages, notes_of
 from sandmould.study.report.known import known_pages
+from sandmould.study.report.many import drawn_note, drawn_part, listed_settings
 from sandmould.study.report.method import Row, provenance_rows, statistics_method
 from sandmould.study.report.optimum import optimum_pages, with_surface
 from sandmould.study.report.sand import shown_runs
 from sandmould.study.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.settings import group_settings
 from sandmould.study.study import Study
 from sandmould.study.verdict import Verdict, judge
-from sandmould.study.words import name_of, number
+from sandmould.study.words import name_of, number, setting_text
 
 TEMPLATES = ROOT / "templates" / "report"
 LIMIT_BYTES = 15_000_000
@@ -81,37 +84,35 @@ class _Page:
 def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
     objective, keys, summary = study.objective, collected.keys, collected.of_sweep.summary
     seeks_best = study.seeks_best
-    scenarios = _scenarios(study_folder, [str(r) for r in summary["run"]])
-    if not scenarios:
+    any_scenario = _scenario_of(study_folder, summary["run"])
+    if any_scenario is None:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
-    any_scenario = next(iter(scenarios.values()))
     certified = bool(read_ledger(study_folder, study).certified_hz)
     notes = notes_of(any_scenario, collected, seeks_best, certified)
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
     verdict = judge(summary, keys, objective.measure, objective.better, notes, seeks_best)
     shown = next(iter(shown_runs(study_folder, summary, verdict).values()), "")
-    by_setting = {
-        setting.label: scenarios[run]
-        for setting in verdict.settings
-        for run in reversed(runs_of(summary, setting)["run"].tolist())
-        if run in scenarios
-    }
+    listed = {setting.label for setting in listed_settings(verdict)}
+    by_setting = {}
+    for values, rows in group_settings(summary, keys):
+        if (label := setting_text(values)) in listed:
+            by_setting[label] = _scenario_of(study_folder, rows["run"])
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
-    scenario = scenarios.get(shown, any_scenario)
-    return _Page(study_folder, href, study, collected, verdict, scenario, by_setting)
+    scenario = _scenario_of(study_folder, [shown] if shown else []) or any_scenario
+    return _Page(
+        study_folder, href, study, collected, verdict, scenario,
+        {label: found for label, found in by_setting.items() if found is not None},
+    )  # fmt: skip
 
 
-def _scenarios(study_folder: Path, runs: Sequence[str]) -> dict[str, AnyScenario]:
-    """Scenario of each run whose file can be read."""
-    found = {}
+def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
+    """Scenario of the first run whose file can be read."""
     for run in runs:
-        try:
-            found[run] = read_run(study_folder / "runs" / run / "scenario.yaml").scenario
-        except (BadInputError, OSError):
-            continue
-    return found
+        with contextlib.suppress(BadInputError, OSError):
+            return read_run(study_folder / "runs" / str(run) / "scenario.yaml").scenario
+    return None
 
 
 def _render(page: _Page, film_budget_bytes: int) -> str:
@@ -126,7 +127,8 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
             page.study_folder, page.study, page.collected, page.scenario
         )
     optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, certificate)
-    charts = objective_charts(of_sweep.summary, verdict, keys)
+    drawn, drawn_verdict = drawn_part(of_sweep, verdict)
+    charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
         charts = tuple(with_surface(c, optimum.optimum, verdict.measure) for c in charts)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
@@ -159,6 +161,7 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         statement=optimum or (agreement if agreement and agreement.is_question else known),
         key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
         objective_charts=[_both_sizes(c) for c in charts],
+        drawn_note=drawn_note(of_sweep, verdict),
         settings=settings_table(verdict, drives_of(page.by_setting)),
         runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
         method=method,

@@ -19,7 +19,6 @@ from sandmould.study.collect import Collected
 from sandmould.study.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.study.report import figures
 from sandmould.study.report.animation import Film, make_film
-from sandmould.study.report.curves import runs_of
 from sandmould.study.report.measured import (
     Curve,
     late_conclusion,
@@ -27,7 +26,7 @@ from sandmould.study.report.measured import (
     whole_conclusion,
 )
 from sandmould.study.verdict import Verdict, rank_runs
-from sandmould.study.words import listed, number
+from sandmould.study.words import listed, number, setting_text
 
 _SECONDARY = (
     "solid_fraction", "apparent_density_corrected_kg_m3", "coordination", "bed_height_m",
@@ -194,15 +193,14 @@ def _films(
 ) -> tuple[Film, ...]:
     films = []
     for role, run in roles.items():
-        setting = next(
-            (s for s in verdict.settings if run in set(runs_of(collected.summary, s)["run"])), None
-        )
+        row = collected.summary[collected.summary["run"] == run].iloc[0]
+        setting = setting_text({key: row[key] for key in collected.keys})
         curve = collected.curves[collected.curves["run"] == run]
         reading = None
         if verdict.measure in curve:
             known = curve[["time_s", verdict.measure]].dropna().to_numpy(dtype=np.float64)
             reading = (known[:, 0], known[:, 1])
-        label = f"{role}: {setting.label}" if setting else role
+        label = f"{role}: {setting}"
         film = make_film(study_folder / "runs" / run, label, reading, budget_bytes)
         if film is not None:
             films.append(film)

@@ -14,6 +14,7 @@ import pandas as pd
 from sandmould.engines.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan import STUDY_FILE
+from sandmould.study.report.many import listed_note, listed_runs, listed_settings
 from sandmould.study.verdict import Verdict
 from sandmould.study.words import name_of, number, seconds, size, titled, with_margin
 
@@ -52,6 +53,8 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
     marked: tuple[bool, ...]
+    note: str = ""
+    """What it leaves out."""
 
 
 def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...]:
@@ -116,7 +119,7 @@ def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table
         *map(Column, ("sd", "runs", *drive)),
     )
     rows, marked = [], []
-    for place, setting in enumerate(verdict.settings):
+    for place, setting in enumerate(listed_settings(verdict)):
         against = verdict.against(setting)
         is_best = verdict.best is not None and setting.label == verdict.best.label
         interval, p, difference = "–", math.nan, math.nan
@@ -141,7 +144,9 @@ def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table
             )
         )
         marked.append(is_best)
-    return Table(columns, tuple(rows), tuple(marked))
+    nearest = "the best and those that come nearest to it"
+    note = listed_note(len(rows), len(verdict.settings), "settings", nearest)
+    return Table(columns, tuple(rows), tuple(marked), note)
 
 
 def _p_text(p: float) -> str:
@@ -209,7 +214,7 @@ def runs_table(
         *(Column(title) for _, title, _ in cost),
     )
     rows, marked = [], []
-    for row in summary.to_dict("records"):
+    for row in listed_runs(summary, verdict).to_dict("records"):
         failed = row["outcome_code"] != int(Outcome.FINISHED)
         rows.append(
             (
@@ -222,7 +227,9 @@ def runs_table(
             )
         )
         marked.append(failed)
-    return Table(columns, tuple(rows), tuple(marked))
+    failed_and_best = "those without a value and then the best; summary.tsv has all"
+    note = listed_note(len(rows), len(summary), "runs", failed_and_best)
+    return Table(columns, tuple(rows), tuple(marked), note)
 
 
 def _parameter_cell(value: Any) -> Cell:
