@@ -1,7 +1,7 @@
 """Calibration against its peers: the noise of one heap, runs needed, and coverage.
 
-``make peers`` runs ``python -m benchmarks.calibration``: it writes results/benchmarks/
-calibration.json and docs/calibration_peers.md. Runs come from the emulator of the study
+``make peers`` runs ``python -m benchmarks.calibration``: it writes calibration.json beside this
+file and docs/calibration_peers.md. Runs come from the emulator of the study
 repose_map; with ``--oracle dem`` they are DEM runs, of one seed unless ``--seeds`` says more or 0,
 and truths are planted by DEM too, in two measures of the same runs.
 ``--record`` takes the map that docs/results keeps. With ``--quick`` few seeds show that everything
@@ -53,7 +53,8 @@ from sandmould import ROOT
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.simulate import provenance
 
-KEPT = ROOT / "results" / "benchmarks"
+KEPT_JSON = Path(__file__).with_name("calibration.json")
+QUICK = ROOT / "results" / "benchmarks" / "quick"
 PEERS = ROOT / ".venv-peers" / "bin" / "python"
 
 
@@ -155,10 +156,9 @@ def measure(file: Path, methods: Sequence[Method], settings: Settings) -> dict[s
     }
 
 
-def keep(found: dict[str, Any], oracle: str, folder: Path) -> None:
+def keep(found: dict[str, Any], oracle: str, path: Path) -> None:
     """Write what was measured beside what is kept of the other oracle."""
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "calibration.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
     kept = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     kept[oracle] = found
     partial = path.with_name(path.name + ".partial")
@@ -176,7 +176,7 @@ def main() -> None:
     parser.add_argument("--page", action="store_true", help="write the page again, measure nothing")
     parser.add_argument("--peers", type=Path, default=PEERS, help="Python with the peers in it")
     asked = parser.parse_args()
-    folder, docs = (KEPT / "quick",) * 2 if asked.quick else (KEPT, ROOT / "docs")
+    path, docs = (QUICK / KEPT_JSON.name, QUICK) if asked.quick else (KEPT_JSON, ROOT / "docs")
     if not asked.page:
         settings, file = settings_of(asked), map_file(asked.record)
         try:
@@ -186,8 +186,7 @@ def main() -> None:
                 found = measure(file, [Ours(), *peers, Nearest()], settings)
         except (NoMapError, PeerError) as error:
             raise SystemExit(str(error)) from None
-        keep(found, asked.oracle, folder)
-    path = folder / "calibration.json"
+        keep(found, asked.oracle, path)
     if not path.exists():
         raise SystemExit(f"{path} is not there: make peers writes it")
     (docs / "calibration_peers.md").write_text(

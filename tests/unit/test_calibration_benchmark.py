@@ -282,9 +282,10 @@ def test_regions_hold_what_they_should(summary: Path) -> None:
 def test_the_page_says_what_was_measured(summary: Path, fake: Peer, tmp_path: Path) -> None:
     settings = Settings(seeds=2, truths=3, targets=(25.0,), cap=12)
     found = measure(summary, [Ours(), fake, Nearest()], settings)
-    keep(found, "emulator", tmp_path / "kept")
-    keep(dem(found), "dem", tmp_path / "kept")
-    kept = json.loads((tmp_path / "kept" / "calibration.json").read_text(encoding="utf-8"))
+    file = tmp_path / "kept" / "calibration.json"
+    keep(found, "emulator", file)
+    keep(dem(found), "dem", file)
+    kept = json.loads(file.read_text(encoding="utf-8"))
     assert list(kept) == ["emulator", "dem"]
     text = page(kept)
     noise = found["noise"]["sd_deg"]
