@@ -20,7 +20,13 @@ from sandmould.study.words import number
 
 PAGE = ROOT / "docs" / "repose_settings.md"
 MEASURE = "heap_angle_deg"
-STUDIES = ("repose_scale", "repose_time_step", "repose_stiffness", "repose_engines")
+STUDIES = (
+    "repose_scale",
+    "repose_small",
+    "repose_time_step",
+    "repose_stiffness",
+    "repose_engines",
+)
 """Studies that vary what should not matter."""
 
 

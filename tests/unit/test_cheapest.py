@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.study import cheapest
 from sandmould.study.agreement import compare_study
 from sandmould.study.cheapest import Factor, factors_of
 from sandmould.study.study import Study
@@ -58,3 +59,8 @@ def test_where_none_agrees_nothing_is_saved() -> None:
     assert found.saving == 1.0
     # The dearest minus this one, whichever came first in the sweep.
     assert found.levels[1].against.startswith("different: −3.")
+
+
+@pytest.mark.skipif(not cheapest.PAGE.exists(), reason="the page is not committed yet")
+def test_the_page_says_what_the_results_say() -> None:
+    assert cheapest.PAGE.read_text(encoding="utf-8") == cheapest.page_text()
