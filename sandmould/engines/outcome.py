@@ -20,6 +20,7 @@ class Outcome(IntEnum):
     UNSTABLE = 312
     NO_FLOW = 313
     NOT_SETTLED = 314
+    COUPLING_DIVERGED = 315
     ENGINE_FAILED = 320
     OUT_OF_WALL_TIME = 400
     DISK_REFUSED = 401
@@ -49,6 +50,7 @@ _MEANING = {
     Outcome.UNSTABLE: "Energy grew beyond what fall and vibration can give, or was not a number.",
     Outcome.NO_FLOW: "The sand stopped flowing before it was meant to.",
     Outcome.NOT_SETTLED: "A layer did not come to rest within the longest time its rule allows.",
+    Outcome.COUPLING_DIVERGED: "The staggered loop of sand and pattern ran away.",
     Outcome.ENGINE_FAILED: "The engine stopped with an error of its own.",
     Outcome.OUT_OF_WALL_TIME: "The wall-time limit came first; the same command continues.",
     Outcome.DISK_REFUSED: "The disk took no more; with room on it the same command continues.",

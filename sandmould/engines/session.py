@@ -119,6 +119,27 @@ class Session(Protocol):
             None when the last advance did not end a window.
         """
 
+    def vertex_loads(self, name: str) -> Array | None:
+        """Give the mean force of the sand on each vertex of a surface since the last asking.
+
+        Of a record that ended without asking nothing is kept. Forces between vertices are shared
+        out by shape functions, eq. (56), so that force and moment are those of the contacts.
+
+        Parameters
+        ----------
+        name : str
+            A surface made of facets.
+
+        Returns
+        -------
+        (nv, d) float64, N, or None
+            None when no load was sampled since.
+
+        Raises
+        ------
+        RefusedError
+        """
+
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
         """Move a surface to new vertices over the next window, or refuse.
 
@@ -126,6 +147,17 @@ class Session(Protocol):
         ------
         RefusedError
         """
+
+    def keep(self) -> Any:
+        """Give all that is needed to compute on from here, or refuse.
+
+        Raises
+        ------
+        RefusedError
+        """
+
+    def go_back(self, kept: Any) -> None:
+        """Compute on from a kept state, which may be gone back to again."""
 
     def attach_elastic_surface(
         self, name: str, stiffness: Array, mass: Array, damping: Array

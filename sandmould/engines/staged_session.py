@@ -46,6 +46,8 @@ class StagedSession(ABC):
         self._vibration_start: int | None = None
         self._ended_window = False
         self._opened: set[str] = set()
+        self._asked: dict[str, tuple[int, int, Array]] = {}
+        """Record, samples and sums of the loads on a surface's vertices when last asked for."""
 
     @property
     @abstractmethod
@@ -76,6 +78,13 @@ class StagedSession(ABC):
     @abstractmethod
     def _mean_loads(self) -> Mapping[str, Array]:
         """Mean force of the sand on each surface over the window that has just ended, N."""
+
+    @abstractmethod
+    def _vertex_sums(self, name: str) -> tuple[Array, int]:
+        """Sum of the loads on a surface's vertices over this record, and its number of samples.
+
+        Right after a record has ended: of the whole of that record.
+        """
 
     @abstractmethod
     def _save(self, folder: Path) -> None:
@@ -176,6 +185,24 @@ class StagedSession(ABC):
         if not self._ended_window:
             return None
         return {name: f for name, f in self._mean_loads().items() if name not in self._opened}
+
+    def vertex_loads(self, name: str) -> Array | None:
+        """Mean force of the sand on each vertex of a surface since the last asking, N."""
+        record = (self.steps - 1) // self._counts.window
+        sums, samples = self._vertex_sums(name)
+        earlier = self._asked.get(name)
+        self._asked[name] = (record, samples, sums)
+        if earlier is not None and earlier[0] == record:
+            sums, samples = sums - earlier[2], samples - earlier[1]
+        return sums / samples if samples else None
+
+    def keep(self) -> Any:
+        """Refuse: only checkpoints are kept."""
+        raise RefusedError("pattern.loop.repeats", "above 0", "0 on this engine")
+
+    def go_back(self, kept: Any) -> None:
+        """Refuse as ``keep`` does."""
+        self.keep()
 
     def attach_elastic_surface(
         self, name: str, stiffness: Array, mass: Array, damping: Array

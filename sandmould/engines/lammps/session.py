@@ -199,6 +199,16 @@ class LammpsSession(DeckSession):
         loads = dict(zip(self._surfaces, values.reshape(-1, d), strict=True))
         return loads | self._kernel.mean_loads() if self._kernel is not None else loads
 
+    def _kernel_of(self, name: str) -> SurfaceKernel:
+        """The kernel that presses on a surface, or refuse: regions of LAMMPS have no vertices."""
+        if self._kernel is None or name not in self._kernel.names:
+            raise RefusedError("surface", name, "a polygon or a mesh on engine lammps")
+        return self._kernel
+
+    def _vertex_sums(self, name: str) -> tuple[Array, int]:
+        samples = ((self.steps - 1) % self._counts.window + 1) // self._counts.load
+        return self._kernel_of(name).load_sums(name), samples
+
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
         """Move the vertices of a polygon or mesh evenly over the next window.
 
@@ -207,9 +217,7 @@ class LammpsSession(DeckSession):
         RefusedError
             For walls, plates and tubes: regions of LAMMPS move as a whole.
         """
-        if self._kernel is None or name not in self._kernel.names:
-            raise RefusedError("surface", name, "a polygon or a mesh on engine lammps")
-        self._kernel.move(name, vertices_m, window_s)
+        self._kernel_of(name).move(name, vertices_m, window_s)
 
     def _save(self, folder: Path) -> None:
         """Write LAMMPS's restart file and the memory of the callback."""

@@ -140,6 +140,10 @@ class SurfaceKernel:
         samples = self._counts.window // self._counts.load
         return self._surfaces.forces(self._bridge.loads / samples)
 
+    def load_sums(self, name: str) -> Array:
+        """Sum of the loads on a surface's vertices over the samples of this record, N."""
+        return self._bridge.loads[self._surfaces.vertices_of(name)].copy()
+
     def move(self, name: str, vertices_m: Array, window_s: float) -> None:
         """Let a surface move evenly to new vertices from the next step on."""
         self._surfaces.set_motion(name, vertices_m, window_s, self._counts.step_s)

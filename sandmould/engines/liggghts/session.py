@@ -164,6 +164,10 @@ class LiggghtsSession(DeckSession):
         self.send(f'write_dump all mesh/vtk "{path}" {fields} surface_{name}')
         return read_triangle_loads(path)
 
+    def _vertex_sums(self, name: str) -> tuple[Array, int]:
+        """Refuse: LIGGGHTS gives a mesh's loads by triangle."""
+        raise RefusedError("surface", name, "triangle_loads on engine liggghts")
+
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
         """Refuse: meshes of LIGGGHTS move as a whole."""
         raise RefusedError("surface", name, self._valid_surface)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ class ReferenceSession(StagedSession):
         self.version = source_hash()
         self.solver = solver_of(self._scenario, self.stage, self.step_s)
         self._loads: dict[str, Array] = {}
+        self._record_sums: Array = np.zeros((0, self._scenario.dimension))
         if checkpoint is not None:
             self._take_up(checkpoint)
 
@@ -86,6 +88,7 @@ class ReferenceSession(StagedSession):
             raise EngineStop(
                 Outcome.UNSTABLE, f"a velocity is not a number after {error} steps"
             ) from error
+        self._record_sums = self.solver.moving.walls.loads.sum(axis=0)
         if self.steps % self._counts.window == 0:
             self._loads = self.solver.mean_loads(self._counts.window)
 
@@ -131,12 +134,35 @@ class ReferenceSession(StagedSession):
     def _mean_loads(self) -> Mapping[str, Array]:
         return self._loads
 
-    def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
-        """Move a surface's vertices evenly to new places over the next window."""
+    def _vertex_sums(self, name: str) -> tuple[Array, int]:
+        samples = (self.steps - 1) % self._counts.window + 1
+        return self._record_sums[self._vertices_of(name)], samples
+
+    def _vertices_of(self, name: str) -> slice:
         try:
-            self.solver.surfaces.set_motion(name, vertices_m, window_s, self.step_s)
+            return self.solver.surfaces.vertices_of(name)
         except KeyError:
             raise RefusedError("surface", name, "a surface made of facets") from None
+
+    def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
+        """Move a surface's vertices evenly to new places over the next window."""
+        self._vertices_of(name)
+        self.solver.surfaces.set_motion(name, vertices_m, window_s, self.step_s)
+
+    def keep(self) -> Any:
+        """Copies of the solver's arrays, loads of this record, where the stage stands."""
+        loads = self.solver.moving.walls.loads.sum(axis=0)
+        stage = (self.stage_over, self.at_rest, self._ended_window, dict(self._asked))
+        return copy.deepcopy(self.solver.state()), loads, dict(self._loads), stage
+
+    def go_back(self, kept: Any) -> None:
+        """Compute on from what ``keep`` gave."""
+        arrays, loads, means, stage = kept
+        self.solver.restore(copy.deepcopy(arrays))
+        self.solver.moving.walls.loads[0] = loads
+        self._loads = dict(means)
+        self.stage_over, self.at_rest, self._ended_window, asked = stage
+        self._asked = dict(asked)
 
     def _save(self, folder: Path) -> None:
         """Write the solver's state, of which nothing is lost."""

@@ -1,0 +1,1 @@
+"""The staggered loop between sand and pattern: windows, relaxation, its own error."""

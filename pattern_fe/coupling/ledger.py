@@ -1,0 +1,105 @@
+"""The loop's own error, window by window: residual, balances of force and energy."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.body import Answer
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One window of the loop."""
+
+    time_s: float
+    window_s: float
+    passes: int
+    """Times that the window was computed."""
+    factor: float
+    """Share of the residual that is gone next."""
+    residual_m: float
+    """Root of the mean square over the vertices of answered less shown displacement."""
+    displacement_m: float
+    """The same of the displacement that the sand saw."""
+    largest_m: float
+    """Largest displacement of a vertex that the sand saw."""
+    load_n: float
+    """Size of the sand's mean force on the pattern."""
+    imbalance_n: float
+    """Size of the sum of that force and the reaction of the supports."""
+    work_j: float
+    """Work of the sand on the surface that it saw, since the run began."""
+    energy_j: float
+    """Elastic energy of the pattern as it answered."""
+    solve_s: float
+    """Wall time of the pattern's part."""
+
+
+COLUMNS = tuple(field.name for field in fields(Entry))
+
+
+def rms_m(displacement_m: Array) -> float:
+    """Root of the mean square length of vectors, (n, d) float64, m."""
+    return float(np.sqrt((displacement_m**2).sum(axis=1).mean()))
+
+
+def work_of(load_n: Array, moved_m: Array) -> float:
+    """Work of the mean loads of a window on the way of the vertices in it, J.
+
+    Parameters
+    ----------
+    load_n, moved_m : (nv, d) float64, N and m
+    """
+    return float((load_n * moved_m).sum())
+
+
+def imbalance_n(load_n: Array, answer: Answer) -> float:
+    """Size of what loads and reaction leave, N."""
+    return float(np.linalg.norm(load_n.sum(axis=0) + answer.reaction_n))
+
+
+class Ledger:
+    """Table of all windows; a resumed run cuts it back to its checkpoint."""
+
+    def __init__(self, path: Path, trusted_bytes: int | None = None) -> None:
+        """Open the table.
+
+        Parameters
+        ----------
+        path : Path
+        trusted_bytes : int, optional
+            Length of what a checkpoint vouches for; none begins anew.
+        """
+        header = "\t".join(COLUMNS) + "\n"
+        if trusted_bytes is None:
+            path.write_text(header, encoding="utf-8")
+        self._file: TextIO = path.open("r+", encoding="utf-8")
+        self._file.truncate(trusted_bytes or len(header))
+        self._file.seek(trusted_bytes or len(header))
+
+    def write(self, entry: Entry) -> None:
+        """Append a window."""
+        row = (str(v) if isinstance(v, int) else f"{v:.9g}" for v in astuple(entry))
+        self._file.write("\t".join(row) + "\n")
+
+    def size(self) -> int:
+        """Flush, and give the length in bytes."""
+        self._file.flush()
+        return self._file.tell()
+
+    def close(self) -> None:
+        """Close the table."""
+        self._file.close()
+
+
+def read_ledger(path: Path) -> pd.DataFrame:
+    """All windows of a run; columns as in ``Entry``."""
+    return pd.read_csv(path, sep="\t")

@@ -1,0 +1,215 @@
+"""Sand and pattern as one session: the staggered loop inside ``advance``."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.body import Answer, ElasticBody
+from pattern_fe.coupling.ledger import Entry, Ledger, imbalance_n, rms_m, work_of
+from pattern_fe.coupling.settings import LoopSettings
+from pattern_fe.coupling.shapes_file import ShapesFile
+from sandmould.engines.outcome import Outcome
+from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.step_counts import StepCounts
+
+Array = NDArray[np.float64]
+LEDGER, SHAPES, CHECKPOINT = "pattern.tsv", "pattern_shapes.f8", "pattern.npz"
+
+
+class CoupledSession:
+    """A session whose sand presses on a pattern that gives way; else the engine's own.
+
+    In a window the surface moves evenly to a displacement, the sand's mean load on its vertices is
+    taken, the pattern answers with the displacement at rest under it, and the next window moves
+    part of the way there. A window may be computed again from the state at its beginning until
+    the answer is what was shown.
+    """
+
+    def __init__(
+        self,
+        inner: Session,
+        body: ElasticBody,
+        surface: str,
+        settings: LoopSettings,
+        counts: StepCounts,
+        work: Path,
+        checkpoint: Path | None = None,
+    ) -> None:
+        """Start with the pattern at rest, or where a checkpoint left it.
+
+        Parameters
+        ----------
+        inner : Session
+            Of any engine that can move the surface.
+        body : ElasticBody
+        surface : str
+            Its name in the engine, vertex for vertex that of the body.
+        settings : LoopSettings
+        counts : StepCounts
+            Of the scenario.
+        work : Path
+            Folder of the tables.
+        checkpoint : Path, optional
+            Folder that ``write_checkpoint`` wrote.
+        """
+        self._inner = inner
+        self._body = body
+        self._surface = surface
+        self._settings = settings
+        self._record_steps = counts.window
+        self._steps = _whole_samples(settings.window_s, counts)
+        self._relaxation = settings.relaxation()
+        rest = body.vertices_m
+        self._shown = np.zeros_like(rest)
+        self._next = np.zeros_like(rest)
+        self._work_j = self._solve_s = 0.0
+        ledger_bytes, rows = None, 0
+        if checkpoint is not None:
+            ledger_bytes, rows = self._take_up(checkpoint)
+        self._ledger = Ledger(work / LEDGER, ledger_bytes)
+        self._shapes = ShapesFile(work / SHAPES, rows, *rest.shape)
+
+    def __getattr__(self, name: str) -> Any:
+        """All else is the engine's own."""
+        return getattr(self._inner, name)
+
+    @property
+    def displacement_m(self) -> Array:
+        """Displacement of the surface that the sand sees, (nv, d) float64, m."""
+        return self._shown
+
+    def advance(self, duration_s: float | None = None) -> None:
+        """Compute for a duration, or up to the next record, in windows of the loop."""
+        inner = self._inner
+        now, record = inner.steps, self._record_steps
+        ahead = record - now % record
+        if duration_s is not None:
+            ahead = round(duration_s / inner.step_s)
+        end = now + ahead
+        while inner.steps < end and not inner.stage_over:
+            self._window(min(self._steps - inner.steps % self._steps, end - inner.steps))
+        if inner.is_root:
+            self._shapes.write(inner.time_s, self._shown)
+
+    def _window(self, steps: int) -> None:
+        """Compute one window, as often as the settings ask."""
+        settings = self._settings
+        kept = self._inner.keep() if settings.repeats else None
+        start, shown, passes = self._shown, self._next, 0
+        self._solve_s = 0.0
+        while True:
+            told = self._pass(shown, steps * self._inner.step_s)
+            passes += 1
+            if told is None:  # too short a window for a sample: its load counts in the next
+                self._shown = shown
+                return
+            load, answer, target = told
+            residual_m = rms_m(answer.displacement_m - shown)
+            if passes > settings.repeats or residual_m <= settings.tolerance * rms_m(shown):
+                break
+            self._inner.go_back(kept)
+            shown = target
+        self._work_j += work_of(load, shown - start)
+        self._shown = shown
+        self._next = self._predicted(start, shown, target)
+        self._write(steps, passes, load, answer)
+        self._check()
+
+    def _pass(self, shown: Array, window_s: float) -> tuple[Array, Answer, Array] | None:
+        """Move the surface through a window; give load, answer and what to show next."""
+        inner = self._inner
+        inner.move_surface(self._surface, self._body.vertices_m + shown, window_s)
+        inner.advance(window_s)
+        load = inner.vertex_loads(self._surface)
+        if load is None:
+            return None
+        begun = time.perf_counter()
+        answer = self._body.answer(load)
+        target = self._relaxation.next(shown.ravel(), answer.displacement_m.ravel())
+        self._solve_s += time.perf_counter() - begun
+        return load, answer, target.reshape(shown.shape)
+
+    def _predicted(self, start: Array, shown: Array, target: Array) -> Array:
+        """Where the next window leads: part of the way to the answer, or on as in this one."""
+        if self._settings.predicts:
+            return np.asarray(target + (shown - start))
+        return target
+
+    def _write(self, steps: int, passes: int, load: Array, answer: Answer) -> None:
+        shown = self._shown
+        self._ledger.write(
+            Entry(
+                time_s=self._inner.time_s,
+                window_s=steps * self._inner.step_s,
+                passes=passes,
+                factor=self._relaxation.factor,
+                residual_m=rms_m(answer.displacement_m - shown),
+                displacement_m=rms_m(shown),
+                largest_m=float(np.linalg.norm(shown, axis=1).max()),
+                load_n=float(np.linalg.norm(load.sum(axis=0))),
+                imbalance_n=imbalance_n(load, answer),
+                work_j=self._work_j,
+                energy_j=answer.energy_j,
+                solve_s=self._solve_s,
+            )
+        )
+
+    def _check(self) -> None:
+        """Stop where the next displacement is beyond all bounds.
+
+        Raises
+        ------
+        EngineStop
+        """
+        largest_m = float(np.linalg.norm(self._next, axis=1).max())
+        if not largest_m <= self._settings.largest_displacement_m:
+            raise EngineStop(
+                Outcome.COUPLING_DIVERGED,
+                f"the pattern is to move by {largest_m:.3g} m, more than pattern.loop."
+                f"largest_displacement_m = {self._settings.largest_displacement_m:g}, after "
+                f"{self._inner.time_s:.4g} s: a smaller factor or another scheme may hold",
+            )
+
+    def write_checkpoint(self, folder: Path) -> None:
+        """Write the engine's state and the loop's."""
+        self._inner.write_checkpoint(folder)
+        size = self._ledger.size()
+        self._shapes.flush()
+        arrays: dict[str, Any] = {
+            "shown": self._shown,
+            "next": self._next,
+            "work_j": self._work_j,
+            "ledger_bytes": size,
+            "rows": self._shapes.rows,
+        }
+        memory = {f"relaxation_{name}": a for name, a in self._relaxation.state().items()}
+        np.savez(folder / CHECKPOINT, **arrays, **memory)
+
+    def _take_up(self, checkpoint: Path) -> tuple[int, int]:
+        """Read what ``write_checkpoint`` wrote; give the trusted parts of the tables."""
+        with np.load(checkpoint / CHECKPOINT) as kept:
+            self._shown, self._next = kept["shown"], kept["next"]
+            self._work_j = float(kept["work_j"])
+            start = "relaxation_"
+            memory = {k.removeprefix(start): kept[k] for k in kept.files if k.startswith(start)}
+            self._relaxation.restore(memory)
+            return int(kept["ledger_bytes"]), int(kept["rows"])
+
+    def close(self) -> None:
+        """Close the tables and free the engine."""
+        self._ledger.close()
+        self._shapes.close()
+        self._inner.close()
+
+
+def _whole_samples(window_s: float, counts: StepCounts) -> int:
+    """Steps of a window: whole samples of the loads, and a whole number of them in a record."""
+    samples = counts.window // counts.load
+    asked = max(1.0, window_s / counts.step_s / counts.load)
+    fits = [n for n in range(1, samples + 1) if samples % n == 0]
+    return counts.load * min(fits, key=lambda n: abs(np.log(n / asked)))

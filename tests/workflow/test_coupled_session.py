@@ -1,0 +1,215 @@
+"""The staggered loop on engines: a plate on springs under sand, whose rest is known exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.body import Answer
+from pattern_fe.coupling.ledger import read_ledger
+from pattern_fe.coupling.session import LEDGER, SHAPES, CoupledSession
+from pattern_fe.coupling.settings import LoopSettings
+from pattern_fe.coupling.shapes_file import read_shapes
+from sandmould.engines.outcome import Outcome
+from sandmould.engines.program import build_program
+from sandmould.engines.reference.session import ReferenceSession
+from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.scenario import Scenario
+from tests.scenes import open_lammps, tube_scene
+
+Array = NDArray[np.float64]
+SLAB_M = np.array([[0.001, 0.02], [0.04, 0.02], [0.079, 0.02], [0.079, 0.025], [0.04, 0.025],
+                   [0.001, 0.025]])  # fmt: skip
+STIFFNESS_N_M = 2e3
+SCENE: dict[str, Any] = {
+    "obstacles": [{"kind": "polygon", "name": "pattern", "vertices_m": SLAB_M.tolist()}],
+    # The plate follows the sand within some windows: rest takes longer than on a fixed floor.
+    "fill": {"layers": [{"count": 40, "repeat": 2}], "settling": {"shortest_s": 0.5}},
+    "background_damping": {"form": "none"},
+    "vibration": [],
+    "record": {"load_every_steps": 5},
+}
+
+
+@dataclass
+class Plate:
+    """Rigid plate on springs that let it move up and down alone."""
+
+    vertices_m: Array
+    stiffness_n_m: float = STIFFNESS_N_M
+
+    def answer(self, load_n: Array) -> Answer:
+        """Weight over stiffness."""
+        force_n = load_n.sum(axis=0)
+        sinks = np.zeros_like(self.vertices_m)
+        sinks[:, 1] = force_n[1] / self.stiffness_n_m
+        return Answer(sinks, 0.5 * force_n[1] ** 2 / self.stiffness_n_m, -force_n)
+
+
+def settings(**changes: Any) -> LoopSettings:
+    values: dict[str, Any] = {
+        "window_s": 0.002, "scheme": "fixed", "factor": 0.1, "least_factor": 0.005,
+        "most_factor": 1.0, "repeats": 0, "tolerance": 0.01, "predicts": False,
+        "largest_displacement_m": 0.02,
+    }  # fmt: skip
+    return LoopSettings(**(values | changes))
+
+
+def opened(engine: str, folder: Path, scenario: Scenario, checkpoint: Path | None) -> Session:
+    if engine == "lammps":
+        return open_lammps(scenario, folder, checkpoint)
+    return ReferenceSession(build_program(scenario), checkpoint)
+
+
+def coupled(
+    folder: Path, engine: str = "reference", checkpoint: Path | None = None, **changes: Any
+) -> CoupledSession:
+    scenario = tube_scene(**SCENE)
+    inner = opened(engine, folder, scenario, checkpoint)
+    plate = Plate(SLAB_M, changes.pop("stiffness_n_m", STIFFNESS_N_M))
+    counts = StepCounts.of(scenario)
+    return CoupledSession(inner, plate, "pattern", settings(**changes), counts, folder, checkpoint)
+
+
+def filled(session: CoupledSession, records: int = 10**6) -> int:
+    """Fill both layers, or as far as so many records go."""
+    scenario, done = tube_scene(**SCENE), 0
+    for stage in build_program(scenario).stages:
+        session.insert_layer(stage.layer)
+        session.start_stage(stage)
+        while not session.stage_over and done < records:
+            session.advance()
+            done += 1
+    return done
+
+
+@pytest.mark.parametrize("engine", ["reference", "lammps"])
+def test_the_plate_comes_to_rest_where_its_springs_carry_the_sand(
+    engine: str, tmp_path: Path
+) -> None:
+    session = coupled(tmp_path, engine)
+    filled(session)
+    ledger, last = after(session, tmp_path)
+    weight_n = (session.snapshot().radius_m ** 2).sum() * np.pi * 2400 * 0.1 * 9.80665
+    loads = session.surface_loads()
+    assert loads is not None
+    session.close()
+    # Walls carry a part of the weight by friction, and a grain or two may lie beside the plate.
+    assert 0.5 * weight_n < -loads["pattern"][1] < weight_n
+    sunk_m = -session.displacement_m[:, 1]
+    assert np.ptp(sunk_m) < 1e-15
+    # The sand is at rest by its rule, not exactly: its load still moves a little.
+    assert sunk_m[0] == pytest.approx(-loads["pattern"][1] / STIFFNESS_N_M, rel=0.05)
+    assert last.residual_m < 0.05 * last.displacement_m
+    # Damped sand loses what the plate does not store: falling sand works on it more than slow sand.
+    assert ledger.energy_j.iloc[-1] <= last.work_j
+
+
+def after(session: CoupledSession, folder: Path) -> tuple[pd.DataFrame, Any]:
+    """Ledger up to now, and its last window."""
+    session._ledger.size()
+    session._shapes.flush()
+    ledger = read_ledger(folder / LEDGER)
+    return ledger, ledger.iloc[-1]
+
+
+def test_shapes_hold_every_record(tmp_path: Path) -> None:
+    session = coupled(tmp_path)
+    records = filled(session, records=4)
+    session.close()
+    time_s, shapes_m = read_shapes(tmp_path / SHAPES, len(SLAB_M), 2)
+    assert len(time_s) == records
+    np.testing.assert_array_equal(shapes_m[-1], session.displacement_m)
+
+
+def test_vertex_loads_of_all_windows_make_up_the_record(tmp_path: Path) -> None:
+    for engine in ("reference", "lammps"):
+        folder = tmp_path / engine
+        folder.mkdir()
+        scenario = tube_scene(**SCENE)
+        session = opened(engine, folder, scenario, None)
+        session.insert_layer(1)
+        session.start_stage(build_program(scenario).stages[0])
+        counts = StepCounts.of(scenario)
+        samples = counts.window // counts.load
+        parts = [samples // 3, samples // 4, samples - samples // 3 - samples // 4]
+        for _ in range(5):
+            session.advance()
+        mean = np.zeros_like(SLAB_M)
+        for part in parts:
+            session.advance(part * counts.load * session.step_s)
+            load = session.vertex_loads("pattern")
+            assert load is not None
+            mean += load * part / samples
+        whole = session.surface_loads()
+        assert whole is not None
+        np.testing.assert_allclose(mean.sum(axis=0), whole["pattern"], rtol=1e-9, atol=1e-9)
+        assert np.abs(mean[3:]).sum() > 10 * np.abs(mean[:3]).sum()  # sand lies on top
+        assert session.vertex_loads("pattern") is None
+        session.close()
+
+
+@pytest.mark.parametrize("engine", ["reference", "lammps"])
+def test_a_stopped_loop_goes_on_as_if_never_stopped(engine: str, tmp_path: Path) -> None:
+    (tmp_path / "straight").mkdir()
+    (tmp_path / "stopped").mkdir()
+    straight = coupled(tmp_path / "straight", engine, scheme="aitken")
+    first = coupled(tmp_path / "stopped", engine, scheme="aitken")
+    stage = build_program(tube_scene(**SCENE)).stages[0]
+    checkpoints = [tmp_path / "straight" / "kept", tmp_path / "stopped" / "kept"]
+    for session, folder in zip((straight, first), checkpoints, strict=True):
+        folder.mkdir()
+        session.insert_layer(1)
+        session.start_stage(stage)
+        for _ in range(6):
+            session.advance()
+        session.write_checkpoint(folder)
+    first.advance()  # beyond what the checkpoint vouches for
+    first.close()
+    second = coupled(tmp_path / "stopped", engine, checkpoints[1], scheme="aitken")
+    for _ in range(3):
+        straight.advance()
+        second.advance()
+    straight.close()
+    second.close()
+    exact = 0.0 if engine == "reference" else 1e-9  # DESIGN, section 3
+    np.testing.assert_allclose(
+        second.displacement_m, straight.displacement_m, rtol=exact, atol=exact
+    )
+    one, two = (read_ledger(tmp_path / name / LEDGER) for name in ("straight", "stopped"))
+    np.testing.assert_allclose(
+        two.drop(columns="solve_s"), one.drop(columns="solve_s"), rtol=exact, atol=exact
+    )
+
+
+def test_repeated_windows_end_with_the_answer_that_was_shown(tmp_path: Path) -> None:
+    plain, repeated = tmp_path / "plain", tmp_path / "repeated"
+    ledgers = []
+    for folder, repeats in ((plain, 0), (repeated, 12)):
+        folder.mkdir()
+        session = coupled(folder, scheme="quasi_newton", repeats=repeats)
+        filled(session, records=12)
+        session.close()
+        ledgers.append(read_ledger(folder / LEDGER).iloc[20:])
+    within = [(ledger.residual_m <= 0.01 * ledger.displacement_m).mean() for ledger in ledgers]
+    assert within[1] > 0.9 > within[0]
+    assert ledgers[1].passes.max() > 1
+
+
+def test_a_soft_plate_runs_away_in_the_plain_loop_and_holds_by_aitken(tmp_path: Path) -> None:
+    (tmp_path / "plain").mkdir()
+    (tmp_path / "aitken").mkdir()
+    soft = 200.0
+    with pytest.raises(EngineStop, match="pattern is to move by") as stop:
+        filled(coupled(tmp_path / "plain", factor=1.0, stiffness_n_m=soft))
+    assert stop.value.outcome is Outcome.COUPLING_DIVERGED
+    held = coupled(tmp_path / "aitken", scheme="aitken", factor=0.02, stiffness_n_m=soft)
+    filled(held, records=10)
+    held.close()
