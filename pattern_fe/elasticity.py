@@ -1,0 +1,116 @@
+"""Forces and stiffness of elements in large displacements; small ones are those from rest.
+
+Total Lagrangian form with the law of St. Venant and Kirchhoff (Bonet and Wood, Nonlinear Continuum
+Mechanics for Finite Element Analysis, 2nd ed., sections 8 and 9): everything is integrated over
+the drawing. At rest its tangent is the stiffness of linear elasticity.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.material import Foam
+from pattern_fe.space import Space
+
+Array = NDArray[np.float64]
+
+
+def deformation_gradient(space: Space, displacement_m: Array) -> Array:
+    """F = 1 + grad u at the integration points.
+
+    Parameters
+    ----------
+    displacement_m : (n, d) float64, m
+
+    Returns
+    -------
+    (ne, q, d, d) float64
+    """
+    moved = displacement_m[space.cells].transpose(0, 2, 1)[:, None]
+    return np.asarray(np.eye(space.dimension) + moved @ space.gradient)
+
+
+def green_strain(deformation: Array) -> Array:
+    """E = (F^T F - 1)/2, none under any rotation, (..., d, d) float64."""
+    square = np.swapaxes(deformation, -1, -2) @ deformation
+    return np.asarray(0.5 * (square - np.eye(deformation.shape[-1])))
+
+
+def small_strain(deformation: Array) -> Array:
+    """Symmetric part of grad u, (..., d, d) float64."""
+    symmetric = 0.5 * (deformation + np.swapaxes(deformation, -1, -2))
+    return np.asarray(symmetric - np.eye(deformation.shape[-1]))
+
+
+def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
+    """Forces with which the nodes must be held in a deformed state.
+
+    Parameters
+    ----------
+    displacement_m : (n, d) float64, m
+
+    Returns
+    -------
+    (n, d) float64, N
+    """
+    deformation = deformation_gradient(space, displacement_m)
+    first_piola = deformation @ foam.stress_pa(green_strain(deformation))
+    weighted = first_piola * space.weight[..., None, None]
+    forces = space.gradient @ np.swapaxes(weighted, -1, -2)
+    return space.summed(forces.sum(axis=1))
+
+
+def element_stiffness_n_m(space: Space, foam: Foam, displacement_m: Array | None = None) -> Array:
+    """Change of the elements' forces with their displacements.
+
+    Parameters
+    ----------
+    displacement_m : (n, d) float64, m, optional
+        State about which they change, by default the drawing.
+
+    Returns
+    -------
+    (ne, k d, k d) float64, N/m
+    """
+    lam, mu = foam.lame_pa
+    ne, _, k, d = space.gradient.shape
+    at_rest = np.zeros_like(space.node_m) if displacement_m is None else displacement_m
+    deformation = deformation_gradient(space, at_rest)
+    stress = foam.stress_pa(green_strain(deformation))
+    weight = space.weight[..., None, None]
+    # column (a, i) of `along`: i-th component of F times the gradient of shape function a
+    along = space.gradient @ np.swapaxes(deformation, -1, -2)
+    along = along.reshape(ne, -1, k * d)
+    pairs = np.swapaxes(along * space.weight[..., None], 1, 2) @ along
+    pairs = pairs.reshape(ne, k, d, k, d)
+    crossed = pairs.transpose(0, 1, 4, 3, 2)
+    # (F F^T)_ij grad a . grad b, one column of F at a time to save memory
+    stretched = np.zeros_like(pairs).reshape(ne, k * d, k * d)
+    scale = np.repeat(space.weight, d, axis=1)[:, None]
+    for column in np.moveaxis(deformation, -1, 0):
+        rows = column[:, :, None, :, None] * space.gradient[:, :, :, None, :]
+        rows = rows.transpose(0, 2, 3, 1, 4).reshape(ne, k * d, -1)
+        stretched += (rows * scale) @ np.swapaxes(rows, 1, 2)
+    loaded = (space.gradient @ (stress * weight) @ np.swapaxes(space.gradient, -1, -2)).sum(axis=1)
+    geometric = loaded[:, :, None, :, None] * np.eye(d)[None, None, :, None, :]
+    whole = lam * pairs + mu * (crossed + stretched.reshape(pairs.shape)) + geometric
+    return np.asarray(whole.reshape(ne, k * d, k * d))
+
+
+def von_mises_pa(foam: Foam, stress_pa: Array) -> Array:
+    """Equivalent stress; in 2D with the stress that plane strain builds up across the plane.
+
+    Parameters
+    ----------
+    stress_pa : (..., d, d) float64, Pa
+
+    Returns
+    -------
+    (...) float64, Pa
+    """
+    trace = np.trace(stress_pa, axis1=-2, axis2=-1)
+    across = foam.poisson * trace if stress_pa.shape[-1] == 2 else 0.0
+    mean = (trace + across) / 3.0
+    deviator2 = np.sum(stress_pa**2, axis=(-2, -1)) + across**2 - 3.0 * mean**2
+    return np.asarray(np.sqrt(np.maximum(1.5 * deviator2, 0.0)))
