@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from skfem.mapping import MappingIsoparametric
 
 Array = NDArray[np.float64]
 _SHOWN = 5
@@ -77,30 +78,45 @@ def _place(point_m: Array) -> str:
 
 
 def _inverted(mesh: Any) -> NDArray[np.bool_]:
-    """Elements folded in themselves or over a neighbour, (ne,) bool.
+    """Elements folded in themselves or over their neighbours, (ne,) bool.
 
-    The order of an element's corners may run either way, in a file as in scikit-fem; so one that
-    is turned inside out is known by lying on the same side of its faces as its neighbours.
+    The order of an element's corners may run either way, in a file as in scikit-fem; so those
+    that are turned inside out are known by lying on the same side of a shared face as others.
     """
-    corner_volume = mesh.mapping().detDF(mesh.refdom.p)
-    extent2 = np.max(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** mesh.dim()
+    # not the mesh's own mapping, which inverts that of simplices at once
+    mapping, axes = MappingIsoparametric(mesh, mesh.elem()), range(mesh.dim())
+    edges = np.array([[mapping.J(i, j, mesh.refdom.p) for j in axes] for i in axes])
+    corner_volume = np.linalg.det(edges.transpose(2, 3, 0, 1))
+    extent = np.max(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** mesh.dim()
     least, most = corner_volume.min(axis=1), corner_volume.max(axis=1)
-    folded = (least <= 1e-9 * extent2) & (most >= -1e-9 * extent2)
-    centre = mesh.p[:, mesh.t].mean(axis=1)
+    folded = (least <= 1e-9 * extent) & (most >= -1e-9 * extent)
     shared = np.flatnonzero(mesh.f2t[1] >= 0)
     one, two = mesh.f2t[:, shared]
-    corners = mesh.p[:, mesh.facets[:, shared]]
+    same = _same_side(mesh, shared)
+    # every element stands here once for either way it may be turned, n apart
+    n = mesh.nelements
+    first = np.concatenate([one, one + n])
+    second = np.concatenate([np.where(same, two + n, two), np.where(same, two, two + n)])
+    links = coo_array((np.ones(len(first)), (first, second)), shape=(2 * n, 2 * n))
+    _, group = connected_components(links, directed=False)
+    piece = np.minimum(group[:n], group[n:])
+    turned = group[:n] != piece
+    fewer = 2 * np.bincount(piece, weights=turned) <= np.bincount(piece)
+    return np.asarray(folded | (turned == fewer[piece]))
+
+
+def _same_side(mesh: Any, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether both elements at inner faces lie on the same side of them."""
+    corners = mesh.p[:, mesh.facets[:, faces]]
     edges = corners[:, 1:] - corners[:, :1]
     if mesh.dim() == 2:
         normal = np.stack([edges[1, 0], -edges[0, 0]])
     else:
         normal = np.cross(edges[:, 0], edges[:, 1], axis=0)
-    middle = corners.mean(axis=1)
-    side = [np.sum(normal * (centre[:, cell] - middle), axis=0) for cell in (one, two)]
-    same = side[0] * side[1] >= 0.0
-    over = np.bincount(np.concatenate([one[same], two[same]]), minlength=mesh.nelements)
-    neighbours = np.bincount(np.concatenate([one, two]), minlength=mesh.nelements)
-    return np.asarray(folded | ((over > 0) & (over == neighbours)))
+    centre = mesh.p[:, mesh.t].mean(axis=1)[:, mesh.f2t[:, faces]]
+    away = centre - corners.mean(axis=1)[:, None]
+    side = np.sum(normal[:, None] * away, axis=0)
+    return np.asarray(side[0] * side[1] >= 0.0)
 
 
 def _pieces(mesh: Any) -> int:

@@ -88,19 +88,20 @@ class CondensedSurface:
 
 
 def condensed_surface(
-    stiffness: csc_array, mass_kg: Array, nodes: NDArray[np.int64], fixed: Mask, damping_1_s: float
+    stiffness: csc_array,
+    mass_kg: Array,
+    nodes: NDArray[np.int64],
+    fixed: Mask,
+    damping_1_s: float,
 ) -> CondensedSurface:
     """Schur complement on some nodes, exact for static loads on them (Guyan 1965).
-
-    The inner mass moves as statics has it; its kinetic energy per component gives the shares in
-    which the whole mass is lumped on the vertices, positive and with the right sum in each
-    direction.
 
     Parameters
     ----------
     stiffness : (N d, N d) sparse float64, N/m
-    mass_kg : (N,) float64, kg
-        Lumped, of all nodes.
+        Of all nodes.
+    mass_kg : (n,) float64, kg
+        Of the nodes kept.
     nodes : (n,) int64
         Kept, all those with a support among them.
     fixed : (N, d) bool
@@ -116,22 +117,16 @@ def condensed_surface(
     kept = (nodes[:, None] * d + np.arange(d)).ravel()
     inner = np.setdiff1d(np.arange(fixed.size), kept)
     schur = stiffness[kept][:, kept].toarray()
-    masses = np.repeat(mass_kg, d)
-    energy = masses[kept].copy()
     if len(inner):
         factor = factorised(stiffness[inner][:, inner])
         coupling = stiffness[inner][:, kept]
         for first in range(0, len(kept), _COLUMNS):
             columns = slice(first, first + _COLUMNS)
-            # how the inner nodes follow a unit motion of each component kept
-            follow = -factor.solve(coupling[:, columns].toarray())
-            schur[:, columns] += coupling.T @ follow
-            energy[columns] += masses[inner] @ follow**2
-    lumped = energy.reshape(-1, d)
-    lumped = (lumped * mass_kg.sum() / lumped.sum(axis=0)).ravel()
+            schur[:, columns] -= coupling.T @ factor.solve(coupling[:, columns].toarray())
+    mass = np.repeat(mass_kg, d)
     held = fixed.ravel()[kept]
     return CondensedSurface(
         0.5 * (schur + schur.T),
-        np.where(held, np.inf, lumped),
-        np.where(held, 0.0, damping_1_s * lumped),
+        np.where(held, np.inf, mass),
+        np.where(held, 0.0, damping_1_s * mass),
     )

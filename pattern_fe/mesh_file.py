@@ -70,8 +70,10 @@ def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
 def _parsed(path: Path) -> meshio.Mesh:
     said = io.StringIO()
     try:
-        # meshio prints and ends the process at a file that it cannot read
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        # meshio prints and ends the process at a file that it cannot read; of a text file it takes
+        # some bytes for a number of triangles, which may overflow
+        hushed = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
+        with hushed[0], hushed[1], np.errstate(over="ignore"):
             return meshio.read(path)
     except (Exception, SystemExit) as error:
         reason = str(error) if isinstance(error, meshio.ReadError | OSError) else "not readable"

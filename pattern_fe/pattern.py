@@ -201,22 +201,26 @@ class Pattern:
     def condensed(self, damping_ratio: float = 0.0) -> CondensedSurface:
         """Stiffness, mass and damping on the vertices of the surface, for an engine's own steps.
 
+        The whole mass is shared by area. Shares that follow the inner motion would bring the
+        first frequency from 7 % low to 1 % low in an L, but leave single vertices so light that,
+        once masses are scaled to a given step, it is lower by a third.
+
         Parameters
         ----------
         damping_ratio : float
-            At the first natural frequency.
+            At the first natural frequency of the pattern itself.
         """
         damping = self.mass_damping_1_s(damping_ratio) if damping_ratio else 0.0
-        return condensed_surface(
-            self.stiffness, self.mass_kg, self.surface.nodes, self.fixed, damping
-        )
+        area = self.surface.vertex_area_m2
+        mass = self.mass_kg.sum() * area / area.sum()
+        return condensed_surface(self.stiffness, mass, self.surface.nodes, self.fixed, damping)
 
     def newmark(self, step_s: float, damping_1_s: float = 0.0, lumped: bool = False) -> Newmark:
         """Small motion with any step, at rest on the drawing."""
         return Newmark(self.stiffness, self._mass_matrix(lumped), self.fixed, step_s, damping_1_s)
 
     def critical_step_s(self, mass_scale: float = 1.0) -> float:
-        """Largest stable step of ``central_differences``: of the stiffest element and the bedding."""
+        """Largest stable step of ``central_differences``, of the stiffest element and bedding."""
         elements2 = (2.0 / dynamics.critical_step_s(self.space, self.foam)) ** 2
         bedding2 = float((self._bedding_n_m / self.mass_kg).max())
         return 2.0 * math.sqrt(mass_scale / (elements2 + bedding2))
