@@ -16,8 +16,8 @@ from pattern_fe.space import Space
 Array = NDArray[np.float64]
 
 
-def deformation_gradient(space: Space, displacement_m: Array) -> Array:
-    """F = 1 + grad u at the integration points.
+def displacement_gradient(space: Space, displacement_m: Array) -> Array:
+    """Grad u at the integration points; F = 1 + grad u.
 
     Parameters
     ----------
@@ -28,19 +28,17 @@ def deformation_gradient(space: Space, displacement_m: Array) -> Array:
     (ne, q, d, d) float64
     """
     moved = displacement_m[space.cells].transpose(0, 2, 1)[:, None]
-    return np.asarray(np.eye(space.dimension) + moved @ space.gradient)
+    return np.asarray(moved @ space.gradient)
 
 
-def green_strain(deformation: Array) -> Array:
-    """E = (F^T F - 1)/2, none under any rotation, (..., d, d) float64."""
-    square = np.swapaxes(deformation, -1, -2) @ deformation
-    return np.asarray(0.5 * (square - np.eye(deformation.shape[-1])))
-
-
-def small_strain(deformation: Array) -> Array:
+def small_strain(slope: Array) -> Array:
     """Symmetric part of grad u, (..., d, d) float64."""
-    symmetric = 0.5 * (deformation + np.swapaxes(deformation, -1, -2))
-    return np.asarray(symmetric - np.eye(deformation.shape[-1]))
+    return np.asarray(0.5 * (slope + np.swapaxes(slope, -1, -2)))
+
+
+def green_strain(slope: Array) -> Array:
+    """E = (F^T F - 1)/2, none under any rotation, without loss of digits where it is small."""
+    return np.asarray(small_strain(slope) + 0.5 * (np.swapaxes(slope, -1, -2) @ slope))
 
 
 def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
@@ -54,8 +52,8 @@ def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
     -------
     (n, d) float64, N
     """
-    deformation = deformation_gradient(space, displacement_m)
-    first_piola = deformation @ foam.stress_pa(green_strain(deformation))
+    slope = displacement_gradient(space, displacement_m)
+    first_piola = (np.eye(space.dimension) + slope) @ foam.stress_pa(green_strain(slope))
     weighted = first_piola * space.weight[..., None, None]
     forces = space.gradient @ np.swapaxes(weighted, -1, -2)
     return space.summed(forces.sum(axis=1))
@@ -76,8 +74,9 @@ def element_stiffness_n_m(space: Space, foam: Foam, displacement_m: Array | None
     lam, mu = foam.lame_pa
     ne, _, k, d = space.gradient.shape
     at_rest = np.zeros_like(space.node_m) if displacement_m is None else displacement_m
-    deformation = deformation_gradient(space, at_rest)
-    stress = foam.stress_pa(green_strain(deformation))
+    slope = displacement_gradient(space, at_rest)
+    deformation = np.eye(d) + slope
+    stress = foam.stress_pa(green_strain(slope))
     weight = space.weight[..., None, None]
     # column (a, i) of `along`: i-th component of F times the gradient of shape function a
     along = space.gradient @ np.swapaxes(deformation, -1, -2)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.elasticity import deformation_gradient, element_stiffness_n_m, internal_force_n
+from pattern_fe.elasticity import displacement_gradient, element_stiffness_n_m, internal_force_n
 from pattern_fe.factor import factorised
 from pattern_fe.material import Foam
 from pattern_fe.space import Space
@@ -104,8 +104,9 @@ class _Equilibrium:
         for halvings in range(8):
             tried = displacement_m + step_m / 2**halvings
             residual, largest = self.residual_n(tried, load_n)
-            kept = bool((np.linalg.det(deformation_gradient(self.space, tried)) > 0.0).all())
-            if kept and abs(float(np.sum(step_m * residual))) <= 0.9 * slope:
+            strained = displacement_gradient(self.space, tried)
+            kept = np.linalg.det(np.eye(self.space.dimension) + strained) > 0.0
+            if kept.all() and abs(float(np.sum(step_m * residual))) <= 0.9 * slope:
                 break
         return tried, residual, largest
 

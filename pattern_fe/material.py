@@ -42,11 +42,6 @@ class Foam:
         shear = self.young_pa / (2.0 * (1.0 + self.poisson))
         return 2.0 * shear * self.poisson / (1.0 - 2.0 * self.poisson), shear
 
-    @property
-    def plane_strain_young_pa(self) -> float:
-        """E/(1 - nu^2): what bends a wide strip, Pa."""
-        return self.young_pa / (1.0 - self.poisson**2)
-
     def stress_pa(self, strain: Array) -> Array:
         """Hooke's law in 3D or plane strain, for Green strains that of St. Venant and Kirchhoff.
 

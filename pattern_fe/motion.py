@@ -127,8 +127,3 @@ class CentralDifferences:
         self.velocity_m_s = self._keeps * self.velocity_m_s + self._gains * force
         self.displacement_m = self.displacement_m + self.step_s * self.velocity_m_s
         self.time_s += self.step_s
-
-    @property
-    def kinetic_energy_j(self) -> float:
-        """Of the velocities half a step ago."""
-        return float(0.5 * np.sum(self._mass_kg * self.velocity_m_s**2))

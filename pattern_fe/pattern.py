@@ -16,7 +16,7 @@ from pattern_fe.checks import check_mesh
 from pattern_fe.condensation import CondensedSurface, condensed_surface
 from pattern_fe.distance import Distance, distance_from_drawing
 from pattern_fe.elasticity import (
-    deformation_gradient,
+    displacement_gradient,
     element_stiffness_n_m,
     green_strain,
     internal_force_n,
@@ -165,10 +165,11 @@ class Pattern:
         -------
         (ne, q, d, d) float64, Pa
         """
-        deformation = deformation_gradient(self.space, displacement_m)
+        slope = displacement_gradient(self.space, displacement_m)
         if not large:
-            return self.foam.stress_pa(small_strain(deformation))
-        second = self.foam.stress_pa(green_strain(deformation))
+            return self.foam.stress_pa(small_strain(slope))
+        second = self.foam.stress_pa(green_strain(slope))
+        deformation = np.eye(self.space.dimension) + slope
         pushed = deformation @ second @ np.swapaxes(deformation, -1, -2)
         return np.asarray(pushed / np.linalg.det(deformation)[..., None, None])
 
@@ -186,10 +187,11 @@ class Pattern:
     def natural_frequencies_hz(self, count: int = 1, lumped: bool = False) -> Array:
         """Lowest natural frequencies, ascending, (count,) float64; rigid motions are near 0."""
         return dynamics.natural_frequencies_hz(
-            self.space, self.foam, self.stiffness, self._mass_matrix(lumped), self.fixed, count
+            self.space, self.foam, self.stiffness, self.mass_matrix(lumped), self.fixed, count
         )
 
-    def _mass_matrix(self, lumped: bool) -> csc_array:
+    def mass_matrix(self, lumped: bool) -> csc_array:
+        """Consistent or lumped mass of all components, (n d, n d) sparse float64, kg."""
         if lumped:
             return dynamics.as_diagonal(self.mass_kg, self.space.dimension)
         return dynamics.consistent_mass_kg(self.space, self.foam)
@@ -217,7 +219,7 @@ class Pattern:
 
     def newmark(self, step_s: float, damping_1_s: float = 0.0, lumped: bool = False) -> Newmark:
         """Small motion with any step, at rest on the drawing."""
-        return Newmark(self.stiffness, self._mass_matrix(lumped), self.fixed, step_s, damping_1_s)
+        return Newmark(self.stiffness, self.mass_matrix(lumped), self.fixed, step_s, damping_1_s)
 
     def critical_step_s(self, mass_scale: float = 1.0) -> float:
         """Largest stable step of ``central_differences``, of the stiffest element and bedding."""

@@ -78,7 +78,7 @@ def _elastica(load: float) -> tuple[float, float]:
 @pytest.mark.parametrize("load", [1.0, 5.0])
 def test_cantilever_bends_far_as_the_elastica(load: float) -> None:
     length, height = 0.4, 0.01
-    pattern = cantilever(length, height, through=1, along=40, order=2, poisson=0.0)
+    pattern = cantilever(length, height, through=1, along=20, order=2, poisson=0.0)
     stiffness = pattern.foam.young_pa * THICKNESS_M * height**3 / 12.0
     force = end_load(pattern, load * stiffness / length**2)
     settings = NewtonSettings(load_steps=2)
@@ -102,15 +102,15 @@ def test_small_loads_give_the_linear_solution() -> None:
 
 def test_load_beyond_the_limit_of_the_law_is_refused_at_the_share_reached() -> None:
     supports = Supports(resting=("left", "bottom"))
-    pattern = Pattern(
-        mesh_of(bar(0.02, 0.01), 0.01), supports, Foam(poisson=0.0), thickness_m=THICKNESS_M
-    )
+    mesh, foam = mesh_of(bar(0.02, 0.01), 0.01), Foam(poisson=0.0)
+    # of first order, for which loads by area are those of a uniform stress
+    pattern = Pattern(mesh, supports, foam, order=1, thickness_m=THICKNESS_M)
     pressed = end_load(pattern, pattern.foam.young_pa * THICKNESS_M * 0.01)[:, ::-1]
-    with pytest.raises(LoadNotReachedError, match=r"no equilibrium beyond 1[89]\.\d %") as stop:
-        pattern.solve_nonlinear(-pressed)
+    with pytest.raises(LoadNotReachedError, match=r"no equilibrium beyond 1[6-9]\.\d %") as stop:
+        pattern.solve_nonlinear(-pressed, NewtonSettings(smallest_step=1.0 / 64.0))
     # without widening the force is E A s (1 - s^2)/2, at most at the stretch s = 1/sqrt(3)
     limit = 1.0 / (3.0 * np.sqrt(3.0))
-    assert limit - 2.0 / 256.0 < stop.value.fraction <= limit
+    assert limit - 2.0 / 64.0 < stop.value.fraction <= limit
 
 
 def test_bedding_holds_a_pattern_that_stands_free() -> None:
