@@ -1,1 +1,6 @@
-"""Deformation of the foam pattern under the sand; holds nothing until the pattern is computed."""
+"""The foam pattern as an elastic body that the sand bends.
+
+Arrays go in and out: displacements (m) and loads (N) have one row a node or, on the surface that an
+engine is given, one row a vertex. In 2D everything is per thickness of the pattern, so that loads
+are in N. The vertical axis is the last one.
+"""

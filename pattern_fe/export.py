@@ -1,0 +1,111 @@
+"""A deformed pattern in files: fields for ParaView, the surface as STL."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+from numpy.typing import NDArray
+from skfem.io.meshio import to_meshio
+
+from pattern_fe.loads import vertex_pressure_pa
+from pattern_fe.perimeter import Perimeter, split_face
+from pattern_fe.space import Space
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+def write_body(path: Path, space: Space, displacement_m: Array, von_mises_pa: Array) -> None:
+    """Write the elements with displacement and equivalent stress, for ParaView (.vtu).
+
+    Corners alone are written, at their places on the drawing; ParaView's filter 'warp by vector'
+    shows the deformed state. Points of 2D lie at z = 0.
+
+    Parameters
+    ----------
+    path : Path
+    space : Space
+    displacement_m : (n, d) float64, m
+    von_mises_pa : (ne,) float64, Pa
+        Mean of each element.
+    """
+    mesh = to_meshio(space.mesh, encode_cell_data=False)
+    moved = _in_space(displacement_m[: mesh.points.shape[0]])
+    meshio.Mesh(
+        _in_space(mesh.points),
+        mesh.cells,
+        point_data={"displacement_m": moved},
+        cell_data={"von_mises_pa": [von_mises_pa]},
+    ).write(path, file_format="vtu")
+
+
+def write_surface(path: Path, perimeter: Perimeter, displacement_m: Array, load_n: Array) -> None:
+    """Write the surface with displacement, load and nodal pressure, for ParaView (.vtu).
+
+    Parameters
+    ----------
+    path : Path
+    perimeter : Perimeter
+        As drawn.
+    displacement_m, load_n : (nv, d) float64, m and N
+        Of the vertices.
+    """
+    kind = "line" if perimeter.facets.shape[1] == 2 else "triangle"
+    meshio.Mesh(
+        _in_space(perimeter.vertices_m),
+        [(kind, perimeter.facets)],
+        point_data={
+            "displacement_m": _in_space(displacement_m),
+            "load_n": _in_space(load_n),
+            "pressure_pa": vertex_pressure_pa(perimeter, load_n),
+        },
+    ).write(path, file_format="vtu")
+
+
+def write_stl(path: Path, space: Space, perimeter: Perimeter, displacement_m: Array) -> None:
+    """Write the deformed surface as STL; a 2D pattern becomes a plate of its thickness.
+
+    Parameters
+    ----------
+    path : Path
+    space : Space
+    perimeter : Perimeter
+        As drawn.
+    displacement_m : (n, d) float64, m
+        Of all nodes of the pattern.
+    """
+    place_m = space.node_m + displacement_m
+    if space.dimension == 3:
+        points, triangles = place_m, perimeter.nodes[perimeter.facets]
+    else:
+        points, triangles = _plate(space, perimeter, place_m)
+    meshio.Mesh(points, [("triangle", triangles)]).write(path, file_format="stl", binary=True)
+
+
+def _plate(space: Space, perimeter: Perimeter, place_m: Array) -> tuple[Array, Indices]:
+    """Two copies of a flat pattern and a wall between them; normals point outwards."""
+    n = len(place_m)
+    half_m = 0.5 * space.thickness_m
+    points = np.vstack([np.column_stack([place_m, np.full(n, z)]) for z in (-half_m, half_m)])
+    domain = space.mesh.refdom
+    corners = list(range(domain.nnodes))
+    if space.order == 1:
+        parts: list[tuple[int, ...]] = [(0, i, i + 1) for i in corners[1:-1]]
+    else:
+        sides = [sorted(face) for face in domain.facets]
+        edges = [len(corners) + sides.index(sorted((i, (i + 1) % len(corners)))) for i in corners]
+        parts = split_face(corners, edges, 8 if len(corners) == 4 else None)
+    flat = space.cells[:, np.array(parts)].reshape(-1, 3)
+    one, two = (space.node_m[flat[:, i]] - space.node_m[flat[:, 0]] for i in (1, 2))
+    turned = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] < 0.0
+    flat = np.where(turned[:, None], flat[:, ::-1], flat)
+    a, b = perimeter.nodes[perimeter.facets].T
+    wall = np.concatenate([np.stack([a, b, b + n], axis=1), np.stack([a, b + n, a + n], axis=1)])
+    return points, np.concatenate([flat[:, ::-1], flat + n, wall])
+
+
+def _in_space(vectors: Array) -> Array:
+    missing = 3 - vectors.shape[1]
+    return np.pad(vectors, ((0, 0), (0, missing)))

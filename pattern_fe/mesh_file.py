@@ -1,0 +1,119 @@
+"""Meshes of patterns from files of any format that meshio reads, and back."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+from numpy.typing import NDArray
+from skfem import MeshHex1, MeshQuad1, MeshTet1, MeshTri1
+from skfem.io.meshio import from_meshio, to_meshio
+
+from pattern_fe.checks import check_mesh
+from pattern_fe.shapes import with_sides
+
+Array = NDArray[np.float64]
+_SOLID = {"tetra": 3, "tetra10": 3, "hexahedron": 3, "hexahedron27": 3}
+_PLANE = {"triangle": 2, "triangle6": 2, "quad": 2, "quad9": 2}
+_STRAIGHT = {3: MeshTri1, 4: MeshQuad1}
+_STRAIGHT_SOLID = {4: MeshTet1, 8: MeshHex1}
+
+
+def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
+    """Read a pattern of triangles or quadrilaterals, or of tetrahedra or hexahedra.
+
+    Physical groups of faces become named boundaries, and the extreme sides are named as in
+    ``shapes.SIDES`` unless a group has that name. Mid-side nodes are dropped: edges are straight.
+
+    Parameters
+    ----------
+    path : Path
+    unit_m : float, m
+        Length of the file's unit, 0.001 for millimetres.
+
+    Returns
+    -------
+    skfem.Mesh
+
+    Raises
+    ------
+    ValueError
+        When the file cannot be read, has not one kind of element, or its mesh is no pattern.
+    """
+    if not 0.0 < unit_m < np.inf:
+        raise ValueError(f"unit of the mesh file {path.name} is {unit_m} m, valid is above 0")
+    found = _parsed(path)
+    kinds = [block.type for block in found.cells]
+    solid = sorted({kind for kind in kinds if kind in _SOLID})
+    plane = sorted({kind for kind in kinds if kind in _PLANE})
+    own = solid or plane
+    if len(own) != 1:
+        shown = ", ".join(sorted(set(kinds))) or "none"
+        valid = "one kind among triangles, quadrilaterals, tetrahedra and hexahedra"
+        raise ValueError(f"mesh file {path.name} has elements {shown}, valid is {valid}")
+    points = np.asarray(found.points, dtype=np.float64)
+    if not solid and points.shape[1] == 3 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points):
+        raise ValueError(
+            f"mesh file {path.name} has a surface in space, not closed round a solid; valid are "
+            "tetrahedra or hexahedra, or triangles or quadrilaterals in a plane of constant z"
+        )
+    mesh = _straight(_with_groups(found), unit_m)
+    check_mesh(mesh)
+    return with_sides(mesh)
+
+
+def _parsed(path: Path) -> meshio.Mesh:
+    said = io.StringIO()
+    try:
+        # meshio prints and ends the process at a file that it cannot read; of a text file it takes
+        # some bytes for a number of triangles, which may overflow
+        hushed = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
+        with hushed[0], hushed[1], np.errstate(over="ignore"):
+            return meshio.read(path)
+    except (Exception, SystemExit) as error:
+        reason = str(error) if isinstance(error, meshio.ReadError | OSError) else "not readable"
+        valid = "a mesh that meshio reads, such as .msh, .vtu or .inp"
+        raise ValueError(f"mesh file {path} cannot be read ({reason}), valid is {valid}") from error
+
+
+def _with_groups(found: meshio.Mesh) -> Any:
+    """Mesh of scikit-fem with the file's groups; it only warns of groups that it cannot place."""
+    log = logging.getLogger("skfem.io.meshio")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        return from_meshio(found, ignore_orientation=True)
+    finally:
+        log.setLevel(level)
+
+
+def _straight(mesh: Any, unit_m: float) -> Any:
+    """Mesh of corners alone, with those groups of faces that lie on its boundary."""
+    corners = mesh.t[: mesh.refdom.nnodes]
+    used, t = np.unique(corners, return_inverse=True)
+    kind = (_STRAIGHT if mesh.dim() == 2 else _STRAIGHT_SOLID)[len(corners)]
+    points = np.ascontiguousarray(unit_m * mesh.p[:, used])
+    straight = kind(points, np.ascontiguousarray(t.reshape(corners.shape)))
+    outer = {tuple(sorted(v)): f for f, v in enumerate(straight.facets.T.tolist())}
+    groups = {}
+    for name, facets in (mesh.boundaries or {}).items():
+        ends = np.searchsorted(used, mesh.facets[: len(straight.facets), np.asarray(facets)])
+        numbers = [outer[tuple(sorted(v))] for v in ends.T.tolist()]
+        own = np.intersect1d(numbers, straight.boundary_facets())
+        if len(own):
+            groups[name] = own
+    return straight.with_boundaries(groups)
+
+
+def write_mesh(path: Path, mesh: Any) -> None:
+    """Write a mesh with its named boundaries in a format that the file's name asks for.
+
+    The names go along as cell data of scikit-fem, which ``read_mesh`` understands; formats
+    without cell data lose them.
+    """
+    meshio.write(path, to_meshio(mesh))

@@ -1,0 +1,250 @@
+"""The foam pattern as an elastic body: what a coupling loop, an engine or a judge asks of it."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import SuperLU
+
+from pattern_fe import dynamics
+from pattern_fe.checks import check_mesh
+from pattern_fe.condensation import CondensedSurface, condensed_surface
+from pattern_fe.distance import Distance, distance_from_drawing
+from pattern_fe.elasticity import (
+    displacement_gradient,
+    element_stiffness_n_m,
+    green_strain,
+    internal_force_n,
+    small_strain,
+    von_mises_pa,
+)
+from pattern_fe.factor import factorised
+from pattern_fe.large_displacement import NewtonSettings, solve_large
+from pattern_fe.material import Foam
+from pattern_fe.motion import CentralDifferences, Newmark
+from pattern_fe.perimeter import perimeter_of
+from pattern_fe.space import space_of
+from pattern_fe.supports import Supports, check_held, fixed_components
+
+Array = NDArray[np.float64]
+_NEWTON = NewtonSettings()
+
+
+class Pattern:
+    """Mesh, foam and supports of one pattern.
+
+    Displacements and loads are arrays of one row a node, ``(n, d)``, or of one row a vertex of
+    the surface, ``(nv, d)``: ``on_nodes`` and ``on_surface`` lead from one to the other.
+
+    Parameters
+    ----------
+    mesh : skfem.Mesh
+        From ``shapes`` or ``mesh_file``.
+    supports : Supports
+    foam : Foam
+    order : int
+        Of the elements: 2, or 1 as in the paper, which is too stiff in bending.
+    thickness_m : float, m
+        Out of the plane; in 2D it must be given, in 3D it must not.
+
+    Raises
+    ------
+    ValueError
+        When the mesh is no pattern or the supports do not fit it.
+    """
+
+    def __init__(
+        self,
+        mesh: Any,
+        supports: Supports,
+        foam: Foam | None = None,
+        order: int = 2,
+        thickness_m: float | None = None,
+    ) -> None:
+        check_mesh(mesh)
+        self.foam = foam or Foam()
+        self.supports = supports
+        self.space = space_of(mesh, order, thickness_m)
+        self.fixed = fixed_components(self.space, supports)
+        """(n, d) bool: components that do not move."""
+        self.surface = perimeter_of(self.space)
+        """As drawn."""
+
+    @cached_property
+    def _bedding_n_m(self) -> Array:
+        """Springs of the bedding at all nodes, (n,) float64, N/m."""
+        return self.supports.bedding_n_m3 * self.on_nodes(self.surface.vertex_area_m2)
+
+    @cached_property
+    def stiffness(self) -> csc_array:
+        """Of small displacements, bedding included, (n d, n d) sparse float64, N/m."""
+        matrix = self.space.assembled(element_stiffness_n_m(self.space, self.foam))
+        return matrix + dynamics.as_diagonal(self._bedding_n_m, self.space.dimension)
+
+    @cached_property
+    def mass_kg(self) -> Array:
+        """Lumped, of each node, (n,) float64."""
+        return dynamics.lumped_mass_kg(self.space, self.foam)
+
+    @cached_property
+    def _free(self) -> NDArray[np.int64]:
+        return np.flatnonzero(~self.fixed.ravel())
+
+    @cached_property
+    def _factor(self) -> SuperLU:
+        check_held(self.space.node_m, self.fixed, self.supports)
+        return factorised(self.stiffness[self._free][:, self._free])
+
+    def on_nodes(self, values: Array) -> Array:
+        """Values of vertices as those of all nodes, 0 inside."""
+        whole = np.zeros((len(self.space.node_m), *values.shape[1:]))
+        whole[self.surface.nodes] = values
+        return whole
+
+    def on_surface(self, values: Array) -> Array:
+        """Values of all nodes as those of the vertices of the surface."""
+        return np.asarray(values[self.surface.nodes])
+
+    def solve_linear(self, load_n: Array) -> Array:
+        """Small displacements under loads; the first call factorises, the others reuse it.
+
+        Parameters
+        ----------
+        load_n : (n, d) float64, N
+
+        Returns
+        -------
+        (n, d) float64, m
+
+        Raises
+        ------
+        ValueError
+            When the pattern is not held, or the loads are not finite.
+        """
+        self._check_load(load_n)
+        displacement = np.zeros(load_n.size)
+        displacement[self._free] = self._factor.solve(load_n.ravel()[self._free])
+        return displacement.reshape(load_n.shape)
+
+    def solve_nonlinear(self, load_n: Array, settings: NewtonSettings = _NEWTON) -> Array:
+        """Large displacements under dead loads; arguments and errors as ``solve_linear``.
+
+        Raises
+        ------
+        LoadNotReachedError
+            When no equilibrium is found; it knows the share of the load reached.
+        """
+        self._check_load(load_n)
+        check_held(self.space.node_m, self.fixed, self.supports)
+        return solve_large(self.space, self.foam, self._bedding_n_m, self.fixed, load_n, settings)
+
+    def _check_load(self, load_n: Array) -> None:
+        valid = self.space.node_m.shape
+        if load_n.shape != valid:
+            raise ValueError(
+                f"loads on the pattern have the shape {load_n.shape}, valid is {valid}"
+            )
+        if not np.isfinite(load_n).all():
+            raise ValueError("loads on the pattern have a component that is not finite")
+
+    def stress_pa(self, displacement_m: Array, large: bool = False) -> Array:
+        """Stress at the integration points: Cauchy's where displacements are large.
+
+        Parameters
+        ----------
+        displacement_m : (n, d) float64, m
+        large : bool
+            Whether they solve the nonlinear form.
+
+        Returns
+        -------
+        (ne, q, d, d) float64, Pa
+        """
+        slope = displacement_gradient(self.space, displacement_m)
+        if not large:
+            return self.foam.stress_pa(small_strain(slope))
+        second = self.foam.stress_pa(green_strain(slope))
+        deformation = np.eye(self.space.dimension) + slope
+        pushed = deformation @ second @ np.swapaxes(deformation, -1, -2)
+        return np.asarray(pushed / np.linalg.det(deformation)[..., None, None])
+
+    def von_mises_pa(self, displacement_m: Array, large: bool = False) -> Array:
+        """Mean equivalent stress of each element, (ne,) float64, Pa; arguments as ``stress_pa``."""
+        equivalent = von_mises_pa(self.foam, self.stress_pa(displacement_m, large))
+        return np.asarray(np.average(equivalent, axis=1, weights=self.space.weight))
+
+    def distance(self, displacement_m: Array) -> Distance:
+        """Distance of the deformed surface from the drawing."""
+        return distance_from_drawing(
+            self.surface, self.surface.moved(self.on_surface(displacement_m))
+        )
+
+    def natural_frequencies_hz(self, count: int = 1, lumped: bool = False) -> Array:
+        """Lowest natural frequencies, ascending, (count,) float64; rigid motions are near 0."""
+        return dynamics.natural_frequencies_hz(
+            self.space, self.foam, self.stiffness, self.mass_matrix(lumped), self.fixed, count
+        )
+
+    def mass_matrix(self, lumped: bool) -> csc_array:
+        """Consistent or lumped mass of all components, (n d, n d) sparse float64, kg."""
+        if lumped:
+            return dynamics.as_diagonal(self.mass_kg, self.space.dimension)
+        return dynamics.consistent_mass_kg(self.space, self.foam)
+
+    def mass_damping_1_s(self, damping_ratio: float) -> float:
+        """Rayleigh's mass damping that gives the first natural frequency a damping ratio."""
+        return 4.0 * math.pi * float(self.natural_frequencies_hz(1)[0]) * damping_ratio
+
+    def condensed(self, damping_ratio: float = 0.0) -> CondensedSurface:
+        """Stiffness, mass and damping on the vertices of the surface, for an engine's own steps.
+
+        The whole mass is shared by area. Shares that follow the inner motion would bring the
+        first frequency from 7 % low to 1 % low in an L, but leave single vertices so light that,
+        once masses are scaled to a given step, it is lower by a third.
+
+        Parameters
+        ----------
+        damping_ratio : float
+            At the first natural frequency of the pattern itself.
+        """
+        damping = self.mass_damping_1_s(damping_ratio) if damping_ratio else 0.0
+        area = self.surface.vertex_area_m2
+        mass = self.mass_kg.sum() * area / area.sum()
+        return condensed_surface(self.stiffness, mass, self.surface.nodes, self.fixed, damping)
+
+    def newmark(self, step_s: float, damping_1_s: float = 0.0, lumped: bool = False) -> Newmark:
+        """Small motion with any step, at rest on the drawing."""
+        return Newmark(self.stiffness, self.mass_matrix(lumped), self.fixed, step_s, damping_1_s)
+
+    def critical_step_s(self, mass_scale: float = 1.0) -> float:
+        """Largest stable step of ``central_differences``, of the stiffest element and bedding."""
+        elements2 = (2.0 / dynamics.critical_step_s(self.space, self.foam)) ** 2
+        bedding2 = float((self._bedding_n_m / self.mass_kg).max())
+        return 2.0 * math.sqrt(mass_scale / (elements2 + bedding2))
+
+    def central_differences(
+        self,
+        step_s: float,
+        damping_1_s: float = 0.0,
+        mass_scale: float = 1.0,
+        large: bool = False,
+    ) -> CentralDifferences:
+        """Explicit motion, at rest on the drawing, with small or large displacements."""
+        if large:
+            bedding = self._bedding_n_m[:, None]
+
+            def force_n(moved_m: Array) -> Array:
+                return internal_force_n(self.space, self.foam, moved_m) + bedding * moved_m
+        else:
+            rows = self.stiffness.tocsr()
+
+            def force_n(moved_m: Array) -> Array:
+                return np.asarray((rows @ moved_m.ravel()).reshape(moved_m.shape))
+
+        mass = mass_scale * self.mass_kg
+        return CentralDifferences(force_n, mass, self.fixed, step_s, damping_1_s)

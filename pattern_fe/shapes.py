@@ -1,0 +1,133 @@
+"""Meshes of patterns made of rectangles: quadrilaterals in 2D, extruded to hexahedra in 3D."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from skfem import MeshHex, MeshQuad
+
+Array = NDArray[np.float64]
+Rectangle = tuple[float, float, float, float]
+"""Left, bottom, right, top, m."""
+SIDES = {
+    2: (("left", "right"), ("bottom", "top")),
+    3: (("left", "right"), ("front", "back"), ("bottom", "top")),
+}
+"""Names of the extreme sides along each axis; the last axis is the vertical one."""
+
+
+def bar(width_m: float, height_m: float) -> list[Rectangle]:
+    """Single rectangle with its lower left corner at the origin."""
+    return [(0.0, 0.0, width_m, height_m)]
+
+
+def l_shape(thickness_m: float, height_m: float, reach_m: float) -> list[Rectangle]:
+    """Stem with a horizontal flange at its top, as the pattern of Rojek (2004), figure 17.
+
+    Parameters
+    ----------
+    thickness_m : float, m
+        Of stem and flange.
+    height_m : float, m
+        From the foot to the top of the flange.
+    reach_m : float, m
+        From the back of the stem to the tip of the flange.
+    """
+    return [
+        (0.0, 0.0, thickness_m, height_m),
+        (0.0, height_m - thickness_m, reach_m, height_m),
+    ]
+
+
+def t_shape(thickness_m: float, height_m: float, width_m: float) -> list[Rectangle]:
+    """Stem in the middle under a flange of a width."""
+    middle_m = 0.5 * width_m
+    return [
+        (middle_m - 0.5 * thickness_m, 0.0, middle_m + 0.5 * thickness_m, height_m),
+        (0.0, height_m - thickness_m, width_m, height_m),
+    ]
+
+
+def frame(thickness_m: float, width_m: float, height_m: float) -> list[Rectangle]:
+    """Hollow box: four walls of one thickness around a cavity."""
+    inner_m, roof_m = width_m - thickness_m, height_m - thickness_m
+    return [
+        (0.0, 0.0, width_m, thickness_m),
+        (0.0, roof_m, width_m, height_m),
+        (0.0, 0.0, thickness_m, height_m),
+        (inner_m, 0.0, width_m, height_m),
+    ]
+
+
+def mesh_of(rectangles: Sequence[Rectangle], element_m: float, depth_m: float | None = None) -> Any:
+    """Mesh a union of rectangles that overlap or share sides.
+
+    All corners lie on grid lines, and between two of these elements are equally long, no longer
+    than asked: ``thickness_m / n`` gives n elements through a thickness.
+
+    Parameters
+    ----------
+    rectangles : sequence of (left, bottom, right, top), m
+    element_m : float, m
+        Longest side of an element.
+    depth_m : float, m, optional
+        Extrudes the shape along the second of three axes.
+
+    Returns
+    -------
+    skfem.MeshQuad or skfem.MeshHex
+        With the extreme sides named as in ``SIDES``.
+
+    Raises
+    ------
+    ValueError
+        When the element size or a rectangle has no extent.
+    """
+    if not (math.isfinite(element_m) and element_m > 0.0):
+        raise ValueError(f"element size of the pattern is {element_m:g} m, valid is above 0")
+    parts = np.array(rectangles, dtype=np.float64).reshape(-1, 2, 2)
+    if depth_m is not None:
+        span = np.broadcast_to([[0.0], [depth_m]], (len(parts), 2, 1))
+        parts = np.concatenate([parts[:, :, :1], span, parts[:, :, 1:]], axis=2)
+    low, high = parts[:, 0], parts[:, 1]
+    if not (len(parts) and np.isfinite(parts).all() and (high > low).all()):
+        raise ValueError(f"rectangles {list(rectangles)} need a positive width, height and depth")
+    lines = [_grid_line(parts[:, :, axis], element_m) for axis in range(low.shape[1])]
+    grid = (MeshQuad if depth_m is None else MeshHex).init_tensor(*lines)
+    centre = grid.p[:, grid.t].mean(axis=1).T[:, None]
+    inside = ((centre > low) & (centre < high)).all(axis=2).any(axis=1)
+    return with_sides(grid.restrict(np.flatnonzero(inside)))
+
+
+def _grid_line(places_m: Array, element_m: float) -> Array:
+    """Places along one axis with all sides of the rectangles among them."""
+    ends = np.unique(places_m)
+    # sums of the user's lengths may miss one another by round-off
+    ends = ends[np.concatenate([[True], np.diff(ends) > 1e-9 * (ends[-1] - ends[0])])]
+    pieces = [
+        np.linspace(a, b, 1 + max(1, math.ceil((b - a) / element_m - 1e-9)))[:-1]
+        for a, b in itertools.pairwise(ends)
+    ]
+    return np.concatenate([*pieces, ends[-1:]])
+
+
+def with_sides(mesh: Any) -> Any:
+    """Name the boundary at either end of each axis; names the mesh already has are kept."""
+    low, high = mesh.p.min(axis=1), mesh.p.max(axis=1)
+    near_m = 1e-9 * float((high - low).max())
+    kept = mesh.boundaries or {}
+    sides = {
+        name: mesh.facets_satisfying(
+            lambda x, axis=axis, place=place: np.abs(x[axis] - place) <= near_m, True
+        )
+        for axis, names in enumerate(SIDES[mesh.dim()])
+        for name, place in zip(names, (low[axis], high[axis]), strict=True)
+    }
+    return mesh.with_boundaries(
+        {name: facets for name, facets in sides.items() if name not in kept and len(facets)}
+    )

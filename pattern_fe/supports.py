@@ -1,0 +1,131 @@
+"""How a pattern is held: clamped, resting on rollers, bedded on sand or free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.space import Space
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Named boundaries and what holds them; without any the pattern is free.
+
+    A free pattern has no static equilibrium of its own: only its motion can be computed, unless a
+    bedding holds it.
+    """
+
+    clamped: tuple[str, ...] = ()
+    """Boundaries that do not move."""
+    resting: tuple[str, ...] = ()
+    """Flat boundaries that slide in their plane without friction but neither sink nor lift."""
+    bedding_n_m3: float = 0.0
+    """Springs all over the surface, N/m per m2 of it: a plain model of sand that holds a pattern
+    (Winkler), and what makes the equations of a free one regular. 0 for none."""
+
+
+def fixed_components(space: Space, supports: Supports) -> Mask:
+    """Components of the displacement that supports keep at zero.
+
+    Returns
+    -------
+    (n, d) bool
+
+    Raises
+    ------
+    ValueError
+        When a boundary is not there, a resting one is not across an axis, or the bedding is
+        negative.
+    """
+    if not 0.0 <= supports.bedding_n_m3 < np.inf:
+        raise ValueError(f"bedding is {supports.bedding_n_m3:g} N/m3, valid is 0 or above")
+    known = sorted(space.mesh.boundaries or {})
+    for name in (*supports.clamped, *supports.resting):
+        if name not in known:
+            valid = ", ".join(known) or "none, for the mesh names no boundary"
+            raise ValueError(f"support on the boundary '{name}', which is not there: valid {valid}")
+    fixed = np.zeros(space.node_m.shape, dtype=bool)
+    for name in supports.clamped:
+        fixed[space.nodes_of(name)] = True
+    for name in supports.resting:
+        nodes = space.nodes_of(name)
+        fixed[nodes, _flat_axis(name, space.node_m[nodes])] = True
+    return fixed
+
+
+def _flat_axis(name: str, place_m: Array) -> int:
+    """Axis across which a boundary lies."""
+    extent = np.ptp(place_m, axis=0)
+    axis = int(extent.argmin())
+    if extent[axis] > 1e-9 * extent.max():
+        across = f"{extent[axis]:.3g} m across its flattest axis"
+        raise ValueError(f"resting boundary '{name}' extends {across}, valid is a flat one")
+    return axis
+
+
+def rigid_motions(node_m: Array) -> Array:
+    """Translations along the axes and small rotations about the middle, all of a size.
+
+    Parameters
+    ----------
+    node_m : (n, d) float64, m
+
+    Returns
+    -------
+    (n d, 3 or 6) float64
+    """
+    n, d = node_m.shape
+    arm = (node_m - node_m.mean(axis=0)) / np.ptp(node_m, axis=0).max()
+    motions = [np.tile(np.eye(d)[axis], (n, 1)) for axis in range(d)]
+    for one, two in ((0, 1),) if d == 2 else ((1, 2), (2, 0), (0, 1)):
+        turn = np.zeros((n, d))
+        turn[:, one], turn[:, two] = -arm[:, two], arm[:, one]
+        motions.append(turn)
+    return np.stack([m.ravel() for m in motions], axis=1)
+
+
+def loose_motions(node_m: Array, fixed: Mask) -> list[str]:
+    """Rigid motions that supports leave, each named by its largest part.
+
+    They are the null space of what the supports see of all rigid motions.
+
+    Parameters
+    ----------
+    node_m : (n, d) float64, m
+    fixed : (n, d) bool
+    """
+    d = node_m.shape[1]
+    names = [f"shift along {AXES[i]}" for i in range(d)]
+    names += ["turn"] if d == 2 else [f"turn about {axis}" for axis in AXES]
+    seen = rigid_motions(node_m)[fixed.ravel()]
+    _, size, rows = np.linalg.svd(
+        np.vstack([seen, np.zeros((len(names), len(names)))]), full_matrices=False
+    )
+    loose = rows[size <= 1e-8 * max(1.0, float(size[0]))]
+    return [names[int(np.abs(row).argmax())] for row in loose]
+
+
+def check_held(node_m: Array, fixed: Mask, supports: Supports) -> None:
+    """Refuse statics of a pattern that can move without deforming.
+
+    Raises
+    ------
+    ValueError
+    """
+    if supports.bedding_n_m3 > 0.0:
+        return
+    loose = loose_motions(node_m, fixed)
+    if not loose:
+        return
+    held = (
+        "has supports that leave it free to" if fixed.any() else "has no support, so it is free to"
+    )
+    valid = "enough clamped or resting boundaries, or a bedding (its motion can be computed free)"
+    raise ValueError(f"pattern {held} {', '.join(loose)}; valid for a static solution: {valid}")

@@ -1,0 +1,145 @@
+"""Contact forces on the pattern's surface, pressures, distances and files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pattern_fe.export import write_body, write_stl, write_surface
+from pattern_fe.loads import vertex_loads_n, vertex_pressure_pa, vertex_traction_pa
+from pattern_fe.pattern import Pattern
+from pattern_fe.shapes import bar, frame, mesh_of
+from sandmould.scenario.mesh import signed_volumes_m3
+from sandmould.scenario.mesh_file import read_surface
+from tests.patterns import FOOT, KINDS, _one_thread, l_pattern, pattern_of_kind  # noqa: F401
+
+Array = NDArray[np.float64]
+
+
+def _moment(place_m: Array, force_n: Array) -> Array:
+    if place_m.shape[1] == 3:
+        return np.cross(place_m, force_n).sum(axis=0)
+    return np.sum(place_m[:, 0] * force_n[:, 1] - place_m[:, 1] * force_n[:, 0])[None]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("order", [1, 2])
+def test_loads_keep_force_and_moment_also_on_a_deformed_pattern(kind: str, order: int) -> None:
+    pattern = pattern_of_kind(kind, order)
+    random = np.random.default_rng(5)
+    displacement = 1e-3 * random.standard_normal(pattern.space.node_m.shape)
+    surface = pattern.surface.moved(pattern.on_surface(displacement))
+    d = surface.vertices_m.shape[1]
+    facet = random.integers(len(surface.facets), size=200)
+    share = random.dirichlet(np.ones(d), size=200)
+    point = np.einsum("mk,mkd->md", share, surface.vertices_m[surface.facets[facet]])
+    force = random.standard_normal((200, d))
+    load = pattern.on_nodes(vertex_loads_n(surface, facet, point, force))
+    place = pattern.space.node_m + displacement
+    # 200 forces of 1 N at arms of 0.02 m: 1e-10 of their sum leaves four digits for round-off
+    assert np.allclose(load.sum(axis=0), force.sum(axis=0), rtol=0.0, atol=1e-10 * 200)
+    assert np.allclose(_moment(place, load), _moment(point, force), rtol=0.0, atol=1e-10 * 4)
+
+
+def test_contact_beside_its_facet_is_refused() -> None:
+    surface = pattern_of_kind("quadrilaterals", 1).surface
+    beyond = surface.vertices_m[1] + 0.1 * (surface.vertices_m[1] - surface.vertices_m[0])
+    with pytest.raises(ValueError, match=r"1 contact points lie outside their facets, one at \("):
+        vertex_loads_n(surface, np.array([0]), beyond[None], np.ones((1, 2)))
+
+
+def test_nodal_pressure_is_force_over_area_as_in_the_paper() -> None:
+    surface = pattern_of_kind("quadrilaterals", 1).surface
+    low = np.isclose(surface.vertices_m[:, 1], 0.0)
+    facet = np.flatnonzero(low[surface.facets].all(axis=1))[:1]
+    ends = surface.vertices_m[surface.facets[facet[0]]]
+    point = 0.75 * ends[:1] + 0.25 * ends[1:]
+    load = vertex_loads_n(surface, facet, point, np.array([[0.0, 8.0]]))
+    # segments of 10 mm, thickness 0.25 m: every vertex has 2.5e-3 m2
+    assert np.allclose(surface.vertex_area_m2, 2.5e-3)
+    first, second = surface.facets[facet[0]]
+    assert vertex_traction_pa(surface, load)[first, 1] == pytest.approx(0.75 * 8.0 / 2.5e-3)
+    middle = second if np.isclose(surface.vertices_m[second, 0], 0.01) else first
+    share = 0.25 if middle == second else 0.75
+    assert vertex_pressure_pa(surface, load)[middle] == pytest.approx(share * 8.0 / 2.5e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_uniform_pressure_is_found_at_flat_parts_edges_and_corners(kind: str) -> None:
+    surface = pattern_of_kind(kind, 2).surface
+    load = -1500.0 * surface.vertex_area_vector_m2
+    assert vertex_pressure_pa(surface, load) == pytest.approx(1500.0)
+
+
+def test_distance_counts_what_leaves_the_drawing_not_what_slides_along_it() -> None:
+    pattern = Pattern(mesh_of(bar(0.02, 0.01), 0.01), FOOT, thickness_m=0.1)
+    found = pattern.distance(np.tile([1e-3, 0.0], (len(pattern.space.node_m), 1)))
+    # of 12 vertices 5 mm apart, three on the right leave and one on the left goes inside
+    assert found.largest_mm == pytest.approx(1.0)
+    assert found.rms_mm == pytest.approx(np.sqrt(4.0 / 12.0))
+
+
+def test_distance_in_3d_is_that_to_the_nearest_triangle() -> None:
+    pattern = pattern_of_kind("hexahedra", 1)
+    found = pattern.distance(0.05 * (pattern.space.node_m - 0.01))
+    # a cube 5 % larger: corners sqrt(3)/2 mm away, faces 0.5 mm
+    assert found.largest_mm == pytest.approx(np.sqrt(3.0) * 0.5)
+    assert 0.5 < found.rms_mm < np.sqrt(3.0) * 0.5
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("kind", KINDS)
+def test_stl_of_the_deformed_pattern_is_closed_and_has_its_volume(
+    tmp_path: Path, kind: str, order: int
+) -> None:
+    pattern = pattern_of_kind(kind, order)
+    stretched = 0.1 * pattern.space.node_m
+    path = tmp_path / "deformed.stl"
+    write_stl(path, pattern.space, pattern.surface, stretched)
+    vertices, triangles = read_surface(path)
+    d = pattern.space.dimension
+    volume = 1.1**d * pattern.space.weight.sum()
+    # STL holds seven digits
+    assert signed_volumes_m3(vertices, triangles).sum() == pytest.approx(volume, rel=1e-5)
+
+
+def test_stl_of_a_plate_keeps_its_hole(tmp_path: Path) -> None:
+    pattern = Pattern(mesh_of(frame(0.01, 0.06, 0.08), 0.01), FOOT, thickness_m=0.02)
+    path = tmp_path / "frame.stl"
+    write_stl(path, pattern.space, pattern.surface, np.zeros_like(pattern.space.node_m))
+    vertices, triangles = read_surface(path)
+    volume = (0.06 * 0.08 - 0.04 * 0.06) * 0.02
+    assert signed_volumes_m3(vertices, triangles).sum() == pytest.approx(volume, rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_fields_for_paraview_come_back(tmp_path: Path, kind: str) -> None:
+    pattern = pattern_of_kind(kind, 2)
+    load = -1500.0 * pattern.surface.vertex_area_vector_m2
+    displacement = pattern.solve_linear(pattern.on_nodes(load))
+    mises = pattern.von_mises_pa(displacement)
+    write_body(tmp_path / "body.vtu", pattern.space, displacement, mises)
+    body = meshio.read(tmp_path / "body.vtu")
+    n, d = pattern.space.mesh.nvertices, pattern.space.dimension
+    assert np.allclose(body.points[:, :d], pattern.space.node_m[:n])
+    assert np.array_equal(body.point_data["displacement_m"][:, :d], displacement[:n])
+    assert np.array_equal(body.cell_data["von_mises_pa"][0], mises)
+    on_surface = pattern.on_surface(displacement)
+    write_surface(tmp_path / "surface.vtu", pattern.surface, on_surface, load)
+    surface = meshio.read(tmp_path / "surface.vtu")
+    assert surface.point_data["pressure_pa"] == pytest.approx(1500.0)
+    assert np.array_equal(surface.point_data["displacement_m"][:, :d], on_surface)
+
+
+def test_loads_of_a_wrong_shape_or_value_are_refused() -> None:
+    pattern = l_pattern()
+    load = np.zeros_like(pattern.space.node_m)
+    with pytest.raises(ValueError, match=r"have the shape \(3, 2\), valid is \(\d+, 2\)"):
+        pattern.solve_linear(load[:3])
+    load[0, 0] = np.nan
+    with pytest.raises(ValueError, match="component that is not finite"):
+        pattern.solve_nonlinear(load)
