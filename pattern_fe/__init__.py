@@ -4,3 +4,19 @@ Arrays go in and out: displacements (m) and loads (N) have one row a node or, on
 engine is given, one row a vertex. In 2D everything is per thickness of the pattern, so that loads
 are in N. The vertical axis is the last one.
 """
+
+import hashlib
+from pathlib import Path
+
+
+def source_files() -> list[Path]:
+    """All files of this room."""
+    return sorted(Path(__file__).parent.rglob("*.py"))
+
+
+def source_hash() -> str:
+    """Hash of this room's sources, which results of bent patterns depend on."""
+    digest = hashlib.sha256()
+    for path in source_files():
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]

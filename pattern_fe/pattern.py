@@ -173,6 +173,13 @@ class Pattern:
         pushed = deformation @ second @ np.swapaxes(deformation, -1, -2)
         return np.asarray(pushed / np.linalg.det(deformation)[..., None, None])
 
+    def energy_j(self, displacement_m: Array, large: bool = False) -> float:
+        """Elastic energy, the bedding's left out; arguments as ``stress_pa``."""
+        slope = displacement_gradient(self.space, displacement_m)
+        strain = green_strain(slope) if large else small_strain(slope)
+        density = np.sum(strain * self.foam.stress_pa(strain), axis=(-2, -1))
+        return float(0.5 * np.sum(density * self.space.weight))
+
     def von_mises_pa(self, displacement_m: Array, large: bool = False) -> Array:
         """Mean equivalent stress of each element, (ne,) float64, Pa; arguments as ``stress_pa``."""
         equivalent = von_mises_pa(self.foam, self.stress_pa(displacement_m, large))

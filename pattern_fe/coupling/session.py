@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from pattern_fe.coupling.settings import LoopSettings
 from pattern_fe.coupling.shapes_file import ShapesFile
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 
 Array = NDArray[np.float64]
@@ -61,8 +63,8 @@ class CoupledSession:
         self._body = body
         self._surface = surface
         self._settings = settings
-        self._record_steps = counts.window
-        self._steps = _whole_samples(settings.window_s, counts)
+        self._counts = counts
+        self._ends = window_ends(settings.window_s, counts)
         self._relaxation = settings.relaxation()
         rest = body.vertices_m
         self._shown = np.zeros_like(rest)
@@ -86,13 +88,15 @@ class CoupledSession:
     def advance(self, duration_s: float | None = None) -> None:
         """Compute for a duration, or up to the next record, in windows of the loop."""
         inner = self._inner
-        now, record = inner.steps, self._record_steps
+        now, record = inner.steps, self._counts.window
         ahead = record - now % record
         if duration_s is not None:
-            ahead = round(duration_s / inner.step_s)
+            ahead = self._counts.steps(duration_s)
         end = now + ahead
         while inner.steps < end and not inner.stage_over:
-            self._window(min(self._steps - inner.steps % self._steps, end - inner.steps))
+            within = inner.steps % record
+            window = int(self._ends[np.searchsorted(self._ends, within, side="right")]) - within
+            self._window(min(window, end - inner.steps))
         if inner.is_root:
             self._shapes.write(inner.time_s, self._shown)
 
@@ -175,6 +179,10 @@ class CoupledSession:
                 f"{self._inner.time_s:.4g} s: a smaller factor or another scheme may hold",
             )
 
+    def snapshot(self) -> Snapshot:
+        """State of all grains relative to the box, and the pattern among them."""
+        return replace(self._inner.snapshot(), pattern_m=self._body.vertices_m + self._shown)
+
     def write_checkpoint(self, folder: Path) -> None:
         """Write the engine's state and the loop's."""
         self._inner.write_checkpoint(folder)
@@ -187,8 +195,8 @@ class CoupledSession:
             "ledger_bytes": size,
             "rows": self._shapes.rows,
         }
-        memory = {f"relaxation_{name}": a for name, a in self._relaxation.state().items()}
-        np.savez(folder / CHECKPOINT, **arrays, **memory)
+        arrays |= {f"relaxation_{name}": a for name, a in self._relaxation.state().items()}
+        np.savez(folder / CHECKPOINT, **arrays)
 
     def _take_up(self, checkpoint: Path) -> tuple[int, int]:
         """Read what ``write_checkpoint`` wrote; give the trusted parts of the tables."""
@@ -207,9 +215,8 @@ class CoupledSession:
         self._inner.close()
 
 
-def _whole_samples(window_s: float, counts: StepCounts) -> int:
-    """Steps of a window: whole samples of the loads, and a whole number of them in a record."""
+def window_ends(window_s: float, counts: StepCounts) -> NDArray[np.int64]:
+    """Steps of a record at which windows end: about as long as asked, of whole load samples."""
     samples = counts.window // counts.load
-    asked = max(1.0, window_s / counts.step_s / counts.load)
-    fits = [n for n in range(1, samples + 1) if samples % n == 0]
-    return counts.load * min(fits, key=lambda n: abs(np.log(n / asked)))
+    windows = min(samples, max(1, round(counts.window * counts.step_s / window_s)))
+    return counts.load * np.rint(np.arange(1, windows + 1) * samples / windows).astype(np.int64)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pattern_fe.coupling.relaxation import Aitken, Fixed, QuasiNewton, Relaxation
 
-Scheme = Literal["fixed", "aitken", "quasi_newton"]
+Scheme = Literal["one_way", "fixed", "aitken", "quasi_newton"]
 _COLUMNS = 10
 _FILTER = 1e-2
 """Share of a change that must be new: below it is noise of the sand."""
@@ -34,6 +34,8 @@ class LoopSettings:
 
     def relaxation(self) -> Relaxation:
         """A fresh memory of the scheme."""
+        if self.scheme == "one_way":
+            return Fixed(0.0)
         if self.scheme == "fixed":
             return Fixed(self.factor)
         if self.scheme == "aitken":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
@@ -25,10 +26,21 @@ DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 """What a disk says that takes no more; other errors of the system are errors of a program."""
 
 
+Opening = Callable[[Program, Path, Path, Path | None], Session]
+"""Opens a session on a rendered deck: program, folder, log, checkpoint to go on from."""
+
+
 class Driver:
     """One run from its newest checkpoint, or from its beginning, to its outcome."""
 
-    def __init__(self, program: Program, folder: Path, name: str, scenario_hash: str) -> None:
+    def __init__(
+        self,
+        program: Program,
+        folder: Path,
+        name: str,
+        scenario_hash: str,
+        open_session: Opening | None = None,
+    ) -> None:
         """Prepare a run.
 
         Parameters
@@ -40,7 +52,10 @@ class Driver:
             Short name for the progress line.
         scenario_hash : str
             Tells this scenario's checkpoints from those of another.
+        open_session : Opening, optional
+            Opens something that acts as a session; by default the scenario's engine.
         """
+        self._open_session = open_session or engine_of(program.scenario).open_session
         self._program = program
         self._scenario = program.scenario
         self._folder = folder
@@ -79,7 +94,7 @@ class Driver:
         self._begin_clocks()
         try:
             try:
-                session = engine_of(self._scenario).open_session(
+                session = self._open_session(
                     self._program,
                     self._folder,
                     self._work / "engine.log",

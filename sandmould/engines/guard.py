@@ -10,7 +10,7 @@ from sandmould.engines.neighbours import touching_pairs
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
-from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.scenario.scenario import Scenario
 
 
@@ -47,7 +47,7 @@ def measure_health(scenario: Scenario, snapshot: Snapshot) -> Health:
         largest = max(largest, float((overlap_m / smaller).max(initial=0.0)))
     # beyond the largest grain's reach nothing can overlap, and meshes need not be searched
     reach_m = float(radius.max(initial=0.0))
-    clearance = scenario.scene_in(snapshot.stage).clearance_m(snapshot.position_m, reach_m)
+    clearance = scene_at(scenario, snapshot).clearance_m(snapshot.position_m, reach_m)
     largest = max(largest, float((1 - clearance / radius).max(initial=0.0)))
     return Health(energy, float(np.sqrt(2 * energy / mass.sum())), largest, clearance)
 

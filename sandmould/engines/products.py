@@ -68,7 +68,14 @@ def peak_memory_bytes() -> int:
     return sum(resource.getrusage(who).ru_maxrss for who in whose) * 1024
 
 
-SAND_PRODUCTS = ("series.tsv", "loads.tsv", "snapshots", "engine.log")
+SAND_PRODUCTS = (
+    "series.tsv",
+    "loads.tsv",
+    "snapshots",
+    "engine.log",
+    "pattern.tsv",
+    "pattern_shapes.f8",
+)
 
 
 def finish(

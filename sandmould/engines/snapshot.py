@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.scenario.geometry import Scene
+from sandmould.scenario.scenario import Scenario
+
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -34,6 +37,8 @@ class Snapshot:
     orientation: NDArray[np.float64] | None = None
     """(n, 1) float64, rad, in 2D or (n, 9) float64, rotation matrices row by row, in 3D; None where
     ``record.orientation`` does not ask for it."""
+    pattern_m: NDArray[np.float64] | None = None
+    """(nv, d) float64, m: vertices of the pattern's outer line, where it bends."""
 
     def save(self, path: Path) -> None:
         """Write to an ``.npz`` file, first under a temporary name."""
@@ -60,3 +65,11 @@ class Snapshot:
         for scalar, kind in (("time_s", float), ("vibration_time_s", float), ("stage", str)):
             values[scalar] = kind(values[scalar])
         return cls(**values)
+
+
+def scene_at(scenario: Scenario, snapshot: Snapshot) -> Scene:
+    """Geometry at the instant of a snapshot: opened gates away, the pattern bent."""
+    scene = scenario.scene_in(snapshot.stage)
+    if scenario.pattern is None or snapshot.pattern_m is None:
+        return scene
+    return scene.bent(scenario.pattern.name, snapshot.pattern_m)

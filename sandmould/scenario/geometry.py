@@ -187,6 +187,13 @@ class Scene:
         """The scene after one of its blocks was taken away."""
         return replace(self, blocks=tuple(b for b in self.blocks if b.name != block))
 
+    def bent(self, outline: str, vertices_m: Array) -> Scene:
+        """The scene with the vertices of one outline elsewhere, (k, 2) float64, m."""
+        bent = (
+            replace(o, vertices_m=vertices_m) if o.name == outline else o for o in self.outlines
+        )
+        return replace(self, outlines=tuple(bent))
+
     def clearance_m(self, position_m: Array, reach_m: float = np.inf) -> Array:
         """Distance of points from the nearest wall or solid, negative where inside one.
 

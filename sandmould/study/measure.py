@@ -21,7 +21,7 @@ from analysis.solid_fraction import (
     solid_fraction_profile,
 )
 from analysis.tube_fill import tube_fill
-from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.moments import LAST_MEASURED, MOMENTS, list_moments, nearest
 from sandmould.study.outflow import add_outflow, measure_outflow
@@ -34,7 +34,7 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
     The solid fraction is taken from the floor to the mean surface of the bed.
     """
     scene, position, radius = (
-        scenario.scene_in(snapshot.stage), snapshot.position_m, snapshot.radius_m
+        scene_at(scenario, snapshot), snapshot.position_m, snapshot.radius_m
     )  # fmt: skip
     row: dict[str, Any] = {
         "time_s": snapshot.time_s,
@@ -81,7 +81,7 @@ def write_picture(folder: Path, out: Path) -> None:
     ax = figure.add_subplot()
     moments = list_moments(folder)
     last = Snapshot.load(moments[-1].path) if moments else None
-    scene = scenario.scene if last is None else scenario.scene_in(last.stage)
+    scene = scenario.scene if last is None else scene_at(scenario, last)
     draw_scene(scene, ax, scenario.box.height_m)
     if last is not None:
         draw_by_layer(last, ax)
@@ -122,7 +122,7 @@ def write_profile(folder: Path, out: Path) -> None:
         moment = nearest(moments, share * moments[-1].vibration_time_s)
         snapshot = Snapshot.load(moment.path)
         profile = solid_fraction_profile(
-            snapshot.position_m, snapshot.radius_m, scenario.scene_in(snapshot.stage), edges_m
+            snapshot.position_m, snapshot.radius_m, scene_at(scenario, snapshot), edges_m
         )
         for height_m, fraction in zip(profile.height_m, profile.solid_fraction, strict=True):
             rows.append((heading, moment.vibration_time_s, height_m, fraction))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import platform
@@ -11,8 +12,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pattern_fe
 from sandmould.engines import choosing, recording
-from sandmould.engines.driver import Driver
+from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.products import SAND_PRODUCTS, Computed, Cost
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
@@ -45,9 +47,6 @@ IN_3D = 0.4
 
 problems = checks.problems
 engine_problem = choosing.engine_problem
-sources = choosing.deck_sources
-template_hash = choosing.deck_hash
-computed_hash = choosing.computed_hash
 no_cost = Cost.of
 
 
@@ -57,9 +56,36 @@ def defaults() -> dict[str, Any]:
 
 
 def resolved(scenario: Scenario) -> Scenario:
-    """The scenario with the hashes of its meshes, so that a changed mesh makes another run."""
+    """The scenario with its pattern's outline and the hashes of its meshes.
+
+    So a changed mesh makes another run.
+    """
+    if scenario.pattern is not None:
+        from pattern_fe.scene import with_surface  # scikit-fem: few studies need it
+
+        scenario = with_surface(scenario)
     obstacles = tuple(with_hash(o) if isinstance(o, SolidMesh) else o for o in scenario.obstacles)
     return scenario.model_copy(update={"obstacles": obstacles})
+
+
+def sources(scenario: Scenario) -> list[Path]:
+    """Templates, and our own code where it computes."""
+    ours = pattern_fe.source_files() if scenario.pattern else []
+    return choosing.deck_sources(scenario) + ours
+
+
+def template_hash(scenario: Scenario) -> str:
+    """Hash of all that turns a scenario into a deck, and of our code where it computes."""
+    return choosing.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
+
+
+def computed_hash(scenario: Scenario) -> str:
+    """Hash of what the engine is told to compute, and of the pattern beside it."""
+    told = choosing.computed_hash(scenario)
+    if scenario.pattern is None:
+        return told
+    beside = scenario.pattern.model_dump_json() + pattern_fe.source_hash()
+    return hashlib.sha256((told + beside).encode()).hexdigest()
 
 
 def lasts_s(scenario: Scenario) -> float:
@@ -133,7 +159,12 @@ def render(run: Run, folder: Path) -> None:
 def compute(run: Run, folder: Path) -> Computed:
     """Take the scenario through its program."""
     program = build_program(run.scenario)
-    driver = Driver(program, folder, run.run, scenario_hash(run.scenario))
+    opening: Opening = choosing.engine_of(run.scenario).open_session
+    if run.scenario.pattern is not None:
+        from pattern_fe.coupling.opening import open_coupled
+
+        opening = open_coupled
+    driver = Driver(program, folder, run.run, scenario_hash(run.scenario), opening)
     outcome = driver.run()
     return Computed(outcome, driver.cost, driver.is_root)
 

@@ -1,0 +1,41 @@
+"""Open a scene of sand and pattern on the scenario's engine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.session import CoupledSession
+from pattern_fe.coupling.settings import LoopSettings
+from pattern_fe.scene import pattern_of
+from sandmould.engines.choosing import engine_of
+from sandmould.engines.program import Program
+from sandmould.engines.session import Session
+from sandmould.engines.step_counts import StepCounts
+
+
+def open_coupled(
+    program: Program, folder: Path, log: Path, checkpoint: Path | None = None
+) -> Session:
+    """Open a coupled session on a rendered deck, afresh or from a checkpoint.
+
+    Parameters
+    ----------
+    program : Program
+        Of a scenario whose pattern is among its obstacles.
+    folder : Path
+        Where the deck lies.
+    log : Path
+        The engine's log; tables of the pattern lie beside it.
+    checkpoint : Path, optional
+    """
+    scenario = program.scenario
+    told = scenario.pattern
+    assert told is not None
+    body = FoamBody(pattern_of(scenario), told.statics == "large")
+    settings = LoopSettings(**told.loop.model_dump())
+    inner = engine_of(scenario).open_session(program, folder, log, checkpoint)
+    counts = StepCounts.of(scenario)
+    session = CoupledSession(inner, body, told.name, settings, counts, log.parent, checkpoint)
+    return cast(Session, session)

@@ -1,0 +1,103 @@
+"""A scenario's pattern: as an elastic body, and as the obstacle that the sand meets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.checks import check_inside
+from pattern_fe.material import Foam
+from pattern_fe.mesh_file import read_mesh
+from pattern_fe.pattern import Pattern
+from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
+from pattern_fe.supports import Supports
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.box import Polygon
+from sandmould.scenario.pattern import Bar, LShape, MeshFile
+from sandmould.scenario.pattern import Pattern as PatternSection
+from sandmould.scenario.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+
+def pattern_of(scenario: Scenario) -> Pattern:
+    """The pattern of a scenario that has one.
+
+    Raises
+    ------
+    BadInputError
+        With one sentence on what keeps it from being computed.
+    """
+    told = scenario.pattern
+    assert told is not None
+    if scenario.dimension == 3:
+        valid = "a scene in 2D: a pattern is coupled in the plane alone"
+        raise BadInputError([Problem("dimension", 3, valid)])
+    with _blaming("pattern.shape", told.shape.model_dump(mode="json")):
+        mesh = _mesh(told).translated(np.array(told.position_m))
+    with _blaming("pattern.position_m", list(told.position_m)):
+        size = np.array([scenario.box.width_m, scenario.box.height_m])
+        check_inside(mesh, np.zeros(2), size)
+    with _blaming("pattern.supports", told.supports.model_dump(mode="json")):
+        pattern = Pattern(
+            mesh,
+            Supports(told.supports.clamped, told.supports.resting),
+            Foam(told.young_modulus_pa, told.poisson_ratio, told.density_kg_m3),
+            told.order,
+            scenario.sand.disc_thickness_m,
+        )
+        pattern.solve_linear(np.zeros_like(pattern.space.node_m))
+    return pattern
+
+
+def _mesh(told: PatternSection) -> Any:
+    shape = told.shape
+    if isinstance(shape, MeshFile):
+        return read_mesh(shape.path, shape.unit_m)
+    if isinstance(shape, Bar):
+        return mesh_of(bar(shape.width_m, shape.height_m), told.element_m)
+    across_m = shape.reach_m if isinstance(shape, LShape) else shape.width_m
+    if shape.thickness_m >= min(shape.height_m, across_m):
+        valid = "below its height and its reach or width"
+        raise ValueError(f"thickness is {shape.thickness_m:g} m, valid is {valid}")
+    make = l_shape if isinstance(shape, LShape) else t_shape
+    return mesh_of(make(shape.thickness_m, shape.height_m, across_m), told.element_m)
+
+
+@contextmanager
+def _blaming(key: str, value: Any) -> Iterator[None]:
+    """Tell what is wrong with a pattern at the key that holds it."""
+    try:
+        yield
+    except ValueError as fault:
+        valid = f"one that can be computed: {fault}"
+        raise BadInputError([Problem(key, value, valid)]) from fault
+
+
+def outer_line(pattern: Pattern) -> slice:
+    """Vertices of the line that the sand meets: the outermost of a pattern with holes."""
+    vertices = pattern.surface.vertices_m
+    return max(pattern.surface.loops, key=lambda loop: np.ptp(vertices[loop], axis=0).max())
+
+
+def with_surface(scenario: Scenario) -> Scenario:
+    """The scenario with its pattern among the obstacles, vertex for vertex.
+
+    Raises
+    ------
+    BadInputError
+    """
+    told = scenario.pattern
+    if told is None:
+        return scenario
+    pattern = pattern_of(scenario)
+    vertices = pattern.surface.vertices_m[outer_line(pattern)]
+    outline = Polygon(
+        kind="polygon", name=told.name, vertices_m=[tuple(v) for v in vertices.tolist()]
+    )
+    others = tuple(o for o in scenario.obstacles if o.name != told.name)
+    return scenario.model_copy(update={"obstacles": (*others, outline)})

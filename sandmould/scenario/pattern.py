@@ -1,0 +1,141 @@
+"""The foam pattern: its shape, its foam, how it is held and how sand and pattern are coupled."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from sandmould import ROOT
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.sand import ARGUED
+
+ROJEK = "Rojek 2004, section 4.3"
+Point = tuple[float, float]
+
+
+def _length(description: str) -> float:
+    """Declare a length that the user gives."""
+    length: float = quantity(..., description, unit="m", source="user", gt=0, le=100)
+    return length
+
+
+class Bar(Section):
+    """A rectangle."""
+
+    kind: Literal["bar"]
+    width_m: float = _length("Width.")
+    height_m: float = _length("Height.")
+
+
+class LShape(Section):
+    """A stem with a flange at its top, reaching to the right."""
+
+    kind: Literal["l_shape"]
+    thickness_m: float = _length("Thickness of stem and flange.")
+    height_m: float = _length("From the foot to the top of the flange.")
+    reach_m: float = _length("From the back of the stem to the tip of the flange.")
+
+
+class TShape(Section):
+    """A stem in the middle under a flange."""
+
+    kind: Literal["t_shape"]
+    thickness_m: float = _length("Thickness of stem and flange.")
+    height_m: float = _length("From the foot to the top of the flange.")
+    width_m: float = _length("Width of the flange.")
+
+
+class MeshFile(Section):
+    """A mesh of triangles or quadrilaterals, in any format that meshio reads."""
+
+    kind: Literal["file"]
+    file: str = quantity(
+        ...,
+        "Mesh file, seen from the file that names it; in a resolved scenario, from the repository.",
+        source="user",
+        min_length=1,
+    )
+    unit_m: float = quantity(
+        1.0, "Length that stands for 1 in the file.", unit="m", source="user", gt=0, le=100
+    )
+
+    @property
+    def path(self) -> Path:
+        """Where the file lies."""
+        return Path(os.path.normpath(ROOT / self.file))
+
+
+Shape = Annotated[Bar | LShape | TShape | MeshFile, Field(discriminator="kind")]
+
+
+class Supports(Section):
+    """Named boundaries and what holds them: left, right, bottom, top, or a group of a mesh file."""
+
+    clamped: tuple[str, ...] = quantity(("bottom",), "Boundaries that do not move.", source=ARGUED)
+    resting: tuple[str, ...] = quantity(
+        (), "Flat boundaries that slide without friction and do not lift.", source=ARGUED
+    )
+
+
+class Loop(Section):
+    """The staggered loop: in each window sand moves under a moving surface, then the pattern."""
+
+    window_s: float = quantity(
+        0.002, "Length of a window; rounded so that a record holds whole ones.", unit="s",
+        source=ARGUED, gt=0, le=1,
+    )  # fmt: skip
+    scheme: Literal["one_way", "fixed", "aitken", "quasi_newton"] = quantity(
+        "aitken",
+        "How far the surface is moved to where the last loads bend the pattern: not at all, a "
+        "fixed share, Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS).",
+        source=ARGUED,
+    )
+    factor: float = quantity(
+        0.02, "The fixed share, or that of the first window.", source=ARGUED, gt=0, le=1
+    )
+    least_factor: float = quantity(0.002, "Least share of Aitken's.", source=ARGUED, gt=0, le=1)
+    most_factor: float = quantity(0.5, "Greatest share of Aitken's.", source=ARGUED, gt=0, le=1)
+    repeats: int = quantity(
+        0, "Times that a window is computed again at most; reference engine.", source=ARGUED,
+        ge=0, le=100,
+    )  # fmt: skip
+    tolerance: float = quantity(
+        0.01, "Residual over displacement below which no window is repeated.", source=ARGUED,
+        gt=0, lt=1,
+    )  # fmt: skip
+    predicts: bool = quantity(
+        False, "Whether a window goes on as the last one went.", source=ARGUED
+    )
+    largest_displacement_m: float = quantity(
+        0.05, "Displacement beyond which the loop has diverged.", unit="m", source=ARGUED, gt=0
+    )
+
+
+class Pattern(Section):
+    """A foam pattern that bends under the sand, 2D only."""
+
+    name: str = quantity("pattern", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
+    shape: Shape = Field(..., description="Its shape.")
+    position_m: Point = quantity(
+        (0.0, 0.0), "Place of the shape's origin in the box.", unit="m", source="user"
+    )
+    element_m: float = quantity(
+        0.005, "Longest side of an element; a mesh file has its own.", unit="m", source=ARGUED,
+        gt=0, le=1,
+    )  # fmt: skip
+    order: Literal[1, 2] = quantity(
+        2, "Order of the elements; those of the first are too stiff in bending.", source=ARGUED
+    )
+    young_modulus_pa: float = quantity(
+        6.4e6, "Young's modulus.", unit="Pa", source=ROJEK, gt=0, le=1e12
+    )
+    poisson_ratio: float = quantity(0.35, "Poisson's ratio.", source=ROJEK, gt=-1, lt=0.5)
+    density_kg_m3: float = quantity(12.0, "Density.", unit="kg/m3", source=ROJEK, gt=0, le=3e4)
+    supports: Supports = Field(Supports(), description="How it is held.")
+    statics: Literal["linear", "large"] = quantity(
+        "linear", "Small displacements, or large ones (total Lagrangian).", source=ARGUED
+    )
+    loop: Loop = Field(Loop(), description="The coupling.")

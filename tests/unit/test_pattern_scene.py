@@ -1,0 +1,117 @@
+"""A scenario's pattern: the outline that the sand meets, and what is told of a bad one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.session import window_ends
+from pattern_fe.scene import pattern_of, with_surface
+from sandmould.engines.snapshot import Snapshot, scene_at
+from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.reading import Origin, merge
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.kinds import sand
+
+L_SCENE: dict[str, Any] = {
+    "box": {"width_m": 0.2, "height_m": 0.2},
+    "pattern": {
+        "shape": {"kind": "l_shape", "thickness_m": 0.01, "height_m": 0.06, "reach_m": 0.05},
+        "position_m": [0.06, 0.0],
+    },
+    "engine": {"name": "reference"},
+}
+
+
+def l_scene(**pattern: Any) -> Scenario:
+    tree = merge(L_SCENE, {"pattern": pattern} if pattern else {}, Origin(), "test")
+    return Scenario.model_validate(tree)
+
+
+def test_the_sand_meets_the_vertices_of_the_elements() -> None:
+    scenario = with_surface(l_scene())
+    (outline,) = scenario.scene.outlines
+    body = FoamBody(pattern_of(scenario))
+    np.testing.assert_array_equal(outline.vertices_m, body.vertices_m)
+    # stem and flange: 0.01 x 0.06 + 0.04 x 0.01
+    assert outline.measure == pytest.approx(1.0e-3)
+    assert with_surface(scenario) == scenario
+
+
+def test_a_scene_bends_with_its_snapshot() -> None:
+    scenario = with_surface(l_scene())
+    (outline,) = scenario.scene.outlines
+    none = np.zeros((0, 2))
+    lower = outline.vertices_m - [0.0, 0.003]
+    snapshot = Snapshot(
+        0.0, -1.0, "settle_1", np.zeros(0, int), np.zeros(0, int), none, none, np.zeros((0, 3)),
+        np.zeros(0), pattern_m=lower,
+    )  # fmt: skip
+    top = np.array([[0.09, 0.06]])  # the highest edge as drawn
+    assert scenario.scene.clearance_m(top) == pytest.approx(0.0)
+    assert scene_at(scenario, snapshot).clearance_m(top) == pytest.approx(0.003)
+
+
+def test_the_flange_hangs_by_its_load_and_the_supports_carry_it() -> None:
+    body = FoamBody(pattern_of(l_scene()))
+    tip = np.argmax(body.vertices_m @ [1.0, 1.0])
+    load = np.zeros_like(body.vertices_m)
+    load[tip] = [0.0, -0.2]
+    answer = body.answer(load)
+    assert answer.displacement_m[tip, 1] < 0.0
+    np.testing.assert_allclose(answer.reaction_n, [0.0, 0.2], atol=1e-9)
+    # Clapeyron: the load's work is twice the stored energy.
+    assert answer.energy_j == pytest.approx(-0.1 * answer.displacement_m[tip, 1], rel=1e-9)
+    large = FoamBody(pattern_of(l_scene()), large=True).answer(0.01 * load)
+    np.testing.assert_allclose(
+        large.displacement_m[tip], 0.01 * answer.displacement_m[tip], rtol=1e-2
+    )
+
+
+@pytest.mark.parametrize(
+    ("pattern", "says"),
+    [
+        ({"supports": {"clamped": ["roof"]}}, "pattern.supports = .*'roof', which is not there"),
+        ({"supports": {"clamped": []}}, "pattern.supports = .*free to shift along x"),
+        ({"position_m": [0.18, 0.0]}, r"pattern.position_m = \[0.18, 0.0\]"),
+        ({"shape": {"kind": "l_shape", "thickness_m": 0.01, "height_m": 0.005, "reach_m": 0.05}},
+         "pattern.shape = .*thickness is 0.01 m, valid is below its height"),
+        ({"shape": {"kind": "file", "file": "nowhere.msh"}}, "pattern.shape = .*nowhere.msh"),
+    ],
+)  # fmt: skip
+def test_a_pattern_that_cannot_be_computed_is_told(pattern: dict[str, Any], says: str) -> None:
+    tree = {**L_SCENE, "pattern": {**L_SCENE["pattern"], **pattern}}
+    with pytest.raises(BadInputError, match=says):
+        with_surface(Scenario.model_validate(tree))
+
+
+def test_a_pattern_in_space_is_told() -> None:
+    with pytest.raises(BadInputError, match="dimension = 3"):
+        with_surface(Scenario.model_validate({**L_SCENE, "dimension": 3}))
+
+
+@pytest.mark.parametrize("ratio", [0.5, -1.0])
+def test_foam_that_keeps_its_volume_is_told(ratio: float) -> None:
+    with pytest.raises(ValidationError, match="poisson_ratio"):
+        l_scene(poisson_ratio=ratio)
+
+
+def test_another_foam_is_another_result() -> None:
+    one, other = (sand.resolved(l_scene(young_modulus_pa=e)) for e in (1e6, 2e6))
+    assert sand.computed_hash(one) != sand.computed_hash(other)
+    assert sand.template_hash(one) != sand.template_hash(one.model_copy(update={"pattern": None}))
+
+
+def test_windows_fill_a_record_with_whole_samples() -> None:
+    ends = window_ends(0.002, StepCounts(1e-5, 20, 20 * 47))
+    assert ends[-1] == 20 * 47
+    assert set(ends % 20) == {0}
+    assert len(ends) == round(47 * 20e-5 / 0.002)
+    assert np.ptp(np.diff(ends, prepend=0)) <= 20
+    assert window_ends(1.0, StepCounts(1e-5, 20, 940)).tolist() == [940]
+    assert len(window_ends(1e-9, StepCounts(1e-5, 20, 940))) == 47
