@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -10,7 +12,56 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-@njit(cache=True)
+def _compiled(d: int) -> Callable[..., Array]:
+    """Build the loop for a number of dimensions, which as a constant makes it twice as fast."""
+
+    @njit(cache=True)
+    def inner_forces(
+        cells: Indices, gradient: Array, weight: Array, displacement: Array, lam: float, mu: float
+    ) -> Array:
+        ne, points, k, _ = gradient.shape
+        force = np.zeros_like(displacement)
+        slope, stress, piola = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
+        for e in range(ne):
+            for q in range(points):
+                for i in range(d):
+                    for j in range(d):
+                        total = 0.0
+                        for a in range(k):
+                            total += displacement[cells[e, a], i] * gradient[e, q, a, j]
+                        slope[i, j] = total
+                trace = 0.0
+                for i in range(d):
+                    for j in range(d):
+                        # of the Green strain, without the 1 of F, which would cost digits
+                        twice = slope[i, j] + slope[j, i]
+                        for m in range(d):
+                            twice += slope[m, i] * slope[m, j]
+                        stress[i, j] = mu * twice
+                        if i == j:
+                            trace += 0.5 * twice
+                for i in range(d):
+                    stress[i, i] += lam * trace
+                for i in range(d):
+                    for j in range(d):
+                        total = stress[i, j]
+                        for m in range(d):
+                            total += slope[i, m] * stress[m, j]
+                        piola[i, j] = total * weight[e, q]
+                for a in range(k):
+                    for i in range(d):
+                        total = 0.0
+                        for j in range(d):
+                            total += piola[i, j] * gradient[e, q, a, j]
+                        force[cells[e, a], i] += total
+        return force
+
+    return inner_forces
+
+
+_BY_DIMENSION = {2: _compiled(2), 3: _compiled(3)}
+
+
 def inner_forces(
     cells: Indices, gradient: Array, weight: Array, displacement: Array, lam: float, mu: float
 ) -> Array:
@@ -28,37 +79,5 @@ def inner_forces(
     -------
     (n, d) float64, N
     """
-    ne, points, k, d = gradient.shape
-    force = np.zeros_like(displacement)
-    slope, stress, piola = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
-    for e in range(ne):
-        for q in range(points):
-            slope[:] = 0.0
-            for a in range(k):
-                node = cells[e, a]
-                for i in range(d):
-                    for j in range(d):
-                        slope[i, j] += displacement[node, i] * gradient[e, q, a, j]
-            trace = 0.0
-            for i in range(d):
-                for j in range(d):
-                    # twice the Green strain, without the 1 of F, which would cost digits
-                    twice = slope[i, j] + slope[j, i]
-                    for m in range(d):
-                        twice += slope[m, i] * slope[m, j]
-                    stress[i, j] = mu * twice
-                trace += 0.5 * stress[i, i] / mu
-            for i in range(d):
-                stress[i, i] += lam * trace
-            for i in range(d):
-                for j in range(d):
-                    piola[i, j] = stress[i, j]
-                    for m in range(d):
-                        piola[i, j] += slope[i, m] * stress[m, j]
-                    piola[i, j] *= weight[e, q]
-            for a in range(k):
-                node = cells[e, a]
-                for i in range(d):
-                    for j in range(d):
-                        force[node, i] += piola[i, j] * gradient[e, q, a, j]
-    return force
+    compiled = _BY_DIMENSION[gradient.shape[3]]
+    return compiled(cells, gradient, weight, displacement, lam, mu)
