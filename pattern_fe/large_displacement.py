@@ -14,8 +14,6 @@ from pattern_fe.space import Space
 from pattern_fe.supports import Mask
 
 Array = NDArray[np.float64]
-
-
 _HALVINGS = 8
 """Of a step of Newton's method, before the load is halved instead."""
 
