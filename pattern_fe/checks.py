@@ -25,23 +25,23 @@ def check_mesh(mesh: Any) -> None:
     Raises
     ------
     ValueError
-        When elements are inverted or degenerate, a face belongs to more than two of them, or they
-        make up several pieces. (Whether the outline is closed is seen when it is built.)
+        When a face belongs to more than two elements, some of them are inverted or degenerate, or
+        they make up several pieces. (That the outline touches itself is seen when it is built.)
     """
     if not np.isfinite(mesh.p).all():
         raise ValueError("mesh of the pattern has nodes whose coordinates are not finite")
+    crowded = int((np.bincount(mesh.t2f.ravel()) > 2).sum())
+    if crowded:
+        raise ValueError(
+            f"mesh of the pattern has {crowded} faces that belong to more than two elements, so "
+            "its outline is not closed; valid is a solid whose elements meet in pairs"
+        )
     bad = np.flatnonzero(_inverted(mesh))
     if len(bad):
         named = ", ".join(map(str, bad[:_SHOWN])) + (", ..." if len(bad) > _SHOWN else "")
         raise ValueError(
             f"mesh of the pattern has {len(bad)} inverted or degenerate elements of "
             f"{mesh.nelements} ({named}, counted from 0), valid is none"
-        )
-    crowded = int((np.bincount(mesh.t2f.ravel()) > 2).sum())
-    if crowded:
-        raise ValueError(
-            f"mesh of the pattern has {crowded} faces that belong to more than two elements, so "
-            "its outline is not closed; valid is a solid whose elements meet in pairs"
         )
     pieces = _pieces(mesh)
     if pieces > 1:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pattern_fe.inner_forces import inner_forces
 from pattern_fe.material import Foam
 from pattern_fe.space import Space
 
@@ -52,11 +53,9 @@ def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
     -------
     (n, d) float64, N
     """
-    slope = displacement_gradient(space, displacement_m)
-    first_piola = (np.eye(space.dimension) + slope) @ foam.stress_pa(green_strain(slope))
-    weighted = first_piola * space.weight[..., None, None]
-    forces = space.gradient @ np.swapaxes(weighted, -1, -2)
-    return space.summed(forces.sum(axis=1))
+    moved = np.ascontiguousarray(displacement_m, dtype=np.float64)
+    lam, mu = foam.lame_pa
+    return inner_forces(space.cells, space.gradient, space.weight, moved, lam, mu)
 
 
 def element_stiffness_n_m(space: Space, foam: Foam, displacement_m: Array | None = None) -> Array:

@@ -18,17 +18,18 @@ from pattern_fe.checks import check_mesh
 from pattern_fe.shapes import with_sides
 
 Array = NDArray[np.float64]
-_SOLID = {"tetra": 3, "tetra10": 3, "hexahedron": 3, "hexahedron27": 3}
-_PLANE = {"triangle": 2, "triangle6": 2, "quad": 2, "quad9": 2}
-_STRAIGHT = {3: MeshTri1, 4: MeshQuad1}
-_STRAIGHT_SOLID = {4: MeshTet1, 8: MeshHex1}
+_SOLID = ("tetra", "tetra10", "hexahedron", "hexahedron27")
+_PLANE = ("triangle", "triangle6", "quad", "quad9")
+_STRAIGHT = {(2, 3): MeshTri1, (2, 4): MeshQuad1, (3, 4): MeshTet1, (3, 8): MeshHex1}
+"""By dimension and number of corners."""
 
 
 def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
     """Read a pattern of triangles or quadrilaterals, or of tetrahedra or hexahedra.
 
     Physical groups of faces become named boundaries, and the extreme sides are named as in
-    ``shapes.SIDES`` unless a group has that name. Mid-side nodes are dropped: edges are straight.
+    ``shapes.SIDES`` unless a group has that name. Mid-side nodes are dropped: edges are straight;
+    groups of faces that have such nodes are not found.
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ def _straight(mesh: Any, unit_m: float) -> Any:
     """Mesh of corners alone, with those groups of faces that lie on its boundary."""
     corners = mesh.t[: mesh.refdom.nnodes]
     used, t = np.unique(corners, return_inverse=True)
-    kind = (_STRAIGHT if mesh.dim() == 2 else _STRAIGHT_SOLID)[len(corners)]
+    kind = _STRAIGHT[mesh.dim(), len(corners)]
     points = np.ascontiguousarray(unit_m * mesh.p[:, used])
     straight = kind(points, np.ascontiguousarray(t.reshape(corners.shape)))
     outer = {tuple(sorted(v)): f for f, v in enumerate(straight.facets.T.tolist())}

@@ -130,7 +130,7 @@ def space_of(mesh: Any, order: int = 2, thickness_m: float | None = None) -> Spa
         order,
         thickness_m,
         np.ascontiguousarray(basis.doflocs.T),
-        basis.element_dofs.T.astype(np.int64),
+        np.ascontiguousarray(basis.element_dofs.T, dtype=np.int64),
         np.ascontiguousarray(np.stack(gradients).transpose(2, 3, 0, 1)),
-        basis.dx * thickness_m,
+        np.ascontiguousarray(basis.dx * thickness_m),
     )

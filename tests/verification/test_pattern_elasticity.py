@@ -97,8 +97,8 @@ def _tip_m(pattern: Pattern, force_n: float) -> float:
     ("poisson", "slenderness", "rel"),
     [
         (0.0, 10, 1e-3),
-        # the clamp keeps the section from warping: as if 3 % of the height were cut off the
-        # length, 0.28 % of the deflection at this slenderness
+        # the clamp keeps the section from widening: as if 2.4 % of the height were cut off the
+        # length, 0.24 % of the deflection at this slenderness
         (0.35, 30, 4e-3),
     ],
 )
@@ -112,8 +112,8 @@ def test_elements_of_first_order_lock_in_bending() -> None:
     exact = _beam_tip_m(cantilever(0.1, 0.01, 2, 20, 1), 0.1, 0.01, 1.0)
     share = [_tip_m(cantilever(0.1, 0.01, n, 10 * n, 1), 1.0) / exact for n in (1, 2, 4, 8)]
     assert share == sorted(share)
-    # one square element through the thickness misses a third, eight a percent
-    assert share[0] < 0.72
+    # one square element through the thickness misses two fifths, eight two percent
+    assert 0.5 < share[0] < 0.65
     assert 0.98 < share[-1] < 1.0
 
 
