@@ -73,28 +73,40 @@ class SuperSteps:
         exchange : Exchange
         substance : Substance
         stages : int
+            At most; shorter durations take fewer.
         share : float
             Of (s^2 + s - 2)/4 stable explicit steps.
         threads : int
         """
         self.volume_m3 = exchange.volume_m3
-        self._weights = stage_weights(stages)
-        explicit_s = float(exchange.limit_s(substance.capacity_j_m3_k).min())
-        self.step_s = share * explicit_s * (stages**2 + stages - 2) / 4.0
+        self._explicit_s = share * float(exchange.limit_s(substance.capacity_j_m3_k).min())
+        self._most_stages = len(stage_weights(stages))
+        self.step_s = self._explicit_s * _gain(stages)
         self._exchange, self._substance, self._threads = exchange, substance, threads
 
     def advance(self, heat: Heat, duration_s: float) -> None:
-        """Take equal super steps over a duration, none longer than ``step_s``."""
+        """Take equal super steps over a duration, each of no more stages than it needs."""
         steps = max(1, math.ceil(duration_s / self.step_s * (1.0 - 1e-12)))
+        stages = 3
+        while stages < self._most_stages and (
+            self._explicit_s * _gain(stages) < duration_s / steps * (1.0 - 1e-12)
+        ):
+            stages += 1
+        weights = stage_weights(stages)
         x, s = self._exchange, self._substance
         set_num_threads(self._threads)
         heat.enthalpy_j_m3 = _super_steps(
-            steps, duration_s / steps, heat.time_s, self._weights,
+            steps, duration_s / steps, heat.time_s, weights,
             x.start, x.neighbour, x.rate_w_m3_k, s.material, s.table.rows, s.table.reference_k,
             heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s,
         )  # fmt: skip
         heat.time_s += duration_s
-        heat.element_steps += steps * len(self._weights) * len(s.material)
+        heat.element_steps += steps * stages * len(s.material)
+
+
+def _gain(stages: int) -> float:
+    """Explicit steps that a super step is long."""
+    return (stages**2 + stages - 2) / 4.0
 
 
 @njit(cache=True, parallel=True)
