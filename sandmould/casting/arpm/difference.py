@@ -64,8 +64,9 @@ class DifferenceSteps:
         steps = max(1, math.ceil(duration_s / self.step_s * (1.0 - 1e-12)))
         set_num_threads(self._threads)
         shape = self._material.shape
+        along_x, along_y, along_z = self._through
         heat.temperature_k = _difference_steps(
-            steps, duration_s / steps, heat.time_s, *self._through, self._material,
+            steps, duration_s / steps, heat.time_s, along_x, along_y, along_z, self._material,
             self._table.rows, self._table.reference_k, heat.enthalpy_j_m3.reshape(shape),
             heat.temperature_k.reshape(shape), heat.frozen_s.reshape(shape),
         ).reshape(-1)  # fmt: skip

@@ -135,7 +135,7 @@ def _all_in_block(good: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
 def _one_material(material: Indices, side: int) -> NDArray[np.bool_]:
     within = tuple(range(1, 2 * material.ndim, 2))
     blocks = np.asarray(_blocks(material, side))
-    alike = blocks.min(axis=within) == blocks.max(axis=within)
+    alike = np.asarray(np.ptp(blocks, axis=within) == 0)
     return _spread(alike, side, material.shape)
 
 
@@ -145,9 +145,9 @@ def _elements(raster: Raster, span: Indices) -> Elements:
     low = place[:, corner].T
     size_m = span[corner] * raster.cell_m
     return Elements(
-        raster.low_m + low * raster.cell_m + 0.5 * size_m[:, None],
+        np.asarray(raster.low_m + low * raster.cell_m + 0.5 * size_m[:, None]),
         size_m,
         raster.material[corner],
         raster.low_m,
-        raster.low_m + np.array(span.shape) * raster.cell_m,
+        np.asarray(raster.low_m + np.array(span.shape) * raster.cell_m),
     )

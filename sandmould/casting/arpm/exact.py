@@ -85,12 +85,3 @@ def stefan_temperature_k(place_m: Array, time_s: float, body: Material, melting_
     similar = place_m / (2.0 * math.sqrt(diffusivity * time_s))
     frozen = wall_k + (melting_k - wall_k) * erf(similar) / math.erf(front)
     return np.asarray(np.where(similar < front, frozen, melting_k))
-
-
-def wall_flux_heat_j_m2(time_s: float, body: Material, melting_k: float, wall_k: float) -> float:
-    """Heat that has gone into the wall of the one-phase Stefan problem, J/m2."""
-    front = stefan_front(body, melting_k, wall_k)
-    diffusivity = body.conductivity_w_m_k / body.capacity_j_m3_k
-    per_root = body.conductivity_w_m_k * (melting_k - wall_k) / (
-        math.erf(front) * math.sqrt(math.pi * diffusivity))  # fmt: skip
-    return 2.0 * per_root * math.sqrt(time_s)

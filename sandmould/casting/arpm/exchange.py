@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, diags_array
+from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 Array = NDArray[np.float64]
@@ -61,13 +61,14 @@ class Exchange:
         """
         n = len(self.volume_m3)
         row = np.repeat(np.arange(n), np.diff(self.start))
-        apart = coo_array((self.rate_w_m3_k / capacity_j_m3_k[row], (row, self.neighbour)), (n, n))
-        apart = apart.tocsr()
-        both = apart.multiply(apart.T)
-        sign = apart.sign()
-        off = sign.multiply(abs(both).sqrt()).tocsr()
-        diagonal = np.asarray(apart.sum(axis=1)).ravel()
-        largest = eigsh(diags_array(diagonal) - off, k=1, which="LA", return_eigenvectors=False)
+        scaled = self.rate_w_m3_k / capacity_j_m3_k[row]
+        apart = csr_array((scaled, self.neighbour, self.start), (n, n))
+        # entries that mirror each other have one sign
+        off = apart.sign().multiply(abs(apart.multiply(apart.T)).sqrt())
+        diagonal: Array = np.bincount(row, scaled, n)
+        largest = eigsh(
+            (diags_array(diagonal) - off).tocsr(), k=1, which="LA", return_eigenvectors=False
+        )
         return 2.0 / float(largest[0])
 
 

@@ -92,8 +92,8 @@ def faces_of(elements: Elements) -> Faces:
         pair, count = np.unique(before[apart] * n + after[apart], return_counts=True)
         area = count * cell ** (owner.ndim - 1)
         parts.append((pair // n, pair % n, np.full(len(pair), axis), area))
-    one, two, axis, area = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Faces(one, two, axis, area)
+    one, two, across, areas = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return Faces(one, two, across, areas.astype(np.float64))
 
 
 def face_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2k_w: float,

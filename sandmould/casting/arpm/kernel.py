@@ -58,7 +58,7 @@ def volume_weight(distance_m: Array, own_m: Array, other_m: Array, kernel_size: 
     return np.asarray(0.5 * (ratio * by_own + second * by_other))
 
 
-def _with_images(elements: Elements, reach_m: float) -> tuple[Array, Indices]:
+def with_images(elements: Elements, reach_m: float) -> tuple[Array, Indices]:
     """Places of all elements and of their mirror images behind the walls, with their numbers."""
     place, number = elements.position_m, np.arange(len(elements.size_m))
     for axis in range(elements.dimensions):
@@ -90,7 +90,7 @@ def neighbours(elements: Elements, kernel_size: float) -> tuple[Indices, Indices
     distance_m : (p,) float64, m
     """
     real = len(elements.size_m)
-    place, number = _with_images(elements, kernel_size * float(elements.size_m.max()))
+    place, number = with_images(elements, kernel_size * float(elements.size_m.max()))
     size = elements.size_m[number]
     octave = np.round(np.log2(size / size.min())).astype(np.int64)
     found = []

@@ -17,7 +17,9 @@ MOULD = 0
 class Solid(Protocol):
     """A body that tells how far points are from its surface, negative inside."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """What messages call it."""
 
     def distance_m(self, position_m: Array) -> Array:
         """Signed distance of points, (n,) float64, m."""
