@@ -147,3 +147,21 @@ def stefan_heat(duration: float) -> float:
     a = METAL.conductivity_w_m_k / METAL.capacity_j_m3_k
     return 2 * METAL.conductivity_w_m_k * 500.0 * math.sqrt(duration / (math.pi * a)) / (
         math.erf(speed))  # fmt: skip
+
+
+@pytest.mark.parametrize("resistance", [0.0, RESISTANCE])
+def test_elements_at_random_places_agree_with_the_exact_contact(resistance: float) -> None:
+    # mirror images across x = 0, so that the faces of the two areas meet there
+    rng, cell = np.random.default_rng(5), 0.01
+    nodes = np.indices((50, 6)).reshape(2, -1).T
+    right = (nodes + 0.5 + rng.uniform(-0.3, 0.3, nodes.shape)) * cell
+    place = np.concatenate([right, right * np.array([-1.0, 1.0])])
+    size = np.full(len(place), cell)
+    material = np.repeat([0, 1], len(right))
+    low, high = np.array([-0.5, 0.0]), np.array([0.5, 0.06])
+    elements = Elements(place, size, material, low, high)
+    filling = Filling((ALUMINIUM, ALUMINIUM), (293.0, 393.0), resistance)
+    found = compare_contact(elements, filling, Method("power", "explicit"))
+    # 0.016 K measured, of 100 K
+    assert found.largest_k < 0.05
+    assert abs(found.drift_percent) < 1e-10

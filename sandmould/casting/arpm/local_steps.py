@@ -72,10 +72,10 @@ class LocalSteps:
         self._material, self._table = substance.material[order], substance.table
         self._level = level
         self._end = np.searchsorted(level, np.arange(int(level.max()) + 1), side="right")
-        highest = level.copy()
         row = np.repeat(np.arange(len(level)), count)
-        np.maximum.at(highest, row, level[self._neighbour])
-        self._slowest_beside = highest
+        self._slowest_beside, self._fastest_beside = level.copy(), level.copy()
+        np.maximum.at(self._slowest_beside, row, level[self._neighbour])
+        np.minimum.at(self._fastest_beside, row, level[self._neighbour])
 
     def advance(self, heat: Heat, duration_s: float) -> None:
         """Take whole cycles of the slowest elements' step over a duration."""
@@ -95,6 +95,7 @@ class LocalSteps:
         _local_steps(
             cycles, duration_s / (cycles * substeps), heat.time_s, end,
             np.minimum(self._level, top), np.minimum(self._slowest_beside, top),
+            np.minimum(self._fastest_beside, top),
             self._start, self._neighbour, self._rate,
             self._material, self._table.rows, self._table.reference_k,
             enthalpy, temperature, frozen,
@@ -109,22 +110,27 @@ class LocalSteps:
 
 @njit(cache=True, parallel=True)
 def _update(
-    ending: int, at: int, dt: float, time_s: float, level: Any, start: Any, neighbour: Any,
-    rate: Any, material: Any, rows: Any, reference: float, integral: Any, enthalpy: Any,
+    ending: int, at: int, dt: float, time_s: float, level: Any, fastest: Any, start: Any,
+    neighbour: Any, rate: Any, material: Any, rows: Any, reference: float, integral: Any, enthalpy: Any,
     temperature: Any, frozen: Any, new: Any,
 ) -> None:  # fmt: skip
     """End the steps of the first elements: new enthalpies, and temperatures into ``new``."""
     for i in prange(ending):
         own_level = level[i]
         own_dt = dt * (1 << own_level)
-        own, taken = own_dt * temperature[i], 0.0
-        for k in range(start[i], start[i + 1]):
-            j = neighbour[k]
-            if level[j] >= own_level:
-                other = own_dt * temperature[j]
-            else:
-                other = integral[j, own_level] + dt * (1 << level[j]) * temperature[j]
-            taken += rate[k] * (other - own)
+        own, taken = temperature[i], 0.0
+        if fastest[i] == own_level:
+            for k in range(start[i], start[i + 1]):
+                taken += rate[k] * (temperature[neighbour[k]] - own)
+            taken *= own_dt
+        else:
+            for k in range(start[i], start[i + 1]):
+                j = neighbour[k]
+                if level[j] >= own_level:
+                    other = own_dt * temperature[j]
+                else:
+                    other = integral[j, own_level] + dt * (1 << level[j]) * temperature[j]
+                taken += rate[k] * (other - own_dt * own)
         before, m = enthalpy[i], material[i]
         after = before + taken
         enthalpy[i] = after
@@ -149,9 +155,9 @@ def _keep(ending: int, at: int, dt: float, level: Any, slowest: Any, integral: A
 
 @njit(cache=True)
 def _local_steps(
-    cycles: int, dt: float, time_s: float, end: Any, level: Any, slowest: Any, start: Any,
-    neighbour: Any, rate: Any, material: Any, rows: Any, reference: float, enthalpy: Any,
-    temperature: Any, frozen: Any,
+    cycles: int, dt: float, time_s: float, end: Any, level: Any, slowest: Any, fastest: Any,
+    start: Any, neighbour: Any, rate: Any, material: Any, rows: Any, reference: float,
+    enthalpy: Any, temperature: Any, frozen: Any,
 ) -> None:  # fmt: skip
     """Take cycles of 2^(levels - 1) of the shortest steps."""
     substeps = 1 << (len(end) - 1)
@@ -161,6 +167,6 @@ def _local_steps(
         while highest < len(end) - 1 and at % (1 << (highest + 1)) == 0:
             highest += 1
         ending = end[highest]
-        _update(ending, at, dt, time_s, level, start, neighbour, rate, material, rows, reference,
-                integral, enthalpy, temperature, frozen, new)  # fmt: skip
+        _update(ending, at, dt, time_s, level, fastest, start, neighbour, rate, material, rows,
+                reference, integral, enthalpy, temperature, frozen, new)  # fmt: skip
         _keep(ending, at, dt, level, slowest, integral, temperature, new)

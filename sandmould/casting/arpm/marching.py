@@ -94,7 +94,7 @@ class ExplicitSteps:
         steps = max(1, math.ceil(duration_s / self.step_s * (1.0 - 1e-12)))
         x, s = self._exchange, self._substance
         set_num_threads(self._threads)
-        heat.temperature_k = explicit_steps(
+        heat.temperature_k = _explicit_steps(
             steps, duration_s / steps, heat.time_s, x.start, x.neighbour, x.rate_w_m3_k,
             s.material, s.table.rows, s.table.reference_k,
             heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s,
@@ -103,16 +103,8 @@ class ExplicitSteps:
         heat.element_steps += steps * len(s.material)
 
 
-@njit(cache=True, inline="always")
-def crossing_s(before: float, after: float, solidus: float, time_s: float, dt: float) -> float:
-    """When an enthalpy fell through the solidus' within a step; NaN if it did not."""
-    if before >= solidus > after:
-        return time_s + dt * (before - solidus) / (before - after)
-    return math.nan
-
-
 @njit(cache=True, parallel=True)
-def explicit_steps(
+def _explicit_steps(
     steps: int, dt: float, time_s: float, start: Any, neighbour: Any, rate: Any,
     material: Any, rows: Any, reference: float, enthalpy: Any, temperature: Any, frozen: Any,
 ) -> Any:  # fmt: skip
@@ -138,6 +130,7 @@ def explicit_steps(
             enthalpy[i] = after
             then[i] = temperature_of(after, m, rows, reference)
             if before >= rows[m, 1] > after:
-                frozen[i] = crossing_s(before, after, rows[m, 1], time_s + step * dt, dt)
+                share = (before - rows[m, 1]) / (before - after)
+                frozen[i] = time_s + (step + share) * dt
         now, then = then, now
     return now

@@ -13,10 +13,11 @@ from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.kernel import kernel_exchange
 from sandmould.casting.arpm.local_steps import LocalSteps
 from sandmould.casting.arpm.marching import STEP_SHARE, ExplicitSteps, Marching, Substance
+from sandmould.casting.arpm.power_diagram import power_exchange
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.super_steps import SuperSteps
 
-Exchanging = Literal["printed", "corrected", "symmetric", "faces", "difference"]
+Exchanging = Literal["printed", "corrected", "symmetric", "faces", "power", "difference"]
 Stepping = Literal["explicit", "super", "local"]
 STEPS = {"explicit": ExplicitSteps, "super": SuperSteps, "local": LocalSteps}
 
@@ -26,7 +27,8 @@ class Method:
     """One way to compute a casting."""
 
     exchange: Exchanging = "faces"
-    """Three readings of eqs. (4) and (5), true faces, or finite differences on a plain grid."""
+    """Three readings of eqs. (4) and (5), true faces on a grid, faces of a power diagram for free
+    positions, or finite differences on a plain grid."""
     stepping: Stepping = "local"
     kernel_size: float = 2.1
     """c_k of the paper; of no use to faces."""
@@ -46,6 +48,8 @@ class Method:
         conductivity, resistance = filling.conductivity_w_m_k, filling.resistance_m2k_w
         if self.exchange == "faces":
             return face_exchange(elements, conductivity, resistance)
+        if self.exchange == "power":
+            return power_exchange(elements, conductivity, resistance)
         if self.exchange == "difference":
             raise ValueError("finite differences have no exchange of elements: give their raster")
         return kernel_exchange(

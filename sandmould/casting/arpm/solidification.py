@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -100,6 +101,8 @@ def solidify(
     begun, begun_cpu = time.perf_counter(), time.process_time()
     records = [(0.0, weights @ heat.temperature_k, heat.enthalpy_j_m3 @ marching.volume_m3)]
     volume = marching.volume_m3[melts]
+    solidus_j_m3 = filling.table.rows[elements.material[melts], 1]
+    frozen = np.zeros(len(volume), dtype=np.bool_)
     for number in range(1, int(np.ceil(until_s / record_s)) + 1):
         target_s = min(number * record_s, until_s)
         marching.advance(heat, target_s - heat.time_s)
@@ -107,7 +110,7 @@ def solidify(
         _check_range(heat, filling)
         total = heat.enthalpy_j_m3 @ marching.volume_m3
         records.append((target_s, weights @ heat.temperature_k, total))
-        frozen = np.isfinite(heat.frozen_s[melts])
+        frozen = heat.enthalpy_j_m3[melts] < solidus_j_m3
         if progress:
             share = max(volume[frozen].sum() / volume.sum(), target_s / until_s)
             rate = heat.element_steps / (time.perf_counter() - begun)
@@ -120,7 +123,7 @@ def solidify(
         dict(zip(probes_m or {}, np.array(curves).T, strict=True)),
         np.array(totals),
         heat,
-        float(heat.frozen_s[melts].max()),
+        float(heat.frozen_s[melts].max()) if frozen.all() else math.nan,
         time.process_time() - begun_cpu,
         time.perf_counter() - begun,
     )
