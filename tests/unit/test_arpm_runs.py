@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from sandmould.casting.arpm.contact_case import contact_elements
-from sandmould.casting.arpm.elements import placed
+from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import Material
 from sandmould.casting.arpm.method import Method
 from sandmould.casting.arpm.plates_case import plates_layout, read_plates
+from sandmould.casting.arpm.power_diagram import power_exchange
 from sandmould.casting.arpm.probes import probe_weights
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import UnstableError, solidify
@@ -84,3 +85,14 @@ def test_probes_look_at_their_own_material_alone() -> None:
     hot = np.where(elements.material == 1, 1800.0, 300.0)
     beside = {"casting": np.array([0.0401, 0.06]), "mould": np.array([0.0399, 0.06])}
     np.testing.assert_allclose(probe_weights(elements, beside) @ hot, [1800.0, 300.0])
+
+
+def test_power_diagrams_refuse_elements_without_a_cell() -> None:
+    place = np.array([[0.5, 0.5], [1.5, 0.5], [1.55, 0.5]])
+    flat = Elements(place, np.array([1.0, 1.0, 0.1]), np.zeros(3, dtype=np.int64), np.zeros(2),
+                    np.array([2.0, 1.0]))  # fmt: skip
+    with pytest.raises(ValueError, match="lies in no cell of its own"):
+        power_exchange(flat, np.ones(1), 0.0)
+    cubes = placed(block(3))
+    with pytest.raises(ValueError, match="drawn in 2D"):
+        power_exchange(cubes, np.ones(2), 0.0)

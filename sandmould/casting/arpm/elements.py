@@ -129,25 +129,24 @@ def _spread(of_block: NDArray[np.bool_], side: int, shape: tuple[int, ...]) -> N
 def _all_in_block(good: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
     """Cells whose whole block is good; those of blocks cut off at the edge are not."""
     within = tuple(range(1, 2 * good.ndim, 2))
-    return _spread(np.asarray(_blocks(good, side)).all(axis=within), side, good.shape)
+    return _spread(np.all(_blocks(good, side), axis=within), side, good.shape)
 
 
 def _one_material(material: Indices, side: int) -> NDArray[np.bool_]:
     within = tuple(range(1, 2 * material.ndim, 2))
-    blocks = np.asarray(_blocks(material, side))
-    alike = np.asarray(np.ptp(blocks, axis=within) == 0)
-    return _spread(alike, side, material.shape)
+    apart = np.ptp(np.asarray(_blocks(material, side)), axis=within)
+    return _spread(np.equal(apart, 0), side, material.shape)
 
 
 def _elements(raster: Raster, span: Indices) -> Elements:
     place = np.indices(span.shape)
     corner = np.all(place % span == 0, axis=0)
     low = place[:, corner].T
-    size_m = span[corner] * raster.cell_m
+    size_m = (span[corner] * raster.cell_m).astype(np.float64)
     return Elements(
-        np.asarray(raster.low_m + low * raster.cell_m + 0.5 * size_m[:, None]),
+        (raster.low_m + low * raster.cell_m + 0.5 * size_m[:, None]).astype(np.float64),
         size_m,
         raster.material[corner],
         raster.low_m,
-        np.asarray(raster.low_m + np.array(span.shape) * raster.cell_m),
+        (raster.low_m + np.array(span.shape) * raster.cell_m).astype(np.float64),
     )

@@ -65,10 +65,8 @@ class Exchange:
         apart = csr_array((scaled, self.neighbour, self.start), (n, n))
         # entries that mirror each other have one sign
         off = apart.sign().multiply(abs(apart.multiply(apart.T)).sqrt())
-        diagonal: Array = np.bincount(row, scaled, n)
-        largest = eigsh(
-            (diags_array(diagonal) - off).tocsr(), k=1, which="LA", return_eigenvectors=False
-        )
+        diagonal = diags_array(np.bincount(row, scaled, n).astype(np.float64))
+        largest = eigsh((diagonal - off).tocsr(), k=1, which="LA", return_eigenvectors=False)
         return 2.0 / float(largest[0])
 
 

@@ -111,8 +111,8 @@ class LocalSteps:
 @njit(cache=True, parallel=True)
 def _update(
     ending: int, at: int, dt: float, time_s: float, level: Any, fastest: Any, start: Any,
-    neighbour: Any, rate: Any, material: Any, rows: Any, reference: float, integral: Any, enthalpy: Any,
-    temperature: Any, frozen: Any, new: Any,
+    neighbour: Any, rate: Any, material: Any, rows: Any, reference: float, integral: Any,
+    enthalpy: Any, temperature: Any, frozen: Any, new: Any,
 ) -> None:  # fmt: skip
     """End the steps of the first elements: new enthalpies, and temperatures into ``new``."""
     for i in prange(ending):

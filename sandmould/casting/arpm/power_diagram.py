@@ -50,17 +50,21 @@ def power_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2k
     one, two, length, near_m, distance = _edges(elements)
     n = len(elements.size_m)
     real = two < n
-    volume = np.bincount(one, 0.5 * length * near_m, n)
-    if not (volume > 0.0).all():
-        place = elements.position_m[np.argmin(volume)].tolist()
-        raise ValueError(f"the element at {place} m has no cell; a larger one covers it")
+    volume = np.bincount(one, 0.5 * length * near_m, n).astype(np.float64)
+    least_m = np.full(n, -1.0)
+    least_m[one] = np.inf
+    np.minimum.at(least_m, one, near_m)
+    if not (least_m > 0.0).all():
+        place = elements.position_m[np.argmin(least_m)].tolist()
+        raise ValueError(f"the element at {place} m lies in no cell of its own; it must stand "
+                         "farther from larger ones")  # fmt: skip
     one, two, length = one[real], two[real], length[real]
     near_m, far_m = near_m[real], (distance - near_m)[real]
     material, other = elements.material[one], elements.material[two]
     path = near_m / conductivity_w_m_k[material] + far_m / conductivity_w_m_k[other]
     path += np.where(material != other, resistance_m2k_w, 0.0)
     once = one < two
-    return over_faces(one[once], two[once], (length / path)[once], volume)
+    return over_faces(one[once], two[once], np.asarray(length / path)[once], volume)
 
 
 def _edges(elements: Elements) -> tuple[Indices, Indices, Array, Array, Array]:
