@@ -48,6 +48,10 @@ def test_layers_stay_beside_the_interface() -> None:
     # blocks of 4 stand on a grid of 4, so that from the interface on a third middle one stays
     outward = [1, 1, 2, 2, 2, 4, 4]
     assert sizes.tolist() == outward[::-1] + outward
+    for kept in (1, 3):
+        few = placed(Raster(material, 1.0, np.zeros(2)), (kept,))
+        # a block of two that holds the last layer kept stays small
+        assert (few.size_m == 1.0).sum() == 2 * 32 * (kept + 1)
     with pytest.raises(ValueError, match="none may be negative"):
         placed(Raster(material, 1.0, np.zeros(2)), (-1,))
 
