@@ -1,0 +1,152 @@
+"""Elements of several sizes: where they are, how large, and of which material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from sandmould.casting.arpm.raster import Raster
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Squares or cubes, given by their centres and sides.
+
+    Raises
+    ------
+    ValueError
+        When a size is not above 0 or the arrays' lengths differ.
+    """
+
+    position_m: Array
+    """(n, d) float64, m."""
+    size_m: Array
+    """(n,) float64, m: r0 of the paper."""
+    material: Indices
+    """(n,) int64."""
+    low_m: Array
+    """(d,) float64, m: corners of the box that they fill."""
+    high_m: Array
+
+    def __post_init__(self) -> None:
+        lengths = {len(self.position_m), len(self.size_m), len(self.material)}
+        if lengths != {len(self.size_m)} or not len(self.size_m):
+            raise ValueError(f"positions, sizes and materials number {sorted(lengths)}; as many "
+                             "of each are needed, and at least one")  # fmt: skip
+        if not (self.size_m > 0.0).all():
+            raise ValueError(f"an element has size_m {self.size_m.min()}; it must be above 0")
+
+    @property
+    def dimensions(self) -> int:
+        """2 or 3."""
+        return self.position_m.shape[1]
+
+    @property
+    def volume_m3(self) -> Array:
+        """(n,) float64, m3, or m2 in 2D."""
+        return np.asarray(self.size_m**self.dimensions)
+
+    def counts(self) -> dict[float, int]:
+        """How many there are of each size (m)."""
+        size, count = np.unique(np.round(self.size_m, 12), return_counts=True)
+        return dict(zip(size.tolist(), count.tolist(), strict=True))
+
+
+def placed(raster: Raster, layers: Sequence[int] = ()) -> Elements:
+    """Replace cells by elements of twice, four times ... their size away from interfaces.
+
+    Parameters
+    ----------
+    raster : Raster
+        Its cells are the small elements.
+    layers : sequence of int
+        One for each doubling: how many layers of the smaller size stay between the doubled
+        elements and the interface of materials or, from the second on, the next smaller size.
+        Empty for elements of one size; 0 doubles wherever a block is of one material.
+
+    Returns
+    -------
+    Elements
+        In C order of their low corners.
+
+    Raises
+    ------
+    ValueError
+        When a number of layers is negative.
+    """
+    if any(n < 0 for n in layers):
+        raise ValueError(f"layers are {list(layers)}; none may be negative")
+    span = np.ones(raster.material.shape, dtype=np.int64)
+    distance = _from_interface(raster.material)
+    for level, kept in enumerate(layers, start=1):
+        half = 2 ** (level - 1)
+        if level > 1:
+            distance = _distance_to(span < half)
+        mergeable = _all_in_block((distance > kept * half) & (span == half), 2 * half)
+        if kept == 0:
+            mergeable &= _one_material(raster.material, 2 * half)
+        span[mergeable] = 2 * half
+    return _elements(raster, span)
+
+
+def _from_interface(material: Indices) -> Array:
+    """Distance, in cells, of each cell's centre to the nearest of another material."""
+    found = np.full(material.shape, np.inf)
+    for number in np.unique(material):
+        own = material == number
+        found[own] = _distance_to(~own)[own]
+    return found
+
+
+def _distance_to(there: NDArray[np.bool_]) -> Array:
+    if not there.any():
+        return np.full(there.shape, np.inf)
+    return np.asarray(distance_transform_edt(~there), dtype=np.float64)
+
+
+def _blocks(values: NDArray[np.generic], side: int) -> NDArray[np.generic]:
+    """A view of whole blocks, axes (block, within) in turn for each dimension."""
+    whole = tuple(slice(0, n // side * side) for n in values.shape)
+    shape = [k for n in values.shape for k in (n // side, side)]
+    return values[whole].reshape(shape)
+
+
+def _spread(of_block: NDArray[np.bool_], side: int, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    found = np.zeros(shape, dtype=np.bool_)
+    for axis in range(len(shape)):
+        of_block = np.repeat(of_block, side, axis=axis)
+    found[tuple(slice(0, n) for n in of_block.shape)] = of_block
+    return found
+
+
+def _all_in_block(good: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
+    """Cells whose whole block is good; those of blocks cut off at the edge are not."""
+    within = tuple(range(1, 2 * good.ndim, 2))
+    return _spread(np.all(_blocks(good, side), axis=within), side, good.shape)
+
+
+def _one_material(material: Indices, side: int) -> NDArray[np.bool_]:
+    within = tuple(range(1, 2 * material.ndim, 2))
+    apart = np.ptp(np.asarray(_blocks(material, side)), axis=within)
+    return _spread(np.equal(apart, 0), side, material.shape)
+
+
+def _elements(raster: Raster, span: Indices) -> Elements:
+    place = np.indices(span.shape)
+    corner = np.all(place % span == 0, axis=0)
+    low = place[:, corner].T
+    size_m = (span[corner] * raster.cell_m).astype(np.float64)
+    return Elements(
+        (raster.low_m + low * raster.cell_m + 0.5 * size_m[:, None]).astype(np.float64),
+        size_m,
+        raster.material[corner],
+        raster.low_m,
+        (raster.low_m + np.array(span.shape) * raster.cell_m).astype(np.float64),
+    )

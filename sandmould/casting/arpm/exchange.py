@@ -1,0 +1,109 @@
+"""Heat exchange between elements as a sparse matrix, and the steps that it allows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse.linalg import eigsh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Heat that each element takes up: dH_i/dt = sum over j of rate_ij (T_j - T_i)."""
+
+    start: Indices
+    """(n + 1,) int64: where the neighbours of each element begin."""
+    neighbour: NDArray[np.int32]
+    """(p,) int32, in rising order for each element."""
+    rate_w_m3_k: Array
+    """(p,) float64, W/m3/K."""
+    volume_m3: Array
+    """(n,) float64, m3, or m2 in 2D."""
+
+    def limit_s(self, capacity_j_m3_k: Array) -> Array:
+        """Longest stable explicit step of each element, (n,) float64, s.
+
+        Half the row sum of Gershgorin's circle; where all rates are positive, temperatures then
+        stay between those of the neighbours before the step.
+
+        Parameters
+        ----------
+        capacity_j_m3_k : (n,) float64, J/m3/K
+            Without latent heat, which only slows an element down.
+        """
+        size = np.add.reduceat(np.abs(self._padded()), self.start[:-1])
+        total = np.add.reduceat(self._padded(), self.start[:-1])
+        alone = np.diff(self.start) == 0
+        row = np.where(alone, 0.0, 0.5 * (size + np.abs(total)))
+        with np.errstate(divide="ignore"):
+            return np.asarray(capacity_j_m3_k / row)
+
+    def _padded(self) -> Array:
+        """Rates with one more: reduceat takes no start behind the last entry."""
+        return np.append(self.rate_w_m3_k, 0.0)
+
+    def instability_s(self, capacity_j_m3_k: Array) -> float:
+        """Explicit step beyond which the fastest mode grows: 2 over the largest eigenvalue.
+
+        Rates are symmetric up to a factor for each row and column in every form of exchange here,
+        so that the eigenvalues are those of a symmetric matrix.
+
+        Parameters
+        ----------
+        capacity_j_m3_k : (n,) float64, J/m3/K
+        """
+        n = len(self.volume_m3)
+        row = np.repeat(np.arange(n), np.diff(self.start))
+        scaled = self.rate_w_m3_k / capacity_j_m3_k[row]
+        apart = csr_array((scaled, self.neighbour, self.start), (n, n))
+        # entries that mirror each other have one sign
+        off = apart.sign().multiply(abs(apart.multiply(apart.T)).sqrt())
+        diagonal = diags_array(np.bincount(row, scaled, n).astype(np.float64))
+        largest = eigsh((diagonal - off).tocsr(), k=1, which="LA", return_eigenvectors=False)
+        return 2.0 / float(largest[0])
+
+
+def from_rows(row: Indices, column: Indices, rate_w_m3_k: Array, volume_m3: Array) -> Exchange:
+    """Sort rates into rows; those of pairs named twice are summed.
+
+    Parameters
+    ----------
+    row, column : (p,) int64
+        The element that takes heat up, and the one that it comes from.
+    rate_w_m3_k : (p,) float64, W/m3/K
+    volume_m3 : (n,) float64, m3
+
+    Returns
+    -------
+    Exchange
+    """
+    n = len(volume_m3)
+    matrix = coo_array((rate_w_m3_k, (row, column)), (n, n)).tocsr()
+    matrix.sort_indices()
+    return Exchange(
+        matrix.indptr.astype(np.int64),
+        matrix.indices.astype(np.int32),
+        np.asarray(matrix.data, dtype=np.float64),
+        volume_m3,
+    )
+
+
+def check_resistance(resistance_m2k_w: float) -> None:
+    """Refuse what is no resistance.
+
+    Raises
+    ------
+    ValueError
+        When it is negative or not finite.
+    """
+    if not (resistance_m2k_w >= 0.0 and math.isfinite(resistance_m2k_w)):
+        raise ValueError(
+            f"resistance_m2k_w is {resistance_m2k_w}; it must be finite and at least 0"
+        )

@@ -1,0 +1,96 @@
+"""Which materials fill a box at time 0, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.marching import Heat, Substance
+from sandmould.casting.arpm.material import EnthalpyTable, Material, enthalpy_table
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Filling:
+    """Materials by number, hot or cold, with a resistance where two of them meet.
+
+    Raises
+    ------
+    ValueError
+        When the lists differ in length or a temperature is not above 0 K.
+    """
+
+    materials: tuple[Material, ...]
+    """The first is the mould."""
+    initial_k: tuple[float, ...]
+    resistance_m2k_w: float = 0.0
+    """1/h of eq. (2)."""
+
+    def __post_init__(self) -> None:
+        if len(self.initial_k) != len(self.materials) or not self.materials:
+            raise ValueError(
+                f"{len(self.materials)} materials have {len(self.initial_k)} initial "
+                "temperatures; each needs one"
+            )
+        if not all(0.0 < t < math.inf for t in self.initial_k):
+            raise ValueError(f"initial_k is {self.initial_k}; all must be finite and above 0")
+
+    @property
+    def conductivity_w_m_k(self) -> Array:
+        """(m,) float64, W/m/K."""
+        return np.array([it.conductivity_w_m_k for it in self.materials])
+
+    @property
+    def table(self) -> EnthalpyTable:
+        """Enthalpy counted from the coldest initial temperature: heat that can be lost."""
+        return enthalpy_table(self.materials, min(self.initial_k))
+
+    def melts(self, elements: Elements) -> NDArray[np.bool_]:
+        """Which elements solidify, (n,) bool."""
+        return np.array([it.melts for it in self.materials])[elements.material]
+
+    def heat(self, elements: Elements) -> Heat:
+        """Heat of elements at time 0.
+
+        Raises
+        ------
+        ValueError
+            When an element has a material that is not listed.
+        """
+        if (most := int(elements.material.max())) >= len(self.materials):
+            raise ValueError(f"an element has material {most}; only {len(self.materials)} are "
+                             "listed, counted from 0")  # fmt: skip
+        start_k = np.array(self.initial_k)[elements.material]
+        return Substance(elements.material, self.table).heat_at(start_k)
+
+
+def check_casting(elements: Elements, filling: Filling) -> None:
+    """Refuse what cannot solidify.
+
+    Parameters
+    ----------
+    elements : Elements
+    filling : Filling
+
+    Raises
+    ------
+    ValueError
+        When nothing melts, all of it does, or a casting starts solid.
+    """
+    melts = filling.melts(elements)
+    if not melts.any():
+        raise ValueError("no element has a solidus; there must be a casting")
+    if melts.all():
+        raise ValueError("every element is casting; there must be a mould that takes its heat")
+    for number in np.unique(elements.material[melts]):
+        it, start_k = filling.materials[number], filling.initial_k[number]
+        if start_k < it.solidus_k:
+            raise ValueError(
+                f"{it.name} starts at {start_k} K; it must start at its solidus of "
+                f"{it.solidus_k} K or above"
+            )

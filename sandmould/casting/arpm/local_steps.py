@@ -1,0 +1,172 @@
+"""Local time steps: each element as long a step as it can, in powers of two.
+
+An element's level is that of its own stable step. A pair exchanges heat at the pace of its faster
+element, which sees the slower one's temperature held; the slower one takes up, at the end of its
+step, the heat of its faster neighbours' temperatures integrated over it. Both sides count the
+same heat, so nothing is lost at the borders of levels, and each update is a mean of temperatures
+where each keeps its own stable step. The paper leaves this for later (section 4.4.3).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, prange, set_num_threads
+from numpy.typing import NDArray
+
+from sandmould.casting.arpm.exchange import Exchange
+from sandmould.casting.arpm.marching import STEP_SHARE, Heat, Substance
+from sandmould.casting.arpm.material import temperature_of
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+MOST_LEVELS = 8
+
+
+class LocalSteps:
+    """Forward Euler with a step of its own for each element."""
+
+    def __init__(
+        self,
+        exchange: Exchange,
+        substance: Substance,
+        share: float = STEP_SHARE,
+        most_levels: int = MOST_LEVELS,
+        threads: int = 1,
+    ) -> None:
+        """Sort the elements by their steps.
+
+        Parameters
+        ----------
+        exchange : Exchange
+        substance : Substance
+        share : float
+            Of each element's longest stable step.
+        most_levels : int
+            Elements never step more than 2 to this power less one times as long as others.
+        threads : int
+        """
+        limit_s = share * exchange.limit_s(substance.capacity_j_m3_k)
+        self._shortest_s = float(limit_s.min())
+        octave = np.floor(np.log2(np.minimum(limit_s / self._shortest_s, 2.0**most_levels)))
+        level = np.minimum(octave.astype(np.int64), most_levels - 1)
+        self._threads = threads
+        self._order = np.argsort(level, kind="stable")
+        self._sort(exchange, substance, level[self._order])
+        self.volume_m3 = exchange.volume_m3
+        self.step_s = self._shortest_s * 2.0 ** int(level.max())
+
+    def _sort(self, exchange: Exchange, substance: Substance, level: Indices) -> None:
+        """Bring everything into the order of levels: those who end a step are always the first."""
+        order = self._order
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        count = np.diff(exchange.start)[order]
+        self._start = np.concatenate([[0], np.cumsum(count)])
+        entry = np.repeat(exchange.start[:-1][order] - self._start[:-1], count)
+        entry += np.arange(len(entry))
+        self._neighbour = back[exchange.neighbour[entry]].astype(np.int32)
+        self._rate = exchange.rate_w_m3_k[entry]
+        self._material, self._table = substance.material[order], substance.table
+        self._level = level
+        self._end = np.searchsorted(level, np.arange(int(level.max()) + 1), side="right")
+        row = np.repeat(np.arange(len(level)), count)
+        self._slowest_beside, self._fastest_beside = level.copy(), level.copy()
+        np.maximum.at(self._slowest_beside, row, level[self._neighbour])
+        np.minimum.at(self._fastest_beside, row, level[self._neighbour])
+
+    def advance(self, heat: Heat, duration_s: float) -> None:
+        """Take whole cycles of the slowest elements' step over a duration."""
+        levels = len(self._end)
+        while levels > 1 and self._shortest_s * 2.0 ** (levels - 1) > duration_s:
+            levels -= 1
+        substeps = 2 ** (levels - 1)
+        cycles = max(1, math.ceil(duration_s / (self._shortest_s * substeps) * (1.0 - 1e-12)))
+        end = self._end[:levels].copy()
+        end[-1] = len(self._order)
+        top = levels - 1
+        enthalpy, temperature, frozen = (
+            values[self._order]
+            for values in (heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s)
+        )
+        set_num_threads(self._threads)
+        _local_steps(
+            cycles, duration_s / (cycles * substeps), heat.time_s, end,
+            np.minimum(self._level, top), np.minimum(self._slowest_beside, top),
+            np.minimum(self._fastest_beside, top),
+            self._start, self._neighbour, self._rate,
+            self._material, self._table.rows, self._table.reference_k,
+            enthalpy, temperature, frozen,
+        )  # fmt: skip
+        heat.enthalpy_j_m3[self._order] = enthalpy
+        heat.temperature_k[self._order] = temperature
+        heat.frozen_s[self._order] = frozen
+        heat.time_s += duration_s
+        of_level = np.diff(np.concatenate([[0], end]))
+        heat.element_steps += cycles * int((of_level * 2 ** np.arange(top, -1, -1)).sum())
+
+
+@njit(cache=True, parallel=True)
+def _update(
+    ending: int, at: int, dt: float, time_s: float, level: Any, fastest: Any, start: Any,
+    neighbour: Any, rate: Any, material: Any, rows: Any, reference: float, integral: Any,
+    enthalpy: Any, temperature: Any, frozen: Any, new: Any,
+) -> None:  # fmt: skip
+    """End the steps of the first elements: new enthalpies, and temperatures into ``new``."""
+    for i in prange(ending):
+        own_level = level[i]
+        own_dt = dt * (1 << own_level)
+        own, taken = temperature[i], 0.0
+        if fastest[i] == own_level:
+            for k in range(start[i], start[i + 1]):
+                taken += rate[k] * (temperature[neighbour[k]] - own)
+            taken *= own_dt
+        else:
+            for k in range(start[i], start[i + 1]):
+                j = neighbour[k]
+                if level[j] >= own_level:
+                    other = own_dt * temperature[j]
+                else:
+                    other = integral[j, own_level] + dt * (1 << level[j]) * temperature[j]
+                taken += rate[k] * (other - own_dt * own)
+        before, m = enthalpy[i], material[i]
+        after = before + taken
+        enthalpy[i] = after
+        new[i] = temperature_of(after, m, rows, reference)
+        if before >= rows[m, 1] > after:
+            share = (before - rows[m, 1]) / (before - after)
+            frozen[i] = time_s + at * dt - (1.0 - share) * own_dt
+
+
+@njit(cache=True, parallel=True)
+def _keep(ending: int, at: int, dt: float, level: Any, slowest: Any, integral: Any,
+          temperature: Any, new: Any) -> None:  # fmt: skip
+    """Add ended steps to the integrals that slower neighbours read, and take new temperatures."""
+    for i in prange(ending):
+        for k in range(level[i] + 1, slowest[i] + 1):
+            if at % (1 << k) == 0:
+                integral[i, k] = 0.0
+            else:
+                integral[i, k] += dt * (1 << level[i]) * temperature[i]
+        temperature[i] = new[i]
+
+
+@njit(cache=True)
+def _local_steps(
+    cycles: int, dt: float, time_s: float, end: Any, level: Any, slowest: Any, fastest: Any,
+    start: Any, neighbour: Any, rate: Any, material: Any, rows: Any, reference: float,
+    enthalpy: Any, temperature: Any, frozen: Any,
+) -> None:  # fmt: skip
+    """Take cycles of 2^(levels - 1) of the shortest steps."""
+    substeps = 1 << (len(end) - 1)
+    integral, new = np.zeros((len(enthalpy), len(end))), np.empty(len(enthalpy))
+    for at in range(1, cycles * substeps + 1):
+        highest = 0
+        while highest < len(end) - 1 and at % (1 << (highest + 1)) == 0:
+            highest += 1
+        ending = end[highest]
+        _update(ending, at, dt, time_s, level, fastest, start, neighbour, rate, material, rows,
+                reference, integral, enthalpy, temperature, frozen, new)  # fmt: skip
+        _keep(ending, at, dt, level, slowest, integral, temperature, new)

@@ -1,0 +1,136 @@
+"""The state of heat in elements, and explicit steps of the enthalpy method, eq. (5)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numba import njit, prange, set_num_threads
+from numpy.typing import NDArray
+
+from sandmould.casting.arpm.exchange import Exchange
+from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+STEP_SHARE = 0.95
+"""Of the longest stable step, taken by default."""
+
+
+@dataclass
+class Heat:
+    """What changes while elements cool."""
+
+    enthalpy_j_m3: Array
+    """(n,) float64, J/m3."""
+    temperature_k: Array
+    """(n,) float64, K."""
+    frozen_s: Array
+    """(n,) float64, s: when each fell below its solidus; NaN before, and where nothing melts."""
+    time_s: float = 0.0
+    element_steps: int = 0
+    """Evaluations of (5) for one element so far."""
+
+
+@dataclass(frozen=True)
+class Substance:
+    """Of what the elements are made, as compiled code wants it."""
+
+    material: Indices
+    """(n,) int64."""
+    table: EnthalpyTable
+
+    @property
+    def capacity_j_m3_k(self) -> Array:
+        """Heat capacity without latent heat, (n,) float64, J/m3/K."""
+        return self.table.rows[self.material, 0]
+
+    def heat_at(self, temperature_k: Array) -> Heat:
+        """Heat of elements at temperatures, (n,) float64, K."""
+        enthalpy = self.table.enthalpy_j_m3(temperature_k, self.material)
+        return Heat(enthalpy, temperature_k.astype(np.float64), np.full(len(enthalpy), np.nan))
+
+
+class Marching(Protocol):
+    """One way to go forward in time."""
+
+    step_s: float
+    """Longest step that it takes."""
+    volume_m3: Array
+
+    def advance(self, heat: Heat, duration_s: float) -> None:
+        """Change the heat by what a duration does."""
+
+
+class ExplicitSteps:
+    """Forward Euler with one step for all elements, as in the paper."""
+
+    def __init__(
+        self,
+        exchange: Exchange,
+        substance: Substance,
+        share: float = STEP_SHARE,
+        threads: int = 1,
+    ) -> None:
+        """Choose the step.
+
+        Parameters
+        ----------
+        exchange : Exchange
+        substance : Substance
+        share : float
+            Of the longest step that keeps temperatures between those of the neighbours.
+        threads : int
+            Results do not depend on it.
+        """
+        self.volume_m3 = exchange.volume_m3
+        self.step_s = share * float(exchange.limit_s(substance.capacity_j_m3_k).min())
+        self._exchange, self._substance, self._threads = exchange, substance, threads
+
+    def advance(self, heat: Heat, duration_s: float) -> None:
+        """Take equal steps over a duration, none longer than ``step_s``."""
+        steps = max(1, math.ceil(duration_s / self.step_s * (1.0 - 1e-12)))
+        x, s = self._exchange, self._substance
+        set_num_threads(self._threads)
+        heat.temperature_k = _explicit_steps(
+            steps, duration_s / steps, heat.time_s, x.start, x.neighbour, x.rate_w_m3_k,
+            s.material, s.table.rows, s.table.reference_k,
+            heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s,
+        )  # fmt: skip
+        heat.time_s += duration_s
+        heat.element_steps += steps * len(s.material)
+
+
+@njit(cache=True, parallel=True)
+def _explicit_steps(
+    steps: int, dt: float, time_s: float, start: Any, neighbour: Any, rate: Any,
+    material: Any, rows: Any, reference: float, enthalpy: Any, temperature: Any, frozen: Any,
+) -> Any:  # fmt: skip
+    """Take explicit steps; enthalpy and freezing times change in place.
+
+    Every element sums over its own neighbours in their order, so that the result does not depend
+    on the threads.
+
+    Returns
+    -------
+    (n,) float64, K
+        The new temperatures.
+    """
+    n = len(enthalpy)
+    now, then = temperature.copy(), np.empty(n)
+    for step in range(steps):
+        for i in prange(n):
+            own, taken = now[i], 0.0
+            for k in range(start[i], start[i + 1]):
+                taken += rate[k] * (now[neighbour[k]] - own)
+            before, m = enthalpy[i], material[i]
+            after = before + dt * taken
+            enthalpy[i] = after
+            then[i] = temperature_of(after, m, rows, reference)
+            if before >= rows[m, 1] > after:
+                share = (before - rows[m, 1]) / (before - after)
+                frozen[i] = time_s + (step + share) * dt
+        now, then = then, now
+    return now

@@ -1,0 +1,98 @@
+"""Faces between elements at free positions: a power diagram (Laguerre-Voronoi), 2D.
+
+The face of two neighbours is where their power distances |x - x_i|^2 - w_i are equal; it stands
+across the line between them, so that a linear temperature gives the exact flux. Aurenhammer, SIAM
+Journal on Computing 16 (1987) 78-96: the diagram is the lower hull of points lifted to
+|x|^2 - w.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.exchange import Exchange, check_resistance
+from sandmould.casting.arpm.faces import over_faces
+from sandmould.casting.arpm.kernel import with_images
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+REACH = 3.0
+"""Sizes within which images stand behind the walls."""
+
+
+def power_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2k_w: float
+                   ) -> Exchange:  # fmt: skip
+    """Rates over the faces of a power diagram with weights (r0/2)^2.
+
+    Parameters
+    ----------
+    elements : Elements
+        Of 2D, at any positions in their box; its walls are insulated.
+    conductivity_w_m_k : (m,) float64, W/m/K
+    resistance_m2k_w : float, m2 K/W
+
+    Returns
+    -------
+    Exchange
+        Its volumes are those of the diagram's cells, not of squares.
+
+    Raises
+    ------
+    ValueError
+        When the elements are in 3D, or one has no cell because a larger one covers it.
+    """
+    check_resistance(resistance_m2k_w)
+    if elements.dimensions != 2:
+        raise ValueError("elements at free positions are in 3D; power diagrams are drawn in 2D")
+    one, two, length, near_m, distance = _edges(elements)
+    n = len(elements.size_m)
+    real = two < n
+    volume = np.bincount(one, 0.5 * length * near_m, n).astype(np.float64)
+    least_m = np.full(n, -1.0)
+    least_m[one] = np.inf
+    np.minimum.at(least_m, one, near_m)
+    if not (least_m > 0.0).all():
+        place = elements.position_m[np.argmin(least_m)].tolist()
+        raise ValueError(f"the element at {place} m lies in no cell of its own; it must stand "
+                         "farther from larger ones")  # fmt: skip
+    one, two, length = one[real], two[real], length[real]
+    near_m, far_m = near_m[real], (distance - near_m)[real]
+    material, other = elements.material[one], elements.material[two]
+    path = near_m / conductivity_w_m_k[material] + far_m / conductivity_w_m_k[other]
+    path += np.where(material != other, resistance_m2k_w, 0.0)
+    once = one < two
+    return over_faces(one[once], two[once], np.asarray(length / path)[once], volume)
+
+
+def _edges(elements: Elements) -> tuple[Indices, Indices, Array, Array, Array]:
+    """Faces of real elements: own, other, length, distance of own to it, distance of centres.
+
+    Others from n on are images behind the walls.
+    """
+    place, number = with_images(elements, REACH * float(elements.size_m.max()))
+    scale = float(elements.size_m.max())
+    centre = 0.5 * (elements.low_m + elements.high_m)
+    at = (place - centre) / scale
+    power = (0.5 * elements.size_m[number] / scale) ** 2
+    hull = ConvexHull(np.column_stack([at, (at**2).sum(axis=1) - power]))
+    low = hull.equations[:, 2] < -1e-12
+    corners = hull.simplices[low].astype(np.int64)
+    # the plane under a facet is that of the power of its triangle's centre
+    equation = hull.equations[low]
+    vertex = -0.5 * equation[:, :2] / equation[:, 2:3]
+    ends = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]))
+    triangle = np.tile(np.arange(len(corners)), 3)
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    ends, triangle = ends[order], triangle[order]
+    paired = np.flatnonzero((ends[1:] == ends[:-1]).all(axis=1))
+    one, two = ends[paired].T
+    length = np.linalg.norm(vertex[triangle[paired]] - vertex[triangle[paired + 1]], axis=1)
+    own, other = np.concatenate([one, two]), np.concatenate([two, one])
+    keep = (own < len(elements.size_m)) & (np.tile(length, 2) > 1e-9)
+    own, other, length = own[keep], other[keep], np.tile(length, 2)[keep]
+    distance = np.linalg.norm(at[own] - at[other], axis=1)
+    near = 0.5 * (distance**2 + power[own] - power[other]) / distance
+    return own, other, length * scale, near * scale, distance * scale

@@ -1,0 +1,128 @@
+"""Materials on a grid of cells, painted from outlines, meshes or images."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+MOULD = 0
+"""Material of all that is not painted."""
+
+
+class Solid(Protocol):
+    """A body that tells how far points are from its surface, negative inside."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+
+    def distance_m(self, position_m: Array) -> Array:
+        """Signed distance of points, (n,) float64, m."""
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Material of each cell of a regular grid.
+
+    Raises
+    ------
+    ValueError
+        When it is neither 2D nor 3D, empty, or its cells have no size.
+    """
+
+    material: NDArray[np.int64]
+    """(nx, ny) or (nx, ny, nz) int64."""
+    cell_m: float
+    low_m: Array
+    """(d,) float64, m: the grid's corner."""
+
+    def __post_init__(self) -> None:
+        if self.material.ndim not in (2, 3) or not self.material.size:
+            raise ValueError(
+                f"the grid of materials has the shape {self.material.shape}; it must be 2D or 3D "
+                "and have cells"
+            )
+        if not self.cell_m > 0.0:
+            raise ValueError(f"cell_m is {self.cell_m}; it must be above 0")
+        if len(self.low_m) != self.material.ndim:
+            raise ValueError(f"low_m is {self.low_m}; a {self.material.ndim}D grid needs as many")
+
+    @property
+    def centre_m(self) -> Array:
+        """Centres of the cells in C order, (n, d) float64, m."""
+        axes = [
+            low + (np.arange(n) + 0.5) * self.cell_m
+            for low, n in zip(self.low_m, self.material.shape, strict=True)
+        ]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+
+def painted(low_m: Array, high_m: Array, cell_m: float, solids: Mapping[int, Solid]) -> Raster:
+    """Paint solids into a box of mould; a cell is a solid's where its centre is inside.
+
+    Parameters
+    ----------
+    low_m, high_m : (d,) float64, m
+        Corners of the box.
+    cell_m : float, m
+    solids : mapping of material to Solid
+        Outlines in 2D, meshes in 3D; material 0 is the mould round them.
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    ValueError
+        When the box is no multiple of the cells, two solids overlap, or a solid holds no cell.
+    """
+    cells = np.round((high_m - low_m) / cell_m).astype(np.int64)
+    if (cells < 1).any() or not np.allclose(cells * cell_m, high_m - low_m, rtol=1e-9):
+        raise ValueError(
+            f"the box measures {(high_m - low_m).tolist()} m; each side must be a multiple of "
+            f"cell_m = {cell_m}"
+        )
+    raster = Raster(np.zeros(cells, dtype=np.int64), cell_m, low_m)
+    centre, flat = raster.centre_m, raster.material.reshape(-1)
+    for material, solid in solids.items():
+        if material == MOULD:
+            raise ValueError(f"{solid.name} has material {MOULD}, which is the mould's")
+        inside = solid.distance_m(centre) < 0.0
+        if not inside.any():
+            raise ValueError(f"{solid.name} holds no cell of {cell_m} m; it must lie in the box")
+        if (taken := inside & (flat != MOULD)).any():
+            place = centre[taken][0].tolist()
+            raise ValueError(
+                f"{solid.name} overlaps material {flat[taken][0]} at {place} m; solids must be "
+                "apart"
+            )
+        flat[inside] = material
+    return raster
+
+
+def from_image(mask: NDArray[np.bool_], cell_m: float) -> Raster:
+    """Take a picture: true is casting (material 1), false is mould.
+
+    Parameters
+    ----------
+    mask : (nx, ny) or (nx, ny, nz) bool
+        The first axis is x; a picture of rows from the top is ``rows[::-1].T``.
+    cell_m : float, m
+        Width of a pixel.
+
+    Raises
+    ------
+    ValueError
+        When the picture is not of booleans, or all of it is casting or mould.
+    """
+    if mask.dtype != np.bool_:
+        raise ValueError(f"the picture holds {mask.dtype}; it must hold booleans")
+    if mask.all() or not mask.any():
+        raise ValueError("the picture is all of one material; it needs casting and mould")
+    return Raster(mask.astype(np.int64), cell_m, np.zeros(mask.ndim))
