@@ -9,19 +9,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sandmould.casting.mps.neighbours import Neighbours, find_neighbours, list_is_old
+from sandmould.casting.mps.neighbours import (
+    Candidates,
+    Neighbours,
+    find_candidates,
+    find_neighbours,
+    list_is_old,
+)
 from sandmould.casting.mps.operators import (
     GRADIENTS,
     crowding,
     density_rate,
     laplacian,
-    number_density,
     pressure_gradient,
 )
 from sandmould.casting.mps.particles import Floats, Particles
 from sandmould.casting.mps.pressure import solve_pressure
 from sandmould.casting.mps.scheme import VISCOUS_SHARE, Metal, Scheme
-from sandmould.casting.mps.sources import NEEDS_HISTORY, SOURCES, Tentative
+from sandmould.casting.mps.sources import SOURCES, Tentative
 from sandmould.casting.mps.weight import Kernel
 
 
@@ -95,16 +100,13 @@ class Flow:
         self.fluid = particles.fluid
         self.pressure_pa = np.zeros(len(particles.kind))
         """(n,) float64, Pa: sum over the relaxations of the last step, whose impulse it is."""
-        self.density = np.full(len(particles.kind), self.kernel.lattice_density)
-        """(n,) float64: number density in the last relaxation."""
-        self._near: Neighbours | None = None
+        self._listed: Candidates | None = None
 
     def pour(self, particles: Particles) -> None:
         """Add particles."""
-        pressure, density = self.pressure_pa, self.density
+        pressure = self.pressure_pa
         self._set(self.particles.joined(particles))
         self.pressure_pa[: len(pressure)] = pressure
-        self.density[: len(density)] = density
 
     def speed(self) -> Floats:
         """Speeds of the fluid, (m,) float64, m/s."""
@@ -136,15 +138,13 @@ class Flow:
         dt = dt_s or self.next_dt_s()
         state, kernel, scheme = self.particles, self.kernel, self.scheme
         near = self._neighbours()
-        x, u, kind = state.position_m, state.velocity_m_s, state.kind
-        compression_before, rate_before = self._history(near)
-        acceleration = np.asarray(self.metal.gravity_m_s2)
-        if self.metal.viscosity_m2_s > 0.0:
-            friction = laplacian(kernel, near, x, u, kind)[self.fluid]
-            acceleration = acceleration + self.metal.viscosity_m2_s * friction
-        u[self.fluid] += dt * acceleration
+        x, u = state.position_m, state.velocity_m_s
+        compression_before = near.density / kernel.lattice_density - 1.0
+        rate_before = density_rate(kernel, near, u) / kernel.lattice_density
+        friction = self.metal.viscosity_m2_s * laplacian(kernel, near, u, state.kind)
+        u[self.fluid] += dt * (friction[self.fluid] + np.asarray(self.metal.gravity_m_s2))
         x[self.fluid] += dt * u[self.fluid]
-        self.pressure_pa = np.zeros(len(kind))
+        self.pressure_pa = np.zeros(len(state.kind))
         for _ in range(scheme.relaxations):
             self._relax(dt, compression_before, rate_before)
         if scheme.shifting > 0.0:
@@ -184,60 +184,49 @@ class Flow:
                 progress(Progress(self.time_s, 100.0 * share, rate, left_s))
 
     def _neighbours(self) -> Neighbours:
-        """Candidates, listed anew when particles moved too far."""
-        x = self.particles.position_m
-        if self._near is None or list_is_old(self.kernel, self._near.listed_m, x):
-            begin = time.perf_counter()
-            self._near = find_neighbours(self.kernel, x, self.particles.kind)
-            self.cost.neighbours_s += time.perf_counter() - begin
-        return self._near
-
-    def _history(self, near: Neighbours) -> tuple[Floats, Floats]:
-        """Compression and its rate at the beginning of a step, for sources that look at them."""
-        state, n0 = self.particles, self.kernel.lattice_density
-        nothing = np.zeros(len(state.kind))
-        if self.scheme.source not in NEEDS_HISTORY:
-            return nothing, nothing
-        x, u, kind = state.position_m, state.velocity_m_s, state.kind
-        density = number_density(self.kernel, near, x, kind)
-        return density / n0 - 1.0, density_rate(self.kernel, near, x, u, kind) / n0
+        """Neighbours of now; candidates are listed anew when particles moved too far."""
+        begin = time.perf_counter()
+        x, kind = self.particles.position_m, self.particles.kind
+        if self._listed is None or list_is_old(self.kernel, self._listed.listed_m, x):
+            self._listed = find_candidates(self.kernel, x, kind)
+        near = find_neighbours(self.kernel, self._listed, x, kind)
+        self.cost.neighbours_s += time.perf_counter() - begin
+        return near
 
     def _relax(self, dt: float, compression_before: Floats, rate_before: Floats) -> None:
         """Correct velocities and positions once."""
         state, kernel, scheme = self.particles, self.kernel, self.scheme
-        x, u, kind = state.position_m, state.velocity_m_s, state.kind
         near = self._neighbours()
-        self.density = number_density(kernel, near, x, kind)
-        compression = self.density / kernel.lattice_density - 1.0
-        tentative = Tentative(
-            kernel, near, x, u, kind, dt, compression, compression_before, rate_before
+        compression = near.density / kernel.lattice_density - 1.0
+        asked = SOURCES[scheme.source](
+            Tentative(
+                kernel, near, state.velocity_m_s, dt, compression, compression_before, rate_before
+            )
         )
-        asked = SOURCES[scheme.source](tentative)
+        surface = near.density < scheme.surface * kernel.lattice_density
         factor = scheme.source_share * self.metal.density_kg_m3 / dt**2
-        surface = self.density < scheme.surface * kernel.lattice_density
         begin = time.perf_counter()
-        solution = solve_pressure(
-            kernel, near, x, kind, surface, factor * asked, scheme.tolerance, compression
+        pressure, iterations = solve_pressure(
+            kernel, near, state.kind, surface, factor * asked, scheme.tolerance
         )
         self.cost.pressure_s += time.perf_counter() - begin
-        self.cost.iterations += solution.iterations
+        self.cost.iterations += iterations
         # negative pressures would pull particles together
-        pressure = np.maximum(solution.pressure_pa, 0.0)
+        np.maximum(pressure, 0.0, out=pressure)
         form = GRADIENTS[scheme.gradient]
-        gradient = pressure_gradient(kernel, near, x, pressure, kind, form)
+        gradient = pressure_gradient(kernel, near, pressure, state.kind, form)
         change = dt / self.metal.density_kg_m3 * gradient
-        u -= change
-        x -= dt * change
+        state.velocity_m_s -= change
+        state.position_m -= dt * change
         self.pressure_pa += pressure
 
     def _shift(self) -> None:
         """Move inner particles to where fewer are; the surface keeps its place."""
         state, kernel = self.particles, self.kernel
         near = self._neighbours()
-        gradient = crowding(kernel, near, state.position_m, state.kind)
-        inner = self.fluid & (self.density >= self.scheme.surface * kernel.lattice_density)
+        inner = self.fluid & (near.density >= self.scheme.surface * kernel.lattice_density)
         step_m = self.scheme.shifting * kernel.spacing_m**2
-        state.position_m[inner] -= step_m * gradient[inner]
+        state.position_m[inner] -= step_m * crowding(kernel, near, state.kind)[inner]
 
     def _check(self) -> None:
         """Stop a run that went wrong."""

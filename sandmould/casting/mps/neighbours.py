@@ -1,7 +1,8 @@
-"""Candidates for neighbours, kept while particles move less than half a skin."""
+"""Neighbours: candidates kept while particles move less than half a skin, and those in reach."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,45 +11,44 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
-from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel
+from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight
 
 SKIN = 0.35
 """Over the particle size. Wider lists last longer, and each pass over them costs more."""
 
 
-class Neighbours(NamedTuple):
+class Candidates(NamedTuple):
     """Particles that may come within the kernel of each other, both ways round."""
 
     start: NDArray[np.int64]
     """(n + 1,) int64: candidates of particle i are start[i] to start[i + 1]."""
-    other: NDArray[np.int32]
-    """(p,) int32."""
+    other: NDArray[np.uint32]
+    """(p,) uint32."""
     listed_m: Floats
     """(n, 3) float64, m: positions that the list was made at."""
 
 
-@njit(**INLINED)
-def apart(
-    kernel: Kernel, position: Floats, i: int, j: int
-) -> tuple[float, float, float, float]:
-    """Vector from particle i to the nearest image of particle j, and its length squared."""
-    dx = position[j, 0] - position[i, 0]
-    dy = position[j, 1] - position[i, 1]
-    dz = position[j, 2] - position[i, 2]
-    period = kernel.period_m
-    if period[0] > 0.0:
-        dx -= period[0] * np.rint(dx / period[0])
-    if period[1] > 0.0:
-        dy -= period[1] * np.rint(dy / period[1])
-    if period[2] > 0.0:
-        dz -= period[2] * np.rint(dz / period[2])
-    return dx, dy, dz, dx * dx + dy * dy + dz * dz
+class Neighbours(NamedTuple):
+    """Particles within the kernel of fluid and walls at given positions; dummies have none."""
+
+    start: NDArray[np.int64]
+    """(n + 1,) int64: neighbours of particle i are start[i] to start[i + 1]."""
+    other: NDArray[np.uint32]
+    """(e,) uint32."""
+    away_m: Floats
+    """(e, 3) float64, m: from particle i to the nearest image of its neighbour."""
+    weight: Floats
+    """(e,) float64: w, eq. (1)."""
+    share: Floats
+    """(e,) float64, 1/m2: w / r^2."""
+    density: Floats
+    """(n,) float64: number density, eq. (2); 0 for dummies."""
 
 
 @njit(**OPTIONS)
 def _both_ways(
     n: int, pair: NDArray[np.int64], kind: Kinds
-) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
     """Rows of candidates from pairs; dummies need none of each other."""
     start = np.zeros(n + 1, dtype=np.int64)
     for k in range(len(pair)):
@@ -59,7 +59,7 @@ def _both_ways(
     for i in range(n):
         start[i + 1] += start[i]
     place = start[:-1].copy()
-    other = np.empty(start[n], dtype=np.int32)
+    other = np.empty(start[n], dtype=np.uint32)
     for k in range(len(pair)):
         i, j = pair[k, 0], pair[k, 1]
         if kind[i] != DUMMY or kind[j] != DUMMY:
@@ -70,7 +70,7 @@ def _both_ways(
     return start, other
 
 
-def find_neighbours(kernel: Kernel, position_m: Floats, kind: Kinds) -> Neighbours:
+def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> Candidates:
     """List candidates.
 
     Parameters
@@ -81,14 +81,16 @@ def find_neighbours(kernel: Kernel, position_m: Floats, kind: Kinds) -> Neighbou
     kind : (n,) int8
     """
     period = np.asarray(kernel.period_m)
-    wrapped = np.where(period > 0.0, np.mod(position_m, np.where(period > 0.0, period, 1.0)), 0.0)
-    # A tree wants points from 0 on in a periodic axis; mod may round up to the period itself.
-    wrapped = np.where(period > 0.0, np.where(wrapped >= period, 0.0, wrapped), position_m)
-    tree = cKDTree(wrapped, boxsize=period if period.any() else None, balanced_tree=False)
+    cyclic = period > 0.0
+    wrapped = position_m.copy()
+    wrapped[:, cyclic] = np.mod(wrapped[:, cyclic], period[cyclic])
+    # mod rounds a tiny negative number up to the period itself, which the tree refuses
+    wrapped[:, cyclic] = np.where(wrapped[:, cyclic] < period[cyclic], wrapped[:, cyclic], 0.0)
+    tree = cKDTree(wrapped, boxsize=period if cyclic.any() else None, balanced_tree=False)
     reach_m = kernel.reach_m + SKIN * kernel.spacing_m
-    pair = tree.query_pairs(reach_m, output_type="ndarray").astype(np.int64, copy=False)
+    pair = tree.query_pairs(reach_m, output_type="ndarray")
     start, other = _both_ways(len(position_m), pair, kind)
-    return Neighbours(start, other, position_m.copy())
+    return Candidates(start, other, position_m.copy())
 
 
 @njit(**OPTIONS)
@@ -102,3 +104,56 @@ def list_is_old(kernel: Kernel, listed: Floats, position: Floats) -> bool:
         if moved > limit:
             return True
     return False
+
+
+@njit(**INLINED)
+def _nearest(apart: float, period: float) -> float:
+    """Distance along an axis to the nearest image."""
+    return apart - period * np.rint(apart / period) if period > 0.0 else apart
+
+
+@njit(**OPTIONS)
+def find_neighbours(
+    kernel: Kernel, listed: Candidates, position: Floats, kind: Kinds
+) -> Neighbours:
+    """Pick the neighbours out of the candidates and weigh them.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    listed : Candidates
+        Not old.
+    position : (n, 3) float64, m
+    kind : (n,) int8
+    """
+    n = len(position)
+    start = np.zeros(n + 1, dtype=np.int64)
+    other = np.empty(len(listed.other), dtype=np.uint32)
+    away = np.empty((len(listed.other), 3))
+    weights = np.empty(len(listed.other))
+    share = np.empty(len(listed.other))
+    density = np.zeros(n)
+    reach2 = kernel.reach_m**2
+    period = kernel.period_m
+    e = 0
+    for i in range(n):
+        if kind[i] != DUMMY:
+            x, y, z = position[i, 0], position[i, 1], position[i, 2]
+            total = 0.0
+            for k in range(listed.start[i], listed.start[i + 1]):
+                j = listed.other[k]
+                dx = _nearest(position[j, 0] - x, period[0])
+                dy = _nearest(position[j, 1] - y, period[1])
+                dz = _nearest(position[j, 2] - z, period[2])
+                r2 = dx * dx + dy * dy + dz * dz
+                if r2 < reach2:
+                    w = weight(kernel, math.sqrt(r2))
+                    other[e] = j
+                    away[e, 0], away[e, 1], away[e, 2] = dx, dy, dz
+                    weights[e] = w
+                    share[e] = w / r2
+                    total += w
+                    e += 1
+            density[i] = total
+        start[i + 1] = e
+    return Neighbours(start, other[:e], away[:e], weights[:e], share[:e], density)

@@ -10,16 +10,18 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import cg
 
-from sandmould.casting.mps.neighbours import Neighbours, apart
+from sandmould.casting.mps.conjugate_gradients import System, solve
+from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
-from sandmould.casting.mps.weight import OPTIONS, Kernel, weight
+from sandmould.casting.mps.weight import OPTIONS, Kernel
+
+Flags = NDArray[np.bool_]
+Numbers = NDArray[np.int64]
 
 CLOSED_COMPRESSION = 0.02
-"""Mean compression beyond which a region without free surface is refused: no pressure can undo
-it, and the least of what a particle too many does to 50."""
-MOST_ITERATIONS = 2000
+"""Mean compression of a region without free surface beyond which it is refused: no pressure can
+undo it, and one particle too many among 50 is as much."""
 
 
 class ClosedRegionError(ArithmeticError):
@@ -31,89 +33,76 @@ class NotSolvedError(ArithmeticError):
 
 
 class Rows(NamedTuple):
-    """Minus the Laplacian between particles of unknown pressure, scaled to a unit diagonal."""
+    """Minus the Laplacian between the particles of unknown pressure."""
 
-    number: NDArray[np.int64]
-    """(m,) int64: particles whose pressure is unknown."""
-    start: NDArray[np.int32]
-    """(m + 1,) int32."""
-    column: NDArray[np.int32]
-    """(e,) int32."""
-    value: Floats
-    """(e,) float64."""
+    number: Numbers
+    """(m,) int64: these particles."""
     scale: Floats
-    """(m,) float64, m: one over the root of the diagonal before scaling."""
-    closed: NDArray[np.bool_]
+    """(m,) float64, m: one over the root of the diagonal, by which rows and columns are scaled."""
+    closed: Flags
     """(m,) bool: not joined, over any number of neighbours, to a particle at the surface."""
+    system: System
 
 
 @njit(**OPTIONS)
-def assemble(
-    kernel: Kernel, near: Neighbours, position: Floats, kind: Kinds, surface: NDArray[np.bool_]
-) -> Rows:
+def assemble(kernel: Kernel, near: Neighbours, kind: Kinds, surface: Flags) -> Rows:
     """Build the system by eq. (4) over n0, so that it is symmetric.
-
-    Scaling by its diagonal is Jacobi's preconditioner, at no cost in the iteration.
 
     Parameters
     ----------
     kernel : Kernel
     near : Neighbours
-    position : (n, 3) float64, m
     kind : (n,) int8
-        Dummies have no pressure: none flows into the mould.
+        Dummies have no pressure: no flux of it into the mould.
     surface : (n,) bool
         Where the pressure is zero.
     """
-    n = len(position)
+    n = len(kind)
     factor = 2.0 * kernel.dimension / kernel.lattice_density
-    reach2 = kernel.reach_m**2
-    row = np.full(n, -1, dtype=np.int32)
+    row = np.full(n, -1, dtype=np.int64)
     number = np.empty(n, dtype=np.int64)
+    scale = np.empty(n)
+    opened = np.zeros(n, dtype=np.bool_)
     m = most = 0
     for i in range(n):
-        if kind[i] != DUMMY and not surface[i]:
+        if kind[i] == DUMMY or surface[i]:
+            continue
+        total = 0.0
+        for k in range(near.start[i], near.start[i + 1]):
+            if kind[near.other[k]] != DUMMY:
+                total += factor * near.share[k]
+                opened[m] |= surface[near.other[k]]
+        if total > 0.0:
             row[i] = m
             number[m] = i
+            scale[m] = 1.0 / math.sqrt(total)
+            most += near.start[i + 1] - near.start[i]
             m += 1
-            most += near.start[i + 1] - near.start[i] + 1
-    start = np.zeros(m + 1, dtype=np.int32)
-    column = np.empty(most, dtype=np.int32)
+    start = np.zeros(m + 1, dtype=np.int64)
+    middle = np.empty(m, dtype=np.int64)
+    column = np.empty(most, dtype=np.uint32)
     value = np.empty(most)
-    scale = np.empty(m)
-    opened = np.zeros(m, dtype=np.bool_)
     e = 0
     for q in range(m):
         i = number[q]
-        diagonal_at, total = e, 0.0
-        column[e] = q
-        e += 1
-        for k in range(near.start[i], near.start[i + 1]):
-            j = near.other[k]
-            if kind[j] == DUMMY:
-                continue
-            _, _, _, r2 = apart(kernel, position, i, j)
-            if r2 < reach2:
-                part = factor * weight(kernel, math.sqrt(r2)) / r2
-                total += part
-                if row[j] >= 0:
-                    column[e] = row[j]
-                    value[e] = -part
+        # earlier columns first: the sweeps of the solver go through either part of a row
+        for later in (False, True):
+            if later:
+                middle[q] = e
+            for k in range(near.start[i], near.start[i + 1]):
+                c = row[near.other[k]]
+                if c >= 0 and (c > q) == later:
+                    column[e] = c
+                    value[e] = -factor * near.share[k] * scale[q] * scale[c]
                     e += 1
-                else:
-                    opened[q] = True
-        value[diagonal_at] = total
-        scale[q] = 1.0 / math.sqrt(total) if total > 0.0 else 0.0
         start[q + 1] = e
-    for q in range(m):
-        for k in range(start[q], start[q + 1]):
-            value[k] *= scale[q] * scale[column[k]]
-    _spread(start, column, opened)
-    return Rows(number[:m], start, column[:e], value[:e], scale, ~opened)
+    system = System(start, middle, column[:e], value[:e])
+    _spread(system, opened[:m])
+    return Rows(number[:m], scale[:m], ~opened[:m], system)
 
 
 @njit(**OPTIONS)
-def _spread(start: NDArray[np.int32], column: NDArray[np.int32], reached: NDArray[np.bool_]) -> None:
+def _spread(system: System, reached: Flags) -> None:
     """Mark all that is joined to what is marked."""
     waiting = np.empty(len(reached), dtype=np.int64)
     count = 0
@@ -125,32 +114,22 @@ def _spread(start: NDArray[np.int32], column: NDArray[np.int32], reached: NDArra
     while done < count:
         q = waiting[done]
         done += 1
-        for k in range(start[q], start[q + 1]):
-            c = column[k]
+        for k in range(system.start[q], system.start[q + 1]):
+            c = system.column[k]
             if not reached[c]:
                 reached[c] = True
                 waiting[count] = c
                 count += 1
 
 
-class Solution(NamedTuple):
-    """Pressure and what it took."""
-
-    pressure_pa: Floats
-    """(n,) float64, Pa; 0 at the surface and on dummies."""
-    iterations: int
-
-
 def solve_pressure(
     kernel: Kernel,
     near: Neighbours,
-    position_m: Floats,
     kind: Kinds,
-    surface: NDArray[np.bool_],
+    surface: Flags,
     source: Floats,
     tolerance: float,
-    compression: Floats,
-) -> Solution:
+) -> tuple[Floats, int]:
     """Solve for the pressure by conjugate gradients.
 
     In a region without free surface the pressure is known but for a constant, and only the part of
@@ -158,14 +137,18 @@ def solve_pressure(
 
     Parameters
     ----------
-    kernel, near, position_m, kind, surface
+    kernel, near, kind, surface
         As ``assemble``.
     source : (n,) float64, Pa/m2
         Minus the Laplacian wanted.
     tolerance : float
-        Residual over the source, both in the Euclidean norm of the scaled system.
-    compression : (n,) float64
-        (n_i - n0)/n0.
+        As ``conjugate_gradients.solve``.
+
+    Returns
+    -------
+    pressure : (n,) float64, Pa
+        0 at the surface and on dummies.
+    iterations : int
 
     Raises
     ------
@@ -173,49 +156,45 @@ def solve_pressure(
         Where a region without free surface is compressed or stretched by more than
         ``CLOSED_COMPRESSION``.
     NotSolvedError
-        After ``MOST_ITERATIONS``.
+        Where the iteration does not converge.
     """
-    rows = assemble(kernel, near, position_m, kind, surface)
-    pressure = np.zeros(len(position_m))
-    if not len(rows.number):
-        return Solution(pressure, 0)
-    m = len(rows.number)
-    matrix = csr_array((rows.value, rows.column, rows.start), shape=(m, m))
+    rows = assemble(kernel, near, kind, surface)
+    pressure = np.zeros(len(kind))
     wanted = rows.scale * source[rows.number]
-    regions = _closed_regions(matrix, rows.closed)
+    regions = _closed_regions(rows)
     for region in regions:
-        mean = float(compression[rows.number[region]].mean())
-        if abs(mean) > CLOSED_COMPRESSION:
-            raise ClosedRegionError(
-                f"{len(region)} particles without a free surface are compressed by "
-                f"{100 * mean:.2g} %: no pressure can undo more than "
-                f"{100 * CLOSED_COMPRESSION:g} %"
-            )
-        null = 1.0 / np.where(rows.scale[region] > 0.0, rows.scale[region], 1.0)
+        _refuse_crowd(near.density[rows.number[region]] / kernel.lattice_density - 1.0)
+        null = 1.0 / rows.scale[region]
         wanted[region] -= null * float(null @ wanted[region]) / float(null @ null)
-    count = 0
-
-    def counted(_: Floats) -> None:
-        nonlocal count
-        count += 1
-
-    found, failed = cg(matrix, wanted, rtol=tolerance, maxiter=MOST_ITERATIONS, callback=counted)
-    if failed or not np.isfinite(found).all():
+    found, iterations, met = solve(rows.system, wanted, tolerance)
+    if not met:
         raise NotSolvedError(
-            f"the pressure of {m} particles did not converge to {tolerance:g} "
-            f"in {MOST_ITERATIONS} iterations"
+            f"the pressure of {len(wanted)} particles did not converge to {tolerance:g} "
+            f"in {iterations} iterations"
         )
     found *= rows.scale
     for region in regions:
         found[region] -= found[region].min()
     pressure[rows.number] = found
-    return Solution(pressure, count)
+    return pressure, iterations
 
 
-def _closed_regions(matrix: csr_array, closed: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+def _refuse_crowd(compression: Floats) -> None:
+    """Refuse a closed region whose particles do not fit it."""
+    mean = float(compression.mean())
+    if abs(mean) > CLOSED_COMPRESSION:
+        raise ClosedRegionError(
+            f"{len(compression)} particles without a free surface are compressed by "
+            f"{100 * mean:.2g} %: no pressure can undo more than {100 * CLOSED_COMPRESSION:g} %"
+        )
+
+
+def _closed_regions(rows: Rows) -> list[Numbers]:
     """Rows of each region without free surface."""
-    inside = np.flatnonzero(closed)
+    inside = np.flatnonzero(rows.closed)
     if not len(inside):
         return []
+    system, m = rows.system, len(rows.number)
+    matrix = csr_array((system.value, system.column, system.start), shape=(m, m))
     count, label = connected_components(matrix[inside][:, inside], directed=False)
     return [inside[label == k] for k in range(count)]

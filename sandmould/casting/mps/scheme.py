@@ -69,6 +69,4 @@ class Scheme:
             raise ValueError(f"shifting is {self.shifting}: valid is 0 to 0.5")
         for name, valid in (("source", SOURCES), ("gradient", GRADIENTS)):
             if getattr(self, name) not in valid:
-                raise ValueError(
-                    f"{name} is '{getattr(self, name)}': valid are {', '.join(valid)}"
-                )
+                raise ValueError(f"{name} is '{getattr(self, name)}': valid are {', '.join(valid)}")

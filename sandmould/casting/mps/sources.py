@@ -13,7 +13,7 @@ import numpy as np
 
 from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.operators import density_rate, divergence
-from sandmould.casting.mps.particles import Floats, Kinds
+from sandmould.casting.mps.particles import Floats
 from sandmould.casting.mps.weight import Kernel
 
 DENSITY_SHARE = 0.01
@@ -26,9 +26,7 @@ class Tentative(NamedTuple):
 
     kernel: Kernel
     near: Neighbours
-    position_m: Floats
     velocity_m_s: Floats
-    kind: Kinds
     dt_s: float
     compression: Floats
     """(n,) float64: (n* - n0)/n0."""
@@ -45,13 +43,13 @@ def density(now: Tentative) -> Floats:
 
 def divergence_and_density(now: Tentative) -> Floats:
     """Divergence of the velocity and a small share of the density (Tanaka and Masunaga 2010)."""
-    rate = divergence(now.kernel, now.near, now.position_m, now.velocity_m_s, now.kind)
+    rate = divergence(now.kernel, now.near, now.velocity_m_s)
     return DENSITY_SHARE * now.compression_before - now.dt_s * rate
 
 
 def higher_order(now: Tentative) -> Floats:
     """Rate of the number density, HS (Khayyer and Gotoh 2009); nothing keeps the volume."""
-    rate = density_rate(now.kernel, now.near, now.position_m, now.velocity_m_s, now.kind)
+    rate = density_rate(now.kernel, now.near, now.velocity_m_s)
     return now.dt_s / now.kernel.lattice_density * rate
 
 
@@ -68,5 +66,3 @@ SOURCES: dict[str, Callable[[Tentative], Floats]] = {
     "higher_order": higher_order,
     "error_compensating": error_compensating,
 }
-NEEDS_HISTORY = ("divergence", "error_compensating")
-"""Sources that look at the beginning of the step."""
