@@ -47,7 +47,7 @@ class Scheme:
     """beta, eq. (7): number density over n0 below which a particle is at the surface."""
     courant: float = 0.1
     """C_n, eq. (8)."""
-    tolerance: float = 1e-3
+    tolerance: float = 1e-2
     """Of the Poisson equation: residual over source."""
     shifting: float = 0.0
     """Share of r0^2 times the gradient of concentration by which inner particles are moved on after

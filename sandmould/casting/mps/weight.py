@@ -8,7 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract", "nsz", "arcp"},
+}
+"""Fused multiply-add and reciprocals are allowed, no other change of the arithmetic."""
 INLINED = OPTIONS | {"forceinline": True}
 
 
