@@ -17,7 +17,6 @@ from sandmould.casting.mps.neighbours import (
     list_is_old,
 )
 from sandmould.casting.mps.operators import (
-    GRADIENTS,
     crowding,
     density_rate,
     laplacian,
@@ -213,8 +212,7 @@ class Flow:
         self.cost.iterations += iterations
         # negative pressures would pull particles together
         np.maximum(pressure, 0.0, out=pressure)
-        form = GRADIENTS[scheme.gradient]
-        gradient = pressure_gradient(kernel, near, pressure, state.kind, form)
+        gradient = pressure_gradient(kernel, near, pressure, state.kind, scheme.gradient)
         change = dt / self.metal.density_kg_m3 * gradient
         state.velocity_m_s -= change
         state.position_m -= dt * change

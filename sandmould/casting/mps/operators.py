@@ -16,12 +16,11 @@ from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.particles import DUMMY, FLUID, Floats, Kinds
 from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight_slope
 
-LEAST, DIFFERENCE, SUM, CONSERVATIVE, CORRECTED, PRINTED = range(6)
+LEAST, DIFFERENCE, SUM, CORRECTED, PRINTED = range(5)
 GRADIENTS = {
     "least": LEAST,
     "difference": DIFFERENCE,
     "sum": SUM,
-    "conservative": CONSERVATIVE,
     "corrected": CORRECTED,
     "printed": PRINTED,
 }
@@ -30,12 +29,11 @@ GRADIENTS = {
 - least: p_j - min p, the least pressure round i: pairs only repel (Koshizuka and Oka 1996);
 - difference: p_j - p_i, exact for a constant field;
 - sum: p_j + p_i, whose pairs cancel, so that momentum is conserved;
-- conservative: p_i + p_j - min p_i - min p_j, CMPS (Khayyer and Gotoh 2008): cancels as well;
 - corrected: p_j - p_i with the inverse moment matrix for d/n0, exact for a linear field on any
   positions (Khayyer and Gotoh 2011);
 - printed: p_i - p_j, as (3) stands in the paper.
 """
-SMALLEST_MOMENT = 0.1
+SMALLEST_MOMENT = 0.02
 """Determinant of the moment matrix, 1 on the lattice, below which it is not inverted."""
 
 
@@ -127,30 +125,11 @@ def least_around(near: Neighbours, pressure: Floats, kind: Kinds) -> Floats:
 
 
 @njit(**OPTIONS)
-def pressure_gradient(
-    kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, form: int
-) -> Floats:
-    """Gradient of the pressure at the fluid's particles, eq. (3).
-
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    pressure : (n,) float64, Pa
-        Of fluid and walls; dummies have none.
-    kind : (n,) int8
-    form : int
-        One of ``GRADIENTS``.
-
-    Returns
-    -------
-    (n, 3) float64, Pa/m
-        0 on walls and dummies.
-    """
+def _gradient(kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, form: int) -> Floats:
+    """As ``pressure_gradient``, before any correction."""
     found = np.zeros((len(pressure), 3))
     factor = kernel.dimension / kernel.lattice_density
-    repelling = form in (LEAST, CONSERVATIVE)
-    least = least_around(near, pressure, kind) if repelling else pressure
+    least = least_around(near, pressure, kind) if form == LEAST else pressure
     for i in range(len(pressure)):
         if kind[i] != FLUID:
             continue
@@ -162,41 +141,63 @@ def pressure_gradient(
                 part = pressure[j] - least[i]
             elif form == SUM:
                 part = pressure[j] + pressure[i]
-            elif form == CONSERVATIVE:
-                # walls take no part in the balance and have no least pressure of their own
-                their = least[j] if kind[j] == FLUID else least[i]
-                part = pressure[i] + pressure[j] - least[i] - their
             elif form == PRINTED:
                 part = pressure[i] - pressure[j]
             else:
                 part = pressure[j] - pressure[i]
             for a in range(3):
                 found[i, a] += factor * part * near.share[k] * near.away_m[k, a]
-    if form == CORRECTED:
-        _correct(kernel, near, kind, found)
     return found
 
 
 @njit(**OPTIONS)
-def _correct(kernel: Kernel, near: Neighbours, kind: Kinds, gradient: Floats) -> None:
-    """Turn gradients of differences into those that are exact for a linear field."""
+def _moments(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
+    """Matrices that a linear field's gradient is multiplied by, (n, 3, 3) float64."""
+    moment = np.zeros((len(kind), 3, 3))
     factor = kernel.dimension / kernel.lattice_density
-    moment = np.zeros((3, 3))
-    for i in range(len(gradient)):
-        if kind[i] != FLUID:
-            continue
-        moment[:] = 0.0
-        for k in range(near.start[i], near.start[i + 1]):
-            if kind[near.other[k]] != DUMMY:
-                for a in range(3):
-                    for b in range(3):
-                        both = near.away_m[k, a] * near.away_m[k, b]
-                        moment[a, b] += factor * near.share[k] * both
-        if kernel.dimension == 2:
-            moment[2, 2] = 1.0
-        # where too few neighbours span the space, the uncorrected gradient stays
-        if np.linalg.det(moment) > SMALLEST_MOMENT:
-            gradient[i] = np.linalg.solve(moment, gradient[i])
+    for i in range(len(kind)):
+        if kind[i] == FLUID:
+            for k in range(near.start[i], near.start[i + 1]):
+                if kind[near.other[k]] != DUMMY:
+                    for a in range(3):
+                        for b in range(3):
+                            both = near.away_m[k, a] * near.away_m[k, b]
+                            moment[i, a, b] += factor * near.share[k] * both
+    return moment
+
+
+def _corrected(kernel: Kernel, near: Neighbours, kind: Kinds, gradient: Floats) -> Floats:
+    """Gradients that are exact for a linear field from those of differences."""
+    moment = _moments(kernel, near, kind)
+    if kernel.dimension == 2:
+        moment[:, 2, 2] = 1.0
+    # where too few neighbours span the space, the uncorrected gradient stays
+    moment[np.linalg.det(moment) < SMALLEST_MOMENT] = np.eye(3)
+    return np.linalg.solve(moment, gradient[:, :, None])[:, :, 0]
+
+
+def pressure_gradient(
+    kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, form: str
+) -> Floats:
+    """Gradient of the pressure at the fluid's particles, eq. (3).
+
+    Parameters
+    ----------
+    kernel : Kernel
+    near : Neighbours
+    pressure : (n,) float64, Pa
+        Of fluid and walls; dummies have none.
+    kind : (n,) int8
+    form : str
+        One of ``GRADIENTS``.
+
+    Returns
+    -------
+    (n, 3) float64, Pa/m
+        0 on walls and dummies.
+    """
+    gradient = _gradient(kernel, near, pressure, kind, GRADIENTS[form])
+    return _corrected(kernel, near, kind, gradient) if form == "corrected" else gradient
 
 
 @njit(**OPTIONS)
