@@ -210,8 +210,8 @@ class Flow:
         )
         self.cost.pressure_s += time.perf_counter() - begin
         self.cost.iterations += iterations
-        # negative pressures would pull particles together
-        np.maximum(pressure, 0.0, out=pressure)
+        if not scheme.tension:
+            np.maximum(pressure, 0.0, out=pressure)
         gradient = pressure_gradient(kernel, near, pressure, state.kind, scheme.gradient)
         change = dt / self.metal.density_kg_m3 * gradient
         state.velocity_m_s -= change

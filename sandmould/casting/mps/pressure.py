@@ -19,9 +19,9 @@ from sandmould.casting.mps.weight import OPTIONS, Kernel
 Flags = NDArray[np.bool_]
 Numbers = NDArray[np.int64]
 
-CLOSED_COMPRESSION = 0.02
-"""Mean compression of a region without free surface beyond which it is refused: no pressure can
-undo it, and one particle too many among 50 is as much."""
+CLOSED_COMPRESSION = 0.1
+"""Mean excess of number density in a region without free surface beyond which it is refused: no
+pressure can undo it. Disorder alone, at the same volume, makes a few percent."""
 
 
 class ClosedRegionError(ArithmeticError):

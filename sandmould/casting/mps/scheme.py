@@ -49,6 +49,8 @@ class Scheme:
     """C_n, eq. (8)."""
     tolerance: float = 1e-2
     """Of the Poisson equation: residual over source."""
+    tension: bool = False
+    """Whether pressures below zero are kept, which pull particles together."""
     shifting: float = 0.0
     """Share of r0^2 times the gradient of concentration by which inner particles are moved on after
     a step (Lind et al. 2012); 0 for none."""
