@@ -67,7 +67,7 @@ def test_the_papers_tank_has_its_particles():
 def test_a_flow_too_fast_is_stopped():
     flow = small_tank(Guard(speed_m_s=0.1))
     flow.particles.velocity_m_s[0, 1] = 1.0
-    with pytest.raises(DivergedError, match="the limit is 0.1 m/s"):
+    with pytest.raises(DivergedError, match="the limit is"):
         flow.step()
 
 

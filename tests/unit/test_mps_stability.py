@@ -33,6 +33,9 @@ def test_verdicts_follow_the_numbers_of_the_text():
     quiet, loud = history(199.0, 0.081), history(201.0, 0.081)
     assert quiet.mean_pa() == pytest.approx(ideal_pa())
     assert quiet.deviation_pa() == pytest.approx([199.0] * 3)
+    # the first two steps form a window, the third one of its own; then all three
+    assert quiet.deviation_pa(2.0) == pytest.approx([199.0] * 3)
+    assert quiet.deviation_pa(4.0) == pytest.approx([0.0] * 3, abs=1e-9)
     assert judge(quiet, "") is Verdict.EXCELLENT
     assert judge(loud, "") is Verdict.GOOD
     assert judge(history(10.0, 0.0861), "") is Verdict.GOOD  # a particle left the surface

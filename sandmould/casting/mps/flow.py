@@ -160,7 +160,7 @@ class Flow:
         each: Callable[[Flow], None] | None = None,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        """Step until a time, the last step cut to meet it.
+        """Step until a time.
 
         Parameters
         ----------
@@ -172,15 +172,17 @@ class Flow:
         """
         begin_s, wall_s, done = self.time_s, self.cost.wall_s, self.cost.particle_steps
         while self.time_s < until_s * (1.0 - 1e-12):
-            self.step(min(self.next_dt_s(), until_s - self.time_s))
+            # equal parts of what is left: a last crumb of a step would have a huge pressure
+            left_s = until_s - self.time_s
+            self.step(left_s / math.ceil(left_s / self.next_dt_s() - 1e-9))
             if each:
                 each(self)
             if progress:
                 spent_s = self.cost.wall_s - wall_s
                 share = (self.time_s - begin_s) / (until_s - begin_s)
                 rate = (self.cost.particle_steps - done) / spent_s
-                left_s = spent_s * (1.0 - share) / share
-                progress(Progress(self.time_s, 100.0 * share, rate, left_s))
+                end_s = spent_s * (1.0 - share) / share
+                progress(Progress(self.time_s, 100.0 * share, rate, end_s))
 
     def _neighbours(self) -> Neighbours:
         """Neighbours of now; candidates are listed anew when particles moved too far."""

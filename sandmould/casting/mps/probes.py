@@ -68,10 +68,26 @@ class History:
         """Mean in time of the pressure of the nearest particles, (k,) float64, Pa."""
         return np.asarray(np.average(self.particle_pressure_pa, axis=0, weights=self.dt_s))
 
-    def deviation_pa(self) -> Floats:
-        """Standard deviation in time of the same, (k,) float64, Pa."""
-        apart = self.particle_pressure_pa - self.mean_pa()
-        return np.asarray(np.sqrt(np.average(apart**2, axis=0, weights=self.dt_s)))
+    def deviation_pa(self, window_s: float = 0.0) -> Floats:
+        """Standard deviation in time of the same, (k,) float64, Pa.
+
+        Parameters
+        ----------
+        window_s : float, s
+            Pressures are averaged over windows of this length before; 0 takes single steps. With
+            c_poi = 1 the fluid is thrown up in one step and falls in the next: what such a run's
+            deviation is depends on the window.
+        """
+        pressure, weights = self.particle_pressure_pa, self.dt_s
+        if window_s > 0.0:
+            window = ((self.time_s - 0.5 * self.dt_s) / window_s).astype(np.int64)
+            weights = np.bincount(window, self.dt_s)
+            sums = [np.bincount(window, self.dt_s * column) for column in pressure.T]
+            held = weights > 0.0
+            pressure = np.stack(sums, axis=1)[held] / weights[held, None]
+            weights = weights[held]
+        apart = pressure - self.mean_pa()
+        return np.asarray(np.sqrt(np.average(apart**2, axis=0, weights=weights)))
 
 
 class Watch:

@@ -59,9 +59,9 @@ class Still:
         """Mean pressure at the depths, (3,) float64, Pa; NaN where a run failed at once."""
         return self._over_time(self.history.mean_pa)
 
-    def deviation_pa(self) -> Floats:
-        """Standard deviation at the depths, (3,) float64, Pa."""
-        return self._over_time(self.history.deviation_pa)
+    def deviation_pa(self, window_s: float = 0.0) -> Floats:
+        """Standard deviation at the depths, (3,) float64, Pa, as ``History.deviation_pa``."""
+        return self._over_time(lambda: self.history.deviation_pa(window_s))
 
     def _over_time(self, measure: Callable[[], Floats]) -> Floats:
         if not len(self.history.time_s):
