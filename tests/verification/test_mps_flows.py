@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,9 +24,9 @@ from sandmould.casting.mps.scheme import Metal, Scheme
 WIDTH_M, NU = 0.1, 1e-3
 ONE_SOLVE = Scheme(1.0, 1, 1.0, source="divergence")
 CONSISTENT = Scheme(
-    5e-3, 1, 1.0, source="divergence", gradient="corrected", tension=True, shifting=0.1
+    5e-3, 1, 1.0, source="divergence", gradient="difference", tension=True, shifting=0.1
 )
-"""For flows without surface: nothing in it takes energy but viscosity."""
+"""For flows without surface: a gradient that is exact for a constant, and no repulsion."""
 
 
 def error(got: Floats, exact: Floats) -> float:
@@ -78,14 +79,14 @@ def energy_left(scheme: Scheme, cells: int) -> float:
 
 
 def test_vortices_decay_by_viscosity():
-    # measured 1.05 on 20 cells a side
-    assert energy_left(CONSISTENT, 20) == pytest.approx(1.0, abs=0.08)
+    # measured 0.98; on so few cells the corrected gradient scatters between 0.9 and 1.17 with the
+    # size of the step
+    assert energy_left(CONSISTENT, 20) == pytest.approx(1.0, abs=0.1)
 
 
-def test_the_papers_scheme_takes_energy_from_vortices():
-    """Repelling pressure and density source: half of the energy is gone where 0.79 should stay."""
-    paper = Scheme(5e-3, 1, 0.5)
-    assert energy_left(paper, 20) < 0.9
+def test_repelling_pressure_takes_energy_from_vortices():
+    # measured 0.59: what calms fluid at rest brakes fluid that flows
+    assert energy_left(replace(CONSISTENT, gradient="least"), 20) < 0.8
 
 
 def conserved(flow: Flow, until_s: float) -> tuple[float, float]:

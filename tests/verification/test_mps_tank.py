@@ -65,16 +65,15 @@ def test_multiple_relaxation_with_half_the_source_calms_the_pressure():
     assert plain > 5.0 * relaxed
 
 
-@pytest.mark.parametrize("form", ["printed", "difference"])
-def test_gradients_that_do_not_work(form):
-    """The sign as printed, and differences to the particle's own pressure."""
-    flow = small_tank(replace(MR5, gradient=form))
-    watch = Watch(np.array([[0.008, 0.004, 0.0]]))
-    try:
-        flow.advance(0.05, watch)
-    except ArithmeticError:
-        return
-    assert watch.history().deviation_pa()[0] > 1000.0 or flow.speed().max() > 0.3
+def test_the_gradient_as_printed_fails():
+    flow = small_tank(replace(MR5, gradient="printed"))
+    with pytest.raises(ArithmeticError):
+        flow.advance(0.05)
+
+
+def test_differences_to_the_own_pressure_do_not_calm():
+    # measured 241 against 18 Pa
+    assert noise_pa(replace(MR5, gradient="difference")) > 5.0 * noise_pa(MR5)
 
 
 def test_the_papers_tank_at_its_recommended_setting():
