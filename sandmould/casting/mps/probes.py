@@ -81,7 +81,7 @@ class History:
         pressure, weights = self.particle_pressure_pa, self.dt_s
         if window_s > 0.0:
             window = ((self.time_s - 0.5 * self.dt_s) / window_s).astype(np.int64)
-            weights = np.bincount(window, self.dt_s)
+            weights = np.bincount(window, self.dt_s).astype(np.float64)
             sums = [np.bincount(window, self.dt_s * column) for column in pressure.T]
             held = weights > 0.0
             pressure = np.stack(sums, axis=1)[held] / weights[held, None]

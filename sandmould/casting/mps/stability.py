@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import product
 
 import numpy as np
 
@@ -14,8 +15,8 @@ from sandmould.casting.mps.probes import History, Watch
 from sandmould.casting.mps.scheme import Metal, Scheme
 from sandmould.casting.mps.tank import COLUMNS, ROWS, SPACING_M, open_tank
 
-PAIRS = ((1e-4, 1), (5e-4, 2), (1e-3, 5), (2e-3, 10))
-"""Largest time step in s and number of relaxations, table 2."""
+STEPS_S, COUNTS = (1e-4, 5e-4, 1e-3, 2e-3), (1, 2, 5, 10)
+"""Largest time steps and numbers of relaxations, table 2: paired there, crossed in figure 6."""
 SHARES = (1.0, 0.5, 0.2, 0.1)
 """c_poi, table 2."""
 DEPTHS_M = (0.03, 0.05, 0.07)
@@ -128,26 +129,25 @@ def run_still(
 
 def table_2(base: Scheme | None = None) -> list[Scheme]:
     """The paper's sixteen conditions."""
-    base = base or Scheme()
     return [
-        replace(base, dt_max_s=dt, relaxations=count, source_share=share)
-        for dt, count in PAIRS
+        _condition(base, dt_s, count, share)
+        for dt_s, count in zip(STEPS_S, COUNTS, strict=True)
         for share in SHARES
     ]
 
 
+def _condition(base: Scheme | None, dt_s: float, count: int, share: float) -> Scheme:
+    """A scheme with the paper's three numbers."""
+    return replace(base or Scheme(), dt_max_s=dt_s, relaxations=count, source_share=share)
+
+
 def stability_map(
-    dt_max_s: Iterable[float] = tuple(dt for dt, _ in PAIRS),
-    relaxations: Iterable[int] = tuple(count for _, count in PAIRS),
+    dt_max_s: Iterable[float] = STEPS_S,
+    relaxations: Iterable[int] = COUNTS,
     shares: Iterable[float] = SHARES,
     duration_s: float = DURATION_S,
     base: Scheme | None = None,
 ) -> Iterator[Still]:
     """Run and judge the full grid of figure 6, one condition after the other."""
-    base = base or Scheme()
-    counts, all_shares = tuple(relaxations), tuple(shares)
-    for dt in dt_max_s:
-        for count in counts:
-            for share in all_shares:
-                scheme = replace(base, dt_max_s=dt, relaxations=count, source_share=share)
-                yield run_still(scheme, duration_s)
+    for dt_s, count, share in product(dt_max_s, relaxations, shares):
+        yield run_still(_condition(base, dt_s, count, share), duration_s)
