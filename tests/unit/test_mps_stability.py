@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from sandmould.casting.mps.flow import Flow
+from sandmould.casting.mps.neighbours import find_candidates, find_neighbours
+from sandmould.casting.mps.particles import FLUID, at_rest, lattice
 from sandmould.casting.mps.probes import History, pressure_at, pressure_nearest
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.stability import (
     Verdict,
+    compression_gain,
     ideal_pa,
     judge,
     probe_places,
@@ -18,6 +21,7 @@ from sandmould.casting.mps.stability import (
     table_2,
 )
 from sandmould.casting.mps.tank import open_tank
+from sandmould.casting.mps.weight import make_kernel
 
 
 def history(deviation_pa: float, top_m: float) -> History:
@@ -81,3 +85,24 @@ def test_probes_read_a_known_field():
     # the nearest particle is half a spacing off
     assert pressure_nearest(flow, probe_places()) == pytest.approx(ideal_pa(), abs=25.0)
     assert np.isnan(pressure_at(flow, np.array([[1.0, 1.0, 0.0]]))).all()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_gain_of_the_density_is_that_of_a_squeezed_lattice(dimension):
+    kernel = make_kernel(dimension, 2e-3)
+    squeeze = 1e-5
+    length_m = 8 * 2e-3 * (1.0 - squeeze)
+    period = (length_m, length_m, length_m if dimension == 3 else 0.0)
+    fluid = at_rest(lattice((0,) * dimension, (8,) * dimension, 2e-3) * (1.0 - squeeze), FLUID)
+    squeezed = kernel._replace(period_m=period)
+    listed = find_candidates(squeezed, fluid.position_m, fluid.kind)
+    density = find_neighbours(squeezed, listed, fluid.position_m, fluid.kind).density
+    by_density = (density.mean() / kernel.lattice_density - 1.0) / (dimension * squeeze)
+    # squeezing is finite: the second derivative adds some 1e-4
+    assert compression_gain(kernel) == pytest.approx(by_density, rel=1e-3)
+
+
+def test_the_papers_kernel_overshoots_at_a_full_source():
+    gain = compression_gain(make_kernel(2, 2e-3))
+    assert gain == pytest.approx(1.7, abs=0.05)
+    assert abs(1.0 - 0.5 * gain) < 0.2 < abs(1.0 - gain)

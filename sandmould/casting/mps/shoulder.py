@@ -29,6 +29,8 @@ RATE_KG_S = 0.1
 POURED_S = 4.0
 SEEN_S = 4.5
 """When figure 8 is drawn."""
+FREEBOARD = 10
+"""Particles that the bore reaches above the casting."""
 GRAVITY = (0.0, 0.0, -9.8)
 POUR_M_S = 0.5
 """Downwards, at the top of the mould: the paper gives none. The stream is as wide as this and the
@@ -83,7 +85,7 @@ def open_shoulder(size_m: float, scheme: Scheme, full: bool) -> Flow:
         raise ValueError(
             f"particle size is {size_m} m: at most {UPPER_M / 4:.4g} m, a quarter of the bore"
         )
-    freeboard_m = 10 * size_m
+    freeboard_m = FREEBOARD * size_m
     sites = _sites(size_m, freeboard_m)
     casting = sites[is_cavity(sites)]
     fluid = at_rest(casting if full else casting[casting[:, 2] < size_m], FLUID)
@@ -223,8 +225,8 @@ def run_shoulder(
         int(flow.fluid.sum()),
         bottom,
         ring,
-        weight_pa_m * (top_m - place[0, 2]),
-        weight_pa_m * (top_m - place[1, 2]),
+        weight_pa_m * (top_m - float(place[0, 2])),
+        weight_pa_m * max(0.0, top_m - float(place[1, 2])),
         rise,
         rise > HOP_SPEED_M_S,
         stopped,
@@ -233,6 +235,9 @@ def run_shoulder(
 
 
 def _level_m(flow: Flow) -> float:
-    """Height of the metal: its highest particles but for splashes, and half of their size."""
-    height_m = flow.particles.position_m[flow.fluid, 2]
-    return float(np.quantile(height_m, 0.995)) + 0.5 * flow.kernel.spacing_m
+    """Height that the metal fills the mould to, by its volume."""
+    size_m = flow.kernel.spacing_m
+    freeboard_m = FREEBOARD * size_m
+    sites = _sites(size_m, freeboard_m)
+    height_m = np.sort(sites[is_cavity(sites, freeboard_m), 2])
+    return float(height_m[min(int(flow.fluid.sum()), len(height_m)) - 1]) + 0.5 * size_m
