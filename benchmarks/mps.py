@@ -77,13 +77,18 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
         (axes[0], "pressure_noise_pa", "standard deviation of pressure at 70 mm, Pa"),
         (axes[1], "mean_speed_m_s", "mean speed of fluid at rest, m/s"),
     ):
-        for row in rows:
+        for number, row in enumerate(rows):
             if key in row:
                 point = (row["cpu_s_per_simulated_s"], row[key])
                 axis.scatter(*point, s=24, color="C0" if row["scheme"].startswith("MR") else "C1")
                 axis.annotate(
-                    row["scheme"], point, xytext=(4, 3), textcoords="offset points", fontsize=8
+                    row["scheme"],
+                    point,
+                    xytext=(5, (3, -9)[number % 2]),
+                    textcoords="offset points",
+                    fontsize=8,
                 )
+        axis.margins(x=0.2)
         axis.set(xscale="log", yscale="log", ylabel=label)
         axis.set_xlabel("processor time for a simulated second, s")
     figure.savefig(path, dpi=120)
