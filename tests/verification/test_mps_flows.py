@@ -109,10 +109,3 @@ def test_a_rotating_patch_keeps_its_momenta():
     assert flow.kinetic_energy_per_mass() == pytest.approx(before, rel=0.02)
     # the middle of a patch that turns is under tension
     assert flow.pressure_pa.min() < 0.0
-
-
-def test_particles_carry_the_mass():
-    flow = rotating_patch(8, Scheme(5e-3, 2, 0.5))
-    flow.advance(0.02)
-    assert flow.cost.particle_steps == 64 * flow.cost.steps
-    assert np.isfinite(flow.particles.position_m).all()

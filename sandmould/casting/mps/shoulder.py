@@ -112,7 +112,6 @@ class Ladle:
         ValueError
             For a rate whose stream is wider than the bore at the pouring speed.
         """
-        self._flow = flow
         self._rate = rate_kg_s
         self._size_m = flow.kernel.spacing_m
         self._mass_kg = flow.metal.density_kg_m3 * self._size_m**3
