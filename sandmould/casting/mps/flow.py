@@ -1,0 +1,245 @@
+"""Flow of metal step by step: prediction, relaxations, guards (figure 1)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sandmould.casting.mps.neighbours import (
+    Candidates,
+    Neighbours,
+    find_candidates,
+    find_neighbours,
+    list_is_old,
+)
+from sandmould.casting.mps.operators import (
+    crowding,
+    density_rate,
+    laplacian,
+    pressure_gradient,
+)
+from sandmould.casting.mps.particles import Floats, Particles
+from sandmould.casting.mps.pressure import solve_pressure
+from sandmould.casting.mps.scheme import VISCOUS_SHARE, Metal, Scheme
+from sandmould.casting.mps.sources import SOURCES, Tentative
+from sandmould.casting.mps.weight import Kernel
+
+
+class DivergedError(ArithmeticError):
+    """Velocities are not numbers, or beyond the limit."""
+
+
+class EscapedError(ArithmeticError):
+    """Fluid left the mould."""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """When a run is stopped."""
+
+    speed_m_s: float = math.inf
+    """Largest speed that can be true."""
+    low_m: tuple[float, float, float] = (-math.inf,) * 3
+    high_m: tuple[float, float, float] = (math.inf,) * 3
+    """Bounds that no fluid may leave."""
+
+
+@dataclass
+class Cost:
+    """What a run has taken so far."""
+
+    steps: int = 0
+    iterations: int = 0
+    """Of the Poisson solver, over all relaxations."""
+    particle_steps: int = 0
+    """Fluid particles over all steps."""
+    wall_s: float = 0.0
+    pressure_s: float = 0.0
+    """Building and solving the Poisson equation."""
+    neighbours_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run is."""
+
+    time_s: float
+    percent: float
+    particle_steps_per_s: float
+    left_s: float
+    """Wall time to the end, at the rate so far."""
+
+
+class Flow:
+    """Particles moved by MPS; ``particles``, ``pressure_pa`` and ``time_s`` may be read at will."""
+
+    def __init__(
+        self,
+        particles: Particles,
+        kernel: Kernel,
+        metal: Metal | None = None,
+        scheme: Scheme | None = None,
+        guard: Guard | None = None,
+    ) -> None:
+        """Start at time 0, without pressure; what is not given is the paper's."""
+        self.kernel = kernel
+        self.metal = metal or Metal()
+        self.scheme = scheme or Scheme()
+        self.guard = guard or Guard()
+        self.time_s = 0.0
+        self.cost = Cost()
+        self._set(particles)
+
+    def _set(self, particles: Particles) -> None:
+        self.particles = particles
+        self.fluid = particles.fluid
+        self.pressure_pa = np.zeros(len(particles.kind))
+        """(n,) float64, Pa: sum over the relaxations of the last step, whose impulse it is."""
+        self._listed: Candidates | None = None
+
+    def pour(self, particles: Particles) -> None:
+        """Add particles."""
+        pressure = self.pressure_pa
+        self._set(self.particles.joined(particles))
+        self.pressure_pa[: len(pressure)] = pressure
+
+    def speed(self) -> Floats:
+        """Speeds of the fluid, (m,) float64, m/s."""
+        return np.sqrt((self.particles.velocity_m_s[self.fluid] ** 2).sum(axis=1))
+
+    def kinetic_energy_per_mass(self) -> float:
+        """Mean over the fluid, J/kg."""
+        return 0.5 * float((self.speed() ** 2).mean())
+
+    def next_dt_s(self) -> float:
+        """Longest step that eq. (8), the viscosity and the scheme allow."""
+        size_m, nu = self.kernel.spacing_m, self.metal.viscosity_m2_s
+        fastest = float(self.speed().max(initial=0.0))
+        courant = self.scheme.courant * size_m / fastest if fastest > 0.0 else math.inf
+        viscous = VISCOUS_SHARE * size_m**2 / nu if nu > 0.0 else math.inf
+        return min(self.scheme.dt_max_s, courant, viscous)
+
+    def step(self, dt_s: float | None = None) -> None:
+        """Make one time step.
+
+        Raises
+        ------
+        DivergedError, EscapedError
+            When a guard strikes.
+        ClosedRegionError, NotSolvedError
+            From ``solve_pressure``.
+        """
+        begin = time.perf_counter()
+        dt = dt_s or self.next_dt_s()
+        state, kernel, scheme = self.particles, self.kernel, self.scheme
+        near = self._neighbours()
+        x, u = state.position_m, state.velocity_m_s
+        compression_before = near.density / kernel.lattice_density - 1.0
+        rate_before = density_rate(kernel, near, u) / kernel.lattice_density
+        friction = self.metal.viscosity_m2_s * laplacian(kernel, near, u, state.kind)
+        u[self.fluid] += dt * (friction[self.fluid] + np.asarray(self.metal.gravity_m_s2))
+        x[self.fluid] += dt * u[self.fluid]
+        self.pressure_pa = np.zeros(len(state.kind))
+        for _ in range(scheme.relaxations):
+            self._relax(dt, compression_before, rate_before)
+        if scheme.shifting > 0.0:
+            self._shift()
+        self.time_s += dt
+        self.cost.steps += 1
+        self.cost.particle_steps += int(self.fluid.sum())
+        self._check()
+        self.cost.wall_s += time.perf_counter() - begin
+
+    def advance(
+        self,
+        until_s: float,
+        each: Callable[[Flow], None] | None = None,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> None:
+        """Step until a time.
+
+        Parameters
+        ----------
+        until_s : float, s
+        each : function of the flow
+            Called after every step.
+        progress : function of a ``Progress``
+            Called after every step.
+        """
+        begin_s, wall_s, done = self.time_s, self.cost.wall_s, self.cost.particle_steps
+        while self.time_s < until_s * (1.0 - 1e-12):
+            # equal parts of what is left: a last crumb of a step would have a huge pressure
+            left_s = until_s - self.time_s
+            self.step(left_s / math.ceil(left_s / self.next_dt_s() - 1e-9))
+            if each:
+                each(self)
+            if progress:
+                spent_s = self.cost.wall_s - wall_s
+                share = (self.time_s - begin_s) / (until_s - begin_s)
+                rate = (self.cost.particle_steps - done) / spent_s
+                end_s = spent_s * (1.0 - share) / share
+                progress(Progress(self.time_s, 100.0 * share, rate, end_s))
+
+    def _neighbours(self) -> Neighbours:
+        """Neighbours of now; candidates are listed anew when particles moved too far."""
+        begin = time.perf_counter()
+        x, kind = self.particles.position_m, self.particles.kind
+        if self._listed is None or list_is_old(self.kernel, self._listed.listed_m, x):
+            self._listed = find_candidates(self.kernel, x, kind)
+        near = find_neighbours(self.kernel, self._listed, x, kind)
+        self.cost.neighbours_s += time.perf_counter() - begin
+        return near
+
+    def _relax(self, dt: float, compression_before: Floats, rate_before: Floats) -> None:
+        """Correct velocities and positions once."""
+        state, kernel, scheme = self.particles, self.kernel, self.scheme
+        near = self._neighbours()
+        compression = near.density / kernel.lattice_density - 1.0
+        asked = SOURCES[scheme.source](
+            Tentative(
+                kernel, near, state.velocity_m_s, dt, compression, compression_before, rate_before
+            )
+        )
+        surface = near.density < scheme.surface * kernel.lattice_density
+        factor = scheme.source_share * self.metal.density_kg_m3 / dt**2
+        begin = time.perf_counter()
+        pressure, iterations = solve_pressure(
+            kernel, near, state.kind, surface, factor * asked, scheme.tolerance
+        )
+        self.cost.pressure_s += time.perf_counter() - begin
+        self.cost.iterations += iterations
+        if not scheme.tension:
+            np.maximum(pressure, 0.0, out=pressure)
+        gradient = pressure_gradient(kernel, near, pressure, state.kind, scheme.gradient)
+        change = dt / self.metal.density_kg_m3 * gradient
+        state.velocity_m_s -= change
+        state.position_m -= dt * change
+        self.pressure_pa += pressure
+
+    def _shift(self) -> None:
+        """Move inner particles to where fewer are; the surface keeps its place."""
+        state, kernel = self.particles, self.kernel
+        near = self._neighbours()
+        inner = self.fluid & (near.density >= self.scheme.surface * kernel.lattice_density)
+        step_m = self.scheme.shifting * kernel.spacing_m**2
+        state.position_m[inner] -= step_m * crowding(kernel, near, state.kind)[inner]
+
+    def _check(self) -> None:
+        """Stop a run that went wrong."""
+        fastest = float(self.speed().max(initial=0.0))
+        if not fastest <= self.guard.speed_m_s:  # also where it is no number
+            raise DivergedError(
+                f"the flow diverged at {self.time_s:.4g} s: a particle is as fast as "
+                f"{fastest:.4g} m/s, the limit is {self.guard.speed_m_s:.4g} m/s"
+            )
+        place = self.particles.position_m[self.fluid]
+        out = ((place < self.guard.low_m) | (place > self.guard.high_m)).any(axis=1)
+        if out.any():
+            raise EscapedError(
+                f"{int(out.sum())} particles left the mould at {self.time_s:.4g} s, "
+                f"the first at {np.round(place[out][0], 4).tolist()} m"
+            )

@@ -1,0 +1,159 @@
+"""Neighbours: candidates kept while particles move less than half a skin, and those in reach."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
+from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight
+
+SKIN = 0.35
+"""Over the particle size. Wider lists last longer, and each pass over them costs more."""
+
+
+class Candidates(NamedTuple):
+    """Particles that may come within the kernel of each other, both ways round."""
+
+    start: NDArray[np.int64]
+    """(n + 1,) int64: candidates of particle i are start[i] to start[i + 1]."""
+    other: NDArray[np.uint32]
+    """(p,) uint32."""
+    listed_m: Floats
+    """(n, 3) float64, m: positions that the list was made at."""
+
+
+class Neighbours(NamedTuple):
+    """Particles within the kernel of fluid and walls at given positions; dummies have none."""
+
+    start: NDArray[np.int64]
+    """(n + 1,) int64: neighbours of particle i are start[i] to start[i + 1]."""
+    other: NDArray[np.uint32]
+    """(e,) uint32."""
+    away_m: Floats
+    """(e, 3) float64, m: from particle i to the nearest image of its neighbour."""
+    weight: Floats
+    """(e,) float64: w, eq. (1)."""
+    share: Floats
+    """(e,) float64, 1/m2: w / r^2."""
+    density: Floats
+    """(n,) float64: number density, eq. (2); 0 for dummies."""
+
+
+@njit(**OPTIONS)
+def _both_ways(
+    n: int, pair: NDArray[np.int64], kind: Kinds
+) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+    """Rows of candidates from pairs; dummies need none of each other."""
+    start = np.zeros(n + 1, dtype=np.int64)
+    for k in range(len(pair)):
+        i, j = pair[k, 0], pair[k, 1]
+        if kind[i] != DUMMY or kind[j] != DUMMY:
+            start[i + 1] += 1
+            start[j + 1] += 1
+    for i in range(n):
+        start[i + 1] += start[i]
+    place = start[:-1].copy()
+    other = np.empty(start[n], dtype=np.uint32)
+    for k in range(len(pair)):
+        i, j = pair[k, 0], pair[k, 1]
+        if kind[i] != DUMMY or kind[j] != DUMMY:
+            other[place[i]] = j
+            other[place[j]] = i
+            place[i] += 1
+            place[j] += 1
+    return start, other
+
+
+def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> Candidates:
+    """List candidates.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    position_m : (n, 3) float64, m
+        Finite.
+    kind : (n,) int8
+    """
+    period = np.asarray(kernel.period_m)
+    cyclic = period > 0.0
+    wrapped = position_m.copy()
+    wrapped[:, cyclic] = np.mod(wrapped[:, cyclic], period[cyclic])
+    # mod rounds a tiny negative number up to the period itself, which the tree refuses
+    wrapped[:, cyclic] = np.where(wrapped[:, cyclic] < period[cyclic], wrapped[:, cyclic], 0.0)
+    tree = cKDTree(wrapped, boxsize=period if cyclic.any() else None, balanced_tree=False)
+    reach_m = kernel.reach_m + SKIN * kernel.spacing_m
+    pair = tree.query_pairs(reach_m, output_type="ndarray")
+    start, other = _both_ways(len(position_m), pair, kind)
+    return Candidates(start, other, position_m.copy())
+
+
+@njit(**OPTIONS)
+def list_is_old(kernel: Kernel, listed: Floats, position: Floats) -> bool:
+    """Whether a particle moved more than half a skin since the list was made."""
+    limit = (0.5 * SKIN * kernel.spacing_m) ** 2
+    for i in range(len(position)):
+        moved = 0.0
+        for a in range(3):
+            moved += (position[i, a] - listed[i, a]) ** 2
+        if moved > limit:
+            return True
+    return False
+
+
+@njit(**INLINED)
+def _nearest(apart: float, period: float) -> float:
+    """Distance along an axis to the nearest image."""
+    return apart - period * np.rint(apart / period) if period > 0.0 else apart
+
+
+@njit(**OPTIONS)
+def find_neighbours(
+    kernel: Kernel, listed: Candidates, position: Floats, kind: Kinds
+) -> Neighbours:
+    """Pick the neighbours out of the candidates and weigh them.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    listed : Candidates
+        Not old.
+    position : (n, 3) float64, m
+    kind : (n,) int8
+    """
+    n = len(position)
+    start = np.zeros(n + 1, dtype=np.int64)
+    other = np.empty(len(listed.other), dtype=np.uint32)
+    away = np.empty((len(listed.other), 3))
+    weights = np.empty(len(listed.other))
+    share = np.empty(len(listed.other))
+    density = np.zeros(n)
+    reach2 = kernel.reach_m**2
+    period = kernel.period_m
+    e = 0
+    for i in range(n):
+        if kind[i] != DUMMY:
+            x, y, z = position[i, 0], position[i, 1], position[i, 2]
+            total = 0.0
+            for k in range(listed.start[i], listed.start[i + 1]):
+                j = listed.other[k]
+                dx = _nearest(position[j, 0] - x, period[0])
+                dy = _nearest(position[j, 1] - y, period[1])
+                dz = _nearest(position[j, 2] - z, period[2])
+                r2 = dx * dx + dy * dy + dz * dz
+                if r2 < reach2:
+                    w = weight(kernel, math.sqrt(r2))
+                    other[e] = j
+                    away[e, 0], away[e, 1], away[e, 2] = dx, dy, dz
+                    weights[e] = w
+                    share[e] = w / r2
+                    total += w
+                    e += 1
+            density[i] = total
+        start[i + 1] = e
+    return Neighbours(start, other[:e], away[:e], weights[:e], share[:e], density)

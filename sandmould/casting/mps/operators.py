@@ -1,0 +1,225 @@
+"""Particle interaction models: gradient (3), Laplacian (4) and relatives.
+
+As printed, (3) and (4) hold (phi_i - phi_j), which turns the gradient round and makes diffusion
+run backwards; here it is (phi_j - phi_i). All divide by the lattice's n0 and not by the local
+n_i: so the Laplacian of the pressure stays symmetric.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sandmould.casting.mps.neighbours import Neighbours
+from sandmould.casting.mps.particles import DUMMY, FLUID, Floats, Kinds
+from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight_slope
+
+LEAST, DIFFERENCE, SUM, CORRECTED, PRINTED = range(5)
+GRADIENTS = {
+    "least": LEAST,
+    "difference": DIFFERENCE,
+    "sum": SUM,
+    "corrected": CORRECTED,
+    "printed": PRINTED,
+}
+"""Numerators of the pressure gradient at particle i:
+
+- least: p_j - min p, the least pressure round i: pairs only repel (Koshizuka and Oka 1996);
+- difference: p_j - p_i, exact for a constant field;
+- sum: p_j + p_i, whose pairs cancel, so that momentum is conserved;
+- corrected: p_j - p_i with the inverse moment matrix for d/n0, exact for a linear field on any
+  positions (Khayyer and Gotoh 2011);
+- printed: p_i - p_j, as (3) stands in the paper.
+"""
+SMALLEST_MOMENT = 0.02
+"""Determinant of the moment matrix, 1 on the lattice, below which it is not inverted."""
+
+
+@njit(**INLINED)
+def _approach(near: Neighbours, velocity: Floats, k: int, i: int) -> float:
+    """Relative velocity times distance; negative where two particles come nearer."""
+    j = near.other[k]
+    return (
+        near.away_m[k, 0] * (velocity[j, 0] - velocity[i, 0])
+        + near.away_m[k, 1] * (velocity[j, 1] - velocity[i, 1])
+        + near.away_m[k, 2] * (velocity[j, 2] - velocity[i, 2])
+    )
+
+
+@njit(**OPTIONS)
+def density_rate(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
+    """Rate of the number density from the velocities, sum of w'(r) r_ij . u_ij / r.
+
+    The source of higher order, HS (Khayyer and Gotoh 2009).
+
+    Parameters
+    ----------
+    kernel : Kernel
+    near : Neighbours
+    velocity : (n, 3) float64, m/s
+
+    Returns
+    -------
+    (n,) float64, 1/s
+    """
+    rate = np.zeros(len(velocity))
+    for i in range(len(velocity)):
+        for k in range(near.start[i], near.start[i + 1]):
+            r = math.sqrt(near.weight[k] / near.share[k]) if near.share[k] > 0.0 else kernel.reach_m
+            rate[i] += weight_slope(kernel, r) / r * _approach(near, velocity, k, i)
+    return rate
+
+
+@njit(**OPTIONS)
+def divergence(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
+    """Divergence of the velocity, d/n0 sum of r_ij . u_ij w / r^2; as ``density_rate``."""
+    found = np.zeros(len(velocity))
+    factor = kernel.dimension / kernel.lattice_density
+    for i in range(len(velocity)):
+        for k in range(near.start[i], near.start[i + 1]):
+            found[i] += factor * near.share[k] * _approach(near, velocity, k, i)
+    return found
+
+
+@njit(**OPTIONS)
+def laplacian(kernel: Kernel, near: Neighbours, field: Floats, kind: Kinds) -> Floats:
+    """Laplacian of a vector field at the fluid's particles, eq. (4) with its sign turned.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    near : Neighbours
+    field : (n, 3) float64
+        Also on walls and dummies.
+    kind : (n,) int8
+
+    Returns
+    -------
+    (n, 3) float64, the field's unit over m2
+        0 on walls and dummies.
+    """
+    found = np.zeros_like(field)
+    factor = 2.0 * kernel.dimension / kernel.lattice_density
+    for i in range(len(field)):
+        if kind[i] == FLUID:
+            for k in range(near.start[i], near.start[i + 1]):
+                j = near.other[k]
+                for a in range(3):
+                    found[i, a] += factor * near.share[k] * (field[j, a] - field[i, a])
+    return found
+
+
+@njit(**OPTIONS)
+def least_around(near: Neighbours, pressure: Floats, kind: Kinds) -> Floats:
+    """Least pressure of each fluid particle and its neighbours, dummies left out, Pa."""
+    least = pressure.copy()
+    for i in range(len(pressure)):
+        if kind[i] == FLUID:
+            for k in range(near.start[i], near.start[i + 1]):
+                j = near.other[k]
+                if kind[j] != DUMMY and pressure[j] < least[i]:
+                    least[i] = pressure[j]
+    return least
+
+
+@njit(**OPTIONS)
+def _gradient(kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, form: int) -> Floats:
+    """As ``pressure_gradient``, before any correction."""
+    found = np.zeros((len(pressure), 3))
+    factor = kernel.dimension / kernel.lattice_density
+    least = least_around(near, pressure, kind) if form == LEAST else pressure
+    for i in range(len(pressure)):
+        if kind[i] != FLUID:
+            continue
+        for k in range(near.start[i], near.start[i + 1]):
+            j = near.other[k]
+            if kind[j] == DUMMY:
+                continue
+            if form == LEAST:
+                part = pressure[j] - least[i]
+            elif form == SUM:
+                part = pressure[j] + pressure[i]
+            elif form == PRINTED:
+                part = pressure[i] - pressure[j]
+            else:
+                part = pressure[j] - pressure[i]
+            for a in range(3):
+                found[i, a] += factor * part * near.share[k] * near.away_m[k, a]
+    return found
+
+
+@njit(**OPTIONS)
+def _moments(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
+    """Matrices that a linear field's gradient is multiplied by, (n, 3, 3) float64."""
+    moment = np.zeros((len(kind), 3, 3))
+    factor = kernel.dimension / kernel.lattice_density
+    for i in range(len(kind)):
+        if kind[i] == FLUID:
+            for k in range(near.start[i], near.start[i + 1]):
+                if kind[near.other[k]] != DUMMY:
+                    for a in range(3):
+                        for b in range(3):
+                            both = near.away_m[k, a] * near.away_m[k, b]
+                            moment[i, a, b] += factor * near.share[k] * both
+    return moment
+
+
+def _corrected(kernel: Kernel, near: Neighbours, kind: Kinds, gradient: Floats) -> Floats:
+    """Gradients that are exact for a linear field from those of differences."""
+    moment = _moments(kernel, near, kind)
+    if kernel.dimension == 2:
+        moment[:, 2, 2] = 1.0
+    # where too few neighbours span the space, the uncorrected gradient stays
+    moment[np.linalg.det(moment) < SMALLEST_MOMENT] = np.eye(3)
+    return np.linalg.solve(moment, gradient[:, :, None])[:, :, 0]
+
+
+def pressure_gradient(
+    kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, form: str
+) -> Floats:
+    """Gradient of the pressure at the fluid's particles, eq. (3).
+
+    Parameters
+    ----------
+    kernel : Kernel
+    near : Neighbours
+    pressure : (n,) float64, Pa
+        Of fluid and walls; dummies have none.
+    kind : (n,) int8
+    form : str
+        One of ``GRADIENTS``.
+
+    Returns
+    -------
+    (n, 3) float64, Pa/m
+        0 on walls and dummies.
+    """
+    gradient = _gradient(kernel, near, pressure, kind, GRADIENTS[form])
+    return _corrected(kernel, near, kind, gradient) if form == "corrected" else gradient
+
+
+@njit(**OPTIONS)
+def crowding(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
+    """Gradient of the concentration of particles, d/n0 sum of r_ij w / r^2; 0 on a lattice.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    near : Neighbours
+    kind : (n,) int8
+
+    Returns
+    -------
+    (n, 3) float64, 1/m
+        0 on walls and dummies, which count as neighbours.
+    """
+    found = np.zeros((len(kind), 3))
+    factor = kernel.dimension / kernel.lattice_density
+    for i in range(len(kind)):
+        if kind[i] == FLUID:
+            for k in range(near.start[i], near.start[i + 1]):
+                for a in range(3):
+                    found[i, a] += factor * near.share[k] * near.away_m[k, a]
+    return found

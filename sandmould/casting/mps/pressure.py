@@ -1,0 +1,200 @@
+"""The Poisson equation for the pressure, eq. (6), as a sparse symmetric system."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from sandmould.casting.mps.conjugate_gradients import System, solve
+from sandmould.casting.mps.neighbours import Neighbours
+from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
+from sandmould.casting.mps.weight import OPTIONS, Kernel
+
+Flags = NDArray[np.bool_]
+Numbers = NDArray[np.int64]
+
+CLOSED_COMPRESSION = 0.1
+"""Mean excess of number density in a region without free surface beyond which it is refused: no
+pressure can undo it. Disorder alone, at the same volume, makes a few percent."""
+
+
+class ClosedRegionError(ArithmeticError):
+    """Fluid without a free surface has more or fewer particles than its space."""
+
+
+class NotSolvedError(ArithmeticError):
+    """The pressure did not converge."""
+
+
+class Rows(NamedTuple):
+    """Minus the Laplacian between the particles of unknown pressure."""
+
+    number: Numbers
+    """(m,) int64: these particles."""
+    scale: Floats
+    """(m,) float64, m: one over the root of the diagonal, by which rows and columns are scaled."""
+    closed: Flags
+    """(m,) bool: not joined, over any number of neighbours, to a particle at the surface."""
+    system: System
+
+
+@njit(**OPTIONS)
+def assemble(kernel: Kernel, near: Neighbours, kind: Kinds, surface: Flags) -> Rows:
+    """Build the system by eq. (4) over n0, so that it is symmetric.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    near : Neighbours
+    kind : (n,) int8
+        Dummies have no pressure: no flux of it into the mould.
+    surface : (n,) bool
+        Where the pressure is zero.
+    """
+    n = len(kind)
+    factor = 2.0 * kernel.dimension / kernel.lattice_density
+    row = np.full(n, -1, dtype=np.int64)
+    number = np.empty(n, dtype=np.int64)
+    scale = np.empty(n)
+    opened = np.zeros(n, dtype=np.bool_)
+    m = most = 0
+    for i in range(n):
+        if kind[i] == DUMMY or surface[i]:
+            continue
+        total = 0.0
+        for k in range(near.start[i], near.start[i + 1]):
+            if kind[near.other[k]] != DUMMY:
+                total += factor * near.share[k]
+                opened[m] |= surface[near.other[k]]
+        if total > 0.0:
+            row[i] = m
+            number[m] = i
+            scale[m] = 1.0 / math.sqrt(total)
+            most += near.start[i + 1] - near.start[i]
+            m += 1
+    start = np.zeros(m + 1, dtype=np.int64)
+    middle = np.empty(m, dtype=np.int64)
+    column = np.empty(most, dtype=np.uint32)
+    value = np.empty(most)
+    e = 0
+    for q in range(m):
+        i = number[q]
+        # earlier columns first: the sweeps of the solver go through either part of a row
+        for later in (False, True):
+            if later:
+                middle[q] = e
+            for k in range(near.start[i], near.start[i + 1]):
+                c = row[near.other[k]]
+                if c >= 0 and (c > q) == later:
+                    column[e] = c
+                    value[e] = -factor * near.share[k] * scale[q] * scale[c]
+                    e += 1
+        start[q + 1] = e
+    system = System(start, middle, column[:e], value[:e])
+    _spread(system, opened[:m])
+    return Rows(number[:m], scale[:m], ~opened[:m], system)
+
+
+@njit(**OPTIONS)
+def _spread(system: System, reached: Flags) -> None:
+    """Mark all that is joined to what is marked."""
+    waiting = np.empty(len(reached), dtype=np.int64)
+    count = 0
+    for q in range(len(reached)):
+        if reached[q]:
+            waiting[count] = q
+            count += 1
+    done = 0
+    while done < count:
+        q = waiting[done]
+        done += 1
+        for k in range(system.start[q], system.start[q + 1]):
+            c = system.column[k]
+            if not reached[c]:
+                reached[c] = True
+                waiting[count] = c
+                count += 1
+
+
+def solve_pressure(
+    kernel: Kernel,
+    near: Neighbours,
+    kind: Kinds,
+    surface: Flags,
+    source: Floats,
+    tolerance: float,
+) -> tuple[Floats, int]:
+    """Solve for the pressure by conjugate gradients.
+
+    In a region without free surface the pressure is known but for a constant, and only the part of
+    the source that sums to zero can be met: the constant is chosen to make the least pressure 0.
+
+    Parameters
+    ----------
+    kernel, near, kind, surface
+        As ``assemble``.
+    source : (n,) float64, Pa/m2
+        Minus the Laplacian wanted.
+    tolerance : float
+        As ``conjugate_gradients.solve``.
+
+    Returns
+    -------
+    pressure : (n,) float64, Pa
+        0 at the surface and on dummies.
+    iterations : int
+
+    Raises
+    ------
+    ClosedRegionError
+        Where a region without free surface is compressed or stretched by more than
+        ``CLOSED_COMPRESSION``.
+    NotSolvedError
+        Where the iteration does not converge.
+    """
+    rows = assemble(kernel, near, kind, surface)
+    pressure = np.zeros(len(kind))
+    wanted = rows.scale * source[rows.number]
+    regions = _closed_regions(rows)
+    for region in regions:
+        _refuse_crowd(near.density[rows.number[region]] / kernel.lattice_density - 1.0)
+        null = 1.0 / rows.scale[region]
+        wanted[region] -= null * float(null @ wanted[region]) / float(null @ null)
+    found, iterations, met = solve(rows.system, wanted, tolerance)
+    if not met:
+        raise NotSolvedError(
+            f"the pressure of {len(wanted)} particles did not converge to {tolerance:g} "
+            f"in {iterations} iterations"
+        )
+    found *= rows.scale
+    for region in regions:
+        found[region] -= found[region].min()
+    pressure[rows.number] = found
+    return pressure, iterations
+
+
+def _refuse_crowd(compression: Floats) -> None:
+    """Refuse a closed region whose particles do not fit it."""
+    mean = float(compression.mean())
+    if abs(mean) > CLOSED_COMPRESSION:
+        raise ClosedRegionError(
+            f"{len(compression)} particles without a free surface are compressed by "
+            f"{100 * mean:.2g} %: no pressure can undo more than {100 * CLOSED_COMPRESSION:g} %"
+        )
+
+
+def _closed_regions(rows: Rows) -> list[Numbers]:
+    """Rows of each region without free surface."""
+    inside = np.flatnonzero(rows.closed)
+    if not len(inside):
+        return []
+    system, m = rows.system, len(rows.number)
+    matrix = csr_array((system.value, system.column, system.start), shape=(m, m))
+    count, label = connected_components(matrix[inside][:, inside], directed=False)
+    return [inside[label == k] for k in range(count)]

@@ -1,0 +1,74 @@
+"""What is computed and how: the metal, and the choices of the method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sandmould.casting.mps.operators import GRADIENTS
+from sandmould.casting.mps.sources import SOURCES
+
+VISCOUS_SHARE = 0.2
+"""Of r0^2/nu, the longest stable explicit step of the viscosity (0.3 on a square lattice)."""
+
+
+@dataclass(frozen=True)
+class Metal:
+    """A Newtonian fluid under gravity."""
+
+    density_kg_m3: float = 2500.0
+    """Molten aluminium, table 1."""
+    viscosity_m2_s: float = 1e-5
+    """Table 1."""
+    gravity_m_s2: tuple[float, float, float] = (0.0, -9.8, 0.0)
+    """The paper's 1960 Pa under 80 mm mean 9.8."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no fluid."""
+        if not self.density_kg_m3 > 0.0:
+            raise ValueError(f"density is {self.density_kg_m3} kg/m3: it must be positive")
+        if not self.viscosity_m2_s >= 0.0:
+            raise ValueError(f"viscosity is {self.viscosity_m2_s} m2/s: it cannot be negative")
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Choices of the method; what is not given is the paper's, at MR5-0.5."""
+
+    dt_max_s: float = 1e-3
+    relaxations: int = 5
+    """Times the pressure is solved for and positions are corrected in a step; 1 is plain MPS."""
+    source_share: float = 0.5
+    """c_poi: of the source that one relaxation undoes."""
+    source: str = "density"
+    """One of ``SOURCES``."""
+    gradient: str = "least"
+    """One of ``GRADIENTS``."""
+    surface: float = 0.985
+    """beta, eq. (7): number density over n0 below which a particle is at the surface."""
+    courant: float = 0.1
+    """C_n, eq. (8)."""
+    tolerance: float = 1e-2
+    """Of the Poisson equation: residual over source."""
+    tension: bool = False
+    """Whether pressures below zero are kept, which pull particles together."""
+    shifting: float = 0.0
+    """Share of r0^2 times the gradient of concentration by which inner particles are moved on after
+    a step (Lind et al. 2012); 0 for none."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be run."""
+        for name in ("dt_max_s", "courant", "tolerance"):
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise ValueError(f"{name} is {value}: it must be positive")
+        if self.relaxations < 1:
+            raise ValueError(f"relaxations is {self.relaxations}: at least 1 is needed")
+        if not 0.0 < self.source_share <= 1.0:
+            raise ValueError(f"source_share is {self.source_share}: valid is above 0 up to 1")
+        if not 0.8 <= self.surface <= 1.0:
+            raise ValueError(f"surface is {self.surface}: valid is 0.8 to 1")
+        if not 0.0 <= self.shifting <= 0.5:
+            raise ValueError(f"shifting is {self.shifting}: valid is 0 to 0.5")
+        for name, valid in (("source", SOURCES), ("gradient", GRADIENTS)):
+            if getattr(self, name) not in valid:
+                raise ValueError(f"{name} is '{getattr(self, name)}': valid are {', '.join(valid)}")
