@@ -27,7 +27,7 @@ from tests.scenes import open_lammps, tube_scene
 Array = NDArray[np.float64]
 SLAB_M = np.array([[0.001, 0.02], [0.04, 0.02], [0.079, 0.02], [0.079, 0.025], [0.04, 0.025],
                    [0.001, 0.025]])  # fmt: skip
-STIFFNESS_N_M = 2e3
+STIFFNESS_N_M = 1e4
 SCENE: dict[str, Any] = {
     "obstacles": [{"kind": "polygon", "name": "pattern", "vertices_m": SLAB_M.tolist()}],
     # The plate follows the sand within some windows: rest takes longer than on a fixed floor.
