@@ -26,9 +26,10 @@ class Race:
     first: dict[str, int] = field(default_factory=dict)
     """Runs that had been made when the guess was good for the first time."""
     since: dict[str, int] = field(default_factory=dict)
-    """Runs since which every guess was good, up to ``HELD_AFTER``; none where the last was not."""
+    """Runs since which every guess was good, up to ``held_after``; none where the last was not."""
     names: list[str] = field(default_factory=list)
     ended: str = ""
+    held_after: int = HELD_AFTER
     last: dict[str, Any] = field(default_factory=dict)
     """Last message with guesses, with all that came with it."""
 
@@ -43,7 +44,7 @@ class Race:
             good = miss_of(point) <= tolerance
             if good:
                 self.first.setdefault(name, self.runs)
-            if self.runs <= HELD_AFTER:
+            if self.runs <= self.held_after:
                 if good:
                     self.since.setdefault(name, self.runs)
                 else:
@@ -53,12 +54,12 @@ class Race:
     def over(self) -> bool:
         """Whether every guess was good once and it is known whether it stays so."""
         good = bool(self.names) and len(self.first) == len(self.names)
-        return good and self.runs >= HELD_AFTER
+        return good and self.runs >= self.held_after
 
 
 def run_race(
     method: Method, problem: Problem, simulate: Simulate, miss_of: Callable[..., float],
-    cap: int = CAP,
+    cap: int = CAP, held_after: int = HELD_AFTER,
 ) -> Race:  # fmt: skip
     """Let a method ask for runs until its guesses are good, it ends, or the cap is reached.
 
@@ -72,8 +73,10 @@ def run_race(
     miss_of : callable
         True miss of a point, degrees.
     cap : int
+    held_after : int
+        Runs up to which a good guess has to stay good.
     """
-    race = Race()
+    race = Race(held_after=held_after)
     messages: Messages = method.solve(problem)
     try:
         message = next(messages)
