@@ -22,8 +22,9 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.box import Plate
 from sandmould.scenario.scenario import FILLING, Scenario
 
-COLUMN_WIDTH = 1.0
-"""Columns that a surface is averaged over, in largest diameters."""
+COLUMN_WIDTH = {2: 1.0, 3: 0.5}
+"""Columns in 2D or rings in 3D that a surface is averaged over, in largest diameters: a ring holds
+more points, and a cone of as many grains is lower."""
 HEAP_DEPTH = 1.5
 """Sand deeper than this, in largest diameters, is a heap and no single grain that rolled away."""
 FLOWN_OUT = 0.95
@@ -34,7 +35,8 @@ def slopes(scenario: Scenario, snapshot: Snapshot) -> tuple[Slope, Slope]:
     """Slopes of the heap on the floor and of what stays in the hopper over a level gate."""
     gate = scenario.gate
     assert gate is not None
-    axis, width_m = np.array(gate.centre_m[:-1]), COLUMN_WIDTH * _largest_m(scenario)
+    axis = np.array(gate.centre_m[:-1])
+    width_m = COLUMN_WIDTH[scenario.dimension] * _largest_m(scenario)
     pouring = np.array(scenario.pouring_m)
     hopper = free_surface(
         snapshot.position_m,
