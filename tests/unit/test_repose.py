@@ -42,8 +42,8 @@ def test_a_pile_of_known_angle_is_measured(dimension: int, angle_deg: float) -> 
     surface = free_surface(position, radius, np.zeros(axes), np.full(axes, 0.2), 0.0)
     slope = heap_slope(surface, 4 * radius_m, np.full(axes, 0.1))
     assert len(slope.flanks) == {2: 2, 3: 4}[dimension]
-    # Steps of a grain over a slope of 30 or 60 of them.
-    assert slope.angle_deg == pytest.approx(angle_deg, abs=0.4)
+    # Steps of a grain over a slope of 30 or 60 of them; in 3D the median of a ring's few terraces.
+    assert slope.angle_deg == pytest.approx(angle_deg, abs={2: 0.4, 3: 0.5}[dimension])
     assert 0.0 < slope.se_deg < 0.6
     assert walls_touched(surface, np.zeros(axes), np.full(axes, 0.2), 3 * radius_m) == []
 
