@@ -1,8 +1,8 @@
 """Noise of pressure and velocity against cost: multiple relaxation and stabilised variants.
 
 ``python -m benchmarks.mps`` runs the still fluid of the MPS paper under each scheme and writes
-mps.json and mps.png to results/benchmarks/. By default 0.3 s, which shows that everything works: the
-paper runs 2 s, and schemes that are calm at first may not stay so.
+mps.json and mps.png to results/benchmarks/. By default 0.3 s, which shows that everything works:
+the paper runs 2 s, and schemes that are calm at first may not stay so.
 """
 
 from __future__ import annotations
