@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.coupling.body import Answer, ElasticBody
-from pattern_fe.coupling.ledger import Entry, Ledger, imbalance_n, rms_m, work_of
+from pattern_fe.coupling.ledger import LEDGER, Entry, Ledger, imbalance_n, rms_m, work_of
 from pattern_fe.coupling.settings import LoopSettings
-from pattern_fe.coupling.shapes_file import ShapesFile
+from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 
 Array = NDArray[np.float64]
-LEDGER, SHAPES, CHECKPOINT = "pattern.tsv", "pattern_shapes.f8", "pattern.npz"
+CHECKPOINT = "pattern.npz"
 
 
 class CoupledSession:

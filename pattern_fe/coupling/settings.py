@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 from pattern_fe.coupling.relaxation import Aitken, Fixed, QuasiNewton, Relaxation
+from sandmould.scenario.pattern import Loop
 
 Scheme = Literal["one_way", "fixed", "aitken", "quasi_newton"]
 _COLUMNS = 10
@@ -31,6 +32,12 @@ class LoopSettings:
     """Whether a window begins where the last displacements point to."""
     largest_displacement_m: float
     """Beyond it the loop has diverged."""
+
+    @classmethod
+    def of(cls, loop: Loop) -> LoopSettings:
+        """Settings of a scenario's loop that has windows."""
+        names = (field.name for field in fields(cls))
+        return cls(**{name: getattr(loop, name) for name in names})
 
     def relaxation(self) -> Relaxation:
         """A fresh memory of the scheme."""

@@ -12,10 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from pattern_fe.coupling.body import Answer
-from pattern_fe.coupling.ledger import read_ledger
-from pattern_fe.coupling.session import LEDGER, SHAPES, CoupledSession
+from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.coupling.settings import LoopSettings
-from pattern_fe.coupling.shapes_file import read_shapes
+from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
