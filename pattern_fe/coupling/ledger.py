@@ -26,6 +26,8 @@ class Entry:
     """Times that the window was computed."""
     factor: float
     """Share of the residual that is gone next."""
+    gain: float
+    """Last measured one; none but in the measured scheme."""
     residual_m: float
     """Root of the mean square over the vertices of answered less shown displacement."""
     displacement_m: float

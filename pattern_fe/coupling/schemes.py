@@ -7,6 +7,8 @@ from pattern_fe.pattern import Pattern
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.scenario import Scenario
 
+REFERENCE_ALONE = ("measured", "monolithic")
+"""Schemes that need what one engine has: to go back to a kept state, and to stop in every step."""
 ABOVE_VIBRATION = 5.0
 """Least ratio of the pattern's first frequency to that of the box, for an answer as if at rest."""
 
@@ -19,7 +21,10 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
     BadInputError
     """
     assert scenario.pattern is not None
-    if scenario.pattern.loop.scheme == "monolithic":
+    scheme, engine = scenario.pattern.loop.scheme, scenario.engine.name
+    if scheme in REFERENCE_ALONE and engine != "reference":
+        raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
+    if scheme == "monolithic":
         explicit_foam(scenario, pattern)
 
 
@@ -29,15 +34,12 @@ def explicit_foam(scenario: Scenario, pattern: Pattern) -> ExplicitFoam:
     Raises
     ------
     BadInputError
-        On another engine, with large displacements, with masses too small for the contacts, or so
-        large that the pattern swings with the box.
+        With large displacements, with masses too small for the contacts, or so large that the
+        pattern swings with the box.
     """
     told = scenario.pattern
     assert told is not None
     loop = told.loop
-    if scenario.engine.name != "reference":
-        valid = f"one of the staggered schemes on engine {scenario.engine.name}, or reference"
-        raise _bad("scheme", loop.scheme, valid)
     if told.statics == "large":
         raise _bad("scheme", loop.scheme, "a staggered scheme with pattern.statics = large")
     bound = ContactBound.of(scenario, pattern)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Literal
 
-from pattern_fe.coupling.relaxation import Aitken, Fixed, QuasiNewton, Relaxation
+from pattern_fe.coupling.relaxation import Aitken, Fixed, Measured, QuasiNewton, Relaxation
 from sandmould.scenario.pattern import Loop
 
-Scheme = Literal["one_way", "fixed", "aitken", "quasi_newton"]
+Scheme = Literal["one_way", "fixed", "measured", "aitken", "quasi_newton"]
 _COLUMNS = 10
 _FILTER = 1e-2
 """Share of a change that must be new: below it is noise of the sand."""
@@ -24,6 +24,8 @@ class LoopSettings:
     """Of the fixed scheme; of the others in their first window."""
     least_factor: float
     most_factor: float
+    limit_share: float
+    """Of the measured limit that the measured scheme goes."""
     repeats: int
     """Times that a window is computed again at most, from the state at its beginning."""
     tolerance: float
@@ -45,6 +47,9 @@ class LoopSettings:
             return Fixed(0.0)
         if self.scheme == "fixed":
             return Fixed(self.factor)
+        if self.scheme == "measured":
+            least, most = self.least_factor, self.most_factor
+            return Measured(self.factor, least, most, self.limit_share)
         if self.scheme == "aitken":
             return Aitken(self.factor, self.least_factor, self.most_factor)
         return QuasiNewton(self.factor, _COLUMNS, _FILTER)

@@ -94,12 +94,13 @@ def test_a_pattern_that_cannot_be_computed_is_told(pattern: dict[str, Any], says
     ("pattern", "scene", "says"),
     [
         ({}, {"engine": {"name": "lammps"}}, "pattern.loop.scheme = 'monolithic' .* on engine lam"),
+        ({"loop": {"scheme": "measured"}}, {"engine": {"name": "lammps"}}, "scheme = 'measured' "),
         ({"statics": "large"}, {}, "pattern.loop.scheme = 'monolithic' .* pattern.statics = large"),
         ({"loop": {"scheme": "monolithic", "mass_scale": 1.0}}, {}, "contacts would throw its li"),
         ({}, {"vibration": [{"acceleration_g": 1.0}]}, "pattern's first frequency, now .* Hz, is"),
     ],
 )  # fmt: skip
-def test_what_the_judge_lacks_is_told(
+def test_what_a_scheme_lacks_is_told(
     pattern: dict[str, Any], scene: dict[str, Any], says: str
 ) -> None:
     told = {**L_SCENE["pattern"], "loop": {"scheme": "monolithic"}, **pattern}
