@@ -92,9 +92,9 @@ class Loop(Section):
             "aitken",
             "How far the surface is moved to where the last loads bend the pattern: not at all, a "
             "fixed share, a share of the limit that a measured gain sets (reference engine), "
-            "Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no windows: monolithic "
-            "steps the pattern explicitly after every step of the grains; slow, the judge of the "
-            "others, reference engine.",
+            "Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no windows: "
+            "monolithic steps the pattern explicitly after every step of the grains; slow, the "
+            "judge of the others, reference engine.",
             source=ARGUED,
         )
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,16 @@ from numpy.typing import NDArray
 
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.opening import open_coupled
 from pattern_fe.pattern import Pattern
+from pattern_fe.scene import with_surface
 from pattern_fe.shapes import bar, mesh_of
 from pattern_fe.supports import Supports
 from sandmould.engines.outcome import Outcome
+from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from tests.patterns import _one_thread  # noqa: F401
-from tests.verification.one_grain import RADIUS_M
+from tests.verification.one_grain import RADIUS_M, one_grain_scene
 from tests.wedge import (
     FILL,
     SQUEEZE_M,
@@ -187,3 +191,22 @@ def test_masses_that_contacts_would_throw_are_told() -> None:
     bound = ContactBound.of(scenario, pattern)
     with pytest.raises(ValueError, match="mass scale of the pattern is 1, valid is above"):
         ExplicitFoam(pattern, scenario.step_s, bound, mass_scale=1.0)
+
+
+def test_a_scenario_opens_the_judge_and_its_log_tells_of_the_masses(tmp_path: Path) -> None:
+    told = {
+        "shape": {"kind": "bar", "width_m": 0.01, "height_m": 0.01},
+        "position_m": [0.02, 0.0],
+        "loop": {"scheme": "monolithic"},
+    }
+    scenario = with_surface(one_grain_scene(pattern=told, engine={"name": "reference"}))
+    session = open_coupled(build_program(scenario), tmp_path, tmp_path / "engine.log")
+    session.insert_layer(1)
+    session.start_stage(session.stage)
+    session.advance()
+    snapshot = session.snapshot()
+    session.close()
+    assert snapshot.pattern_m is not None
+    assert re.search(
+        r"masses times \d.*, first frequency \d", (tmp_path / "engine.log").read_text()
+    )
