@@ -59,6 +59,12 @@ class Perimeter:
         area = np.linalg.norm(self.facet_area_vector_m2, axis=1)
         return self._shared(area[:, None])[:, 0]
 
+    @property
+    def outer_line(self) -> slice:
+        """Vertices of the line that the sand meets in 2D: the outermost of a pattern with holes."""
+        vertices = self.vertices_m
+        return max(self.loops, key=lambda loop: np.ptp(vertices[loop], axis=0).max())
+
     def _shared(self, values: Array) -> Array:
         shared = np.zeros((len(self.vertices_m), values.shape[1]))
         for corner in self.facets.T:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.checks import check_inside
+from pattern_fe.coupling.schemes import refuse_scheme
 from pattern_fe.material import Foam
 from pattern_fe.mesh_file import read_mesh
 from pattern_fe.pattern import Pattern
@@ -78,12 +79,6 @@ def _blaming(key: str, value: Any) -> Iterator[None]:
         raise BadInputError([Problem(key, value, valid)]) from fault
 
 
-def outer_line(pattern: Pattern) -> slice:
-    """Vertices of the line that the sand meets: the outermost of a pattern with holes."""
-    vertices = pattern.surface.vertices_m
-    return max(pattern.surface.loops, key=lambda loop: np.ptp(vertices[loop], axis=0).max())
-
-
 def with_surface(scenario: Scenario) -> Scenario:
     """The scenario with its pattern among the obstacles, vertex for vertex.
 
@@ -95,7 +90,8 @@ def with_surface(scenario: Scenario) -> Scenario:
     if told is None:
         return scenario
     pattern = pattern_of(scenario)
-    vertices = pattern.surface.vertices_m[outer_line(pattern)]
+    refuse_scheme(scenario, pattern)
+    vertices = pattern.surface.vertices_m[pattern.surface.outer_line]
     outline = Polygon(
         kind="polygon", name=told.name, vertices_m=[tuple(v) for v in vertices.tolist()]
     )

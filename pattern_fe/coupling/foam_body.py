@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from pattern_fe.coupling.body import Answer
 from pattern_fe.elasticity import internal_force_n
 from pattern_fe.pattern import Pattern
-from pattern_fe.scene import outer_line
 
 Array = NDArray[np.float64]
 
@@ -27,7 +26,7 @@ class FoamBody:
         """
         self._pattern = pattern
         self._large = large
-        self._line = outer_line(pattern)
+        self._line = pattern.surface.outer_line
 
     @property
     def vertices_m(self) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 import pandas as pd
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pattern_fe.coupling.body import Answer
 
 Array = NDArray[np.float64]
+LEDGER = "pattern.tsv"
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Entry:
     """Times that the window was computed."""
     factor: float
     """Share of the residual that is gone next."""
+    gain: float
+    """Last measured one; none but in the measured scheme."""
     residual_m: float
     """Root of the mean square over the vertices of answered less shown displacement."""
     displacement_m: float
@@ -41,9 +44,6 @@ class Entry:
     """Elastic energy of the pattern as it answered."""
     solve_s: float
     """Wall time of the pattern's part."""
-
-
-COLUMNS = tuple(field.name for field in fields(Entry))
 
 
 def rms_m(displacement_m: Array) -> float:
@@ -67,9 +67,11 @@ def imbalance_n(load_n: Array, answer: Answer) -> float:
 
 
 class Ledger:
-    """Table of all windows; a resumed run cuts it back to its checkpoint."""
+    """Table of rows of one kind; a resumed run cuts it back to its checkpoint."""
 
-    def __init__(self, path: Path, trusted_bytes: int | None = None) -> None:
+    def __init__(
+        self, path: Path, trusted_bytes: int | None = None, kind: type[Any] = Entry
+    ) -> None:
         """Open the table.
 
         Parameters
@@ -77,16 +79,18 @@ class Ledger:
         path : Path
         trusted_bytes : int, optional
             Length of what a checkpoint vouches for; none begins anew.
+        kind : type
+            Frozen dataclass of the rows, a column a field.
         """
-        header = "\t".join(COLUMNS) + "\n"
+        header = "\t".join(field.name for field in fields(kind)) + "\n"
         if trusted_bytes is None:
             path.write_text(header, encoding="utf-8")
         self._file: TextIO = path.open("r+", encoding="utf-8")
         self._file.truncate(trusted_bytes or len(header))
         self._file.seek(trusted_bytes or len(header))
 
-    def write(self, entry: Entry) -> None:
-        """Append a window."""
+    def write(self, entry: Any) -> None:
+        """Append a row."""
         row = (str(v) if isinstance(v, int) else f"{v:.9g}" for v in astuple(entry))
         self._file.write("\t".join(row) + "\n")
 
@@ -101,5 +105,5 @@ class Ledger:
 
 
 def read_ledger(path: Path) -> pd.DataFrame:
-    """All windows of a run; columns as in ``Entry``."""
+    """All rows of a run; columns as the fields of what was written."""
     return pd.read_csv(path, sep="\t")

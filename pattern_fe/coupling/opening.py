@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import cast
 
 from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.judge import JudgeSession
+from pattern_fe.coupling.schemes import explicit_foam
 from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.coupling.settings import LoopSettings
 from pattern_fe.scene import pattern_of
@@ -33,9 +35,28 @@ def open_coupled(
     scenario = program.scenario
     told = scenario.pattern
     assert told is not None
+    if told.loop.scheme == "monolithic":
+        return cast(Session, _open_judge(program, log, checkpoint))
     body = FoamBody(pattern_of(scenario), told.statics == "large")
-    settings = LoopSettings(**told.loop.model_dump())
+    settings = LoopSettings.of(told.loop)
     inner = engine_of(scenario).open_session(program, folder, log, checkpoint)
     counts = StepCounts.of(scenario)
     session = CoupledSession(inner, body, told.name, settings, counts, log.parent, checkpoint)
     return cast(Session, session)
+
+
+def _open_judge(program: Program, log: Path, checkpoint: Path | None) -> JudgeSession:
+    """Open the judge; the log says how the pattern's masses are scaled."""
+    scenario = program.scenario
+    told = scenario.pattern
+    assert told is not None
+    foam = explicit_foam(scenario, pattern_of(scenario))
+    limit_m = told.loop.largest_displacement_m
+    session = JudgeSession(program, foam, told.name, limit_m, log.parent, checkpoint)
+    log.write_text(
+        f"reference solver, kernels {session.version}\n"
+        f"pattern in every step: masses times {foam.mass_scale:.4g}, {foam.sub_steps} steps in one "
+        f"of the grains, first frequency {foam.first_hz:.4g} Hz\n",
+        encoding="utf-8",
+    )
+    return session

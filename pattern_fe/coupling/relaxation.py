@@ -54,6 +54,26 @@ class Fixed:
         """Nothing is remembered."""
 
 
+class Measured(Fixed):
+    """A share of the limit 2 / (1 + g) of a fixed factor, for a gain that was measured."""
+
+    def __init__(self, first: float, least: float, most: float, share: float) -> None:
+        super().__init__(first)
+        self._least, self._most, self._share = least, most, share
+
+    def learn(self, limit: float) -> None:
+        """Take up the limit that a new gain sets."""
+        self.factor = float(np.clip(self._share * limit, self._least, self._most))
+
+    def state(self) -> dict[str, Array]:
+        """The factor."""
+        return {"factor": np.array([self.factor])}
+
+    def restore(self, arrays: dict[str, Array]) -> None:
+        """Take up the factor."""
+        self.factor = float(arrays["factor"][0])
+
+
 class Aitken:
     """One share for all, from how the last two residuals differ (Küttler and Wall 2008, (44)).
 

@@ -11,16 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.coupling.body import Answer, ElasticBody
-from pattern_fe.coupling.ledger import Entry, Ledger, imbalance_n, rms_m, work_of
+from pattern_fe.coupling.gain import measure_gain
+from pattern_fe.coupling.ledger import LEDGER, Entry, Ledger, imbalance_n, rms_m, work_of
+from pattern_fe.coupling.relaxation import Measured
 from pattern_fe.coupling.settings import LoopSettings
-from pattern_fe.coupling.shapes_file import ShapesFile
+from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 
 Array = NDArray[np.float64]
-LEDGER, SHAPES, CHECKPOINT = "pattern.tsv", "pattern_shapes.f8", "pattern.npz"
+CHECKPOINT = "pattern.npz"
 
 
 class CoupledSession:
@@ -70,6 +72,7 @@ class CoupledSession:
         self._shown = np.zeros_like(rest)
         self._next = np.zeros_like(rest)
         self._work_j = self._solve_s = 0.0
+        self._gain = np.nan
         ledger_bytes, rows = None, 0
         if checkpoint is not None:
             ledger_bytes, rows = self._take_up(checkpoint)
@@ -96,9 +99,23 @@ class CoupledSession:
         while inner.steps < end and not inner.stage_over:
             within = inner.steps % record
             window = int(self._ends[np.searchsorted(self._ends, within, side="right")]) - within
+            if within == 0:
+                self._measure(window * inner.step_s)
             self._window(min(window, end - inner.steps))
         if inner.is_root:
             self._shapes.write(inner.time_s, self._shown)
+
+    def _measure(self, window_s: float) -> None:
+        """Measure the gain anew, at every record: sand that falls, settles or is shaken changes it.
+
+        Without a load the factor stays.
+        """
+        relaxation = self._relaxation
+        if isinstance(relaxation, Measured):
+            found = measure_gain(self._inner, self._body, self._surface, self._next, window_s)
+            if found is not None:
+                self._gain = found.gain
+                relaxation.learn(found.limit)
 
     def _window(self, steps: int) -> None:
         """Compute one window, as often as the settings ask."""
@@ -152,6 +169,7 @@ class CoupledSession:
                 window_s=steps * self._inner.step_s,
                 passes=passes,
                 factor=self._relaxation.factor,
+                gain=self._gain,
                 residual_m=rms_m(answer.displacement_m - shown),
                 displacement_m=rms_m(shown),
                 largest_m=float(np.linalg.norm(shown, axis=1).max()),
@@ -192,6 +210,7 @@ class CoupledSession:
             "shown": self._shown,
             "next": self._next,
             "work_j": self._work_j,
+            "gain": self._gain,
             "ledger_bytes": size,
             "rows": self._shapes.rows,
         }
@@ -203,6 +222,7 @@ class CoupledSession:
         with np.load(checkpoint / CHECKPOINT) as kept:
             self._shown, self._next = kept["shown"], kept["next"]
             self._work_j = float(kept["work_j"])
+            self._gain = float(kept["gain"])
             start = "relaxation_"
             memory = {k.removeprefix(start): kept[k] for k in kept.files if k.startswith(start)}
             self._relaxation.restore(memory)

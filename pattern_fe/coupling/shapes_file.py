@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+SHAPES = "pattern_shapes.f8"
 
 
 class ShapesFile:

@@ -87,17 +87,29 @@ class Loop(Section):
         0.002, "Length of a window; rounded so that a record holds whole ones.", unit="s",
         source=ARGUED, gt=0, le=1,
     )  # fmt: skip
-    scheme: Literal["one_way", "fixed", "aitken", "quasi_newton"] = quantity(
-        "aitken",
-        "How far the surface is moved to where the last loads bend the pattern: not at all, a "
-        "fixed share, Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS).",
-        source=ARGUED,
+    scheme: Literal["one_way", "fixed", "measured", "aitken", "quasi_newton", "monolithic"] = (
+        quantity(
+            "aitken",
+            "How far the surface is moved to where the last loads bend the pattern: not at all, a "
+            "fixed share, a share of the limit that a measured gain sets (reference engine), "
+            "Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no windows: "
+            "monolithic steps the pattern explicitly after every step of the grains; slow, the "
+            "judge of the others, reference engine.",
+            source=ARGUED,
+        )
     )
     factor: float = quantity(
         0.02, "The fixed share, or that of the first window.", source=ARGUED, gt=0, le=1
     )
-    least_factor: float = quantity(0.002, "Least share of Aitken's.", source=ARGUED, gt=0, le=1)
-    most_factor: float = quantity(0.5, "Greatest share of Aitken's.", source=ARGUED, gt=0, le=1)
+    least_factor: float = quantity(
+        0.002, "Least share of Aitken's or measured.", source=ARGUED, gt=0, le=1
+    )
+    most_factor: float = quantity(
+        0.5, "Greatest share of Aitken's or measured.", source=ARGUED, gt=0, le=1
+    )
+    limit_share: float = quantity(
+        0.5, "Share in the measured scheme of the limit 2 / (1 + gain).", source=ARGUED, gt=0, le=1
+    )
     repeats: int = quantity(
         0, "Times that a window is computed again at most; reference engine.", source=ARGUED,
         ge=0, le=100,
@@ -109,6 +121,16 @@ class Loop(Section):
     predicts: bool = quantity(
         False, "Whether a window goes on as the last one went.", source=ARGUED
     )
+    mass_scale: float | None = quantity(
+        None,
+        "Factor of the pattern's masses in the monolithic scheme; just large enough for the step "
+        "of the grains and for their contacts unless given.",
+        source=ARGUED, gt=0,
+    )  # fmt: skip
+    damping_ratio: float = quantity(
+        0.5, "Damping of the pattern's slowest mode in the monolithic scheme, by mass damping.",
+        source=ARGUED, ge=0, le=10,
+    )  # fmt: skip
     largest_displacement_m: float = quantity(
         0.05, "Displacement beyond which the loop has diverged.", unit="m", source=ARGUED, gt=0
     )

@@ -90,6 +90,24 @@ def test_a_pattern_that_cannot_be_computed_is_told(pattern: dict[str, Any], says
         with_surface(Scenario.model_validate(tree))
 
 
+@pytest.mark.parametrize(
+    ("pattern", "scene", "says"),
+    [
+        ({}, {"engine": {"name": "lammps"}}, "pattern.loop.scheme = 'monolithic' .* on engine lam"),
+        ({"loop": {"scheme": "measured"}}, {"engine": {"name": "lammps"}}, "scheme = 'measured' "),
+        ({"statics": "large"}, {}, "pattern.loop.scheme = 'monolithic' .* pattern.statics = large"),
+        ({"loop": {"scheme": "monolithic", "mass_scale": 1.0}}, {}, "contacts would throw its li"),
+        ({}, {"vibration": [{"acceleration_g": 1.0}]}, "pattern's first frequency, now .* Hz, is"),
+    ],
+)  # fmt: skip
+def test_what_a_scheme_lacks_is_told(
+    pattern: dict[str, Any], scene: dict[str, Any], says: str
+) -> None:
+    told = {**L_SCENE["pattern"], "loop": {"scheme": "monolithic"}, **pattern}
+    with pytest.raises(BadInputError, match=says):
+        with_surface(Scenario.model_validate({**L_SCENE, "pattern": told, **scene}))
+
+
 def test_a_pattern_in_space_is_told() -> None:
     with pytest.raises(BadInputError, match="dimension = 3"):
         with_surface(Scenario.model_validate({**L_SCENE, "dimension": 3}))

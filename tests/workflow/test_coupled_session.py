@@ -12,10 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from pattern_fe.coupling.body import Answer
-from pattern_fe.coupling.ledger import read_ledger
-from pattern_fe.coupling.session import LEDGER, SHAPES, CoupledSession
+from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.coupling.settings import LoopSettings
-from pattern_fe.coupling.shapes_file import read_shapes
+from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
@@ -56,7 +56,7 @@ class Plate:
 def settings(**changes: Any) -> LoopSettings:
     values: dict[str, Any] = {
         "window_s": 0.002, "scheme": "fixed", "factor": 0.02, "least_factor": 0.005,
-        "most_factor": 1.0, "repeats": 0, "tolerance": 0.01, "predicts": False,
+        "most_factor": 1.0, "limit_share": 0.5, "repeats": 0, "tolerance": 0.01, "predicts": False,
         "largest_displacement_m": 0.02,
     }  # fmt: skip
     return LoopSettings(**(values | changes))

@@ -1,0 +1,162 @@
+"""The foam pattern in motion, stepped with the grains by central differences."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.pattern import Pattern
+from sandmould.scenario.scenario import Scenario
+
+Array = NDArray[np.float64]
+STABLE_SHARE = 0.8
+"""Of what central differences bear: several grains may lean on one vertex at a slant."""
+
+
+@dataclass(frozen=True)
+class ContactBound:
+    """The stiffest spring and dashpot that the sand can put on one vertex."""
+
+    stiffness_n_m: float
+    damping_n_s_m: float
+
+    @classmethod
+    def of(cls, scenario: Scenario, pattern: Pattern) -> ContactBound:
+        """Contacts of the largest grains, eq. (19), as many as find room on a facet."""
+        law, classes = scenario.contact.grain_wall, scenario.sand.classes(scenario.dimension)
+        mass_kg = scenario.sand.grain_mass_kg(classes[-1].diameter_m, scenario.dimension)
+        dashpot = 2.0 * law.damping_ratio * math.sqrt(mass_kg * law.normal_stiffness_n_m)
+        stiffness = max(law.normal_stiffness_n_m, law.tangential_stiffness_n_m)
+        corner = pattern.surface.vertices_m[pattern.surface.facets]
+        longest_m = float(np.linalg.norm(corner[:, 1] - corner[:, 0], axis=1).max())
+        contacts = 1 + math.floor(longest_m / classes[0].diameter_m)
+        return cls(contacts * stiffness, contacts * dashpot)
+
+    def mass_kg(self, step_s: float) -> float:
+        """Least mass of a vertex that such contacts do not throw.
+
+        Dashpots take the velocity half a step ago, as the grains' do (section 3.5): M must be above
+        dt C / 2 + dt^2 K / 4.
+        """
+        return 0.5 * step_s * self.damping_n_s_m + 0.25 * step_s**2 * self.stiffness_n_m
+
+
+class ExplicitFoam:
+    """A pattern with lumped, scaled masses under loads on its outer line; small displacements.
+
+    Its energies obey the discrete balance of central differences to round-off: velocities live
+    half a step from the displacements, and so does the elastic energy u_n K u_n+1 / 2.
+    """
+
+    def __init__(
+        self,
+        pattern: Pattern,
+        step_s: float,
+        contact: ContactBound,
+        mass_scale: float | None = None,
+        damping_ratio: float = 0.0,
+    ) -> None:
+        """Stand at rest as drawn.
+
+        Parameters
+        ----------
+        pattern : Pattern
+        step_s : float, s
+            Of the grains.
+        contact : ContactBound
+        mass_scale : float, optional
+            Factor of all masses; just large enough for one step a step of the grains, and not
+            below 1, unless given. With a smaller one the pattern goes in shorter steps.
+        damping_ratio : float
+            Of the slowest mode, by mass damping.
+
+        Raises
+        ------
+        ValueError
+            When the masses are too small for the contacts: no step of the pattern's own helps.
+        """
+        line = pattern.surface.outer_line
+        self._nodes = pattern.surface.nodes[line]
+        self.vertices_m = pattern.surface.vertices_m[line]
+        """Of the outer line as drawn, (nv, d) float64, m."""
+        free = ~pattern.fixed[self._nodes].all(axis=1)
+        pressed = contact.mass_kg(step_s) / float(pattern.mass_kg[self._nodes][free].min())
+        inner = (step_s / pattern.critical_step_s()) ** 2
+        least = pressed / STABLE_SHARE
+        if mass_scale is None:
+            mass_scale = max(1.0, (inner + pressed) / STABLE_SHARE)
+        elif mass_scale <= least:
+            raise ValueError(
+                f"mass scale of the pattern is {mass_scale:g}, valid is above {least:.3g} or a "
+                f"shorter time step than {step_s:.3g} s: contacts would throw its lightest vertex"
+            )
+        self.mass_scale = mass_scale
+        self.sub_steps = math.ceil(math.sqrt(inner / (STABLE_SHARE * mass_scale - pressed)) - 1e-9)
+        """Steps of the pattern in one of the grains, under a load that stays."""
+        self.first_hz = float(pattern.natural_frequencies_hz(1, True)[0]) / math.sqrt(mass_scale)
+        """Lowest natural frequency with the masses scaled."""
+        self._stiffness = pattern.stiffness.tocsr()
+        self._mass_kg = mass_scale * pattern.mass_kg[:, None]
+        self._damping_1_s = 4.0 * math.pi * self.first_hz * damping_ratio
+        self._motion = pattern.central_differences(
+            step_s / self.sub_steps, self._damping_1_s, mass_scale
+        )
+        self._before = self._motion.displacement_m
+        self.work_j = self.damped_j = 0.0
+        """Work of the loads, and what damping took of it, since the start."""
+
+    @property
+    def displacement_m(self) -> Array:
+        """Of the vertices of the outer line, (nv, d) float64, m."""
+        return np.asarray(self._motion.displacement_m[self._nodes])
+
+    def advance(self, load_n: Array) -> None:
+        """Go on by one step of the grains.
+
+        Parameters
+        ----------
+        load_n : (nv, d) float64, N
+            On the outer line, at the start of the step.
+        """
+        motion = self._motion
+        load = np.zeros_like(motion.displacement_m)
+        load[self._nodes] = load_n
+        for _ in range(self.sub_steps):
+            self._before, velocity = motion.displacement_m, motion.velocity_m_s
+            motion.advance(load)
+            mean = 0.5 * (velocity + motion.velocity_m_s)
+            self.work_j += motion.step_s * float(np.vdot(load, mean))
+            lost = self._damping_1_s * float(np.vdot(self._mass_kg * mean, mean))
+            self.damped_j += motion.step_s * lost
+
+    @property
+    def kinetic_j(self) -> float:
+        """Kinetic energy of the scaled masses, half a step ago."""
+        velocity = self._motion.velocity_m_s
+        return 0.5 * float(np.vdot(self._mass_kg * velocity, velocity))
+
+    @property
+    def elastic_j(self) -> float:
+        """Elastic energy half a step ago, that of a bedding included."""
+        force = self._stiffness @ self._motion.displacement_m.ravel()
+        return 0.5 * float(self._before.ravel() @ force)
+
+    def state(self) -> dict[str, Array]:
+        """All that moves, by name."""
+        motion = self._motion
+        return {
+            "displacement": motion.displacement_m,
+            "velocity": motion.velocity_m_s,
+            "before": self._before,
+            "energies": np.array([self.work_j, self.damped_j]),
+        }
+
+    def restore(self, arrays: dict[str, Array]) -> None:
+        """Go on from what ``state`` gave."""
+        self._motion.displacement_m = arrays["displacement"]
+        self._motion.velocity_m_s = arrays["velocity"]
+        self._before = arrays["before"]
+        self.work_j, self.damped_j = (float(x) for x in arrays["energies"])

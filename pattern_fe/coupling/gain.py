@@ -1,0 +1,85 @@
+"""How strongly the sand answers a pattern that moves: the gain of the staggered loop, measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.body import ElasticBody
+from pattern_fe.coupling.ledger import rms_m
+from sandmould.engines.session import Session
+
+Array = NDArray[np.float64]
+MOVED_M = 1e-6
+"""Size of the perturbation: grains overlap a surface by some hundred times as much."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Change of the answered displacement, taken negative, over the change of what was shown."""
+
+    gain: float
+
+    @property
+    def limit(self) -> float:
+        """Fixed factor below which the loop holds, 2 / (1 + g).
+
+        With a spring a and a dashpot b of the sand, as shares of the pattern's stiffness and the
+        dashpot over the window, g = a + 2 b; the true limit is the smaller of 2 / (1 + 2 b) and
+        2 / (a - 2 b), where that is positive. Neither is below 2 / (1 + g).
+        """
+        return 2.0 / (1.0 + max(0.0, self.gain))
+
+
+def measure_gain(
+    session: Session,
+    body: ElasticBody,
+    surface: str,
+    shown_m: Array,
+    window_s: float,
+    moved_m: float = MOVED_M,
+) -> Gain | None:
+    """Compute a window twice, once led a little farther along the answer; the session stays.
+
+    Parameters
+    ----------
+    session : Session
+        Of an engine that can keep a state and go back.
+    body : ElasticBody
+    surface : str
+        Its name in the engine.
+    shown_m : (nv, d) float64, m
+        Displacement that the window leads to.
+    window_s : float
+    moved_m : float
+        Perturbation, root of the mean square over the vertices.
+
+    Returns
+    -------
+    Gain or None
+        None where no sand presses on the pattern.
+
+    Raises
+    ------
+    RefusedError
+        On an engine that cannot go back.
+    """
+    kept = session.keep()
+
+    def answered(target_m: Array) -> Array | None:
+        session.move_surface(surface, body.vertices_m + target_m, window_s)
+        session.advance(window_s)
+        load = session.vertex_loads(surface)
+        session.go_back(kept)
+        return None if load is None else body.answer(load).displacement_m
+
+    plain = answered(shown_m)
+    if plain is None or not plain.any():
+        return None
+    way = plain * (moved_m / rms_m(plain))
+    led = answered(shown_m + way)
+    assert led is not None
+    # the surface moves evenly: in the mean over the window the sand sees half of the way
+    return Gain(-float(np.vdot(led - plain, way) / (0.5 * np.vdot(way, way))))

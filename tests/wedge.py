@@ -1,0 +1,103 @@
+"""One frictionless disc squeezed between the left wall and the end of a foam bar, no gravity.
+
+The bar is one element high and of the first order: its end stays straight, so that two contact
+springs and the bar, a third spring, are in series.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
+from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.judge import JudgeSession
+from pattern_fe.coupling.session import CoupledSession
+from pattern_fe.coupling.settings import LoopSettings
+from pattern_fe.material import Foam
+from pattern_fe.pattern import Pattern
+from pattern_fe.shapes import bar, mesh_of
+from pattern_fe.supports import Supports
+from sandmould.engines.program import build_program
+from sandmould.engines.reference.session import ReferenceSession
+from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.scenario import Scenario
+from tests.verification.one_grain import RADIUS_M, one_grain_scene
+
+Array = NDArray[np.float64]
+SQUEEZE_M = 1e-4
+"""Overlap with either side before the bar gives way."""
+WALL_N_M = 2e4
+HEIGHT_M = 0.015
+"""Of the disc and of the middle of the bar."""
+LENGTH_M = 0.02
+FILL: dict[str, Any] = {"layers": [{"count": 1}], "settling": {"shortest_s": 1.9}}
+
+
+def wedge_pattern(young_pa: float, gap_m: float = 2 * (RADIUS_M - SQUEEZE_M)) -> Pattern:
+    """A bar clamped at its right end, its left end at a distance from the wall."""
+    mesh = mesh_of(bar(LENGTH_M, 0.01), 0.01).translated(np.array([gap_m, HEIGHT_M - 0.005]))
+    return Pattern(mesh, Supports(clamped=("right",)), Foam(young_pa), 1, 0.1)
+
+
+def end_stiffness_n_m(pattern: Pattern) -> float:
+    """Force on the middle of the bar's end over the way it goes."""
+    surface = pattern.surface
+    end = surface.vertices_m[:, 0] < surface.vertices_m[:, 0].min() + 1e-9
+    load = np.zeros_like(surface.vertices_m)
+    load[end, 0] = 0.5
+    moved = pattern.on_surface(pattern.solve_linear(pattern.on_nodes(load)))
+    return float(1.0 / moved[end, 0].mean())
+
+
+def wedge_scene(pattern: Pattern, damping_ratio: float = 0.95, **changes: Any) -> Scenario:
+    """The scene of a bar; the fill ends when a test does."""
+    outline = pattern.surface.vertices_m[pattern.surface.outer_line]
+    wall = {"friction": 0.0, "damping_ratio": damping_ratio, "normal_stiffness_n_m": WALL_N_M}
+    scene = {
+        "gravity_m_s2": 0.0,
+        "obstacles": [{"kind": "polygon", "name": "pattern", "vertices_m": outline.tolist()}],
+        "contact": {"grain_wall": wall},
+        "time_step": {"step_s": 1e-5},
+        "engine": {"name": "reference"},
+        "fill": FILL,
+        "record": {"load_every_steps": 1, "series_every_s": 2e-3},
+    }
+    return one_grain_scene(**(scene | changes))
+
+
+def judge(
+    pattern: Pattern, scenario: Scenario, folder: Path, checkpoint: Path | None = None, **foam: Any
+) -> JudgeSession:
+    """The judge of a scene; see ``ExplicitFoam`` for the settings of the foam."""
+    body = ExplicitFoam(pattern, scenario.step_s, ContactBound.of(scenario, pattern), **foam)
+    return JudgeSession(build_program(scenario), body, "pattern", 0.01, folder, checkpoint)
+
+
+def staggered(pattern: Pattern, scenario: Scenario, folder: Path, **changes: Any) -> CoupledSession:
+    """The staggered loop of a scene."""
+    values: dict[str, Any] = {
+        "window_s": 2e-4, "scheme": "quasi_newton", "factor": 0.1, "least_factor": 1e-3,
+        "most_factor": 1.0, "limit_share": 0.5, "repeats": 0, "tolerance": 1e-9, "predicts": False,
+        "largest_displacement_m": 0.01,
+    }  # fmt: skip
+    settings = LoopSettings(**(values | changes))
+    inner, counts = ReferenceSession(build_program(scenario)), StepCounts.of(scenario)
+    return CoupledSession(inner, FoamBody(pattern), "pattern", settings, counts, folder)
+
+
+def put_disc(session: Any, x_m: float = RADIUS_M - SQUEEZE_M, speed_m_s: float = 0.0) -> None:
+    """Place the disc before the bar and begin."""
+    session.insert_layer(1)
+    session.set_state(np.array([[x_m, HEIGHT_M]]), np.array([[speed_m_s, 0.0]]), np.zeros((1, 3)))
+    session.start_stage(session.stage)
+
+
+def end_moved_m(session: Any, pattern: Pattern) -> float:
+    """How far the bar's end has been pushed in."""
+    vertices = pattern.surface.vertices_m[pattern.surface.outer_line]
+    end = vertices[:, 0] < vertices[:, 0].min() + 1e-9
+    return float(session.displacement_m[end, 0].mean())
