@@ -23,7 +23,6 @@ from sandmould.engines.products import Computed, Cost, peak_memory_bytes
 from sandmould.engines.progress import Progress
 from sandmould.scenario.solidification import Solidification
 
-ENGINE = "arpm"
 PRODUCTS = ("series.tsv", "fields.npz")
 
 
@@ -52,9 +51,14 @@ def source_hash() -> str:
     return hashlib.sha256(b"".join(f.read_bytes() for f in source_files())).hexdigest()[:12]
 
 
+def engine_of(scenario: Solidification) -> str:
+    """What computes it, as tables call it."""
+    return "differences" if scenario.exchange == "difference" else "arpm"
+
+
 def no_cost(scenario: Solidification) -> ElementCost:
     """Cost of a run that has not begun."""
-    return ElementCost(ENGINE, 1, math.nan, scenario.step_share, source_hash())
+    return ElementCost(engine_of(scenario), 1, math.nan, scenario.step_share, source_hash())
 
 
 def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
