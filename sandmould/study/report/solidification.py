@@ -177,7 +177,7 @@ def _curve_percent(
 
 def _error_cost(errors: Sequence[_Error]) -> str:
     """Errors over the processor's time, both on logarithmic axes."""
-    figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
+    figure = Figure(figsize=(11, 5.2), dpi=110, layout="constrained")
     panels = figure.subplots(1, 2)
     for place, one in enumerate(errors):
         marker = MARKERS[place % len(MARKERS)]
@@ -190,7 +190,8 @@ def _error_cost(errors: Sequence[_Error]) -> str:
         panel.set_xlabel("processor time, s")
         panel.set_ylabel(what)
         panel.grid(alpha=0.3, which="both")
-    panels[1].legend(fontsize=7)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3,
+                  fontsize=8)  # fmt: skip
     return png(figure)
 
 
