@@ -43,8 +43,13 @@ class Cost:
         return cls(scenario.engine.name, scenario.engine.ranks, scenario.step_s, fraction)
 
     def row(self) -> dict[str, Any]:
-        """Columns and values."""
+        """Values by name, as a continued run takes them up."""
         return asdict(self)
+
+    def columns(self) -> dict[str, Any]:
+        """Columns of ``cost.tsv`` and their values."""
+        rate = self.grain_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
+        return {**self.row(), "grain_steps_per_s": rate}
 
 
 @dataclass(frozen=True)
@@ -106,8 +111,7 @@ def finish(
             shutil.rmtree(target)
         if (work / name).exists():
             os.replace(work / name, target)
-    rate = cost.grain_steps / cost.engine_wall_s if cost.engine_wall_s > 0 else 0.0
-    row = {**cost.row(), "grain_steps_per_s": rate}
+    row = cost.columns()
     with (folder / "cost.tsv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(row), delimiter="\t", lineterminator="\n")
         writer.writeheader()

@@ -70,7 +70,7 @@ def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Bat
 
     for run in runs:
         kind, scenario = kind_of(run.scenario), run.scenario
-        alike = _Alike(str(scenario.engine.name), kind.threads(scenario), kind.ranks(scenario))
+        alike = _Alike(kind.speed_class(scenario)[0], kind.threads(scenario), kind.ranks(scenario))
         kept.setdefault(alike, []).append(run)
         filled[alike] = filled.get(alike, 0.0) + planned_wall_s(run)
         if filled[alike] >= wall_s * beside(alike):

@@ -236,7 +236,9 @@ class _AtPoint:
     ) -> Iterator[Run]:
         dump = base.model_dump(mode="json")
         parameters = {key: value_at(dump, key) for key in self.point}
-        label = run_label({ENGINE: base.engine.name, **parameters} if source else parameters)
+        label = run_label(
+            {ENGINE: self.kind.speed_class(base)[0], **parameters} if source else parameters
+        )
         if part.startswith("control"):
             label = f"{letters(part)}_{run_label(parameters)}"
         sources = {**dict(_sources(base, self.origin)), **source}

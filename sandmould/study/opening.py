@@ -20,7 +20,13 @@ from sandmould.study.calibration import asked as calibration
 from sandmould.study.certificate import asked as certificate
 from sandmould.study.kinds.kind import kind_named
 from sandmould.study.rounds import asked as rounds
-from sandmould.study.study import ONLY_SAND, DeckStudy, Material, Study, study_model
+from sandmould.study.study import (
+    ONLY_SAND,
+    SolidificationStudy,
+    Study,
+    material_model,
+    study_model,
+)
 
 STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
@@ -81,17 +87,17 @@ def open_study(path: Path) -> OpenStudy:
         valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
         raise BadInputError([Problem("file name", path.name, valid, shown)])
     files = _files(path)
-    model = _model(files)
+    kind = _kind(files)
+    model, material_of = study_model(kind), material_model(kind)
     found = [p for f in files for p in _wrong_units(model, f)]
     origin = Origin(file={"": shown})
-    kind = "deck" if model is DeckStudy else "sand"
     tree: Tree = {"scenario": kind_named(kind).defaults()}
     material = _material(files)
-    if material is not None:
-        found += _wrong_units(Material, material)
+    if material is not None and material_of is not None:
+        found += _wrong_units(material_of, material)
         # By itself first, so that a message has the key as the material's file has it.
         alone = Origin(file={"": material.shown})
-        validated(Material, merge({}, material.tree, alone, material.shown), alone)
+        validated(material_of, merge({}, material.tree, alone, material.shown), alone)
         tree = merge(tree, {"scenario": material.tree}, origin, material.shown)
     for file in files:
         if "sweep" in file.tree:
@@ -106,6 +112,7 @@ def open_study(path: Path) -> OpenStudy:
     found = sweep.problems(study.sweep, base, study.replicates) or [
         *comparing.problems(study),
         *_reported(study),
+        *_reference(study),
         *calibration.problems(study.calibration, study.sweep),
         *rounds.problems(study.refine, study.sweep, study.objective.better, study.scenario.seed),
         *certificate.problems(
@@ -117,21 +124,25 @@ def open_study(path: Path) -> OpenStudy:
     return OpenStudy(path.stem, path, study, tree, origin)
 
 
-def _model(files: list[_File]) -> type[Study]:
-    """Type of the study, by the last file that states its kind."""
+def _kind(files: list[_File]) -> str:
+    """Kind of the study, by the last file that states it; the schema refuses what is none."""
     stated = [f for f in files if "kind" in f.tree]
-    kind = stated[-1].tree["kind"] if stated else "sand"
-    if kind in ("solidification", "flow"):
-        valid = "sand or deck; solidification and flow come with their own solvers"
+    kind = str(stated[-1].tree["kind"]) if stated else "sand"
+    if kind == "flow":
+        valid = "sand, deck or solidification; flow comes with its own solver"
         raise BadInputError([Problem("kind", kind, valid, stated[-1].shown)])
-    return study_model(str(kind))
+    return kind if kind in ("deck", "solidification") else "sand"
 
 
 def _not_of_its_kind(tree: Tree) -> Iterator[Problem]:
     """Sections that only studies of sand have."""
-    for name in ONLY_SAND if tree.get("kind", "sand") != "sand" else ():
+    kind = tree.get("kind", "sand")
+    absent = [*(ONLY_SAND if kind != "sand" else ()), *(["material"] if kind == "deck" else ())]
+    for name in absent:
         if tree.get(name):
-            yield Problem(name, tree[name], f"absent in a study of kind {tree['kind']}")
+            yield Problem(name, tree[name], f"absent in a study of kind {kind}")
+    if kind == "solidification" and tree.get("replicates", 1) != 1:
+        yield Problem("replicates", tree["replicates"], "1: nothing in a run is drawn by lot")
 
 
 def _reported(study: Study) -> Iterator[Problem]:
@@ -139,6 +150,15 @@ def _reported(study: Study) -> Iterator[Problem]:
     if study.objective.reported_best and len(study.sweep.swept) != 1:
         shown = [one.value for one in study.objective.reported_best]
         yield Problem("objective.reported_best", shown, "absent unless one key is swept")
+
+
+def _reference(study: Study) -> Iterator[Problem]:
+    """The point that others are compared with is one of the sweep."""
+    if not isinstance(study, SolidificationStudy) or not study.reference:
+        return
+    swept = sweep.points(study.sweep, study.scenario.seed)
+    if study.reference not in swept:
+        yield Problem("reference", study.reference, f"a point of the sweep, such as {swept[0]}")
 
 
 def _files(path: Path) -> list[_File]:

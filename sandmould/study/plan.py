@@ -16,6 +16,7 @@ from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solidification import Solidification
 from sandmould.study.expand import Part, Run
 from sandmould.study.kinds.kind import SpeedClass, kind_of
 from sandmould.study.study import Study
@@ -43,6 +44,19 @@ class _DeckRunFile(_RunFile):
     """The same of a deck of the user's own."""
 
     scenario: OwnDeck  # type: ignore[assignment]
+
+
+class _SolidificationRunFile(_RunFile):
+    """The same of a casting in its mould."""
+
+    scenario: Solidification  # type: ignore[assignment]
+
+
+_FILE_OF: dict[type, type[_RunFile]] = {
+    OwnDeck: _DeckRunFile, Solidification: _SolidificationRunFile
+}  # fmt: skip
+_SIGN = {"template": _DeckRunFile, "shapes": _SolidificationRunFile}
+"""Keys that only a scenario of one kind has."""
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
@@ -87,7 +101,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _scenario_text(run: Run) -> str:
-    model = _DeckRunFile if isinstance(run.scenario, OwnDeck) else _RunFile
+    model = _FILE_OF.get(type(run.scenario), _RunFile)
     file = model(**{name: getattr(run, name) for name in _RunFile.model_fields})
     tree = file.model_dump(mode="json")
     text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
@@ -123,8 +137,9 @@ def read_run(path: Path) -> Run:
     """
     shown = str(path)
     tree = read_planned(path, shown)
-    is_deck = "template" in (tree.get("scenario") or ())
-    file = validated(_DeckRunFile if is_deck else _RunFile, tree, Origin({"": shown}))
+    keys = tree.get("scenario") or ()
+    model = next((model for key, model in _SIGN.items() if key in keys), _RunFile)
+    file = validated(model, tree, Origin({"": shown}))
     return Run(**{name: getattr(file, name) for name in _RunFile.model_fields})
 
 

@@ -17,7 +17,8 @@ from pydantic_core import PydanticUndefined
 from sandmould import ROOT
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section, models_in
-from sandmould.study.study import DeckStudy, Study
+from sandmould.scenario.solidification import Solidification
+from sandmould.study.study import DeckStudy, SolidificationStudy, Study
 
 SCHEMA = ROOT / "config" / "schema.json"
 DEFAULT = ROOT / "config" / "default.yaml"
@@ -26,9 +27,16 @@ Tree = dict[str, Any]
 
 def schema_text() -> str:
     """JSON schema of a study's file; every leaf may also state its source."""
-    schema, of_deck = Study.model_json_schema(), DeckStudy.model_json_schema()
-    definitions = schema.pop("$defs") | of_deck["$defs"]
-    scenarios = [part["properties"]["scenario"] for part in (schema, of_deck)]
+    schema = Study.model_json_schema()
+    others = [model.model_json_schema() for model in (DeckStudy, SolidificationStudy)]
+    definitions = schema.pop("$defs")
+    scenarios = [part["properties"]["scenario"] for part in (schema, *others)]
+    for other in others:
+        # a name that both have is one section, but for names that pydantic had to tell apart
+        definitions = other["$defs"] | definitions
+        schema["properties"] = other["properties"] | schema["properties"]
+    # The material states a part of it, and what the study is based on another.
+    definitions["Solidification"].pop("required")
     # The kind may be that of the study which this one is based on.
     schema["properties"]["scenario"] = {
         "description": "What is simulated, by kind.",
@@ -74,6 +82,7 @@ def default_text() -> str:
         "# a study states only what differs.",
         *_lines(Study()),
         *_entry_keys(OwnDeck, "", "the scenario of a study of kind deck"),
+        *_entry_keys(Solidification, "", "the scenario of a study of kind solidification"),
     ]
     return "\n".join(lines) + "\n"
 

@@ -11,6 +11,7 @@ from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solidification import MetalAndMould, Solidification
 from sandmould.study.calibration.asked import Calibration
 from sandmould.study.certificate.asked import Certificate
 from sandmould.study.rounds.asked import Refinement
@@ -117,7 +118,10 @@ class Study(Section):
         None, "Study or shipped scenario that this one changes.", source="user", pattern=NAME
     )
     material: str | None = quantity(
-        None, "Sand of config/materials that the scenario starts from.", source="user", pattern=NAME
+        None,
+        "Materials of config/materials that the scenario starts from.",
+        source="user",
+        pattern=NAME,
     )
     scenario: Scenario = Field(Scenario(), description="The scene of sand.")
     sweep: Sweep = Field(
@@ -165,10 +169,30 @@ class DeckStudy(Study):
     )
 
 
-ONLY_SAND = ("material", "cross_check", "calibration", "certificate")
+class SolidificationStudy(Study):
+    """A study of a casting in its mould."""
+
+    scenario: Solidification = Field(  # type: ignore[assignment]
+        ..., description="The casting, its mould, and how they are computed."
+    )
+    reference: dict[str, Any] = Field(
+        {},
+        description="The swept point that the others are compared with in error and cost: a value "
+        "of every swept key, as the sweep has it.",
+    )
+
+
+ONLY_SAND = ("cross_check", "calibration", "certificate")
 """Sections that other kinds of studies do not have."""
+_MODELS: dict[str, type[Study]] = {"deck": DeckStudy, "solidification": SolidificationStudy}
+_MATERIALS: dict[str, type[Section]] = {"sand": Material, "solidification": MetalAndMould}
 
 
 def study_model(kind: str) -> type[Study]:
     """Type of the studies of a kind."""
-    return DeckStudy if kind == "deck" else Study
+    return _MODELS.get(kind, Study)
+
+
+def material_model(kind: str) -> type[Section] | None:
+    """What a material file holds for a kind of studies; None where they have none."""
+    return _MATERIALS.get(kind)

@@ -80,12 +80,12 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "missing material": (
         "based_on: tube\nmaterial: silica",
         "trial.yaml: material = 'silica' cannot be used: valid is the name of a material: "
-        "rojek_2004.",
+        "hirata_2019, hirata_2019_aluminium, rojek_2004.",
     ),
     "kind of a later solver": (
         "based_on: tube\nkind: flow\nmetal: aluminium",
         "trial.yaml: kind = 'flow' cannot be used: "
-        "valid is sand or deck; solidification and flow come with their own solvers.",
+        "valid is sand, deck or solidification; flow comes with its own solver.",
     ),
     "measure after the end": (
         "based_on: tube\nobjective: {at_vibration_s: 60}",

@@ -13,7 +13,7 @@ import pytest
 from sandmould import ROOT
 from sandmould.engines.outcome import Outcome
 from sandmould.study.expand import expand
-from sandmould.study.kinds.kind import kind_of
+from sandmould.study.kinds.kind import kind_named, kind_of
 from sandmould.study.opening import open_study
 from tests.workflow.runs import kill_at_a_checkpoint
 
@@ -58,12 +58,13 @@ def checkout(tmp_path: Path, calibration: Path) -> Path:
 
 @pytest.mark.parametrize("study", STUDIES, ids=lambda p: p.stem)
 def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
-    for other in open_study(study).study.calibration.also:
+    opened = open_study(study).study
+    for other in opened.calibration.also:
         (checkout / "results" / other).mkdir()
         (checkout / "results" / other / "summary.tsv").touch()
     ran = snakemake("-n", "--configfile", str(study), folder=checkout)
     assert ran.returncode == 0, ran.stderr
-    assert "grain-steps" in ran.stderr
+    assert kind_named(opened.kind).WORK in ran.stderr
     assert "wall time on 2 cores" in ran.stderr
     assert (checkout / "results" / study.stem / "runs.tsv").exists()
 

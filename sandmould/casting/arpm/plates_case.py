@@ -1,7 +1,8 @@
 """The casting with four plates of section 4: layouts 2-1 to 2-3B, errors and times.
 
-Its geometry and most of its materials are stand-ins that ``config/materials/hirata_2019.yaml``
-lists with their sources: the paper's Table 1 and Fig. 5 are lost to us.
+Its geometry and most of its materials are stand-ins that ``config/scenarios/plates.yaml`` and
+``config/materials/hirata_2019.yaml`` list with their sources: the paper's Table 1 and Fig. 5 are
+lost to us.
 """
 
 from __future__ import annotations
@@ -23,9 +24,12 @@ from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.solidification import Progress, Solidification, solidify
 from sandmould.scenario.outline import Outline
 from sandmould.scenario.reading import Origin, merge, read_yaml
+from sandmould.scenario.solidification import FourPlates
 
 Array = NDArray[np.float64]
 MATERIALS = ROOT / "config" / "materials" / "hirata_2019.yaml"
+ALUMINIUM = ROOT / "config" / "materials" / "hirata_2019_aluminium.yaml"
+SCENARIO = ROOT / "config" / "scenarios" / "plates.yaml"
 SMALL_M = 0.002
 LAYERS: dict[str, tuple[int, ...]] = {
     "2-1": (), "2-2A": (2,), "2-2B": (4,), "2-3A": (2, 2), "2-3B": (4, 4),
@@ -35,8 +39,8 @@ ERROR_TIME_S = 2000.0
 """t_sol in (7), used uniformly (section 4.3.3)."""
 
 
-def read_values(path: Path = MATERIALS) -> dict[str, Any]:
-    """Values of a materials file, without their units and sources.
+def read_values(path: Path) -> dict[str, Any]:
+    """Values of a file, without their units and sources.
 
     Raises
     ------
@@ -60,13 +64,7 @@ class Plates:
     @property
     def outline(self) -> Outline:
         """The casting."""
-        up, right, down, left = (0.5 * t for t in self.thickness_m)
-        r = self.reach_m
-        corners = [
-            (up, right), (up, r), (-up, r), (-up, left), (-r, left), (-r, -left),
-            (-down, -left), (-down, -r), (down, -r), (down, -right), (r, -right), (r, right),
-        ]  # fmt: skip
-        return Outline("plates", np.array(corners))
+        return FourPlates(reach_m=self.reach_m, thickness_m=self.thickness_m).outline
 
     @property
     def probes_m(self) -> dict[str, Array]:
@@ -82,20 +80,21 @@ class Plates:
         return painted(-half, half, cell_m, {1: self.outline})
 
 
-def read_plates(path: Path = MATERIALS) -> Plates:
-    """The case of section 4 from its file."""
-    values = read_values(path)
-    plates, initial = values["plates"], values["initial_k"]
+def read_plates() -> Plates:
+    """The case of section 4 from its files."""
+    values, scenario = read_values(MATERIALS), read_values(SCENARIO)["scenario"]
+    (plates,), box, initial = scenario["shapes"], scenario["box"], values["initial_k"]
     materials = tuple(Material(**values[name]) for name in ("mould", "casting"))
     filling = Filling(
         materials, (initial["mould"], initial["casting"]), 1.0 / values["heat_transfer_w_m2_k"]
     )
-    return Plates(filling, plates["box_m"], plates["reach_m"], tuple(plates["thickness_m"]))
+    box_m = box["high_m"][0] - box["low_m"][0]
+    return Plates(filling, box_m, plates["reach_m"], tuple(plates["thickness_m"]))
 
 
-def read_aluminium(path: Path = MATERIALS) -> Material:
+def read_aluminium() -> Material:
     """The metal of the contact test of section 3."""
-    return Material(**read_values(path)["contact"])
+    return Material(**read_values(ALUMINIUM))
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,12 @@ from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solidification import Solidification
 
 if TYPE_CHECKING:
     from sandmould.study.expand import Run
 
-AnyScenario = Scenario | OwnDeck
+AnyScenario = Scenario | OwnDeck | Solidification
 SpeedClass = tuple[str, int]
 """Engine and dimension: what the speed of a core depends on most."""
 
@@ -124,7 +125,7 @@ class Kind(Protocol):
         """Measure what a run left behind; the picture last."""
 
 
-_MODULE_OF = {Scenario: "sand", OwnDeck: "deck"}
+_MODULE_OF = {Scenario: "sand", OwnDeck: "deck", Solidification: "solidification"}
 
 
 def kind_named(name: str) -> Kind:

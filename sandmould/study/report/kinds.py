@@ -11,14 +11,16 @@ import pandas as pd
 
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solidification import Solidification
 from sandmould.study.collect import Collected
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.report.filling import filling_pages
 from sandmould.study.report.measured import Curve, measure_curves, whole_conclusion
 from sandmould.study.report.method import Row, deck_method, sand_method
 from sandmould.study.report.sand import sand_pages
-from sandmould.study.study import Study
-from sandmould.study.verdict import Verdict, sand_notes
+from sandmould.study.report.solidification import shown_run, solid_method, solid_pages
+from sandmould.study.study import SolidificationStudy, Study
+from sandmould.study.verdict import Verdict, rank_runs, sand_notes
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,8 @@ def notes_of(
     """
     if isinstance(scenario, OwnDeck):
         return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
+    if isinstance(scenario, Solidification):
+        return ("Two dimensions: heat that leaves a casting across the plane is not counted.",)
     stage = scenario.vibration[0] if scenario.vibration else None
     deepest = _deepest_overlap_fraction(collected.summary)
     return sand_notes(collected.keys, stage, deepest, seeks_best, is_certified)
@@ -91,6 +95,17 @@ def kind_pages(
             (),
             {"curves": _deck_curves(scenario, of_sweep, verdict)},
         )
+    if isinstance(scenario, Solidification):
+        reference = study.reference if isinstance(study, SolidificationStudy) else {}
+        best = _run_of(of_sweep.summary, verdict) if study.seeks_best else ""
+        shown = shown_run(reference, of_sweep, best)
+        return KindPages(
+            "solidification.html",
+            solid_method(scenario, collected.keys),
+            "the end of the run",
+            (),
+            {"pages": solid_pages(study_folder, reference, scenario, of_sweep, verdict, shown)},
+        )
     filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
     return KindPages(
         "sand.html",
@@ -111,6 +126,11 @@ def _deck_curves(scenario: OwnDeck, collected: Collected, verdict: Verdict) -> t
     """The objective first, then the other measures."""
     measures = dict.fromkeys([verdict.measure, *scenario.measures])
     return measure_curves(collected, verdict, list(measures), whole_conclusion)
+
+
+def _run_of(summary: pd.DataFrame, verdict: Verdict) -> str:
+    """The best run of the objective; empty where none finished."""
+    return rank_runs(summary, verdict.measure, verdict.better).get("best", "")
 
 
 def drives_of(by_setting: Mapping[str, AnyScenario]) -> dict[str, Scenario]:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.calibration.sands import Calibrated, CalibratedSand
 from sandmould.study.collect import Collected
@@ -150,7 +150,7 @@ def _heaps(
     study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: AnyScenario
 ) -> tuple[Heap, ...]:
     """Runs with the least, the middle and the steepest slope."""
-    if isinstance(scenario, OwnDeck) or scenario.gate is None or not scenario.gate.is_level:
+    if not isinstance(scenario, Scenario) or scenario.gate is None or not scenario.gate.is_level:
         return ()
     values = finished_values(summary, verdict.measure).dropna().sort_values()
     places = np.unique(np.linspace(0, len(values) - 1, SHOWN_HEAPS).round().astype(int))

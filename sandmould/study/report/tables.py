@@ -78,9 +78,11 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
         found.append(KeyNumber(number(best.mean), label, mean))
     finished = int((summary["outcome_code"] == int(Outcome.FINISHED)).sum())
     found.append(KeyNumber(f"{finished} of {len(summary)}", "runs finished"))
-    grains = _total(summary, "grains", "median")
-    if grains is not None:
-        found.append(KeyNumber(f"{grains:,.0f}".replace(",", "\u202f"), "grains in a run"))
+    for what in ("grains", "elements"):
+        count = _total(summary, what, "median")
+        if count is not None:
+            shown = f"{count:,.0f}".replace(",", "\u202f")
+            found.append(KeyNumber(shown, f"{what} in a run"))
     wall_s, cpu_s = _total(summary, "wall_s", "sum"), _total(summary, "cpu_s", "sum")
     if wall_s is not None:
         note = "" if cpu_s is None else f"{seconds(cpu_s)} of processor time"
@@ -174,10 +176,12 @@ def _number_cells(*values: tuple[float, int]) -> tuple[Cell, ...]:
 
 _COST = (
     ("grains", "grains", lambda v: f"{v:.0f}"),
+    ("elements", "elements", lambda v: f"{v:.0f}"),
     ("simulated_s", "simulated", seconds),
     ("wall_s", "wall time", seconds),
     ("cpu_s", "processor time", seconds),
     ("grain_steps_per_s", "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
+    ("element_steps_per_s", "element-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("peak_memory_bytes", "memory", size),
     ("time_step_fraction", "step / critical", number),
     ("largest_overlap_fraction", "largest overlap", lambda v: f"{100 * v:.1f} %"),

@@ -1,0 +1,135 @@
+"""One run of solidification: from its scenario to cooling curves, fields and cost."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sandmould.casting.arpm import scene
+from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.solidification import Progress as Cooled
+from sandmould.casting.arpm.solidification import Solidification as Found
+from sandmould.casting.arpm.solidification import UnstableError, solidify
+from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.engines.products import Computed, Cost, peak_memory_bytes
+from sandmould.engines.progress import Progress
+from sandmould.scenario.solidification import Solidification
+
+PRODUCTS = ("series.tsv", "fields.npz")
+
+
+@dataclass
+class ElementCost(Cost):
+    """The cost row of a run on elements; compiling is left out of ``cpu_s``."""
+
+    elements: int = 0
+    element_steps: int = 0
+
+    def columns(self) -> dict[str, Any]:
+        """Columns of ``cost.tsv`` and their values."""
+        rate = self.element_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
+        names = ("engine", "version", "ranks", "elements", "element_steps", "time_step_s",
+                 "wall_s", "engine_wall_s", "cpu_s", "peak_memory_bytes")  # fmt: skip
+        return {name: getattr(self, name) for name in names} | {"element_steps_per_s": rate}
+
+
+def source_files() -> list[Path]:
+    """Files of the solver."""
+    return sorted(Path(__file__).parent.glob("*.py"))
+
+
+def source_hash() -> str:
+    """State of the solver, which stands in place of a version."""
+    return hashlib.sha256(b"".join(f.read_bytes() for f in source_files())).hexdigest()[:12]
+
+
+def engine_of(scenario: Solidification) -> str:
+    """What computes it, as tables call it."""
+    return "differences" if scenario.exchange == "difference" else "arpm"
+
+
+def no_cost(scenario: Solidification) -> ElementCost:
+    """Cost of a run that has not begun."""
+    return ElementCost(engine_of(scenario), 1, math.nan, scenario.step_share, source_hash())
+
+
+def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
+    """Solidify a casting from its beginning: runs are short and leave no checkpoint.
+
+    Parameters
+    ----------
+    scenario : Solidification
+    folder : Path
+        The run's; products are written to its ``work``.
+    run : str
+        Its name, for the line of progress.
+    """
+    work = folder / "work"
+    work.mkdir(parents=True, exist_ok=True)
+    begun = time.monotonic()
+    cost, planned_s = no_cost(scenario), scene.expected_s(scenario)
+    shown = Progress(run, work, scene.expected_element_steps(scenario), "element-steps")
+    elements, filling = scene.elements_of(scenario), scene.filling_of(scenario)
+    cost.elements = len(elements.size_m)
+    cooled = Cooled(0.0, 0.0, 0.0)
+
+    def tell(now: Cooled) -> None:
+        nonlocal cooled
+        cooled = now
+        elapsed_s = time.monotonic() - stepping
+        shown.show("cooling", now.time_s, now.element_steps_per_s * elapsed_s,
+                   now.element_steps_per_s)  # fmt: skip
+
+    try:
+        marching = scene.method_of(scenario).marching(elements, filling, scene.raster_of(scenario))
+        marching.advance(filling.heat(elements), 1e-9)  # compiled before it is timed
+        cost.time_step_s, stepping = marching.step_s, time.monotonic()
+        probes_m = {probe.name: np.array(probe.at_m) for probe in scenario.probes}
+        found = solidify(
+            elements, filling, marching, probes_m, scenario.record_s, scenario.until_s, tell
+        )
+    except (UnstableError, ValueError) as stop:
+        code = Outcome.UNSTABLE if isinstance(stop, UnstableError) else Outcome.BAD_INPUT
+        outcome = RunOutcome(code, str(stop), cooled.time_s, planned_s)
+        cost.wall_s = time.monotonic() - begun
+        return Computed(outcome, cost, is_root=True)
+    _write(elements, filling.melts(elements), found, work)
+    end_s = float(found.time_s[-1])
+    shown.show("cooling", end_s, found.heat.element_steps,
+               found.heat.element_steps / max(found.wall_s, 1e-9), last=True)  # fmt: skip
+    cost.element_steps, cost.cpu_s = found.heat.element_steps, found.cpu_s
+    cost.engine_wall_s, cost.wall_s = found.wall_s, time.monotonic() - begun
+    cost.peak_memory_bytes = peak_memory_bytes()
+    detail = ""
+    if math.isnan(found.solidification_time_s):
+        detail = f"some of the casting is still liquid at {end_s:g} s: raise until_s"
+    return Computed(RunOutcome(Outcome.FINISHED, detail, end_s, planned_s), cost, is_root=True)
+
+
+def _write(elements: Elements, melts: NDArray[np.bool_], found: Found, work: Path) -> None:
+    """Write the curves and the fields at the end."""
+    frozen_s, volume = found.heat.frozen_s[melts], elements.volume_m3[melts]
+    solid = [float(volume[frozen_s <= t].sum() / volume.sum()) for t in found.time_s]
+    clock, share, heat = scene.SERIES
+    probes = {f"{name}_k": curve for name, curve in found.probe_k.items()}
+    table = pd.DataFrame({clock: found.time_s, **probes, share: solid, heat: found.enthalpy_j})
+    table.to_csv(work / "series.tsv", sep="\t", index=False, float_format="%.10g")
+    np.savez_compressed(
+        work / "fields.npz", position_m=elements.position_m, size_m=elements.size_m,
+        melts=melts, frozen_s=found.heat.frozen_s, temperature_k=found.heat.temperature_k,
+    )  # fmt: skip
+
+
+def complete(scenario: Solidification, work: Path) -> None:
+    """Make an empty table of curves where a broken run wrote none."""
+    path = work / "series.tsv"
+    if not path.exists():
+        path.write_text("\t".join(scene.SERIES) + "\n", encoding="utf-8")

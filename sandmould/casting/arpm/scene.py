@@ -1,0 +1,155 @@
+"""A scenario of solidification as elements, materials and a method; what keeps it from one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+
+import numpy as np
+
+from sandmould.casting.arpm.elements import Elements, placed
+from sandmould.casting.arpm.filling import Filling, check_casting
+from sandmould.casting.arpm.material import Material
+from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.raster import Raster, painted
+from sandmould.casting.arpm.super_steps import STAGES
+from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.solidification import Rectangle, Shape, Solidification
+
+KERNEL_FORMS = ("printed", "corrected", "symmetric")
+SERIES = ("time_s", "solidified_fraction", "enthalpy_j_m")
+"""Columns of ``series.tsv`` beside the probes'."""
+
+
+@lru_cache(maxsize=8)
+def _raster(box: Rectangle, shapes: tuple[Shape, ...], element_m: float) -> Raster:
+    solids = {number: shape.outline for number, shape in enumerate(shapes, start=1)}
+    return painted(np.array(box.low_m), np.array(box.high_m), element_m, solids)
+
+
+@lru_cache(maxsize=8)
+def _elements(
+    box: Rectangle, shapes: tuple[Shape, ...], element_m: float, layers: tuple[int, ...]
+) -> Elements:
+    return placed(_raster(box, shapes, element_m), layers)
+
+
+def raster_of(scenario: Solidification) -> Raster:
+    """Cells of the smallest size, 0 for the mould; ValueErrors are those of ``painted``."""
+    return _raster(scenario.box, scenario.shapes, scenario.element_m)
+
+
+def elements_of(scenario: Solidification) -> Elements:
+    """Elements of a scenario; ValueErrors are those of ``painted``."""
+    return _elements(scenario.box, scenario.shapes, scenario.element_m, scenario.layers)
+
+
+def filling_of(scenario: Solidification) -> Filling:
+    """Materials: the mould, then the metal once for each shape."""
+    mould = Material(**scenario.mould.model_dump())
+    metal = Material(**scenario.casting.model_dump())
+    shapes = len(scenario.shapes)
+    transfer = scenario.heat_transfer_w_m2_k
+    return Filling(
+        (mould, *(metal,) * shapes),
+        (scenario.initial_k.mould, *(scenario.initial_k.casting,) * shapes),
+        1.0 / transfer if transfer else 0.0,
+    )
+
+
+def method_of(scenario: Solidification) -> Method:
+    """How elements exchange heat and go forward in time."""
+    return Method(
+        scenario.exchange, scenario.stepping, scenario.kernel_size, scenario.refuse_ratio,
+        step_share=scenario.step_share, threads=scenario.threads,
+    )  # fmt: skip
+
+
+def problems(scenario: Solidification) -> list[Problem]:
+    """List what keeps a well-typed scenario from being run."""
+    return [*_misfits(scenario)] or [*_layout_problems(scenario)]
+
+
+def _misfits(scenario: Solidification) -> Iterator[Problem]:
+    pour_k, solidus_k = scenario.initial_k.casting, scenario.casting.solidus_k
+    if pour_k < solidus_k:
+        valid = f"at least the solidus of {scenario.casting.name}, {solidus_k:g} K"
+        yield Problem("initial_k.casting", pour_k, valid)
+    if scenario.initial_k.mould >= solidus_k:
+        valid = f"below the solidus of {scenario.casting.name}, {solidus_k:g} K"
+        yield Problem("initial_k.mould", scenario.initial_k.mould, valid)
+    if scenario.exchange == "difference" and scenario.layers:
+        valid = "empty with exchange difference: its cells have one size"
+        yield Problem("layers", list(scenario.layers), valid)
+    has_ratio = scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.refuse_ratio
+    if has_ratio and scenario.kernel_size < 2.0:
+        valid = "at least 2 where sizes double, or any with refuse_ratio: false"
+        yield Problem("kernel_size", scenario.kernel_size, valid)
+    low_m, high_m = np.array(scenario.box.low_m), np.array(scenario.box.high_m)
+    room = f"the box from {low_m.tolist()} to {high_m.tolist()} m"
+    for i, shape in enumerate(scenario.shapes):
+        corners = shape.outline.corners()
+        if (corners < low_m).any() or (corners > high_m).any():
+            reach = [corners.min(axis=0).tolist(), corners.max(axis=0).tolist()]
+            yield Problem(f"shapes.{i}", reach, f"a {shape.kind} inside {room}")
+    names = [probe.name for probe in scenario.probes]
+    for i, probe in enumerate(scenario.probes):
+        if (np.array(probe.at_m) < low_m).any() or (np.array(probe.at_m) > high_m).any():
+            yield Problem(f"probes.{i}.at_m", list(probe.at_m), f"a point in {room}")
+        if probe.name in names[:i]:
+            yield Problem(f"probes.{i}.name", probe.name, "each name once")
+
+
+def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
+    try:
+        check_casting(elements_of(scenario), filling_of(scenario))
+    except ValueError as error:
+        shown = [shape.kind for shape in scenario.shapes]
+        valid = f"a casting that elements of {scenario.element_m:g} m can fill in its mould"
+        yield Problem("shapes", shown, f"{valid} ({error})")
+
+
+def expected_s(scenario: Solidification) -> float:
+    """Estimate when a casting is solid.
+
+    Chvorinov's rule with the flux of a half space of mould at the solidus (Chvorinov, Giesserei 27
+    (1940) 177-186); its modulus is the radius of the largest circle in the casting.
+
+    Parameters
+    ----------
+    scenario : Solidification
+
+    Returns
+    -------
+    float, s
+        Not beyond the time at which the run is stopped.
+    """
+    mould, metal = scenario.mould, scenario.casting
+    raster = raster_of(scenario)
+    inside = raster.centre_m[raster.material.reshape(-1) > 0]
+    modulus_m = max(float(-s.outline.distance_m(inside).min()) for s in scenario.shapes)
+    superheat_k = scenario.initial_k.casting - metal.solidus_k
+    heat_j_m3 = metal.density_kg_m3 * (
+        metal.latent_heat_j_kg + metal.heat_capacity_j_kg_k * superheat_k
+    )
+    effusivity_2 = mould.conductivity_w_m_k * mould.density_kg_m3 * mould.heat_capacity_j_kg_k
+    drop_k = metal.solidus_k - scenario.initial_k.mould
+    found_s = 0.25 * math.pi / effusivity_2 * (heat_j_m3 * modulus_m / drop_k) ** 2
+    return min(found_s, scenario.until_s)
+
+
+def expected_element_steps(scenario: Solidification) -> float:
+    """Estimate the element-steps of a run, by the step that each element alone could take."""
+    elements, filling = elements_of(scenario), filling_of(scenario)
+    capacity = np.array([it.capacity_j_m3_k for it in filling.materials])
+    spread = (capacity / filling.conductivity_w_m_k)[elements.material]
+    limit_s = scenario.step_share * spread * elements.size_m**2 / (2 * elements.dimensions)
+    limit_s = np.minimum(limit_s, scenario.record_s)  # steps end at records
+    lasts_s = expected_s(scenario)
+    if scenario.stepping == "local" and scenario.exchange != "difference":
+        return float(np.sum(lasts_s / limit_s))
+    steps = len(limit_s) * lasts_s / float(limit_s.min())
+    if scenario.stepping == "super" and scenario.exchange != "difference":
+        return steps * 4.0 * STAGES / (STAGES**2 + STAGES - 2)
+    return steps

@@ -1,0 +1,193 @@
+"""A casting that solidifies in its mould: what is poured into what, and how it is computed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from sandmould.scenario.outline import Outline, outline_fault
+from sandmould.scenario.quantity import NAME, Section, quantity
+from sandmould.scenario.sand import ARGUED
+
+PAPER = "Hirata and Anzai 2019"
+Place = tuple[float, float]
+
+
+class MouldMaterial(Section):
+    """What a mould is made of: it conducts and does not melt."""
+
+    name: str = quantity("mould", "What messages call it.", source=ARGUED, min_length=1)
+    density_kg_m3: float = quantity(..., "Density.", unit="kg/m3", source="user", gt=0)
+    heat_capacity_j_kg_k: float = quantity(..., "Heat.", unit="J/kg/K", source="user", gt=0)
+    conductivity_w_m_k: float = quantity(..., "Conductivity.", unit="W/m/K", source="user", gt=0)
+
+
+class Metal(MouldMaterial):
+    """What is poured: it gives its latent heat evenly between liquidus and solidus."""
+
+    name: str = quantity("casting", "What messages call it.", source=ARGUED, min_length=1)
+    latent_heat_j_kg: float = quantity(..., "Latent heat.", unit="J/kg", source="user", ge=0)
+    solidus_k: float = quantity(..., "All is solid below it.", unit="K", source="user", gt=0)
+    liquidus_k: float = quantity(..., "All is liquid above it.", unit="K", source="user", gt=0)
+
+    @model_validator(mode="after")
+    def _order(self) -> Metal:
+        if self.solidus_k > self.liquidus_k:
+            raise PydanticCustomError("solidus", "a solidus_k that is not above its liquidus_k")
+        return self
+
+
+class PouredAt(Section):
+    """Temperatures when the mould is full."""
+
+    casting: float = quantity(..., "Of the casting.", unit="K", source="user", gt=0)
+    mould: float = quantity(..., "Of the mould.", unit="K", source="user", gt=0)
+
+
+class MetalAndMould(Section):
+    """A named pair of materials: the part of a scenario that a material file may state."""
+
+    casting: Metal = Field(..., description="The metal.")
+    mould: MouldMaterial = Field(..., description="The mould.")
+    initial_k: PouredAt = Field(..., description="Temperatures at the start.")
+    heat_transfer_w_m2_k: float | None = quantity(
+        None,
+        "Heat that passes from casting to mould, h of eq. (2); perfect contact unless given.",
+        unit="W/m2/K",
+        source=ARGUED,
+        gt=0,
+    )
+
+
+class Rectangle(Section):
+    """An upright rectangle."""
+
+    kind: Literal["rectangle"] = Field("rectangle", description="Shape.")
+    low_m: Place = quantity(..., "Its lower left corner.", unit="m", source="user")
+    high_m: Place = quantity(..., "Its upper right corner.", unit="m", source="user")
+
+    @model_validator(mode="after")
+    def _order(self) -> Rectangle:
+        if not all(a < b for a, b in zip(self.low_m, self.high_m, strict=True)):
+            raise PydanticCustomError("corners", "a high_m that is right of and above its low_m")
+        return self
+
+    @property
+    def outline(self) -> Outline:
+        """Its edge."""
+        (a, b), (c, d) = self.low_m, self.high_m
+        return Outline("the rectangle", np.array([(a, b), (c, b), (c, d), (a, d)]))
+
+
+class CastOutline(Section):
+    """A closed line of straight edges."""
+
+    kind: Literal["polygon"] = Field("polygon", description="Shape.")
+    vertices_m: tuple[Place, ...] = quantity(
+        ..., "Corners in turn; the last is joined to the first.", unit="m", source="user",
+        min_length=3,
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _closed(self) -> CastOutline:
+        if fault := outline_fault(np.array(self.vertices_m)):
+            raise PydanticCustomError("polygon", "{fault}", {"fault": fault})
+        return self
+
+    @property
+    def outline(self) -> Outline:
+        """Its edge."""
+        return Outline("the polygon", np.array(self.vertices_m))
+
+
+class FourPlates(Section):
+    """Plates of several thicknesses that meet at the origin, as in the paper's section 4."""
+
+    kind: Literal["plates"] = Field("plates", description="Shape.")
+    reach_m: float = quantity(..., "Of each plate from the origin.", unit="m", source="user", gt=0)
+    thickness_m: tuple[float, float, float, float] = quantity(
+        ..., "Upwards, to the right, downwards, to the left.", unit="m", source="user"
+    )
+
+    @model_validator(mode="after")
+    def _plates(self) -> FourPlates:
+        if not all(0.0 < t < 2.0 * self.reach_m for t in self.thickness_m):
+            raise PydanticCustomError("plates", "thicknesses above 0 and below twice reach_m")
+        return self
+
+    @property
+    def outline(self) -> Outline:
+        """Its edge."""
+        up, right, down, left = (0.5 * t for t in self.thickness_m)
+        r = self.reach_m
+        corners = [
+            (up, right), (up, r), (-up, r), (-up, left), (-r, left), (-r, -left),
+            (-down, -left), (-down, -r), (down, -r), (down, -right), (r, -right), (r, right),
+        ]  # fmt: skip
+        return Outline("plates", np.array(corners))
+
+
+Shape = Annotated[Rectangle | CastOutline | FourPlates, Field(discriminator="kind")]
+
+
+class Probe(Section):
+    """A point whose temperature is recorded."""
+
+    name: str = quantity(..., "Its column is <name>_k.", source="user", pattern=NAME)
+    at_m: Place = quantity(..., "Where it is.", unit="m", source="user")
+
+
+class Solidification(MetalAndMould):
+    """One casting in its mould, complete: two dimensions, adiabatic box."""
+
+    box: Rectangle = Field(..., description="The mould's outside; no heat passes it.")
+    shapes: tuple[Shape, ...] = Field(
+        ..., min_length=1, description="Parts of the casting; none may overlap another."
+    )
+    probes: tuple[Probe, ...] = Field((), description="Points of cooling curves.")
+    element_m: float = quantity(..., "Side of the smallest element.", unit="m", source="user", gt=0)
+    layers: tuple[Annotated[int, Field(ge=0, le=1000)], ...] = quantity(
+        (),
+        "For each doubling of the elements' size, how many layers of the smaller size stay beside "
+        "the interface; empty for elements of one size.",
+        source=f"{PAPER}, section 4.1",
+        max_length=8,
+    )
+    exchange: Literal["printed", "corrected", "symmetric", "faces", "difference"] = quantity(
+        "faces",
+        "How elements exchange heat: three readings of eqs. (4) and (5), true faces, or finite "
+        "differences.",
+        source=ARGUED,
+    )
+    stepping: Literal["explicit", "super", "local"] = quantity(
+        "local",
+        "One step for all, super time steps, or local steps; of no use to differences.",
+        source=ARGUED,
+    )
+    kernel_size: float = quantity(
+        2.1, "c_k of eq. (3); of no use to faces and differences.", source=PAPER, gt=1, le=10
+    )
+    refuse_ratio: bool = quantity(
+        True,
+        "Whether sizes that break the rule of 1/c_k are refused; of no use to faces.",
+        source=f"{PAPER}, section 4.3.2",
+    )
+    step_share: float = quantity(
+        0.95, "Time step over the longest stable one.", source=ARGUED, gt=0, le=10
+    )
+    threads: int = quantity(1, "Threads of one run.", source=ARGUED, ge=1, le=256)
+    record_s: float = quantity(5.0, "Between records.", unit="s", source=ARGUED, gt=0)
+    until_s: float = quantity(
+        20000.0, "The run ends here if something is still liquid.", unit="s", source=ARGUED, gt=0
+    )
+    hot_spot_reach_m: float = quantity(
+        0.02,
+        "A hot spot freezes later than all of the casting within this distance.",
+        unit="m",
+        source=ARGUED,
+        gt=0,
+    )
+    seed: int = quantity(1, "Nothing is drawn by lot: it changes no result.", source=ARGUED, ge=0)

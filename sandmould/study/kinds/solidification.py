@@ -1,0 +1,189 @@
+"""Studies of solidification: a casting in its mould, by particles of several sizes.
+
+A run has no checkpoint: one that was killed begins again, which costs seconds to minutes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.freezing import freezing
+from sandmould.casting.arpm import computation, scene
+from sandmould.engines.products import Computed
+from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.solidification import Solidification
+from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.moments import LAST_MEASURED
+
+if TYPE_CHECKING:
+    from sandmould.study.expand import Run
+
+MODEL = Solidification
+WORK = "element-steps"
+PRODUCTS = computation.PRODUCTS
+BASE_MEMORY_MB = 600
+ELEMENTS_PER_MB = 500
+RATE = 2e7
+RATE_OF_DIFFERENCES = 1e8
+"""Element-steps a second of one core: 1.9e7 and 1.3e8 on the machine where plates_small was first
+run; fixed, so that a study has the same batches everywhere."""
+SLOWER = 10.0
+"""Than that a machine may be, and a run longer than expected."""
+
+problems = scene.problems
+complete = computation.complete
+no_cost = computation.no_cost
+
+
+def defaults() -> dict[str, Any]:
+    """Nothing: casting and mould are the user's."""
+    return {}
+
+
+def resolved(scenario: Solidification) -> Solidification:
+    """The scenario: it names no files."""
+    return scenario
+
+
+def lasts_s(scenario: Solidification) -> float:
+    """Measures are those of the end."""
+    return 0.0
+
+
+def engine_problem(scenario: Solidification) -> Problem | None:
+    """None: the solver is our own."""
+    return None
+
+
+def sources(scenario: Solidification) -> list[Path]:
+    """Our solver."""
+    return computation.source_files()
+
+
+def template_hash(scenario: Solidification) -> str:
+    """Hash of our solver."""
+    return computation.source_hash()
+
+
+def computed_hash(scenario: Solidification) -> str:
+    """Hash of scenario and solver."""
+    text = scenario.model_dump_json(exclude={"seed"}) + computation.source_hash()
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def threads(scenario: Solidification) -> int:
+    """Of one process."""
+    return scenario.threads
+
+
+def ranks(scenario: Solidification) -> int:
+    """No MPI."""
+    return 1
+
+
+def memory_mb(scenario: Solidification) -> int:
+    """Libraries, and some 2 kB an element for the pairs of a kernel."""
+    return BASE_MEMORY_MB + len(scene.elements_of(scenario).size_m) // ELEMENTS_PER_MB
+
+
+def allowed_s(scenario: Solidification) -> float:
+    """Wall time on a slow machine."""
+    return SLOWER * predicted_s(scenario)
+
+
+def planned_work(scenario: Solidification) -> float:
+    """Element-steps, by Chvorinov's rule."""
+    return scene.expected_element_steps(scenario)
+
+
+def predicted_s(scenario: Solidification) -> float:
+    """Wall time at fixed speeds."""
+    return planned_work(scenario) / (_speed(scenario) * scenario.threads)
+
+
+def planned_s(scenario: Solidification) -> float:
+    """Until all is solid, by Chvorinov's rule."""
+    return scene.expected_s(scenario)
+
+
+def speed_class(scenario: Solidification) -> SpeedClass:
+    """Elements or finite differences, in 2D."""
+    return computation.engine_of(scenario), 2
+
+
+def rate(scenario: Solidification, results: Path) -> float:
+    """The fixed speed."""
+    return _speed(scenario)
+
+
+def _speed(scenario: Solidification) -> float:
+    return RATE_OF_DIFFERENCES if scenario.exchange == "difference" else RATE
+
+
+def plan_cells(scenario: Solidification) -> Mapping[str, str]:
+    """Elements, and the time at which all should be solid."""
+    return {
+        "elements": f"{len(scene.elements_of(scenario).size_m):,}",
+        "solid at about": f"{scene.expected_s(scenario):.0f} s",
+    }
+
+
+def render(run: Run, folder: Path) -> None:
+    """Write down all that the solver is given, each value with its source."""
+    lines = [
+        f"# Study {run.study}, run {run.run}: what the solver {computation.source_hash()} is given",
+        *_lines(run.scenario.model_dump(mode="json"), run.sources),
+    ]
+    partial = folder / "deck.in.partial"
+    partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    os.replace(partial, folder / "deck.in")
+
+
+def _lines(tree: Any, sources: Mapping[str, str], key: str = "") -> list[str]:
+    """One line a value; a list with one source stays together."""
+    if key in sources or not isinstance(tree, dict | list):
+        return [f"{key} = {tree}".ljust(60) + f" # {sources.get(key, 'not stated')}"]
+    each = tree.items() if isinstance(tree, dict) else enumerate(tree)
+    return [line for n, v in each for line in _lines(v, sources, f"{key}.{n}" if key else str(n))]
+
+
+def compute(run: Run, folder: Path) -> Computed:
+    """Solidify the casting."""
+    return computation.compute(run.scenario, folder, run.run)
+
+
+def measure(run: Run, folder: Path) -> None:
+    """Write the measures against time, those of the whole run in every row, and the picture."""
+    from matplotlib.figure import Figure
+
+    from sandmould.study.report.freezing_figure import draw_freezing
+
+    series = pd.read_csv(folder / "series.tsv", sep="\t")
+    clock = {"time_s": series["time_s"], "vibration_time_s": -1.0, "stage": "cooling"}
+    table = pd.DataFrame({**clock, **series.drop(columns=["time_s", "enthalpy_j_m"])})
+    figure = Figure(figsize=(6, 5), dpi=150, layout="constrained")
+    if (folder / "fields.npz").exists():
+        with np.load(folder / "fields.npz") as kept:
+            fields = dict(kept)
+        melts, heat = fields["melts"], series["enthalpy_j_m"]
+        found = freezing(
+            fields["position_m"][melts], fields["frozen_s"][melts], run.scenario.hot_spot_reach_m
+        )
+        table["enthalpy_drift_fraction"] = heat / heat.iloc[0] - 1.0
+        table["solidification_time_s"] = found.solidification_time_s
+        table["last_point_x_m"], table["last_point_y_m"] = found.last_point_m
+        table["hot_spots"] = len(found.hot_spots_m)
+        draw_freezing(fields, found, figure.subplots())
+    else:
+        figure.text(0.5, 0.5, "No fields: the run broke off.", ha="center")
+    partial = folder / "measures.tsv.partial"
+    table.to_csv(partial, sep="\t", index=False, float_format="%.10g")
+    os.replace(partial, folder / "measures.tsv")
+    figure.savefig(folder / LAST_MEASURED)

@@ -1,0 +1,73 @@
+"""Pictures of a casting: when each part of it froze, and how warm casting and mould are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from analysis.freezing import Freezing
+
+Array = NDArray[np.float64]
+SHOWN_SPOTS = 12
+
+
+def draw_freezing(fields: Mapping[str, Array], found: Freezing, axes: Axes) -> None:
+    """Draw freezing times over the casting with hot spots and the last point to freeze.
+
+    Parameters
+    ----------
+    fields : mapping
+        Arrays of ``fields.npz``.
+    found : Freezing
+    axes : Axes
+    """
+    melts = fields["melts"].astype(bool)
+    values = np.where(melts, fields["frozen_s"], np.nan)
+    _draw(fields, values, axes, "frozen at, s", "viridis")
+    beside_mm = 1e3 * (fields["position_m"][melts].min(axis=0) - 3.0 * fields["size_m"].max())
+    beyond_mm = 1e3 * (fields["position_m"][melts].max(axis=0) + 3.0 * fields["size_m"].max())
+    axes.set_xlim(beside_mm[0], beyond_mm[0])
+    axes.set_ylim(beside_mm[1], beyond_mm[1])
+    spots_mm = 1e3 * found.hot_spots_m[:SHOWN_SPOTS]
+    axes.plot(*spots_mm.T, "o", mfc="none", mec="#D55E00", ms=9, mew=1.5, label="hot spot")
+    if np.isfinite(found.last_point_m).all():
+        at = f"last to freeze, {found.solidification_time_s:.0f} s"
+        axes.plot(*(1e3 * found.last_point_m), "x", color="#D55E00", ms=9, mew=2, label=at)
+    axes.legend(fontsize=8, loc="upper right")
+
+
+def draw_temperature(fields: Mapping[str, Array], axes: Axes) -> None:
+    """Draw temperatures at the end over casting and mould; ``fields`` as in ``draw_freezing``."""
+    _draw(fields, fields["temperature_k"], axes, "temperature at the end, K", "inferno")
+
+
+def _draw(fields: Mapping[str, Array], values: Array, axes: Axes, title: str, colours: str) -> None:
+    grid, low_m, high_m = _grid(fields["position_m"], fields["size_m"], values)
+    (left, below), (right, above) = (1e3 * low_m).tolist(), (1e3 * high_m).tolist()
+    shown = axes.imshow(
+        grid.T, origin="lower", extent=(left, right, below, above), cmap=colours,
+        interpolation="nearest",
+    )  # fmt: skip
+    figure = axes.figure
+    figure.colorbar(shown, ax=axes, label=title, shrink=0.85)
+    axes.set_xlabel("x, mm")
+    axes.set_ylabel("y, mm")
+
+
+def _grid(position_m: Array, size_m: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Values on cells of the smallest size, larger elements over several of them."""
+    cell_m = float(size_m.min())
+    low_m = (position_m - 0.5 * size_m[:, None]).min(axis=0)
+    high_m = (position_m + 0.5 * size_m[:, None]).max(axis=0)
+    grid = np.full(np.round((high_m - low_m) / cell_m).astype(int), np.nan)
+    corner = np.round((position_m - 0.5 * size_m[:, None] - low_m) / cell_m).astype(int)
+    span = np.round(size_m / cell_m).astype(int)
+    for cells in np.unique(span):
+        own = span == cells
+        for i in range(cells):
+            for j in range(cells):
+                grid[corner[own, 0] + i, corner[own, 1] + j] = values[own]
+    return grid, low_m, high_m
