@@ -21,7 +21,13 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
     BadInputError
     """
     assert scenario.pattern is not None
-    scheme, engine = scenario.pattern.loop.scheme, scenario.engine.name
+    loop, engine = scenario.pattern.loop, scenario.engine.name
+    scheme = loop.scheme
+    if engine == "liggghts":
+        valid = "lammps or reference in a scene with a pattern: its meshes do not bend"
+        raise BadInputError([Problem("engine.name", engine, valid)])
+    if loop.repeats and engine != "reference":
+        raise _bad("repeats", loop.repeats, f"0 on engine {engine}, or engine reference")
     if scheme in REFERENCE_ALONE and engine != "reference":
         raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
     if scheme == "monolithic":

@@ -133,3 +133,17 @@ def test_windows_fill_a_record_with_whole_samples() -> None:
     assert np.ptp(np.diff(ends, prepend=0)) <= 20
     assert window_ends(1.0, StepCounts(1e-5, 20, 940)).tolist() == [940]
     assert len(window_ends(1e-9, StepCounts(1e-5, 20, 940))) == 47
+
+
+@pytest.mark.parametrize(
+    ("engine", "loop", "says"),
+    [
+        ("liggghts", {}, "engine.name = 'liggghts' cannot be used: valid is lammps or reference"),
+        ("lammps", {"repeats": 3}, "pattern.loop.repeats = 3 cannot be used: valid is 0 on engine"),
+    ],
+)
+def test_what_an_engine_cannot_couple_is_told(engine: str, loop: dict[str, Any], says: str) -> None:
+    tree = {**L_SCENE, "engine": {"name": engine}}
+    tree["pattern"] = {**L_SCENE["pattern"], "loop": loop}
+    with pytest.raises(BadInputError, match=says):
+        sand.resolved(Scenario.model_validate(tree))
