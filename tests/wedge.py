@@ -16,7 +16,6 @@ from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.judge import JudgeSession
 from pattern_fe.coupling.session import CoupledSession
-from pattern_fe.coupling.settings import LoopSettings
 from pattern_fe.material import Foam
 from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, mesh_of
@@ -24,6 +23,7 @@ from pattern_fe.supports import Supports
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
 from tests.verification.one_grain import RADIUS_M, one_grain_scene
 
@@ -84,7 +84,8 @@ def staggered(pattern: Pattern, scenario: Scenario, folder: Path, **changes: Any
         "most_factor": 1.0, "limit_share": 0.5, "repeats": 0, "tolerance": 1e-9, "predicts": False,
         "largest_displacement_m": 0.01,
     }  # fmt: skip
-    settings = LoopSettings(**(values | changes))
+    # Unchecked: the limit of a factor may lie above 1, which no scenario may ask for.
+    settings = Loop.model_construct(**(values | changes))
     inner, counts = ReferenceSession(build_program(scenario)), StepCounts.of(scenario)
     return CoupledSession(inner, FoamBody(pattern), "pattern", settings, counts, folder)
 

@@ -9,7 +9,6 @@ from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.judge import JudgeSession
 from pattern_fe.coupling.schemes import explicit_foam
 from pattern_fe.coupling.session import CoupledSession
-from pattern_fe.coupling.settings import LoopSettings
 from pattern_fe.scene import pattern_of
 from sandmould.engines.choosing import engine_of
 from sandmould.engines.program import Program
@@ -38,10 +37,9 @@ def open_coupled(
     if told.loop.scheme == "monolithic":
         return cast(Session, _open_judge(program, log, checkpoint))
     body = FoamBody(pattern_of(scenario), told.statics == "large")
-    settings = LoopSettings.of(told.loop)
     inner = engine_of(scenario).open_session(program, folder, log, checkpoint)
     counts = StepCounts.of(scenario)
-    session = CoupledSession(inner, body, told.name, settings, counts, log.parent, checkpoint)
+    session = CoupledSession(inner, body, told.name, told.loop, counts, log.parent, checkpoint)
     return cast(Session, session)
 
 

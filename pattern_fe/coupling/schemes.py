@@ -26,6 +26,10 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
     if engine == "liggghts":
         valid = "lammps or reference in a scene with a pattern: its meshes do not bend"
         raise BadInputError([Problem("engine.name", engine, valid)])
+    if scenario.discharge is not None:
+        # Loads on vertices are forgotten when a gate is taken away.
+        valid = "absent in a scene with a pattern"
+        raise BadInputError([Problem("discharge.gate", scenario.discharge.gate, valid)])
     if loop.repeats and engine != "reference":
         raise _bad("repeats", loop.repeats, f"0 on engine {engine}, or engine reference")
     if scheme in REFERENCE_ALONE and engine != "reference":

@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.coupling.body import Answer, ElasticBody
+from pattern_fe.coupling.choosing import relaxation_of
 from pattern_fe.coupling.gain import measure_gain
 from pattern_fe.coupling.ledger import LEDGER, Entry, Ledger, imbalance_n, rms_m, work_of
 from pattern_fe.coupling.relaxation import Measured
-from pattern_fe.coupling.settings import LoopSettings
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.pattern import Loop
 
 Array = NDArray[np.float64]
 CHECKPOINT = "pattern.npz"
@@ -39,7 +40,7 @@ class CoupledSession:
         inner: Session,
         body: ElasticBody,
         surface: str,
-        settings: LoopSettings,
+        loop: Loop,
         counts: StepCounts,
         work: Path,
         checkpoint: Path | None = None,
@@ -53,7 +54,8 @@ class CoupledSession:
         body : ElasticBody
         surface : str
             Its name in the engine, vertex for vertex that of the body.
-        settings : LoopSettings
+        loop : Loop
+            Of the scenario; one that has windows.
         counts : StepCounts
             Of the scenario.
         work : Path
@@ -64,10 +66,10 @@ class CoupledSession:
         self._inner = inner
         self._body = body
         self._surface = surface
-        self._settings = settings
+        self._loop = loop
         self._counts = counts
-        self._ends = window_ends(settings.window_s, counts)
-        self._relaxation = settings.relaxation()
+        self._ends = window_ends(loop.window_s, counts)
+        self._relaxation = relaxation_of(loop)
         rest = body.vertices_m
         self._shown = np.zeros_like(rest)
         self._next = np.zeros_like(rest)
@@ -118,9 +120,9 @@ class CoupledSession:
                 relaxation.learn(found.limit)
 
     def _window(self, steps: int) -> None:
-        """Compute one window, as often as the settings ask."""
-        settings = self._settings
-        kept = self._inner.keep() if settings.repeats else None
+        """Compute one window, as often as is asked."""
+        loop = self._loop
+        kept = self._inner.keep() if loop.repeats else None
         start, shown, passes = self._shown, self._next, 0
         self._solve_s = 0.0
         while True:
@@ -131,7 +133,7 @@ class CoupledSession:
                 return
             load, answer, target = told
             residual_m = rms_m(answer.displacement_m - shown)
-            if passes > settings.repeats or residual_m <= settings.tolerance * rms_m(shown):
+            if passes > loop.repeats or residual_m <= loop.tolerance * rms_m(shown):
                 break
             self._inner.go_back(kept)
             shown = target
@@ -157,7 +159,7 @@ class CoupledSession:
 
     def _predicted(self, start: Array, shown: Array, target: Array) -> Array:
         """Where the next window leads: part of the way to the answer, or on as in this one."""
-        if self._settings.predicts:
+        if self._loop.predicts:
             return np.asarray(target + (shown - start))
         return target
 
@@ -189,11 +191,11 @@ class CoupledSession:
         EngineStop
         """
         largest_m = float(np.linalg.norm(self._next, axis=1).max())
-        if not largest_m <= self._settings.largest_displacement_m:
+        if not largest_m <= self._loop.largest_displacement_m:
             raise EngineStop(
                 Outcome.COUPLING_DIVERGED,
                 f"the pattern is to move by {largest_m:.3g} m, more than pattern.loop."
-                f"largest_displacement_m = {self._settings.largest_displacement_m:g}, after "
+                f"largest_displacement_m = {self._loop.largest_displacement_m:g}, after "
                 f"{self._inner.time_s:.4g} s: a smaller factor or another scheme may hold",
             )
 

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from pattern_fe.coupling.body import Answer
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
 from pattern_fe.coupling.session import CoupledSession
-from pattern_fe.coupling.settings import LoopSettings
 from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_lammps, tube_scene
 
@@ -53,13 +53,13 @@ class Plate:
         return Answer(sinks, 0.5 * force_n[1] ** 2 / self.stiffness_n_m, -force_n)
 
 
-def settings(**changes: Any) -> LoopSettings:
+def settings(**changes: Any) -> Loop:
     values: dict[str, Any] = {
         "window_s": 0.002, "scheme": "fixed", "factor": 0.02, "least_factor": 0.005,
         "most_factor": 1.0, "limit_share": 0.5, "repeats": 0, "tolerance": 0.01, "predicts": False,
         "largest_displacement_m": 0.02,
     }  # fmt: skip
-    return LoopSettings(**(values | changes))
+    return Loop(**(values | changes))
 
 
 def opened(engine: str, folder: Path, scenario: Scenario, checkpoint: Path | None) -> Session:
