@@ -151,5 +151,5 @@ def test_what_an_engine_cannot_couple_is_told(engine: str, loop: dict[str, Any],
 
 def test_a_gate_beside_a_pattern_is_told() -> None:
     scenario = Scenario.model_validate({**L_SCENE, "discharge": {"gate": "gate"}})
-    with pytest.raises(BadInputError, match="discharge.gate = 'gate' .* absent in a scene with"):
+    with pytest.raises(BadInputError, match=r"discharge.gate = 'gate' .* absent in a scene with"):
         sand.resolved(scenario)
