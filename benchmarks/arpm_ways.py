@@ -19,7 +19,7 @@ from sandmould.casting.arpm.solidification import Solidification, solidify
 
 ADAPTIVE = "2-3B"
 WARMING_S = 10.0
-COARSE_M = 0.02
+COARSE_M = 0.01
 """Elements of the run that only compiles."""
 FEM = "scikit-fem"
 

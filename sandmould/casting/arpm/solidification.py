@@ -194,7 +194,8 @@ def _beginning(heat: Heat, marching: Marching, weights: csr_array) -> Cooling:
 def _record(now: Cooling, marching: Marching, weights: csr_array) -> None:
     now.time_s.append(now.heat.time_s)
     now.probe_k.append(np.asarray(weights @ now.heat.temperature_k))
-    now.enthalpy_j.append(float(now.heat.enthalpy_j_m3 @ marching.volume_m3))
+    # not a product of BLAS: its threads wait for one another longer than a record takes
+    now.enthalpy_j.append(float(np.sum(now.heat.enthalpy_j_m3 * marching.volume_m3)))
 
 
 def _check_range(heat: Heat, filling: Filling) -> None:
