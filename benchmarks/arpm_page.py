@@ -46,7 +46,7 @@ def write(kept: Mapping[str, Any]) -> None:
     )
     text = Template(WORDS.read_text(encoding="utf-8")).substitute(
         verdict=_verdict(ways),
-        contact=_faces_words(contact),
+        contact=_contact_words(contact),
         contact_table=_contact_table(contact, "corrected"),
         printed_table=_contact_table(contact, "printed"),
         reference_mm=f"{ways[0]['size_mm']:g}",
@@ -109,11 +109,17 @@ def _verdict(ways: Sequence[Row]) -> str:
     return " ".join(said)
 
 
-def _faces_words(rows: Sequence[Row]) -> str:
+def _contact_words(rows: Sequence[Row]) -> str:
     of_faces = [r for r in rows if r["exchange"] == "faces"]
     most = max(abs(r["error_percent"]) for r in of_faces)
+    of_one_side = [
+        r for r in rows
+        if (r["exchange"], r["case"], r["resistance_m2k_w"]) == ("corrected", "1-3A", 0.0)
+    ]  # fmt: skip
+    least = min(of_one_side, key=lambda r: abs(r["error_percent"]))
     return (
-        "True faces have no kernel: in all cases, with and without resistance, they are within "
+        f"Without resistance the error of 1-3A is least at c_k = {least['kernel_size']:g}. True "
+        "faces have no kernel: in all cases, with and without resistance, they are within "
         f"{most:.4f} %, and {max(r['largest_k'] for r in of_faces):.2f} K at most."
     )
 
