@@ -17,6 +17,8 @@ _UNITS = (
 _NAMES = {
     "engine.name": "engine",
     "background_damping.form": "background damping",
+    "dt_max_s": "largest step",
+    "source_share": "c_poi",
     "coordination": "coordination number",
     "coordination_bearing": "coordination of bearing grains",
     "rolling_arm_fraction": "rolling arm",

@@ -19,6 +19,7 @@ from sandmould.casting.arpm import computation, scene
 from sandmould.engines.products import Computed
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.solidification import Solidification
+from sandmould.study.kinds.given import write_given
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.moments import LAST_MEASURED
 
@@ -137,21 +138,7 @@ def plan_cells(scenario: Solidification) -> Mapping[str, str]:
 
 def render(run: Run, folder: Path) -> None:
     """Write down all that the solver is given, each value with its source."""
-    lines = [
-        f"# Study {run.study}, run {run.run}: what the solver {computation.source_hash()} is given",
-        *_lines(run.scenario.model_dump(mode="json"), run.sources),
-    ]
-    partial = folder / "deck.in.partial"
-    partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
-
-
-def _lines(tree: Any, sources: Mapping[str, str], key: str = "") -> list[str]:
-    """One line a value; a list with one source stays together."""
-    if key in sources or not isinstance(tree, dict | list):
-        return [f"{key} = {tree}".ljust(60) + f" # {sources.get(key, 'not stated')}"]
-    each = tree.items() if isinstance(tree, dict) else enumerate(tree)
-    return [line for n, v in each for line in _lines(v, sources, f"{key}.{n}" if key else str(n))]
+    write_given(run, folder, computation.source_hash())
 
 
 def compute(run: Run, folder: Path) -> Computed:
