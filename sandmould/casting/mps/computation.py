@@ -149,8 +149,8 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)
     begun, cost = time.monotonic(), no_cost(scenario)
-    planned = scene.expected(scenario).fluid_steps
-    shown = Progress(run, work, planned, "particle-steps")
+    planned = scene.expected_work(scenario)
+    shown = Progress(run, work, planned, "particle-solves")
     with contextlib.suppress(ArithmeticError):
         scene.open_flow(scenario).step()  # compiled before it is timed
     flow = scene.open_flow(scenario)
@@ -168,7 +168,8 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
         return "pouring" if ladle and flow.time_s < ladle.lasts_s else "flowing"
 
     def tell(now: Flowed) -> None:
-        shown.show(stage(), now.time_s, 0.01 * now.percent * planned, now.particle_steps_per_s)
+        done = 0.01 * now.percent * planned
+        shown.show(stage(), now.time_s, done, done / flow.cost.wall_s)
 
     stepping, outcome = time.process_time(), Outcome.FINISHED
     detail = ""
@@ -185,8 +186,7 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     )
     np.savez_compressed(work / "fields.npz", **record.fields(flow))
     cost.wall_s = time.monotonic() - begun
-    rate = cost.particle_steps / max(cost.engine_wall_s, 1e-9)
-    shown.show(stage(), flow.time_s, planned, rate, last=True)
+    shown.show(stage(), flow.time_s, planned, planned / max(cost.engine_wall_s, 1e-9), last=True)
     return Computed(
         RunOutcome(outcome, detail, flow.time_s, scenario.duration_s), cost, is_root=True
     )

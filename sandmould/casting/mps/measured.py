@@ -88,7 +88,7 @@ def _hops(scenario: MetalFlow, table: pd.DataFrame, past: History) -> bool:
     case = scenario.case
     if isinstance(case, StillTank):
         return still_hops(past, case.depth_m, case.particle_m)
-    full = table["particles"] == table["particles"].max()
+    full = table["particles"] >= scene.fluid_of(scenario)  # what splashes before does not hop
     later = table[full & (table["time_s"] > scenario.measured_from_s)]
     return bool((later["largest_rise_m_s"] > HOP_SPEED_M_S).any())
 

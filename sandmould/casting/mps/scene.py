@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import fields
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from sandmould.casting.mps.flow import Flow
 from sandmould.casting.mps.particles import Floats
 from sandmould.casting.mps.scheme import VISCOUS_SHARE, Metal, Scheme
 from sandmould.casting.mps.shoulder import (
-    FREEBOARD,
+    POUR_HEIGHT,
     POUR_M_S,
     Casting,
     Ladle,
@@ -32,15 +31,8 @@ DEPTHS = (3 / 8, 5 / 8, 7 / 8)
 """The paper's 30, 50 and 70 mm over 80."""
 LEVELS = 8
 """Levels of metal at which the length of a step is foreseen."""
-
-
-class Expected(NamedTuple):
-    """What a run will take."""
-
-    fluid_steps: float
-    """Particles of fluid over all steps."""
-    work: float
-    """All particles over all steps, once and once for every relaxation."""
+MOULD_SHARE = 0.2
+"""Of the time that a particle of metal takes; measured 0.15 in space, 0.4 in the plane."""
 
 
 def scheme_of(scenario: MetalFlow) -> Scheme:
@@ -190,7 +182,7 @@ def _counts(case: StillTank | ShoulderedCylinder) -> tuple[int, int, int]:
     flow = open_flow(MetalFlow(case=case))
     begins = int(flow.fluid.sum())
     mould = len(flow.particles.kind) - begins
-    if isinstance(case, StillTank):
+    if isinstance(case, StillTank) or case.starts == "full":
         return mould, begins, begins
     return mould, begins, len(casting_of(case).filled_m(case.particle_m))
 
@@ -200,29 +192,37 @@ def fluid_of(scenario: MetalFlow) -> int:
     return _counts(scenario.case)[2]
 
 
-def expected(scenario: MetalFlow) -> Expected:
-    """Foresee a run's cost: metal that stands takes the largest step, a stream limits it (8)."""
+def expected_work(scenario: MetalFlow) -> float:
+    """Foresee the work of a run: particles over all steps, once and once for every relaxation.
+
+    Metal that stands takes the largest step; a stream that falls limits it by eq. (8). A particle
+    of the mould counts as ``MOULD_SHARE`` of one of metal.
+    """
     case = scenario.case
     mould, begins, ends = _counts(case)
     viscosity = scenario.metal.viscosity_m2_s
     viscous_s = VISCOUS_SHARE * case.particle_m**2 / viscosity if viscosity > 0.0 else math.inf
     still_s = min(scenario.dt_max_s, viscous_s)
-    parts: list[tuple[float, int]] = []  # steps, and particles of fluid in them
-    poured_s = 0.0
-    if not isinstance(case, StillTank) and case.starts == "empty":
-        mass_kg = scenario.metal.density_kg_m3 * case.particle_m**3
-        poured_s = min((ends - begins) * mass_kg / case.rate_kg_s, scenario.duration_s)
-        part_s = poured_s / LEVELS
-        from_m = case.height_m + FREEBOARD * case.particle_m
-        for share in (np.arange(LEVELS) + 0.5) / LEVELS:
-            fluid = int(begins + share * (ends - begins))
-            drop_m = from_m - level_m(scenario, fluid)
-            fastest = math.sqrt(POUR_M_S**2 + 2.0 * scenario.metal.gravity_m_s2 * drop_m)
-            dt_s = min(still_s, scenario.courant * case.particle_m / fastest)
-            parts.append((part_s / dt_s, fluid))
-    parts.append(((scenario.duration_s - poured_s) / still_s, ends))
-    solves = 1 + scenario.relaxations
-    return Expected(
-        sum(steps * fluid for steps, fluid in parts),
-        sum(steps * (fluid + mould) * solves for steps, fluid in parts),
-    )
+    poured_s = _pouring_s(scenario, ends - begins)
+    work = max(0.0, scenario.duration_s - poured_s) / still_s * (ends + MOULD_SHARE * mould)
+    part_s = min(poured_s, scenario.duration_s) / LEVELS
+    for part in range(LEVELS if poured_s else 0):
+        fluid = int(begins + (part + 0.5) * part_s / poured_s * (ends - begins))
+        drop_m = max(0.0, _mouth_m(case) - level_m(scenario, fluid))
+        fastest = math.sqrt(POUR_M_S**2 + 2.0 * scenario.metal.gravity_m_s2 * drop_m)
+        dt_s = min(still_s, scenario.courant * case.particle_m / fastest)
+        work += part_s / dt_s * (fluid + MOULD_SHARE * mould)
+    return work * (1 + scenario.relaxations)
+
+
+def _pouring_s(scenario: MetalFlow, particles: int) -> float:
+    """Time that so many particles take to be poured in."""
+    case = scenario.case
+    if isinstance(case, StillTank):
+        return 0.0
+    return particles * scenario.metal.density_kg_m3 * case.particle_m**3 / case.rate_kg_s
+
+
+def _mouth_m(case: StillTank | ShoulderedCylinder) -> float:
+    """Height that metal is poured from."""
+    return 0.0 if isinstance(case, StillTank) else case.height_m + POUR_HEIGHT * case.particle_m

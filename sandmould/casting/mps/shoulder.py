@@ -27,6 +27,8 @@ SEEN_S = 4.5
 """When figure 8 is drawn."""
 FREEBOARD = 10
 """Particles that the bore reaches above the casting."""
+POUR_HEIGHT = 5
+"""Particles above the casting where metal comes in."""
 GRAVITY = (0.0, 0.0, -9.8)
 POUR_M_S = 0.5
 """Downwards, at the top of the mould: the paper gives none. The stream is as wide as this and the
@@ -154,7 +156,7 @@ class Ladle:
         """Pour into a flow; ValueErrors are those of ``stream``."""
         size_m = flow.kernel.spacing_m
         across = stream(size_m, rate_kg_s, flow.metal.density_kg_m3, casting)
-        high_m = casting.height_m + 5 * size_m
+        high_m = casting.height_m + POUR_HEIGHT * size_m
         self._layer = np.column_stack((across, np.full(len(across), high_m)))
         self._rate = rate_kg_s
         self._mass_kg = flow.metal.density_kg_m3 * size_m**3
