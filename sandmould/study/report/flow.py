@@ -21,12 +21,12 @@ from sandmould.study.collect import Collected
 from sandmould.study.report.figures import png
 from sandmould.study.report.flow_figure import draw_frame, frame_of
 from sandmould.study.report.flow_film import SHADES, FlowFilm, make_flow_film
-from sandmould.study.report.flow_map import said_of, stability_map
+from sandmould.study.report.flow_map import condition_text, said_of, stability_map
 from sandmould.study.report.measured import Curve, measure_curves
 from sandmould.study.report.method import Row
 from sandmould.study.report.tables import Cell, Column, Table
 from sandmould.study.verdict import Verdict
-from sandmould.study.words import listed, name_of, number, setting_text
+from sandmould.study.words import listed, name_of, number
 
 SHOWN = 6
 """Runs whose histories and fields are drawn."""
@@ -124,7 +124,7 @@ def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
 
 
 def _shown(row: pd.Series[Any], keys: Sequence[str], study_folder: Path) -> _Shown:
-    label = setting_text({key: row[key] for key in keys})
+    label = condition_text({key: row[key] for key in keys})
     run = str(row["run"])
     return _Shown(run, label, study_folder / "runs" / run, str(row["classification"]))
 
@@ -171,7 +171,7 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
         columns.append(Column("paper's text", False))
     rows = []
     for (_, row), text in zip(ranked.iterrows(), said, strict=True):
-        label = setting_text({key: row[key] for key in keys})
+        label = condition_text({key: row[key] for key in keys})
         note = str(row["detail"]) if str(row["detail"]) != "nan" else ""
         cells = [Cell(label, label), Cell(str(row["classification"]), str(row["rank"]), note=note)]
         values = [float(row.get(column, np.nan)) for column, _ in shown]
@@ -199,7 +199,7 @@ def _histories(shown: Sequence[_Shown], ideal_pa: dict[str, float]) -> str:
         highest = 3.0 * max(ideal_pa.values())
         axes.set_ylim(0.0, min(highest, max(1.05 * axes.get_ylim()[1], 1.0)))
         axes.tick_params(labelsize=8)
-    figure.supxlabel("time, s", fontsize=9)
+        axes.set_xlabel("time, s", fontsize=8)
     figure.supylabel("pressure, Pa", fontsize=9)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center",
                   ncols=len(ideal_pa), fontsize=8)  # fmt: skip

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 
 from sandmould.casting.mps.stability import COUNTS, SHARES, STEPS_S, Verdict
 from sandmould.study.report.figures import png
+from sandmould.study.words import setting_text
 
 AXES = ("dt_max_s", "relaxations")
 PANELS = "source_share"
@@ -70,6 +71,14 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
     ]  # fmt: skip
     figure.legend(handles=signs, loc="outside lower center", ncols=3, frameon=False)
     return png(figure)
+
+
+def condition_text(values: Mapping[str, Any]) -> str:
+    """A setting as the paper names it, ``MR5-0.5``, with its largest step; any other in full."""
+    if set(values) != {*AXES, PANELS}:
+        return setting_text(values)
+    dt_ms = 1e3 * float(values[AXES[0]])
+    return f"MR{values[AXES[1]]}-{float(values[PANELS]):.3g}, {dt_ms:g} ms"
 
 
 def said_of(values: Mapping[str, Any]) -> str:
