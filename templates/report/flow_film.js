@@ -10,23 +10,10 @@
   let film = null, timer = null;
 
   async function unpack(packed) {
-    const bytes = Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0));
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const raw = new Uint8Array(await new Response(stream).arrayBuffer());
+    const raw = await inflate(packed.data);
     const n = packed.particles, frames = packed.time_s.length, d = packed.dimension;
-    const all = d * frames * n;
-    const place = new Uint16Array(all);
-    for (let axis = 0, at = 0; axis < d; axis++) {
-      for (let frame = 0; frame < frames; frame++) {
-        for (let particle = 0; particle < n; particle++, at++) {
-          const folded = raw[at] | (raw[all + at] << 8);
-          const change = (folded >>> 1) ^ -(folded & 1);
-          place[at] = (frame ? place[at - n] : 0) + change;
-        }
-      }
-    }
-    const shade = (kind, frame) => raw.subarray(2 * all + (kind * frames + frame) * n);
-    const at = (axis, frame) => place.subarray((axis * frames + frame) * n);
+    const at = unfold(raw, d, frames, n), start = 2 * d * frames * n;
+    const shade = (kind, frame) => raw.subarray(start + (kind * frames + frame) * n);
     return { ...packed, data: null, frames, at, shade };
   }
 

@@ -5,11 +5,10 @@ A run has no checkpoint: one that was killed begins again, which costs seconds t
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -18,10 +17,10 @@ from sandmould.casting.mps import computation, scene
 from sandmould.casting.mps.measured import by_window, measure_flow
 from sandmould.engines.outcome import RunOutcome
 from sandmould.engines.products import Computed
-from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.flow import MetalFlow, StillTank
-from sandmould.study.kinds.given import write_given
+from sandmould.study.kinds import own_solver
 from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.own_solver import hash_with, write_given
 from sandmould.study.moments import LAST_MEASURED
 
 if TYPE_CHECKING:
@@ -39,29 +38,14 @@ batches everywhere."""
 SLOWER = 10.0
 """Than that a machine may be, and a run longer than expected."""
 
+defaults = own_solver.defaults
+resolved = own_solver.resolved
+lasts_s = own_solver.lasts_s
+engine_problem = own_solver.engine_problem
+ranks = own_solver.ranks
 problems = scene.problems
 complete = computation.complete
 no_cost = computation.no_cost
-
-
-def defaults() -> dict[str, Any]:
-    """Nothing: the case is the user's."""
-    return {}
-
-
-def resolved(scenario: MetalFlow) -> MetalFlow:
-    """The scenario: it names no files."""
-    return scenario
-
-
-def lasts_s(scenario: MetalFlow) -> float:
-    """Measures are those of the end."""
-    return 0.0
-
-
-def engine_problem(scenario: MetalFlow) -> Problem | None:
-    """None: the solver is our own."""
-    return None
 
 
 def sources(scenario: MetalFlow) -> list[Path]:
@@ -76,17 +60,11 @@ def template_hash(scenario: MetalFlow) -> str:
 
 def computed_hash(scenario: MetalFlow) -> str:
     """Hash of scenario and solver."""
-    text = scenario.model_dump_json(exclude={"seed"}) + computation.source_hash()
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hash_with(scenario, computation.source_hash())
 
 
 def threads(scenario: MetalFlow) -> int:
     """One."""
-    return 1
-
-
-def ranks(scenario: MetalFlow) -> int:
-    """No MPI."""
     return 1
 
 

@@ -5,11 +5,10 @@ A run has no checkpoint: one that was killed begins again, which costs seconds t
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -17,10 +16,10 @@ import pandas as pd
 from analysis.freezing import freezing
 from sandmould.casting.arpm import computation, scene
 from sandmould.engines.products import Computed
-from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.solidification import Solidification
-from sandmould.study.kinds.given import write_given
+from sandmould.study.kinds import own_solver
 from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.own_solver import hash_with, write_given
 from sandmould.study.moments import LAST_MEASURED
 
 if TYPE_CHECKING:
@@ -38,29 +37,14 @@ run; fixed, so that a study has the same batches everywhere."""
 SLOWER = 10.0
 """Than that a machine may be, and a run longer than expected."""
 
+defaults = own_solver.defaults
+resolved = own_solver.resolved
+lasts_s = own_solver.lasts_s
+engine_problem = own_solver.engine_problem
+ranks = own_solver.ranks
 problems = scene.problems
 complete = computation.complete
 no_cost = computation.no_cost
-
-
-def defaults() -> dict[str, Any]:
-    """Nothing: casting and mould are the user's."""
-    return {}
-
-
-def resolved(scenario: Solidification) -> Solidification:
-    """The scenario: it names no files."""
-    return scenario
-
-
-def lasts_s(scenario: Solidification) -> float:
-    """Measures are those of the end."""
-    return 0.0
-
-
-def engine_problem(scenario: Solidification) -> Problem | None:
-    """None: the solver is our own."""
-    return None
 
 
 def sources(scenario: Solidification) -> list[Path]:
@@ -75,18 +59,12 @@ def template_hash(scenario: Solidification) -> str:
 
 def computed_hash(scenario: Solidification) -> str:
     """Hash of scenario and solver."""
-    text = scenario.model_dump_json(exclude={"seed"}) + computation.source_hash()
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hash_with(scenario, computation.source_hash())
 
 
 def threads(scenario: Solidification) -> int:
     """Of one process."""
     return scenario.threads
-
-
-def ranks(scenario: Solidification) -> int:
-    """No MPI."""
-    return 1
 
 
 def memory_mb(scenario: Solidification) -> int:
