@@ -76,7 +76,8 @@ class _Record:
         self._every_s, self._next_s = every_s, 0.0
         self._up = up
         self._rows: list[tuple[float, int, int]] = []
-        self._frames: list[tuple[float, Floats, Floats, Floats]] = []
+        self._frames: list[tuple[Any, ...]] = []
+        """Time, and positions, velocities and pressures of the metal."""
 
     def __call__(self, flow: Flow) -> None:
         """Note a step, and the field when a record is due."""
@@ -91,8 +92,8 @@ class _Record:
         """Note the field."""
         state, own = flow.particles, flow.fluid
         if not self._frames or self._frames[-1][0] < flow.time_s:
-            self._frames.append((flow.time_s, state.position_m[own], state.velocity_m_s[own],
-                                 flow.pressure_pa[own]))  # fmt: skip
+            fields = (state.position_m[own], state.velocity_m_s[own], flow.pressure_pa[own])
+            self._frames.append((flow.time_s, *(field.astype(np.float32) for field in fields)))
 
     def table(self, names: Sequence[str]) -> pd.DataFrame:
         """One row a step; a probe of several places shows their mean."""
@@ -111,17 +112,16 @@ class _Record:
     def fields(self, flow: Flow) -> dict[str, Any]:
         """Frames, one after the other: particles keep their order and new ones come last."""
         d = flow.kernel.dimension
-        short: dict[str, Any] = {
-            name: np.concatenate([frame[place] for frame in self._frames]).astype(np.float32)
-            for place, name in ((1, "position_m"), (2, "velocity_m_s"), (3, "pressure_pa"))
-        }
+        place, velocity, pressure = (
+            np.concatenate([frame[field] for frame in self._frames]) for field in (1, 2, 3)
+        )
         wall = flow.particles.position_m[flow.particles.kind == WALL, :d]
         return {
             "time_s": np.array([frame[0] for frame in self._frames]),
             "count": np.array([len(frame[1]) for frame in self._frames]),
-            "position_m": short["position_m"][:, :d],
-            "velocity_m_s": short["velocity_m_s"][:, :d],
-            "pressure_pa": short["pressure_pa"],
+            "position_m": place[:, :d],
+            "velocity_m_s": velocity[:, :d],
+            "pressure_pa": pressure,
             "wall_m": wall.astype(np.float32),
             "particle_m": flow.kernel.spacing_m,
         }

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,10 +12,11 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.stability import Verdict as Stability
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
 from sandmould.study.report.figures import png
 from sandmould.study.report.flow_figure import draw_frame, frame_of
@@ -81,13 +81,12 @@ def flow_pages(
         Most that all films together may weigh.
     """
     ranked = _ranked(scenario, collected.summary)
-    places = np.unique(np.linspace(0, len(ranked) - 1, min(SHOWN, len(ranked))).round().astype(int))
-    shown = [_shown(ranked.iloc[place], collected.keys, study_folder) for place in places.tolist()]
+    shown = _shown(ranked, collected.keys, study_folder)
     ideal_pa = scene.ideal_pa(scenario, scene.fluid_of(scenario))
     filmed = [shown[0], shown[-1]][: min(FILMED, len(shown))] if shown else []
     probes = [f"{name}_pa" for name in ideal_pa]
     return FlowPages(
-        map=stability_map(collected.summary, collected.keys),
+        map=stability_map(ranked, collected.keys),
         sentences=_sentences(scenario, ranked, ideal_pa),
         noise=_noise(scenario, ranked, collected.keys),
         histories=_histories(shown, ideal_pa),
@@ -109,7 +108,7 @@ def flow_pages(
 
 
 def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
-    """Runs with fields: excellent, good and failed, the calmest of each first."""
+    """Runs that ended: excellent, good and failed, the calmest of each first."""
     order = {stability.value: place for place, stability in enumerate(Stability)}
     table = summary.copy()
     for column in ("classification", f"{scene.deepest(scenario)}_sd_pa"):
@@ -123,13 +122,19 @@ def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _shown(row: pd.Series[Any], keys: Sequence[str], study_folder: Path) -> _Shown:
-    label = condition_text({key: row[key] for key in keys})
-    run = str(row["run"])
-    return _Shown(run, label, study_folder / "runs" / run, str(row["classification"]))
+def _shown(ranked: pd.DataFrame, keys: Sequence[str], study_folder: Path) -> list[_Shown]:
+    """Runs that left fields, evenly from the calmest to the worst."""
+    found = []
+    for _, row in ranked.iterrows():
+        folder = study_folder / "runs" / str(row["run"])
+        if (folder / "fields.npz").is_file():
+            label = condition_text({key: row[key] for key in keys})
+            found.append(_Shown(folder.name, label, folder, str(row["classification"])))
+    places = np.linspace(0, len(found) - 1, min(SHOWN, len(found))).round().astype(int)
+    return [found[place] for place in np.unique(places).tolist()]
 
 
-def _load(folder: Path) -> dict[str, np.ndarray]:
+def _load(folder: Path) -> dict[str, NDArray[np.float64]]:
     with np.load(folder / "fields.npz") as kept:
         return dict(kept)
 
@@ -158,7 +163,11 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
     """Every run with its verdict, pressures and speeds, beside what the paper says."""
     names = [probe.name for probe in scene.probes_of(scenario)]
     deepest = scene.deepest(scenario)
-    said = [said_of({key: row[key] for key in keys}) for _, row in ranked.iterrows()]
+    is_papers = scenario.case == StillTank() and scenario.metal == PouredMetal()
+    said = [
+        said_of({key: row[key] for key in keys}) if is_papers else ""
+        for _, row in ranked.iterrows()
+    ]
     columns = [Column("setting", False), Column("verdict", False)]
     shown: list[tuple[str, int]] = []
     for name in names:

@@ -31,6 +31,7 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
     Parameters
     ----------
     summary : DataFrame
+        Runs that ended, each with its classification.
     keys : sequence of str
         Swept keys.
 
@@ -39,17 +40,16 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
     str
         A ``data:`` address; empty unless time step and relaxations are swept.
     """
-    known = summary[summary["classification"].notna()] if "classification" in summary else summary
-    if not set(AXES) <= set(keys) or "classification" not in known or known.empty:
+    if not set(AXES) <= set(keys) or summary.empty:
         return ""
     shares: list[Any] = [None]
     if PANELS in keys:
-        shares = sorted(known[PANELS].unique().tolist(), reverse=True)
+        shares = sorted(summary[PANELS].unique().tolist(), reverse=True)
     figure = Figure(figsize=(max(5.0, 2.9 * len(shares)), 3.4), dpi=110, layout="constrained")
     panels = figure.subplots(1, len(shares), sharex=True, sharey=True, squeeze=False)[0]
-    steps, counts = sorted(known[AXES[0]].unique()), sorted(known[AXES[1]].unique())
+    steps, counts = sorted(summary[AXES[0]].unique()), sorted(summary[AXES[1]].unique())
     for axes, share in zip(panels, shares, strict=True):
-        part = known if share is None else known[known[PANELS] == share]
+        part = summary if share is None else summary[summary[PANELS] == share]
         for verdict, (marker, colour) in SIGNS.items():
             own = part[part["classification"] == verdict.value]
             # evenly spaced, as the paper's: the values rise by doubling
