@@ -186,7 +186,8 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     )
     np.savez_compressed(work / "fields.npz", **record.fields(flow))
     cost.wall_s = time.monotonic() - begun
-    shown.show(stage(), flow.time_s, planned, planned / max(cost.engine_wall_s, 1e-9), last=True)
+    done = planned * flow.time_s / scenario.duration_s
+    shown.show(stage(), flow.time_s, done, done / max(cost.engine_wall_s, 1e-9), last=True)
     return Computed(
         RunOutcome(outcome, detail, flow.time_s, scenario.duration_s), cost, is_root=True
     )

@@ -145,7 +145,7 @@ def _sentences(
     """How many settings hold, and how far their pressure is from rho g h."""
     counts = ranked["classification"].value_counts()
     parts = [f"{counts.get(s.value, 0)} {s.value}" for s in Stability]
-    said = [f"Of {len(ranked)} runs {listed(parts)} by the rule of figure 6."]
+    said = [f"By the rule of figure 6 {listed(parts)}, of {len(ranked)}."]
     name = scene.deepest(scenario)
     errors = pd.to_numeric(ranked[f"{name}_error_pa"], errors="coerce").dropna() if (
         f"{name}_error_pa" in ranked) else pd.Series(dtype=float)  # fmt: skip
@@ -234,7 +234,7 @@ def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels, three in a row."""
     across = min(count, 3)
     rows = -(-count // across)
-    figure = Figure(figsize=(11.0, height * rows + 0.6), dpi=100, layout="constrained")
+    figure = Figure(figsize=(1.0 + 3.4 * across, height * rows + 0.6), dpi=100, layout="constrained")
     panels = figure.subplots(rows, across, squeeze=False).ravel()
     for axes in panels[count:]:
         axes.set_axis_off()
