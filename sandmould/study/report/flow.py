@@ -234,7 +234,9 @@ def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels, three in a row."""
     across = min(count, 3)
     rows = -(-count // across)
-    figure = Figure(figsize=(1.0 + 3.4 * across, height * rows + 0.6), dpi=100, layout="constrained")
+    figure = Figure(
+        figsize=(1.0 + 3.4 * across, height * rows + 0.6), dpi=100, layout="constrained"
+    )
     panels = figure.subplots(rows, across, squeeze=False).ravel()
     for axes in panels[count:]:
         axes.set_axis_off()
