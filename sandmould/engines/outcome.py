@@ -21,6 +21,8 @@ class Outcome(IntEnum):
     NO_FLOW = 313
     NOT_SETTLED = 314
     COUPLING_DIVERGED = 315
+    ESCAPED_METAL = 316
+    NO_FREE_SURFACE = 317
     ENGINE_FAILED = 320
     OUT_OF_WALL_TIME = 400
     DISK_REFUSED = 401
@@ -51,6 +53,8 @@ _MEANING = {
     Outcome.NO_FLOW: "The sand stopped flowing before it was meant to.",
     Outcome.NOT_SETTLED: "A layer did not come to rest within the longest time its rule allows.",
     Outcome.COUPLING_DIVERGED: "The staggered loop of sand and pattern ran away.",
+    Outcome.ESCAPED_METAL: "Metal left the mould.",
+    Outcome.NO_FREE_SURFACE: "Metal without a free surface did not fit its place in the mould.",
     Outcome.ENGINE_FAILED: "The engine stopped with an error of its own.",
     Outcome.OUT_OF_WALL_TIME: "The wall-time limit came first; the same command continues.",
     Outcome.DISK_REFUSED: "The disk took no more; with room on it the same command continues.",

@@ -128,20 +128,20 @@ def _kind(files: list[_File]) -> str:
     """Kind of the study, by the last file that states it; the schema refuses what is none."""
     stated = [f for f in files if "kind" in f.tree]
     kind = str(stated[-1].tree["kind"]) if stated else "sand"
-    if kind == "flow":
-        valid = "sand, deck or solidification; flow comes with its own solver"
-        raise BadInputError([Problem("kind", kind, valid, stated[-1].shown)])
-    return kind if kind in ("deck", "solidification") else "sand"
+    return kind if kind in ("deck", "solidification", "flow") else "sand"
 
 
 def _not_of_its_kind(tree: Tree) -> Iterator[Problem]:
     """Sections that only studies of sand have."""
     kind = tree.get("kind", "sand")
-    absent = [*(ONLY_SAND if kind != "sand" else ()), *(["material"] if kind == "deck" else ())]
+    absent = [
+        *(ONLY_SAND if kind != "sand" else ()),
+        *(["material"] if kind in ("deck", "flow") else ()),
+    ]
     for name in absent:
         if tree.get(name):
             yield Problem(name, tree[name], f"absent in a study of kind {kind}")
-    if kind == "solidification" and tree.get("replicates", 1) != 1:
+    if kind in ("solidification", "flow") and tree.get("replicates", 1) != 1:
         yield Problem("replicates", tree["replicates"], "1: nothing in a run is drawn by lot")
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from sandmould.engines.progress import duration_text
+from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_planned, validated
@@ -52,10 +53,16 @@ class _SolidificationRunFile(_RunFile):
     scenario: Solidification  # type: ignore[assignment]
 
 
+class _FlowRunFile(_RunFile):
+    """The same of metal that flows."""
+
+    scenario: MetalFlow  # type: ignore[assignment]
+
+
 _FILE_OF: dict[type, type[_RunFile]] = {
-    OwnDeck: _DeckRunFile, Solidification: _SolidificationRunFile
+    OwnDeck: _DeckRunFile, Solidification: _SolidificationRunFile, MetalFlow: _FlowRunFile
 }  # fmt: skip
-_SIGN = {"template": _DeckRunFile, "shapes": _SolidificationRunFile}
+_SIGN = {"template": _DeckRunFile, "shapes": _SolidificationRunFile, "case": _FlowRunFile}
 """Keys that only a scenario of one kind has."""
 
 

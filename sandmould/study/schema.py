@@ -15,10 +15,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from sandmould import ROOT
+from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section, models_in
 from sandmould.scenario.solidification import Solidification
-from sandmould.study.study import DeckStudy, SolidificationStudy, Study
+from sandmould.study.study import DeckStudy, FlowStudy, SolidificationStudy, Study
 
 SCHEMA = ROOT / "config" / "schema.json"
 DEFAULT = ROOT / "config" / "default.yaml"
@@ -28,7 +29,7 @@ Tree = dict[str, Any]
 def schema_text() -> str:
     """JSON schema of a study's file; every leaf may also state its source."""
     schema = Study.model_json_schema()
-    others = [model.model_json_schema() for model in (DeckStudy, SolidificationStudy)]
+    others = [model.model_json_schema() for model in (DeckStudy, SolidificationStudy, FlowStudy)]
     definitions = schema.pop("$defs")
     scenarios = [part["properties"]["scenario"] for part in (schema, *others)]
     for other in others:
@@ -36,7 +37,8 @@ def schema_text() -> str:
         definitions = other["$defs"] | definitions
         schema["properties"] = other["properties"] | schema["properties"]
     # The material states a part of it, and what the study is based on another.
-    definitions["Solidification"].pop("required")
+    for name in ("Solidification", "MetalFlow"):
+        definitions[name].pop("required")
     # The kind may be that of the study which this one is based on.
     schema["properties"]["scenario"] = {
         "description": "What is simulated, by kind.",
@@ -83,6 +85,7 @@ def default_text() -> str:
         *_lines(Study()),
         *_entry_keys(OwnDeck, "", "the scenario of a study of kind deck"),
         *_entry_keys(Solidification, "", "the scenario of a study of kind solidification"),
+        *_entry_keys(MetalFlow, "", "the scenario of a study of kind flow"),
     ]
     return "\n".join(lines) + "\n"
 

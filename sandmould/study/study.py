@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from sandmould.scenario.contact import BackgroundDamping, Contact
+from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
@@ -182,9 +183,19 @@ class SolidificationStudy(Study):
     )
 
 
+class FlowStudy(Study):
+    """A study of metal that flows."""
+
+    scenario: MetalFlow = Field(  # type: ignore[assignment]
+        ..., description="The metal, where it flows, and how that is computed."
+    )
+
+
 ONLY_SAND = ("cross_check", "calibration", "certificate")
 """Sections that other kinds of studies do not have."""
-_MODELS: dict[str, type[Study]] = {"deck": DeckStudy, "solidification": SolidificationStudy}
+_MODELS: dict[str, type[Study]] = {
+    "deck": DeckStudy, "solidification": SolidificationStudy, "flow": FlowStudy
+}  # fmt: skip
 _MATERIALS: dict[str, type[Section]] = {"sand": Material, "solidification": MetalAndMould}
 
 

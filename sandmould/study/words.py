@@ -17,6 +17,8 @@ _UNITS = (
 _NAMES = {
     "engine.name": "engine",
     "background_damping.form": "background damping",
+    "dt_max_s": "largest step",
+    "source_share": "c_poi",
     "coordination": "coordination number",
     "coordination_bearing": "coordination of bearing grains",
     "rolling_arm_fraction": "rolling arm",
@@ -25,6 +27,14 @@ _NAMES = {
     "apparent_density_raw_kg_m3": "apparent density, as eq. (55) prints it",
     "apparent_density_corrected_kg_m3": "apparent density, corrected for walls",
 }
+
+_OF_PROBE = {
+    "_window_sd_pa": "deviation of short means of the pressure",
+    "_sd_pa": "deviation of the pressure",
+    "_mean_pa": "mean pressure",
+    "_error_pa": "error of the mean pressure",
+}
+"""Measures at a probe of a flow."""
 
 
 def unit_of(key: str) -> str:
@@ -45,6 +55,9 @@ def name_of(key: str) -> str:
         return _NAMES.get(key) or _NAMES[last]
     if last.endswith("_fill_fraction"):
         return f"fill of the {last.removesuffix('_fill_fraction').replace('_', ' ')}"
+    for ending, what in _OF_PROBE.items():
+        if last.endswith(ending):
+            return f"{what} at {last.removesuffix(ending).replace('_', ' ')}"
     suffix = next((s for s, _ in _UNITS if last.endswith(s)), "")
     if suffix == "_fraction":
         suffix = ""

@@ -11,28 +11,15 @@
   let film = null, timer = null;
 
   async function unpack(packed) {
-    const bytes = Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0));
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const raw = new Uint8Array(await new Response(stream).arrayBuffer());
+    const raw = await inflate(packed.data);
     const n = packed.grains, frames = packed.time_s.length, d = packed.dimension;
-    const all = d * frames * n;
-    const place = new Uint16Array(all);
-    for (let axis = 0, at = 0; axis < d; axis++) {
-      for (let frame = 0; frame < frames; frame++) {
-        for (let grain = 0; grain < n; grain++, at++) {
-          const folded = raw[at] | (raw[all + at] << 8);
-          const change = (folded >>> 1) ^ -(folded & 1);
-          place[at] = (frame ? place[at - n] : 0) + change;
-        }
-      }
-    }
-    const radius_m = new Float64Array(n), start = 2 * all;
+    const at = unfold(raw, d, frames, n), start = 2 * d * frames * n;
+    const radius_m = new Float64Array(n);
     for (let grain = 0; grain < n; grain++) {
       const share = raw[start + grain] | (raw[start + n + grain] << 8);
       radius_m[grain] = (share / 65535) * packed.largest_radius_m;
     }
     const layer = raw.subarray(start + 2 * n, start + 3 * n);
-    const at = (axis, frame) => place.subarray((axis * frames + frame) * n, (axis * frames + frame + 1) * n);
     return { ...packed, data: null, frames, at, radius_m, layer };
   }
 

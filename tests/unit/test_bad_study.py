@@ -82,11 +82,6 @@ CASES: dict[str, tuple[str | bytes, str]] = {
         "trial.yaml: material = 'silica' cannot be used: valid is the name of a material: "
         "hirata_2019, hirata_2019_aluminium, rojek_2004.",
     ),
-    "kind of a later solver": (
-        "based_on: tube\nkind: flow\nmetal: aluminium",
-        "trial.yaml: kind = 'flow' cannot be used: "
-        "valid is sand, deck or solidification; flow comes with its own solver.",
-    ),
     "measure after the end": (
         "based_on: tube\nobjective: {at_vibration_s: 60}",
         "trial.yaml: objective.at_vibration_s = 60.0 cannot be used: "

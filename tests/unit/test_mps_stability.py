@@ -18,6 +18,7 @@ from sandmould.casting.mps.stability import (
     probe_places,
     run_still,
     stability_map,
+    still_hops,
     table_2,
 )
 from sandmould.casting.mps.tank import open_tank
@@ -33,6 +34,10 @@ def history(deviation_pa: float, top_m: float) -> History:
     return History(np.cumsum(dt_s), dt_s, pressure, pressure, still, still, still, still + top_m)
 
 
+def judged(seen: History, stopped: str = "") -> Verdict:
+    return judge(stopped, still_hops(seen, 0.08, 2e-3), float(seen.deviation_pa()[-1]))
+
+
 def test_verdicts_follow_the_numbers_of_the_text():
     quiet, loud = history(199.0, 0.081), history(201.0, 0.081)
     assert quiet.mean_pa() == pytest.approx(ideal_pa())
@@ -40,10 +45,10 @@ def test_verdicts_follow_the_numbers_of_the_text():
     # the first two steps form a window, the third one of its own; then all three
     assert quiet.deviation_pa(2.0) == pytest.approx([199.0] * 3)
     assert quiet.deviation_pa(4.0) == pytest.approx([0.0] * 3, abs=1e-9)
-    assert judge(quiet, "") is Verdict.EXCELLENT
-    assert judge(loud, "") is Verdict.GOOD
-    assert judge(history(10.0, 0.0861), "") is Verdict.GOOD  # a particle left the surface
-    assert judge(quiet, "the flow diverged") is Verdict.FAILED
+    assert judged(quiet) is Verdict.EXCELLENT
+    assert judged(loud) is Verdict.GOOD
+    assert judged(history(10.0, 0.0861)) is Verdict.GOOD  # a particle left the surface
+    assert judged(quiet, "the flow diverged") is Verdict.FAILED
 
 
 def test_the_conditions_of_table_2():

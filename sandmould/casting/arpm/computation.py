@@ -20,6 +20,7 @@ from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.solidification import Cooling, UnstableError, solidify
 from sandmould.casting.arpm.solidification import Progress as Cooled
 from sandmould.casting.arpm.solidification import Solidification as Found
+from sandmould.casting.hashing import hash_with
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.products import Computed, Cost, peak_memory_bytes
 from sandmould.engines.progress import Progress
@@ -58,8 +59,7 @@ def source_hash() -> str:
 
 def computed_hash(scenario: Solidification) -> str:
     """Hash of scenario and solver."""
-    text = scenario.model_dump_json(exclude={"seed"}) + source_hash()
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hash_with(scenario, source_hash())
 
 
 def engine_of(scenario: Solidification) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sandmould.casting.mps.flow import Flow
 from sandmould.casting.mps.particles import DUMMY, Floats
@@ -41,6 +42,32 @@ def pressure_nearest(flow: Flow, place_m: Floats) -> Floats:
     place = flow.particles.position_m[flow.fluid]
     far = np.linalg.norm(place[None] - place_m[:, None], axis=2)
     return flow.pressure_pa[flow.fluid][far.argmin(axis=1)]
+
+
+def window_means(
+    time_s: Floats, dt_s: Floats, values: Floats, window_s: float
+) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Means over windows of time, steps weighted by their length.
+
+    Parameters
+    ----------
+    time_s, dt_s : (t,) float64, s
+        Ends and lengths of the steps.
+    values : (t, k) float64
+    window_s : float, s
+
+    Returns
+    -------
+    number : (w,) int64
+        Of each window that holds the middle of a step.
+    weight : (w,) float64, s
+    mean : (w, k) float64
+    """
+    window = ((time_s - 0.5 * dt_s) / window_s).astype(np.int64)
+    weight = np.bincount(window, dt_s).astype(np.float64)
+    sums = [np.bincount(window, dt_s * column) for column in values.T]
+    held = np.flatnonzero(weight > 0.0)
+    return held, weight[held], np.stack(sums, axis=1)[held] / weight[held, None]
 
 
 @dataclass(frozen=True)
@@ -80,12 +107,7 @@ class History:
         """
         pressure, weights = self.particle_pressure_pa, self.dt_s
         if window_s > 0.0:
-            window = ((self.time_s - 0.5 * self.dt_s) / window_s).astype(np.int64)
-            weights = np.bincount(window, self.dt_s).astype(np.float64)
-            sums = [np.bincount(window, self.dt_s * column) for column in pressure.T]
-            held = weights > 0.0
-            pressure = np.stack(sums, axis=1)[held] / weights[held, None]
-            weights = weights[held]
+            _, weights, pressure = window_means(self.time_s, self.dt_s, pressure, window_s)
         apart = pressure - self.mean_pa()
         return np.asarray(np.sqrt(np.average(apart**2, axis=0, weights=weights)))
 

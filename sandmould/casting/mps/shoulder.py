@@ -14,7 +14,6 @@ from sandmould.casting.mps.particles import (
     FLUID,
     WALL_LAYERS,
     Floats,
-    Particles,
     at_rest,
     lattice,
     mould_around,
@@ -23,14 +22,13 @@ from sandmould.casting.mps.probes import pressure_at
 from sandmould.casting.mps.scheme import Metal, Scheme
 from sandmould.casting.mps.weight import make_kernel
 
-HEIGHT_M, LOWER_M, UPPER_M = 0.18, 0.04, 0.025
-"""Height of the casting and diameters of its halves."""
 RATE_KG_S = 0.1
-POURED_S = 4.0
 SEEN_S = 4.5
 """When figure 8 is drawn."""
 FREEBOARD = 10
 """Particles that the bore reaches above the casting."""
+POUR_HEIGHT = 5
+"""Particles above the casting where metal comes in."""
 GRAVITY = (0.0, 0.0, -9.8)
 POUR_M_S = 0.5
 """Downwards, at the top of the mould: the paper gives none. The stream is as wide as this and the
@@ -39,34 +37,56 @@ HOP_SPEED_M_S = 0.5
 """Upward speed after pouring, beyond which metal hops: enough to rise 13 mm, six particles."""
 
 
-def is_cavity(place_m: Floats, freeboard_m: float = 0.0) -> NDArray[np.bool_]:
-    """Whether points are inside the mould, (n,) bool; the upper half may reach higher."""
-    across_m = np.hypot(place_m[:, 0], place_m[:, 1])
-    height_m = place_m[:, 2]
-    wide = (height_m < 0.5 * HEIGHT_M) & (across_m < 0.5 * LOWER_M)
-    narrow = (height_m < HEIGHT_M + freeboard_m) & (across_m < 0.5 * UPPER_M)
-    return np.asarray((height_m > 0.0) & (wide | narrow))
+@dataclass(frozen=True)
+class Casting:
+    """A cylinder with a shoulder at half its height; the paper's unless given."""
+
+    height_m: float = 0.18
+    lower_m: float = 0.04
+    """Diameter of the lower half."""
+    upper_m: float = 0.025
+
+    def holds(self, place_m: Floats, freeboard_m: float = 0.0) -> NDArray[np.bool_]:
+        """Whether points are inside the mould, (n,) bool; the upper half may reach higher."""
+        across_m = np.hypot(place_m[:, 0], place_m[:, 1])
+        height_m = place_m[:, 2]
+        wide = (height_m < 0.5 * self.height_m) & (across_m < 0.5 * self.lower_m)
+        narrow = (height_m < self.height_m + freeboard_m) & (across_m < 0.5 * self.upper_m)
+        return np.asarray((height_m > 0.0) & (wide | narrow))
+
+    def sites(self, size_m: float) -> Floats:
+        """Lattice over casting, mould and bore above it, (n, 3) float64, m."""
+        half = math.ceil(0.5 * self.lower_m / size_m) + WALL_LAYERS
+        top = math.ceil((self.height_m + FREEBOARD * size_m) / size_m)
+        return lattice((-half, -half, -WALL_LAYERS), (half, half, top), size_m)
+
+    def filled_m(self, size_m: float) -> Floats:
+        """Sites of the metal that fills it, (n, 3) float64, m."""
+        sites = self.sites(size_m)
+        return sites[self.holds(sites)]
+
+    def level_m(self, size_m: float, particles: int) -> float:
+        """Height that so many particles fill the mould to."""
+        sites = self.sites(size_m)
+        height_m = np.sort(sites[self.holds(sites, FREEBOARD * size_m), 2])
+        return float(height_m[min(particles, len(height_m)) - 1]) + 0.5 * size_m
 
 
-def hydrostatic_pa(metal: Metal) -> float:
-    """Pressure at the bottom of the full casting: 4410 Pa for aluminium."""
-    return metal.density_kg_m3 * float(np.linalg.norm(metal.gravity_m_s2)) * HEIGHT_M
+PAPERS = Casting()
 
 
-def _sites(size_m: float, freeboard_m: float) -> Floats:
-    half = math.ceil(0.5 * LOWER_M / size_m) + WALL_LAYERS
-    top = math.ceil((HEIGHT_M + freeboard_m) / size_m)
-    return lattice((-half, -half, -WALL_LAYERS), (half, half, top), size_m)
+def pressure_pa_m(metal: Metal) -> float:
+    """Hydrostatic pressure by depth, Pa/m: 4410 Pa at the bottom of 180 mm of aluminium."""
+    return metal.density_kg_m3 * float(np.linalg.norm(metal.gravity_m_s2))
 
 
-def mould(size_m: float, freeboard_m: float) -> Particles:
-    """Walls and dummies round the casting, open at the top."""
-    return mould_around(
-        _sites(size_m, freeboard_m), lambda place: is_cavity(place, freeboard_m), size_m
-    )
-
-
-def open_shoulder(size_m: float, scheme: Scheme, full: bool) -> Flow:
+def open_shoulder(
+    size_m: float,
+    scheme: Scheme,
+    full: bool,
+    metal: Metal | None = None,
+    casting: Casting = PAPERS,
+) -> Flow:
     """Flow in the mould, full of metal at rest or with a first layer to be poured on.
 
     Parameters
@@ -75,74 +95,93 @@ def open_shoulder(size_m: float, scheme: Scheme, full: bool) -> Flow:
         Of the particles; the paper does not give it (2 mm make about 19 700 in the casting).
     scheme : Scheme
     full : bool
+    metal : Metal, optional
+        The paper's unless given; its gravity is along -z.
+    casting : Casting
 
     Raises
     ------
     ValueError
         For particles too large to fill the narrow half with four.
     """
-    if size_m > UPPER_M / 4:
+    if size_m > casting.upper_m / 4 * (1.0 + 1e-9):
         raise ValueError(
-            f"particle size is {size_m} m: at most {UPPER_M / 4:.4g} m, a quarter of the bore"
+            f"particle size is {size_m} m: at most {casting.upper_m / 4:.4g} m, a quarter of the "
+            "bore"
         )
+    metal = metal or Metal(gravity_m_s2=GRAVITY)
     freeboard_m = FREEBOARD * size_m
-    sites = _sites(size_m, freeboard_m)
-    casting = sites[is_cavity(sites)]
-    fluid = at_rest(casting if full else casting[casting[:, 2] < size_m], FLUID)
-    margin_m = (WALL_LAYERS + 1) * size_m
-    half_m = 0.5 * LOWER_M + margin_m
-    limit_m_s = 2.0 * math.sqrt(2.0 * 9.8 * (HEIGHT_M + freeboard_m)) + POUR_M_S
-    guard = Guard(
-        limit_m_s,
-        (-half_m, -half_m, -margin_m),
-        (half_m, half_m, HEIGHT_M + freeboard_m + HEIGHT_M),
+    walls = mould_around(
+        casting.sites(size_m), lambda place: casting.holds(place, freeboard_m), size_m
     )
-    everything = fluid.joined(mould(size_m, freeboard_m))
-    return Flow(everything, make_kernel(3, size_m), Metal(gravity_m_s2=GRAVITY), scheme, guard)
+    filled = casting.filled_m(size_m)
+    fluid = at_rest(filled if full else filled[filled[:, 2] < size_m], FLUID)
+    margin_m = (WALL_LAYERS + 1) * size_m
+    half_m = 0.5 * casting.lower_m + margin_m
+    g = float(np.linalg.norm(metal.gravity_m_s2))
+    top_m = casting.height_m + freeboard_m
+    guard = Guard(
+        2.0 * math.sqrt(2.0 * g * top_m) + POUR_M_S,
+        (-half_m, -half_m, -margin_m),
+        (half_m, half_m, top_m + casting.height_m),
+    )
+    return Flow(fluid.joined(walls), make_kernel(3, size_m), metal, scheme, guard)
+
+
+def stream(size_m: float, rate_kg_s: float, density_kg_m3: float, casting: Casting) -> Floats:
+    """Sites across a stream at the pouring speed, (n, 2) float64, m.
+
+    Raises
+    ------
+    ValueError
+        For a rate whose stream is wider than the bore.
+    """
+    area_m2 = rate_kg_s / density_kg_m3 / POUR_M_S
+    cells = max(1, round(area_m2 / size_m**2))
+    half = math.ceil(math.sqrt(cells))
+    place = lattice((-half, -half), (half, half), size_m)
+    layer = place[np.argsort(np.hypot(*place.T), kind="stable")][:cells]
+    if np.hypot(*layer.T).max() > 0.5 * casting.upper_m - 0.5 * size_m:
+        raise ValueError(
+            f"pouring rate is {rate_kg_s} kg/s: at {POUR_M_S} m/s the stream is wider than the "
+            f"bore of {casting.upper_m} m"
+        )
+    return layer
 
 
 class Ladle:
-    """Pours layers of particles in at the top of the mould, at a constant rate."""
+    """Pours layers of particles in at the top of the mould, at a constant rate until it is full."""
 
-    def __init__(self, flow: Flow, rate_kg_s: float = RATE_KG_S) -> None:
-        """Pour into a flow.
-
-        Raises
-        ------
-        ValueError
-            For a rate whose stream is wider than the bore at the pouring speed.
-        """
+    def __init__(self, flow: Flow, rate_kg_s: float = RATE_KG_S, casting: Casting = PAPERS) -> None:
+        """Pour into a flow; ValueErrors are those of ``stream``."""
+        size_m = flow.kernel.spacing_m
+        across = stream(size_m, rate_kg_s, flow.metal.density_kg_m3, casting)
+        high_m = casting.height_m + POUR_HEIGHT * size_m
+        self._layer = np.column_stack((across, np.full(len(across), high_m)))
         self._rate = rate_kg_s
-        self._size_m = flow.kernel.spacing_m
-        self._mass_kg = flow.metal.density_kg_m3 * self._size_m**3
+        self._mass_kg = flow.metal.density_kg_m3 * size_m**3
         self._poured = 0
-        area_m2 = rate_kg_s / flow.metal.density_kg_m3 / POUR_M_S
-        cells = max(1, round(area_m2 / self._size_m**2))
-        half = math.ceil(math.sqrt(cells))
-        place = lattice((-half, -half), (half, half), self._size_m)
-        layer = place[np.argsort(np.hypot(*place.T), kind="stable")][:cells]
-        if np.hypot(*layer.T).max() > 0.5 * UPPER_M - 0.5 * self._size_m:
-            raise ValueError(
-                f"pouring rate is {rate_kg_s} kg/s: at {POUR_M_S} m/s the stream is wider than "
-                f"the bore of {UPPER_M} m"
-            )
-        high_m = HEIGHT_M + 5 * self._size_m
-        self._layer = np.column_stack((layer, np.full(cells, high_m)))
+        self._wanted = len(casting.filled_m(size_m)) - int(flow.fluid.sum())
 
     @property
     def poured_kg(self) -> float:
         """Mass poured so far."""
         return self._poured * self._mass_kg
 
+    @property
+    def lasts_s(self) -> float:
+        """Time until the casting is full."""
+        return self._wanted * self._mass_kg / self._rate
+
     def __call__(self, flow: Flow) -> None:
         """Add a layer whenever its mass is due; pass it to ``Flow.advance`` as ``each``."""
-        due_kg = self._rate * min(flow.time_s, POURED_S)
-        if self.poured_kg + len(self._layer) * self._mass_kg > due_kg:
+        count = min(len(self._layer), self._wanted - self._poured)
+        if count <= 0 or self.poured_kg + count * self._mass_kg > self._rate * flow.time_s:
             return
-        fresh = at_rest(self._layer, FLUID)
+        fresh = at_rest(self._layer[:count], FLUID)
         fresh.velocity_m_s[:, 2] = -POUR_M_S
         flow.pour(fresh)
-        self._poured += len(self._layer)
+        self._poured += count
 
 
 @dataclass(frozen=True)
@@ -167,12 +206,12 @@ class Poured:
     cost: Cost
 
 
-def ring_m(size_m: float) -> Floats:
-    """Places right under the shoulder, (8, 3) float64, m: between the halves' radii."""
-    radius_m = 0.25 * (LOWER_M + UPPER_M)
+def ring_m(radius_m: float, height_m: float) -> Floats:
+    """Places round the axis, (8, 3) float64, m."""
     turn = np.arange(8) * math.pi / 4
-    height_m = np.full(8, 0.5 * HEIGHT_M - size_m)
-    return np.stack((radius_m * np.cos(turn), radius_m * np.sin(turn), height_m), axis=1)
+    return np.stack(
+        (radius_m * np.cos(turn), radius_m * np.sin(turn), np.full(8, height_m)), axis=1
+    )
 
 
 def run_shoulder(
@@ -197,7 +236,9 @@ def run_shoulder(
     progress : function of a ``Progress``, optional
     """
     size_m = flow.kernel.spacing_m
-    place = np.vstack(([[0.0, 0.0, 0.5 * size_m]], ring_m(size_m)))
+    radius_m = 0.25 * (PAPERS.lower_m + PAPERS.upper_m)
+    ring = ring_m(radius_m, 0.5 * PAPERS.height_m - size_m)
+    place = np.vstack(([[0.0, 0.0, 0.5 * size_m]], ring))
     ladle = Ladle(flow) if pour else None
     rows: list[tuple[float, float, float]] = []
 
@@ -216,14 +257,14 @@ def run_shoulder(
         stopped = str(error)
     seen = np.array(rows).reshape(-1, 3)
     nothing = not len(seen)
-    bottom, ring = (math.nan, math.nan) if nothing else seen[:, :2].mean(axis=0).tolist()
+    bottom, ring_pa = (math.nan, math.nan) if nothing else seen[:, :2].mean(axis=0).tolist()
     rise = math.nan if nothing else float(seen[:, 2].max())
-    top_m = _level_m(flow)
-    weight_pa_m = hydrostatic_pa(flow.metal) / HEIGHT_M
+    count = int(flow.fluid.sum())
+    top_m, weight_pa_m = PAPERS.level_m(size_m, count), pressure_pa_m(flow.metal)
     return Poured(
-        int(flow.fluid.sum()),
+        count,
         bottom,
-        ring,
+        ring_pa,
         weight_pa_m * (top_m - float(place[0, 2])),
         weight_pa_m * max(0.0, top_m - float(place[1, 2])),
         rise,
@@ -231,12 +272,3 @@ def run_shoulder(
         stopped,
         flow.cost,
     )
-
-
-def _level_m(flow: Flow) -> float:
-    """Height that the metal fills the mould to, by its volume."""
-    size_m = flow.kernel.spacing_m
-    freeboard_m = FREEBOARD * size_m
-    sites = _sites(size_m, freeboard_m)
-    height_m = np.sort(sites[is_cavity(sites, freeboard_m), 2])
-    return float(height_m[min(int(flow.fluid.sum()), len(height_m)) - 1]) + 0.5 * size_m

@@ -26,9 +26,9 @@ DEPTHS_M = (0.03, 0.05, 0.07)
 DURATION_S = 2.0
 QUIET_PA = 200.0
 """Standard deviation at 70 mm below which 'the ideal pressure distribution could be achieved'."""
-HOP_M = 3.0 * SPACING_M
-"""Rise of the highest particle above the filled height, beyond which fluid hops: waves of a noisy
-surface lift whole rows by one or two particles, a particle three above it has left the fluid."""
+HOP_PARTICLES = 3.0
+"""Rise of the highest particle above the filled height, in particles, beyond which fluid hops:
+waves of a noisy surface lift whole rows by one or two, a particle three above it has left."""
 
 
 class Verdict(Enum):
@@ -101,13 +101,26 @@ def probe_places() -> Floats:
     return np.stack((half, height_m, np.zeros(3)), axis=1)
 
 
-def judge(history: History, stopped: str) -> Verdict:
-    """Judge a run as the paper's figure 6 does, by numbers its text gives."""
+def judge(stopped: str, hops: bool, deviation_pa: float, quiet_pa: float = QUIET_PA) -> Verdict:
+    """Judge a run as the paper's figure 6 does, by numbers its text gives.
+
+    Parameters
+    ----------
+    stopped : str
+        Why a guard stopped it, or nothing.
+    hops : bool
+    deviation_pa : float, Pa
+        Standard deviation in time of the pressure at the deepest place.
+    quiet_pa : float, Pa
+    """
     if stopped:
         return Verdict.FAILED
-    hopped = float(history.top_m.max()) > ROWS * SPACING_M + HOP_M
-    quiet = float(history.deviation_pa()[-1]) < QUIET_PA
-    return Verdict.EXCELLENT if quiet and not hopped else Verdict.GOOD
+    return Verdict.EXCELLENT if deviation_pa < quiet_pa and not hops else Verdict.GOOD
+
+
+def still_hops(history: History, filled_m: float, spacing_m: float) -> bool:
+    """Whether a particle left fluid that started at rest, filled to a height."""
+    return float(history.top_m.max(initial=0.0)) > filled_m + HOP_PARTICLES * spacing_m
 
 
 def run_still(
@@ -141,7 +154,10 @@ def run_still(
     except ArithmeticError as error:
         stopped = str(error)
     history = watch.history()
-    return Still(scheme, judge(history, stopped), stopped, history, flow.cost)
+    # a run that a guard stops at once has no history
+    deviation_pa = math.nan if stopped else float(history.deviation_pa()[-1])
+    verdict = judge(stopped, still_hops(history, ROWS * SPACING_M, SPACING_M), deviation_pa)
+    return Still(scheme, verdict, stopped, history, flow.cost)
 
 
 def table_2(base: Scheme | None = None) -> list[Scheme]:

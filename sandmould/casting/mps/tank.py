@@ -37,19 +37,26 @@ def still_tank(columns: int = COLUMNS, rows: int = ROWS, spacing_m: float = SPAC
     return fluid.joined(mould_around(sites, is_cavity, spacing_m))
 
 
-def open_tank(scheme: Scheme, metal: Metal | None = None) -> Flow:
-    """Flow in the paper's tank.
+def open_tank(
+    scheme: Scheme,
+    metal: Metal | None = None,
+    columns: int = COLUMNS,
+    rows: int = ROWS,
+    spacing_m: float = SPACING_M,
+) -> Flow:
+    """Flow in the paper's tank, or in one of other size.
 
     The speed limit is that of a fall from three times the height of the walls: what started at
     rest can only be as fast if energy came from nowhere.
     """
     metal = metal or Metal()
-    height_m = WALL_ROWS * SPACING_M
+    height_m = (rows + WALL_ROWS - ROWS) * spacing_m
     g = float(np.linalg.norm(metal.gravity_m_s2))
-    margin = WALL_LAYERS * SPACING_M
+    margin = WALL_LAYERS * spacing_m
     guard = Guard(
         float(np.sqrt(2.0 * g * 3.0 * height_m)),
         (-margin, -margin, -1.0),
-        (COLUMNS * SPACING_M + margin, 2.0 * height_m, 1.0),
+        (columns * spacing_m + margin, 2.0 * height_m, 1.0),
     )
-    return Flow(still_tank(), make_kernel(2, SPACING_M), metal, scheme, guard)
+    tank = still_tank(columns, rows, spacing_m)
+    return Flow(tank, make_kernel(2, spacing_m), metal, scheme, guard)

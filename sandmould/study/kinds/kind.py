@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from sandmould.engines.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.scenario import Scenario
@@ -17,7 +18,7 @@ from sandmould.scenario.solidification import Solidification
 if TYPE_CHECKING:
     from sandmould.study.expand import Run
 
-AnyScenario = Scenario | OwnDeck | Solidification
+AnyScenario = Scenario | OwnDeck | Solidification | MetalFlow
 SpeedClass = tuple[str, int]
 """Engine and dimension: what the speed of a core depends on most."""
 
@@ -125,7 +126,9 @@ class Kind(Protocol):
         """Measure what a run left behind; the picture last."""
 
 
-_MODULE_OF = {Scenario: "sand", OwnDeck: "deck", Solidification: "solidification"}
+_MODULE_OF = {
+    Scenario: "sand", OwnDeck: "deck", Solidification: "solidification", MetalFlow: "flow"
+}  # fmt: skip
 
 
 def kind_named(name: str) -> Kind:

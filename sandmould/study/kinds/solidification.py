@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -14,10 +14,11 @@ from analysis.export import elements_to_vtk
 from analysis.freezing import freezing
 from sandmould.casting.arpm import computation, scene
 from sandmould.engines.products import Computed
-from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
+from sandmould.study.kinds import own_solver
 from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.own_solver import write_given
 from sandmould.study.moments import LAST_MEASURED
 
 if TYPE_CHECKING:
@@ -35,31 +36,20 @@ run; fixed, so that a study has the same batches everywhere."""
 SLOWER = 10.0
 """Than that a machine may be, and a run longer than expected."""
 
+defaults = own_solver.defaults
+lasts_s = own_solver.lasts_s
+engine_problem = own_solver.engine_problem
+ranks = own_solver.ranks
 problems = scene.problems
 complete = computation.complete
 computed_hash = computation.computed_hash
 no_cost = computation.no_cost
 
 
-def defaults() -> dict[str, Any]:
-    """Nothing: casting and mould are the user's."""
-    return {}
-
-
 def resolved(scenario: Solidification) -> Solidification:
     """The scenario with the hashes of its files, so that a changed mesh makes another run."""
     shapes = tuple(with_file_hash(shape) for shape in scenario.shapes)
     return scenario.model_copy(update={"shapes": shapes})
-
-
-def lasts_s(scenario: Solidification) -> float:
-    """Measures are those of the end."""
-    return 0.0
-
-
-def engine_problem(scenario: Solidification) -> Problem | None:
-    """None: the solver is our own."""
-    return None
 
 
 def sources(scenario: Solidification) -> list[Path]:
@@ -75,11 +65,6 @@ def template_hash(scenario: Solidification) -> str:
 def threads(scenario: Solidification) -> int:
     """Of one process."""
     return scenario.threads
-
-
-def ranks(scenario: Solidification) -> int:
-    """No MPI."""
-    return 1
 
 
 def memory_mb(scenario: Solidification) -> int:
@@ -131,21 +116,7 @@ def plan_cells(scenario: Solidification) -> Mapping[str, str]:
 
 def render(run: Run, folder: Path) -> None:
     """Write down all that the solver is given, each value with its source."""
-    lines = [
-        f"# Study {run.study}, run {run.run}: what the solver {computation.source_hash()} is given",
-        *_lines(run.scenario.model_dump(mode="json"), run.sources),
-    ]
-    partial = folder / "deck.in.partial"
-    partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
-
-
-def _lines(tree: Any, sources: Mapping[str, str], key: str = "") -> list[str]:
-    """One line a value; a list with one source stays together."""
-    if key in sources or not isinstance(tree, dict | list):
-        return [f"{key} = {tree}".ljust(60) + f" # {sources.get(key, 'not stated')}"]
-    each = tree.items() if isinstance(tree, dict) else enumerate(tree)
-    return [line for n, v in each for line in _lines(v, sources, f"{key}.{n}" if key else str(n))]
+    write_given(run, folder, computation.source_hash())
 
 
 def compute(run: Run, folder: Path) -> Computed:

@@ -117,7 +117,7 @@ def _pack(
         radius_m[row], layer[row] = frame.radius_m, np.minimum(frame.layer, 255)
     largest_m = float(radius_m.max(initial=0.0)) or 1.0
     share = np.rint(radius_m / largest_m * 65535).astype(np.uint16)
-    raw = _split_bytes(_changes(place)) + _split_bytes(share) + layer.tobytes()
+    raw = split_bytes(changes(place)) + split_bytes(share) + layer.tobytes()
     time_s = np.array([f.time_s for f in frames])
     return Film(
         run=run,
@@ -135,7 +135,7 @@ def _pack(
     )
 
 
-def _changes(place: NDArray[np.uint16]) -> NDArray[np.uint16]:
+def changes(place: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Change of each coordinate from the frame before, folded so that small ones are small.
 
     0, -1, 1, -2, 2, ... become 0, 1, 2, 3, 4, ...; the first frame is the change from 0.
@@ -144,7 +144,7 @@ def _changes(place: NDArray[np.uint16]) -> NDArray[np.uint16]:
     return ((step << 1) ^ (step >> 15)).astype(np.uint16)
 
 
-def _split_bytes(values: NDArray[np.uint16]) -> bytes:
+def split_bytes(values: NDArray[np.uint16]) -> bytes:
     """All low bytes, then all high bytes."""
     return (values & 0xFF).astype(np.uint8).tobytes() + (values >> 8).astype(np.uint8).tobytes()
 

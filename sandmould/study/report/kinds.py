@@ -9,12 +9,14 @@ from typing import Any
 
 import pandas as pd
 
+from sandmould.scenario.flow import MetalFlow, StillTank
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.collect import Collected
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.report.filling import filling_pages
+from sandmould.study.report.flow import flow_method, flow_pages
 from sandmould.study.report.measured import Curve, measure_curves, whole_conclusion
 from sandmould.study.report.method import Row, deck_method, sand_method
 from sandmould.study.report.sand import sand_pages
@@ -55,9 +57,25 @@ def notes_of(
     if isinstance(scenario, Solidification):
         flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
         return (flat,) if scenario.dimensions == 2 else ()
+    if isinstance(scenario, MetalFlow):
+        return _flow_notes(scenario)
     stage = scenario.vibration[0] if scenario.vibration else None
     deepest = _deepest_overlap_fraction(collected.summary)
     return sand_notes(collected.keys, stage, deepest, seeks_best, is_certified)
+
+
+def _flow_notes(scenario: MetalFlow) -> tuple[str, ...]:
+    """What the paper leaves open."""
+    gradient = (
+        "The gradient as printed, eq. (3), points the wrong way and makes every run fail; the "
+        f"gradient used here, {scenario.gradient}, is a choice."
+    )
+    if isinstance(scenario.case, StillTank):
+        return (gradient,)
+    return (
+        gradient,
+        "The paper gives neither the particle size in space nor the speed of the stream.",
+    )
 
 
 def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
@@ -106,6 +124,15 @@ def kind_pages(
             "the end of the run",
             (),
             {"pages": solid_pages(study_folder, reference, scenario, of_sweep, verdict, shown)},
+        )
+    if isinstance(scenario, MetalFlow):
+        pages = flow_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes)
+        return KindPages(
+            "flow.html",
+            flow_method(scenario, collected.keys),
+            "the end of the run",
+            (),
+            {"pages": pages},
         )
     filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
     return KindPages(

@@ -78,7 +78,7 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
         found.append(KeyNumber(number(best.mean), label, mean))
     finished = int((summary["outcome_code"] == int(Outcome.FINISHED)).sum())
     found.append(KeyNumber(f"{finished} of {len(summary)}", "runs finished"))
-    for what in ("grains", "elements"):
+    for what in ("grains", "elements", "particles"):
         count = _total(summary, what, "median")
         if count is not None:
             shown = f"{count:,.0f}".replace(",", "\u202f")
@@ -177,11 +177,14 @@ def _number_cells(*values: tuple[float, int]) -> tuple[Cell, ...]:
 _COST = (
     ("grains", "grains", lambda v: f"{v:.0f}"),
     ("elements", "elements", lambda v: f"{v:.0f}"),
+    ("particles", "particles", lambda v: f"{v:.0f}"),
     ("simulated_s", "simulated", seconds),
     ("wall_s", "wall time", seconds),
     ("cpu_s", "processor time", seconds),
     ("grain_steps_per_s", "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("element_steps_per_s", "element-steps/s", lambda v: f"{number(v / 1e6)} M"),
+    ("particle_steps_per_s", "particle-steps/s", lambda v: f"{number(v / 1e6)} M"),
+    ("solver_fraction", "time in the solver", lambda v: f"{100 * v:.0f} %"),
     ("peak_memory_bytes", "memory", size),
     ("time_step_fraction", "step / critical", number),
     ("largest_overlap_fraction", "largest overlap", lambda v: f"{100 * v:.1f} %"),

@@ -1,0 +1,122 @@
+"""What a run of a flow says of its stability: pressure noise, speeds, and the paper's verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from sandmould.casting.mps import scene
+from sandmould.casting.mps.probes import History, window_means
+from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
+from sandmould.casting.mps.stability import Verdict, judge, still_hops
+from sandmould.scenario.flow import MetalFlow, StillTank
+
+_MEANS = ("mean_speed_m_s", "kinetic_energy_j_kg", "step_iterations")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is measured from ``measured_from_s`` on; NaN where a guard stopped the run."""
+
+    mean_pa: dict[str, float]
+    """By probe."""
+    sd_pa: dict[str, float]
+    """Standard deviation in time, step by step."""
+    window_sd_pa: dict[str, float]
+    """The same of means over ``noise_window_s``."""
+    ideal_pa: dict[str, float]
+    """Hydrostatic, of the metal that is there at the end."""
+    peak_speed_m_s: float
+    average_speed_m_s: float
+    hops: bool
+    verdict: Verdict
+
+
+def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> Measured:
+    """Measure and judge a run.
+
+    Parameters
+    ----------
+    scenario : MetalFlow
+    table : DataFrame
+        ``series.tsv``.
+    stopped : str
+        Why a guard stopped it, or nothing.
+    """
+    names = [probe.name for probe in scene.probes_of(scenario)]
+    whole = _history(table, names)
+    past = _later(whole, scenario.measured_from_s)
+    particles = int(table["particles"].iloc[-1]) if len(table) else 0
+    known = not stopped and len(past.time_s) > 0
+    nothing = [math.nan] * len(names)
+    sd = past.deviation_pa().tolist() if known else nothing
+    windows = past.deviation_pa(scenario.noise_window_s).tolist() if known else nothing
+    sd_pa = dict(zip(names, sd, strict=True))
+    hops = _hops(scenario, table, whole)
+    return Measured(
+        dict(zip(names, past.mean_pa().tolist() if known else nothing, strict=True)),
+        sd_pa,
+        dict(zip(names, windows, strict=True)),
+        scene.ideal_pa(scenario, particles),
+        float(past.largest_speed_m_s.max()) if known else math.nan,
+        float(np.average(past.mean_speed_m_s, weights=past.dt_s)) if known else math.nan,
+        hops,
+        judge(stopped, hops, sd_pa[scene.deepest(scenario)], scenario.quiet_pa),
+    )
+
+
+def _history(table: pd.DataFrame, names: Sequence[str]) -> History:
+    time_s = table["time_s"].to_numpy(dtype=np.float64)
+    pressure = table[[f"{name}_pa" for name in names]].to_numpy(dtype=np.float64)
+    speeds = ("largest_speed_m_s", "mean_speed_m_s", "kinetic_energy_j_kg", "top_m")
+    columns = (table[name].to_numpy(dtype=np.float64) for name in speeds)
+    return History(time_s, np.diff(time_s, prepend=0.0), pressure, pressure, *columns)
+
+
+def _later(past: History, from_s: float) -> History:
+    """Steps that end after a time."""
+    kept = past.time_s > from_s
+    return History(*(getattr(past, name)[kept] for name in History.__dataclass_fields__))
+
+
+def _hops(scenario: MetalFlow, table: pd.DataFrame, past: History) -> bool:
+    """Whether metal at rest, or poured in before, is thrown up."""
+    case = scenario.case
+    if isinstance(case, StillTank):
+        return still_hops(past, case.depth_m, case.particle_m)
+    full = table["particles"] >= scene.fluid_of(scenario)  # what splashes before does not hop
+    later = table[full & (table["time_s"] > scenario.measured_from_s)]
+    return bool((later["largest_rise_m_s"] > HOP_SPEED_M_S).any())
+
+
+def by_window(table: pd.DataFrame, names: Sequence[str], window_s: float) -> pd.DataFrame:
+    """Means over windows, and the fastest particle of each.
+
+    Parameters
+    ----------
+    table : DataFrame
+        ``series.tsv``.
+    names : sequence of str
+        Probes.
+    window_s : float, s
+
+    Returns
+    -------
+    DataFrame
+        A row a window, at its middle.
+    """
+    time_s = table["time_s"].to_numpy(dtype=np.float64)
+    dt_s = np.diff(time_s, prepend=0.0)
+    columns = [*(f"{name}_pa" for name in names), *_MEANS]
+    values = table[columns].to_numpy(dtype=np.float64)
+    number, _, mean = window_means(time_s, dt_s, values, window_s)
+    window = ((time_s - 0.5 * dt_s) / window_s).astype(np.int64)
+    fastest = table["largest_speed_m_s"].groupby(window).max()
+    found = pd.DataFrame(mean, columns=columns)
+    found.insert(0, "time_s", (number + 0.5) * window_s)
+    found["largest_speed_m_s"] = fastest.to_numpy()
+    return found

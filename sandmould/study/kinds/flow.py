@@ -1,0 +1,166 @@
+"""Studies of metal that flows: a still tank, or a casting poured over a shoulder, by MPS.
+
+A run has no checkpoint: one that was killed begins again, which costs seconds to minutes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from sandmould.casting.hashing import hash_with
+from sandmould.casting.mps import computation, scene
+from sandmould.casting.mps.measured import by_window, measure_flow
+from sandmould.engines.outcome import RunOutcome
+from sandmould.engines.products import Computed
+from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.study.kinds import own_solver
+from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.own_solver import write_given
+from sandmould.study.moments import LAST_MEASURED
+
+if TYPE_CHECKING:
+    from sandmould.study.expand import Run
+
+MODEL = MetalFlow
+WORK = "particle-solves"
+PRODUCTS = computation.PRODUCTS
+BASE_MEMORY_MB = 600
+PARTICLES_PER_MB = 300
+RECORD_BYTES = 28
+"""Of a particle: seven float32."""
+RATES = {2: 6e5, 3: 3e5}
+"""Particle-solves a second of one core by dimension, the prediction counted as one: 6.3e5 and
+2.8e5 to 3.7e5 on the machine where tank_small was first run; fixed, so that a study has the same
+batches everywhere."""
+SLOWER = 10.0
+"""Than that a machine may be, and a run longer than expected."""
+
+defaults = own_solver.defaults
+resolved = own_solver.resolved
+lasts_s = own_solver.lasts_s
+engine_problem = own_solver.engine_problem
+ranks = own_solver.ranks
+problems = scene.problems
+complete = computation.complete
+no_cost = computation.no_cost
+
+
+def sources(scenario: MetalFlow) -> list[Path]:
+    """Our solver."""
+    return computation.source_files()
+
+
+def template_hash(scenario: MetalFlow) -> str:
+    """Hash of our solver."""
+    return computation.source_hash()
+
+
+def computed_hash(scenario: MetalFlow) -> str:
+    """Hash of scenario and solver."""
+    return hash_with(scenario, computation.source_hash())
+
+
+def threads(scenario: MetalFlow) -> int:
+    """One."""
+    return 1
+
+
+def memory_mb(scenario: MetalFlow) -> int:
+    """Libraries, some 3 kB a particle for its pairs, and the records, held twice at the end."""
+    particles, records = scene.fluid_of(scenario), scenario.duration_s / scenario.record_s
+    return (
+        BASE_MEMORY_MB
+        + particles // PARTICLES_PER_MB
+        + round(1e-6 * 2 * RECORD_BYTES * particles * records)
+    )
+
+
+def allowed_s(scenario: MetalFlow) -> float:
+    """Wall time on a slow machine."""
+    return SLOWER * predicted_s(scenario)
+
+
+def planned_work(scenario: MetalFlow) -> float:
+    """Particle-solves."""
+    return scene.expected_work(scenario)
+
+
+def predicted_s(scenario: MetalFlow) -> float:
+    """Wall time at a fixed speed."""
+    return planned_work(scenario) / RATES[speed_class(scenario)[1]]
+
+
+def planned_s(scenario: MetalFlow) -> float:
+    """Its duration."""
+    return scenario.duration_s
+
+
+def speed_class(scenario: MetalFlow) -> SpeedClass:
+    """In the plane or in space."""
+    return "mps", 2 if isinstance(scenario.case, StillTank) else 3
+
+
+def rate(scenario: MetalFlow, results: Path) -> float:
+    """The fixed speed."""
+    return RATES[speed_class(scenario)[1]]
+
+
+def plan_cells(scenario: MetalFlow) -> Mapping[str, str]:
+    """Particles of metal, and how long they flow."""
+    return {
+        "particles": f"{scene.fluid_of(scenario):,}",
+        "simulated": f"{scenario.duration_s:g} s",
+    }
+
+
+def render(run: Run, folder: Path) -> None:
+    """Write down all that the solver is given, each value with its source."""
+    write_given(run, folder, computation.source_hash())
+
+
+def compute(run: Run, folder: Path) -> Computed:
+    """Let the metal flow."""
+    return computation.compute(run.scenario, folder, run.run)
+
+
+def measure(run: Run, folder: Path) -> None:
+    """Write the measures against time, those of the whole run in every row, and the picture."""
+    from matplotlib.figure import Figure
+
+    from sandmould.study.report.flow_figure import draw_last
+
+    scenario: MetalFlow = run.scenario
+    outcome = RunOutcome.read(folder / "outcome.json")
+    series = pd.read_csv(folder / "series.tsv", sep="\t")
+    names = [probe.name for probe in scene.probes_of(scenario)]
+    table = by_window(series, names, scenario.record_s)
+    if table.empty:  # stopped in its first step: a row for the verdict all the same
+        table.loc[0, "time_s"] = outcome.simulated_s
+    table.insert(1, "vibration_time_s", -1.0)
+    table.insert(2, "stage", "flowing")
+    found = measure_flow(scenario, series, outcome.detail)
+    for name in names:
+        table[f"{name}_mean_pa"] = found.mean_pa[name]
+        table[f"{name}_sd_pa"] = found.sd_pa[name]
+        table[f"{name}_window_sd_pa"] = found.window_sd_pa[name]
+        table[f"{name}_error_pa"] = found.mean_pa[name] - found.ideal_pa[name]
+    table["peak_speed_m_s"] = found.peak_speed_m_s
+    table["average_speed_m_s"] = found.average_speed_m_s
+    table["hops"] = int(found.hops)
+    table["classification"] = found.verdict.value
+    partial = folder / "measures.tsv.partial"
+    table.to_csv(partial, sep="\t", index=False, float_format="%.10g")
+    os.replace(partial, folder / "measures.tsv")
+    figure = Figure(figsize=(5, 6), dpi=150, layout="constrained")
+    if (folder / "fields.npz").exists():
+        with np.load(folder / "fields.npz") as kept:
+            draw_last(dict(kept), figure.subplots(), max(found.ideal_pa.values()))
+    else:
+        figure.text(0.5, 0.5, "No fields: the run broke off.", ha="center")
+    figure.savefig(folder / LAST_MEASURED)
