@@ -137,15 +137,24 @@ def write_measures(folder: Path, out: Path) -> None:
     other rows stay good.
     """
     scenario = read_run(folder / "scenario.yaml").scenario
+    bent = None
+    if scenario.pattern is not None:
+        from sandmould.study.bending import BentPattern, add_loop  # scikit-fem: few studies need it
+
+        bent = BentPattern(scenario)
     rows = []
     for path in sorted((folder / "snapshots").glob("*.npz")):
         try:
-            rows.append(measure_snapshot(scenario, Snapshot.load(path)))
+            snapshot = Snapshot.load(path)
+            row = measure_snapshot(scenario, snapshot)
+            rows.append(row if bent is None else row | bent.row(snapshot))
         except ValueError as error:
             rows.append({"stage": f"unreadable: {error}"})
     columns = ["time_s", "vibration_time_s", "stage", "grains"]
     table = pd.DataFrame(rows) if rows else pd.DataFrame(columns=columns)
     table = add_outflow(table, folder)
+    if bent is not None:
+        table = add_loop(table, folder, bent.reach_m)
     partial = out.with_name(out.name + ".partial")
     table.to_csv(partial, sep="\t", index=False, float_format="%.8g")
     os.replace(partial, out)

@@ -1,0 +1,35 @@
+"""Deflection of outlines whose answer is plain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.deflection import deflection, farthest_corner
+
+L_M = np.array([[0, 0], [2, 0], [2, 8], [12, 8], [12, 10], [0, 10]], dtype=float)
+FOOT_M = L_M[:2]
+
+
+def test_the_tip_of_an_l_is_the_upper_corner_of_its_flange() -> None:
+    assert farthest_corner(L_M, FOOT_M) == 4
+
+
+def test_of_two_ends_of_a_t_the_right_one_is_taken() -> None:
+    t_m = np.array([[5, 0], [7, 0], [7, 8], [12, 8], [12, 10], [0, 10], [0, 8], [5, 8]], float)
+    # A tenth and its likes are not exact: the two ends differ by round-off.
+    assert farthest_corner(0.1 * t_m, 0.1 * t_m[:2]) == 4
+
+
+def test_a_pattern_that_nothing_holds_has_no_farthest_corner() -> None:
+    with pytest.raises(ValueError, match="points that hold the pattern are 0"):
+        farthest_corner(L_M, L_M[:0])
+
+
+def test_a_tip_that_sinks_deflects() -> None:
+    now_m = L_M.copy()
+    now_m[4] += [0.3, -0.4]
+    now_m[2] += [0.6, 0.0]
+    found = deflection(L_M, now_m, 4)
+    assert found.tip_m == pytest.approx(0.4)
+    assert found.largest_m == pytest.approx(0.6)
