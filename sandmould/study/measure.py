@@ -89,11 +89,18 @@ def write_picture(folder: Path, out: Path) -> None:
 
 
 def write_exports(folder: Path, out: Path) -> None:
-    """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks."""
+    """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks.
+
+    A pattern's bent surface is always written: it is what the run was made for.
+    """
     scenario = read_run(folder / "scenario.yaml").scenario
     wanted = scenario.record.export
     out.mkdir(exist_ok=True)
     moments = list_moments(folder)
+    if scenario.pattern is not None:
+        from sandmould.study.bent_files import write_bent  # scikit-fem: few studies need it
+
+        write_bent(scenario, folder, out)
     if wanted == "none" or not moments:
         return
     if scenario.scene.solids:

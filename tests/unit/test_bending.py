@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pandas as pd
 import pytest
@@ -17,7 +18,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.bending import verdict_of
 from sandmould.study.expand import Run
-from sandmould.study.measure import write_measures
+from sandmould.study.measure import write_exports, write_measures
 from sandmould.study.plan import write_plan
 
 FORCE_N = -0.2
@@ -132,3 +133,24 @@ def test_a_run_without_a_ledger_has_its_shape_alone(folder: Path) -> None:
     table = measured(folder)
     assert "pattern_tip_deflection_m" in table
     assert "pattern_residual_fraction" not in table
+
+
+def test_the_bent_pattern_is_written_for_tools_that_measure_shapes(
+    folder: Path, body: FoamBody, scenario: Scenario
+) -> None:
+    write_exports(folder, folder / "exports")
+    names = sorted(p.name for p in (folder / "exports").glob("pattern_*"))
+    assert names == ["pattern_filled.stl", "pattern_filled.vtu", "pattern_final.stl",
+                     "pattern_final.vtu"]  # fmt: skip
+    load, bent = tip_load(body)
+    final = meshio.read(folder / "exports" / "pattern_final.vtu")
+    assert final.points[:, :2] == pytest.approx(body.vertices_m + 0.5 * bent)
+    assert final.point_data["load_n"][:, :2] == pytest.approx(load)
+    assert np.abs(final.point_data["distance_m"]).max() == pytest.approx(
+        measured(folder).pattern_distance_largest_m.iloc[-1]
+    )
+    solid = meshio.read(folder / "exports" / "pattern_filled.stl")
+    thickness_m = scenario.sand.disc_thickness_m
+    assert np.ptp(solid.points[:, 2]) == pytest.approx(thickness_m, rel=1e-6)
+    highest_m = (body.vertices_m + bent)[:, 1].max()
+    assert solid.points[:, 1].max() == pytest.approx(highest_m, rel=1e-6)

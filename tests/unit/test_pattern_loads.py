@@ -142,7 +142,23 @@ def test_fields_for_paraview_come_back(tmp_path: Path, kind: str) -> None:
     write_surface(tmp_path / "surface.vtu", pattern.surface, on_surface, load)
     surface = meshio.read(tmp_path / "surface.vtu")
     assert surface.point_data["pressure_pa"] == pytest.approx(1500.0)
+    assert np.allclose(surface.points[:, :d], pattern.surface.vertices_m + on_surface)
+    away_m = surface.point_data["distance_m"]
+    assert np.abs(away_m).max() == pytest.approx(pattern.distance(displacement).largest_m)
+    write_surface(tmp_path / "bare.vtu", pattern.surface, on_surface)
+    bare = meshio.read(tmp_path / "bare.vtu")
+    assert set(bare.point_data) == {"displacement_m", "distance_m"}
     assert np.array_equal(surface.point_data["displacement_m"][:, :d], on_surface)
+
+
+def test_inner_nodes_follow_the_outer_line_as_under_loads_on_it() -> None:
+    pattern = l_pattern()
+    line = pattern.surface.outer_line
+    load = np.zeros_like(pattern.surface.vertices_m)
+    load[line] = -1500.0 * pattern.surface.vertex_area_vector_m2[line]
+    answer = pattern.solve_linear(pattern.on_nodes(load))
+    spread = pattern.spread(pattern.on_surface(answer)[line])
+    assert spread == pytest.approx(answer, abs=1e-12)
 
 
 def test_loads_of_a_wrong_shape_or_value_are_refused() -> None:
