@@ -1,4 +1,4 @@
-"""How far sand has bent a pattern: its farthest corner, its largest displacement."""
+"""How far sand has bent a pattern, and the sand that lies under it."""
 
 from __future__ import annotations
 
@@ -67,3 +67,27 @@ def deflection(drawn_m: Array, now_m: Array, tip: int) -> Deflection:
     moved_m = now_m - drawn_m
     largest_m = float(np.linalg.norm(moved_m, axis=1).max())
     return Deflection(-float(moved_m[tip, -1]), largest_m)
+
+
+def under_outline(outline_m: Array, position_m: Array) -> NDArray[np.bool_]:
+    """Which points have a part of a closed outline straight above them.
+
+    Parameters
+    ----------
+    outline_m : (nv, 2) float64, m
+        Counter-clockwise.
+    position_m : (n, 2) float64, m
+        Points outside it.
+
+    Returns
+    -------
+    (n,) bool
+    """
+    start_m, end_m = outline_m, np.roll(outline_m, -1, axis=0)
+    # The solid lies left of an edge, so it lies above those that lead to the right.
+    down = end_m[:, 0] > start_m[:, 0]
+    (x, y), (x_end, y_end) = start_m[down].T[..., None], end_m[down].T[..., None]
+    at_x, at_y = position_m.T
+    share = (at_x - x) / (x_end - x)
+    above = (share >= 0.0) & (share < 1.0) & (y + share * (y_end - y) > at_y)
+    return np.asarray(above.any(axis=0))

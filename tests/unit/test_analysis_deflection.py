@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.deflection import deflection, farthest_corner
+from analysis.deflection import deflection, farthest_corner, under_outline
 
 L_M = np.array([[0, 0], [2, 0], [2, 8], [12, 8], [12, 10], [0, 10]], dtype=float)
 FOOT_M = L_M[:2]
@@ -33,3 +33,10 @@ def test_a_tip_that_sinks_deflects() -> None:
     found = deflection(L_M, now_m, 4)
     assert found.tip_m == pytest.approx(0.4)
     assert found.largest_m == pytest.approx(0.6)
+
+
+def test_sand_under_a_flange_is_told_from_sand_beside_and_above() -> None:
+    places_m = np.array([[5, 1], [11, 7], [1, 11], [5, 11], [13, 1], [-1, 5]], dtype=float)
+    assert under_outline(L_M, places_m).tolist() == [True, True, False, False, False, False]
+    sunk_m = L_M - [[0, 0], [0, 0], [0, 0], [0, 2], [0, 2], [0, 0]]
+    assert under_outline(sunk_m, np.array([[11.0, 6.5], [3.0, 7.5]])).tolist() == [False, True]
