@@ -7,9 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.scenario.outline import Outline
+
 Array = NDArray[np.float64]
 _SAME = 1e-9
 """Distances that differ by less than this share are the same: round-off of a symmetric drawing."""
+_COLUMNS = 1000
+"""Strips that the space under a pattern is added up from."""
 
 
 @dataclass(frozen=True)
@@ -69,25 +73,43 @@ def deflection(drawn_m: Array, now_m: Array, tip: int) -> Deflection:
     return Deflection(-float(moved_m[tip, -1]), largest_m)
 
 
-def under_outline(outline_m: Array, position_m: Array) -> NDArray[np.bool_]:
-    """Which points have a part of a closed outline straight above them.
+def fill_under(outline_m: Array, position_m: Array, radius_m: Array) -> float:
+    """Share of the space straight under a pattern, down to y = 0, that discs fill.
+
+    Discs count whole where their centre lies there: the paper's low density under a flange.
 
     Parameters
     ----------
     outline_m : (nv, 2) float64, m
-        Counter-clockwise.
+        Closed, counter-clockwise.
     position_m : (n, 2) float64, m
-        Points outside it.
+    radius_m : (n,) float64, m
 
     Returns
     -------
-    (n,) bool
+    float
+        NaN for a pattern without space under it.
     """
-    start_m, end_m = outline_m, np.roll(outline_m, -1, axis=0)
-    # The solid lies left of an edge, so it lies above those that lead to the right.
-    down = end_m[:, 0] > start_m[:, 0]
-    (x, y), (x_end, y_end) = start_m[down].T[..., None], end_m[down].T[..., None]
-    at_x, at_y = position_m.T
-    share = (at_x - x) / (x_end - x)
-    above = (share >= 0.0) & (share < 1.0) & (y + share * (y_end - y) > at_y)
-    return np.asarray(above.any(axis=0))
+    left_m, right_m = outline_m[:, 0].min(), outline_m[:, 0].max()
+    width_m = (right_m - left_m) / _COLUMNS
+    x = left_m + width_m * (np.arange(_COLUMNS) + 0.5)
+    solid_m2 = Outline("pattern", outline_m).measure
+    under_m2 = width_m * float(np.nanmax(_heights_m(outline_m, x), axis=0).sum()) - solid_m2
+    if not under_m2 > _SAME * solid_m2:
+        return np.nan
+    with np.errstate(invalid="ignore"):
+        above = (_heights_m(outline_m, position_m[:, 0]) > position_m[:, 1]).sum(axis=0)
+    # A point in the solid has an odd number of sides above it, one under it two or more.
+    under = (above > 0) & (above % 2 == 0)
+    return float(np.pi * (radius_m[under] ** 2).sum() / under_m2)
+
+
+def _heights_m(outline_m: Array, x_m: Array) -> Array:
+    """Where upright lines cross each side, (nv, k) float64, m; NaN where they do not."""
+    end_m = np.roll(outline_m, -1, axis=0)
+    (x, y), (x_end, y_end) = outline_m.T[..., None], end_m.T[..., None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (x_m - x) / (x_end - x)
+    # Half open to the right, so that a line through a corner crosses one of its two sides.
+    crossed = (np.minimum(x, x_end) <= x_m) & (x_m < np.maximum(x, x_end))
+    return np.where(crossed, y + share * (y_end - y), np.nan)

@@ -25,7 +25,7 @@ _MEANS: dict[State, str] = {
     "diverged": "the shape means nothing",
 }
 _VERBS: dict[State, str] = {
-    "holds": "hold", "lags": "lag", "one way": "are one way", "cycles": "go in cycles",
+    "holds": "holds", "lags": "lags", "one way": "is one way", "cycles": "goes in cycles",
     "diverged": "diverged",
 }  # fmt: skip
 
@@ -121,8 +121,11 @@ def study_sentence(verdicts: Sequence[LoopVerdict]) -> str:
     found = [v.state for v in verdicts]
     if not found:
         return "No run has a ledger that tells of its loop."
-    if set(found) == {"holds"}:
-        return f"The loop holds in all {len(found)} runs."
-    counts = [f"{found.count(s)} {_VERBS[s]}" for s in _VERBS if s in found]
-    told = f"Of {len(found)} runs {', '.join(counts)}"
-    return f"{told}: only shapes of runs that hold are answers."
+    count = f"all {len(found)} runs" if len(found) > 1 else "the one run"
+    if len(set(found)) == 1:
+        told = f"The loop {_VERBS[found[0]]} in {count}"
+    else:
+        told = ", ".join(f"{_VERBS[s]} in {found.count(s)}" for s in _VERBS if s in found)
+        told = f"The loop {told} of {len(found)} runs"
+    rest = "" if set(found) == {"holds"} else ": only where it holds is a shape an answer"
+    return f"{told}{rest}."

@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.coordination import contacts
-from analysis.deflection import under_outline
+from analysis.deflection import fill_under
 from analysis.density import apparent_density
 from analysis.export import solids_to_vtk, to_ovito, to_vtk
 from analysis.layers import mixing_index
@@ -23,7 +23,6 @@ from analysis.solid_fraction import (
 )
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot, scene_at
-from sandmould.scenario.geometry import Array
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.moments import LAST_MEASURED, MOMENTS, list_moments, nearest
 from sandmould.study.outflow import add_outflow, measure_outflow
@@ -66,21 +65,8 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
     if snapshot.pattern_m is not None:
-        row |= _densities_under(snapshot.pattern_m, position, density.corrected_kg_m3)
+        row["pattern_under_fraction"] = fill_under(snapshot.pattern_m, position, radius)
     return row | measure_outflow(scenario, snapshot)
-
-
-def _densities_under(outline_m: Array, position_m: Array, density_kg_m3: Array) -> dict[str, Any]:
-    """Mean apparent density of the sand under a pattern, and of that beside it as high."""
-    under = under_outline(outline_m, position_m)
-    top_m = position_m[under, 1].max(initial=-np.inf)
-    beside = ~under & (position_m[:, 1] <= top_m)
-    return {
-        f"pattern_density_{name}_kg_m3": float(np.nanmean(density_kg_m3[chosen]))
-        if np.isfinite(density_kg_m3[chosen]).any()
-        else np.nan
-        for name, chosen in {"under": under, "beside": beside}.items()
-    }
 
 
 def measure_sand(folder: Path) -> None:

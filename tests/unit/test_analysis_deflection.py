@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.deflection import deflection, farthest_corner, under_outline
+from analysis.deflection import deflection, farthest_corner, fill_under
 
 L_M = np.array([[0, 0], [2, 0], [2, 8], [12, 8], [12, 10], [0, 10]], dtype=float)
 FOOT_M = L_M[:2]
@@ -35,8 +35,23 @@ def test_a_tip_that_sinks_deflects() -> None:
     assert found.largest_m == pytest.approx(0.6)
 
 
-def test_sand_under_a_flange_is_told_from_sand_beside_and_above() -> None:
-    places_m = np.array([[5, 1], [11, 7], [1, 11], [5, 11], [13, 1], [-1, 5]], dtype=float)
-    assert under_outline(L_M, places_m).tolist() == [True, True, False, False, False, False]
+def test_sand_under_a_flange_is_told_from_sand_beside_above_and_in_it() -> None:
+    # The space under the flange is 10 x 8; centres in it count, on edges and corners of x too.
+    places_m = np.array([[5, 1], [11, 7], [2, 3], [1, 11], [5, 11], [13, 1], [-1, 5], [5, 9]])
+    found = fill_under(L_M, places_m.astype(float), np.arange(1.0, 9.0))
+    assert found == pytest.approx(np.pi * (1 + 4 + 9) / 80.0)
+    whole = fill_under(L_M, np.zeros((0, 2)), np.zeros(0))
+    assert whole == 0.0
+
+
+def test_the_space_under_a_bent_flange_is_smaller() -> None:
     sunk_m = L_M - [[0, 0], [0, 0], [0, 0], [0, 2], [0, 2], [0, 0]]
-    assert under_outline(sunk_m, np.array([[11.0, 6.5], [3.0, 7.5]])).tolist() == [False, True]
+    disc = np.array([[3.0, 7.5]]), np.array([1.0])
+    # A tenth of the strips' width is all that a sloping edge may cost.
+    assert fill_under(sunk_m, *disc) == pytest.approx(np.pi / 70.0, rel=1e-3)
+    assert fill_under(sunk_m, np.array([[11.0, 6.5]]), np.array([1.0])) == 0.0
+
+
+def test_a_block_on_the_floor_has_nothing_under_it() -> None:
+    block_m = np.array([[0, 0], [2, 0], [2, 3], [0, 3]], dtype=float)
+    assert np.isnan(fill_under(block_m, np.array([[1.0, 4.0]]), np.array([0.5])))

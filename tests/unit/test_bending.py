@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import meshio
 import numpy as np
@@ -14,23 +13,12 @@ from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.ledger import LEDGER
 from pattern_fe.scene import pattern_of, with_surface
 from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.bending import verdict_of
 from sandmould.study.expand import Run
 from sandmould.study.measure import write_exports, write_measures
 from sandmould.study.plan import write_plan
-
-FORCE_N = -0.2
-"""On the tip of the flange, downwards."""
-WINDOW_S = 0.002
-SCENE: dict[str, Any] = {
-    "box": {"width_m": 0.15, "height_m": 0.15},
-    "pattern": {
-        "shape": {"kind": "l_shape", "thickness_m": 0.01, "height_m": 0.06, "reach_m": 0.05},
-        "position_m": [0.04, 0.0],
-    },
-}
+from tests.bent_run import SCENE, tip_load, write_bent_run
 
 
 @pytest.fixture(scope="module")
@@ -45,43 +33,9 @@ def body(scenario: Scenario) -> FoamBody:
 
 @pytest.fixture
 def folder(tmp_path: Path, scenario: Scenario, body: FoamBody) -> Path:
-    """Four snapshots: drawn, bent under a load, the same as vibration begins, half bent."""
     write_plan([Run("test", "one", {}, 1, scenario, {})], tmp_path)
-    folder = tmp_path / "runs" / "one"
-    (folder / "snapshots").mkdir()
-    load, bent = tip_load(body)
-    one = np.array([1])
-    place_m, none = np.array([[0.01, 0.002]]), np.zeros((1, 2))
-    for number, (time_s, shaken_s, share) in enumerate(
-        [(0.02, -1.0, 0.0), (0.04, -1.0, 1.0), (0.04, 0.0, 1.0), (0.06, 0.02, 0.5)]
-    ):
-        stage = "settle_1" if shaken_s < 0.0 else "vibrate_1"
-        Snapshot(
-            time_s, shaken_s, stage, one, one, place_m, none, np.zeros((1, 3)), np.array([0.002]),
-            pattern_m=body.vertices_m + share * bent, pattern_load_n=load,
-        ).save(folder / "snapshots" / f"{number:06d}.npz")  # fmt: skip
-    write_ledger(folder)
-    pd.DataFrame({"wall_s": [6.0]}).to_csv(folder / "cost.tsv", sep="\t", index=False)
-    return folder
-
-
-def tip_load(body: FoamBody) -> tuple[np.ndarray, np.ndarray]:
-    load = np.zeros_like(body.vertices_m)
-    load[np.argmax(body.vertices_m @ [1.0, 1.0]), 1] = FORCE_N
-    return load, body.answer(load).displacement_m
-
-
-def write_ledger(folder: Path) -> None:
-    time_s = WINDOW_S * np.arange(1, 31)
-    rows = pd.DataFrame(
-        {
-            "time_s": time_s, "window_s": WINDOW_S, "passes": 2, "factor": 0.02, "gain": np.nan,
-            "residual_m": np.where(time_s < 0.041, 2e-4, 1e-4), "displacement_m": 1e-3,
-            "largest_m": 2e-3, "load_n": 0.2, "imbalance_n": 2e-12, "moment_left_n_m": 1e-12,
-            "work_j": 0.01 * time_s, "energy_j": 0.005 * time_s, "solve_s": 0.01,
-        }
-    )  # fmt: skip
-    rows.to_csv(folder / LEDGER, sep="\t", index=False)
+    write_bent_run(tmp_path / "runs" / "one", body)
+    return tmp_path / "runs" / "one"
 
 
 def measured(folder: Path) -> pd.DataFrame:

@@ -103,6 +103,8 @@ def test_a_study_counts_its_runs() -> None:
     holds, lags, cycles = judged(), judged(residual_m=0.004), judged(work_j=0.0)
     assert study_sentence([holds, holds]) == "The loop holds in all 2 runs."
     assert study_sentence([holds, cycles, lags, lags]) == (
-        "Of 4 runs 1 hold, 2 lag, 1 go in cycles: only shapes of runs that hold are answers."
+        "The loop holds in 1, lags in 2, goes in cycles in 1 of 4 runs: only where it holds is a "
+        "shape an answer."
     )
+    assert study_sentence([lags]).startswith("The loop lags in the one run: only where")
     assert study_sentence([]) == "No run has a ledger that tells of its loop."
