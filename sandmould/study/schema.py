@@ -36,7 +36,8 @@ def schema_text() -> str:
         definitions = other["$defs"] | definitions
         schema["properties"] = other["properties"] | schema["properties"]
     # The material states a part of it, and what the study is based on another.
-    definitions["Solidification"].pop("required")
+    for name in ("Solidification", "Pattern"):
+        definitions[name].pop("required")
     # The kind may be that of the study which this one is based on.
     schema["properties"]["scenario"] = {
         "description": "What is simulated, by kind.",

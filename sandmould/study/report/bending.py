@@ -200,7 +200,6 @@ _COLUMNS = (
     ("tip at end", TIP, 1e3, "mm"),
     ("largest distance", "pattern_distance_largest_m", 1e3, "mm"),
     ("its RMS", "pattern_distance_rms_m", 1e3, "mm"),
-    ("windows", "pattern_windows", 1.0, ""),
     ("outside engine", "pattern_outside_fraction", 1e2, "%"),
 )
 
@@ -216,7 +215,7 @@ def _runs_table(
     columns = (
         *(Column(title, False) for title in ("run", *(["setting"] if collected.keys else []))),
         Column("loop", False),
-        *(Column(f"{title}, {unit}" if unit else title) for title, _, _, unit in _COLUMNS),
+        *(Column(f"{title}, {unit}") for title, _, _, unit in _COLUMNS),
         Column("surface", False),
         Column("solid", False),
     )
@@ -230,13 +229,20 @@ def _runs_table(
             (
                 Cell(run, run),
                 *([Cell(setting, setting)] if collected.keys else []),
-                Cell(judged.state, judged.state, note=judged.sentence) if judged else Cell("–", ""),
+                _loop_cell(judged),
                 *(_value_cell(measures.get(name), factor) for _, name, factor, _ in _COLUMNS),
                 *(_file_cell(study_folder, href, run, suffix) for suffix in ("vtu", "stl")),
             )
         )
         marked.append(judged is None or judged.state != "holds")
     return Table(columns, tuple(rows), tuple(marked))
+
+
+def _loop_cell(verdict: LoopVerdict | None) -> Cell:
+    if verdict is None:
+        return Cell("–", "")
+    told = verdict.sentence.split(": ", 1)[1]
+    return Cell(verdict.state, verdict.state, note=told[0].upper() + told[1:])
 
 
 def _value_cell(value: Any, factor: float) -> Cell:
@@ -249,4 +255,4 @@ def _file_cell(study_folder: Path, href: str, run: str, suffix: str) -> Cell:
     name = f"pattern_final.{suffix}"
     if not (study_folder / "runs" / run / "exports" / name).is_file():
         return Cell("–", "")
-    return Cell(name, name, f"{href}runs/{quote(run)}/exports/{name}")
+    return Cell(suffix.upper(), name, f"{href}runs/{quote(run)}/exports/{name}")

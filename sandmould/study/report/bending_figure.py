@@ -42,8 +42,8 @@ def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
     known = {name: shape for name, shape in shapes.items() if shape is not None}
     if not known:
         return "", ""
-    figure = Figure(figsize=(_WIDTH_IN, _WIDTH_IN), dpi=110)
-    ax = figure.add_axes((0.08, 0.07, 0.9, 0.9))
+    figure = Figure(dpi=110, layout="constrained")
+    ax = figure.add_subplot()
     ax.add_patch(Polygon(drawn.vertices_m * _MM, facecolor="0.9", edgecolor="0.35", ls="--"))
     ax.plot([], [], color="0.35", ls="--", label="as drawn")
     for name, shape_m in known.items():

@@ -26,6 +26,7 @@ class _Curve:
     column: str
     label: str
     factor: float = 1.0
+    thick: bool = False
 
 
 def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, ...]:
@@ -42,14 +43,14 @@ def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, .
     found = [
         (
             "displacement, mm",
-            (_Curve("displacement_m", "shown", 1e3), _Curve("residual_m", "residual", 1e3)),
+            (_Curve("displacement_m", "shown", 1e3, True), _Curve("residual_m", "residual", 1e3)),
             "Root mean square over the surface's vertices of the displacement that the sand saw, "
             "and of the one that its loads give less that.",
         ),
         (
             "energy, J",
             (
-                _Curve("work_j", "work of sand"),
+                _Curve("work_j", "work of sand", thick=True),
                 _Curve("energy_j", "stored"),
                 _Curve("elastic_j", "stored"),
                 _Curve("kinetic_j", "kinetic"),
@@ -90,6 +91,7 @@ def _chart(shown: pd.DataFrame, title: str, curves: tuple[_Curve, ...]) -> Chart
         Line(
             np.column_stack([shown["time_s"], curve.factor * shown[curve.column]]),
             tint,
+            curve.thick,
             label=curve.label,
             title=curve.label,
         )
