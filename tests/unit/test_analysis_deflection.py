@@ -17,8 +17,8 @@ def test_the_tip_of_an_l_is_the_upper_corner_of_its_flange() -> None:
 
 def test_of_two_ends_of_a_t_the_right_one_is_taken() -> None:
     t_m = np.array([[5, 0], [7, 0], [7, 8], [12, 8], [12, 10], [0, 10], [0, 8], [5, 8]], float)
-    # A tenth and its likes are not exact: the two ends differ by round-off.
-    assert farthest_corner(0.1 * t_m, 0.1 * t_m[:2]) == 4
+    t_m[5, 0] -= 1e-12  # round-off
+    assert farthest_corner(t_m, t_m[:2]) == 4
 
 
 def test_a_pattern_that_nothing_holds_has_no_farthest_corner() -> None:
@@ -50,6 +50,12 @@ def test_the_space_under_a_bent_flange_is_smaller() -> None:
     # A tenth of the strips' width is all that a sloping edge may cost.
     assert fill_under(sunk_m, *disc) == pytest.approx(np.pi / 70.0, rel=1e-3)
     assert fill_under(sunk_m, np.array([[11.0, 6.5]]), np.array([1.0])) == 0.0
+
+
+def test_a_point_in_the_foot_of_a_c_is_not_under_its_top() -> None:
+    c_m = np.array([[0, 0], [9, 0], [9, 2], [2, 2], [2, 8], [9, 8], [9, 10], [0, 10]], dtype=float)
+    places_m = np.array([[5.0, 1.0], [5.0, 5.0]])
+    assert fill_under(c_m, places_m, np.array([3.0, 1.0])) == pytest.approx(np.pi / 42.0)
 
 
 def test_a_block_on_the_floor_has_nothing_under_it() -> None:
