@@ -14,10 +14,12 @@ from sandmould.scenario.outline import Outline
 
 @dataclass(frozen=True)
 class Distance:
-    """Distances of a deformed surface from the surface drawn, mm."""
+    """Distances of a deformed surface from the surface drawn."""
 
-    largest_mm: float
-    rms_mm: float
+    vertex_m: Array
+    """(nv,) float64, m: of each vertex; positive where it is outside the drawing."""
+    largest_m: float
+    rms_m: float
     """Root of the mean square over the deformed surface, by area."""
 
 
@@ -33,11 +35,20 @@ def distance_from_drawing(drawn: Perimeter, deformed: Perimeter) -> Distance:
     """
     place_m = deformed.vertices_m
     if drawn.loops:
-        lines = [Outline("drawn", drawn.vertices_m[loop]) for loop in drawn.loops]
-        away_m = np.min([np.abs(line.distance_m(place_m)) for line in lines], axis=0)
+        away_m = _from_lines_m(drawn, place_m)
     else:
-        surface = TriangleMesh("drawn", drawn.vertices_m, drawn.facets)
-        away_m = np.abs(surface.distance_m(place_m))
-    area: Array = deformed.vertex_area_m2
-    rms = float(np.sqrt(np.average(away_m**2, weights=area)))
-    return Distance(1e3 * float(away_m.max()), 1e3 * rms)
+        away_m = TriangleMesh("drawn", drawn.vertices_m, drawn.facets).distance_m(place_m)
+    rms_m = float(np.sqrt(np.average(away_m**2, weights=deformed.vertex_area_m2)))
+    return Distance(away_m, float(np.abs(away_m).max()), rms_m)
+
+
+def _from_lines_m(drawn: Perimeter, place_m: Array) -> Array:
+    """Signed distance from closed lines; the solid lies left of them, so holes run clockwise."""
+    found = []
+    for loop in drawn.loops:
+        vertices_m = drawn.vertices_m[loop]
+        x, y = vertices_m.T
+        is_outer = np.dot(x, np.roll(y, -1)) > np.dot(y, np.roll(x, -1))
+        away_m = Outline("drawn", vertices_m).distance_m(place_m)
+        found.append(away_m if is_outer else -away_m)
+    return np.asarray(np.max(found, axis=0))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skfem.io.meshio import to_meshio
 
+from pattern_fe.distance import distance_from_drawing
 from pattern_fe.loads import vertex_pressure_pa
 from pattern_fe.perimeter import Perimeter, split_face
 from pattern_fe.space import Space
@@ -41,8 +42,13 @@ def write_body(path: Path, space: Space, displacement_m: Array, von_mises_pa: Ar
     ).write(path, file_format="vtu")
 
 
-def write_surface(path: Path, perimeter: Perimeter, displacement_m: Array, load_n: Array) -> None:
-    """Write the surface with displacement, load and nodal pressure, for ParaView (.vtu).
+def write_surface(
+    path: Path, perimeter: Perimeter, displacement_m: Array, load_n: Array | None = None
+) -> None:
+    """Write the deformed surface, for ParaView and tools that measure shapes (.vtu).
+
+    Points lie where the vertices are, each with its displacement and its distance from the drawing,
+    positive outside it; with loads also these and the pressure (56), per area as drawn.
 
     Parameters
     ----------
@@ -53,15 +59,17 @@ def write_surface(path: Path, perimeter: Perimeter, displacement_m: Array, load_
         Of the vertices.
     """
     kind = "line" if perimeter.facets.shape[1] == 2 else "triangle"
-    meshio.Mesh(
-        _in_space(perimeter.vertices_m),
-        [(kind, perimeter.facets)],
-        point_data={
-            "displacement_m": _in_space(displacement_m),
-            "load_n": _in_space(load_n),
-            "pressure_pa": vertex_pressure_pa(perimeter, load_n),
-        },
-    ).write(path, file_format="vtu")
+    moved = perimeter.moved(displacement_m)
+    values = {
+        "displacement_m": _in_space(displacement_m),
+        "distance_m": distance_from_drawing(perimeter, moved).vertex_m,
+    }
+    if load_n is not None:
+        values["load_n"] = _in_space(load_n)
+        values["pressure_pa"] = vertex_pressure_pa(perimeter, load_n)
+    meshio.Mesh(_in_space(moved.vertices_m), [(kind, perimeter.facets)], point_data=values).write(
+        path, file_format="vtu"
+    )
 
 
 def write_stl(path: Path, space: Space, perimeter: Perimeter, displacement_m: Array) -> None:

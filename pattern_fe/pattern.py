@@ -143,6 +143,27 @@ class Pattern:
         check_held(self.space.node_m, self.fixed, self.supports)
         return solve_large(self.space, self.foam, self._bedding_n_m, self.fixed, load_n, settings)
 
+    def spread(self, outer_m: Array) -> Array:
+        """Displacement of all nodes at rest for a given one of the outer line, in 2D; small ones.
+
+        Parameters
+        ----------
+        outer_m : (nv, 2) float64, m
+            Of the vertices of the outer line.
+
+        Returns
+        -------
+        (n, 2) float64, m
+        """
+        whole = np.zeros_like(self.space.node_m)
+        nodes = self.surface.outer.nodes
+        whole[nodes] = outer_m
+        inner = np.setdiff1d(self._free, (2 * nodes[:, None] + [0, 1]).ravel())
+        if len(inner):
+            pull_n = -(self.stiffness @ whole.ravel())[inner]
+            whole.ravel()[inner] = factorised(self.stiffness[inner][:, inner]).solve(pull_n)
+        return whole
+
     def _check_load(self, load_n: Array) -> None:
         valid = self.space.node_m.shape
         if load_n.shape != valid:

@@ -65,6 +65,20 @@ class Perimeter:
         vertices = self.vertices_m
         return max(self.loops, key=lambda loop: np.ptp(vertices[loop], axis=0).max())
 
+    @property
+    def outer(self) -> Perimeter:
+        """The line that the sand meets in 2D, as a surface of its own."""
+        line = self.outer_line
+        of_line = self.facets[(self.facets >= line.start).all(1) & (self.facets < line.stop).all(1)]
+        whole = slice(0, line.stop - line.start)
+        return replace(
+            self,
+            vertices_m=self.vertices_m[line],
+            facets=of_line - line.start,
+            nodes=self.nodes[line],
+            loops=(whole,),
+        )
+
     def _shared(self, values: Array) -> Array:
         shared = np.zeros((len(self.vertices_m), values.shape[1]))
         for corner in self.facets.T:

@@ -21,6 +21,8 @@ class Answer:
     """Elastic energy stored in it."""
     reaction_n: Array
     """(d,) float64, N: force of the supports on the pattern."""
+    moment_left_n_m: float = np.nan
+    """Size of the moment about the origin that loads and reactions leave; none unless told."""
 
 
 class ElasticBody(Protocol):

@@ -40,11 +40,17 @@ class FoamBody:
         on_surface[self._line] = load_n
         load = pattern.on_nodes(on_surface)
         moved = pattern.solve_nonlinear(load) if self._large else pattern.solve_linear(load)
-        inner = self._inner_force_n(moved)
+        reaction = self._inner_force_n(moved) - load
+        reaction[~pattern.fixed.any(axis=1)] = 0.0
+        # Small displacements balance on the drawing, large ones where the nodes have come to.
+        place_m = pattern.space.node_m + (moved if self._large else 0.0)
+        outer = load + reaction
+        moment = place_m[:, 0] * outer[:, 1] - place_m[:, 1] * outer[:, 0]
         return Answer(
             pattern.on_surface(moved)[self._line],
             pattern.energy_j(moved, self._large),
-            np.asarray((inner - load)[pattern.fixed.any(axis=1)].sum(axis=0)),
+            np.asarray(reaction.sum(axis=0)),
+            abs(float(moment.sum())),
         )
 
     def _inner_force_n(self, moved_m: Array) -> Array:

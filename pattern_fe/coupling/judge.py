@@ -139,7 +139,7 @@ class JudgeSession(ReferenceSession):
     def snapshot(self) -> Snapshot:
         """State of all grains relative to the box, and the pattern among them."""
         moved = self._foam.vertices_m + self.displacement_m
-        return replace(super().snapshot(), pattern_m=moved)
+        return replace(super().snapshot(), pattern_m=moved, pattern_load_n=self._load)
 
     def keep(self) -> Any:
         """Copies of what grains and pattern are; the tables go on."""

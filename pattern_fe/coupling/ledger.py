@@ -38,6 +38,8 @@ class Entry:
     """Size of the sand's mean force on the pattern."""
     imbalance_n: float
     """Size of the sum of that force and the reaction of the supports."""
+    moment_left_n_m: float
+    """Size of the moment of both about the origin; none of a body that does not tell."""
     work_j: float
     """Work of the sand on the surface that it saw, since the run began."""
     energy_j: float

@@ -73,6 +73,8 @@ class CoupledSession:
         rest = body.vertices_m
         self._shown = np.zeros_like(rest)
         self._next = np.zeros_like(rest)
+        self._load = np.zeros_like(rest)
+        self._load_sum, self._load_steps = np.zeros_like(rest), 0
         self._work_j = self._solve_s = 0.0
         self._gain = np.nan
         ledger_bytes, rows = None, 0
@@ -102,6 +104,7 @@ class CoupledSession:
             within = inner.steps % record
             window = int(self._ends[np.searchsorted(self._ends, within, side="right")]) - within
             if within == 0:
+                self._load_sum, self._load_steps = np.zeros_like(self._load), 0
                 self._measure(window * inner.step_s)
             self._window(min(window, end - inner.steps))
         if inner.is_root:
@@ -137,6 +140,8 @@ class CoupledSession:
                 break
             self._inner.go_back(kept)
             shown = target
+        self._load_sum, self._load_steps = self._load_sum + steps * load, self._load_steps + steps
+        self._load = self._load_sum / self._load_steps
         self._work_j += work_of(load, shown - start)
         self._shown = shown
         self._next = self._predicted(start, shown, target)
@@ -177,6 +182,7 @@ class CoupledSession:
                 largest_m=float(np.linalg.norm(shown, axis=1).max()),
                 load_n=float(np.linalg.norm(load.sum(axis=0))),
                 imbalance_n=imbalance_n(load, answer),
+                moment_left_n_m=answer.moment_left_n_m,
                 work_j=self._work_j,
                 energy_j=answer.energy_j,
                 solve_s=self._solve_s,
@@ -201,7 +207,8 @@ class CoupledSession:
 
     def snapshot(self) -> Snapshot:
         """State of all grains relative to the box, and the pattern among them."""
-        return replace(self._inner.snapshot(), pattern_m=self._body.vertices_m + self._shown)
+        moved_m = self._body.vertices_m + self._shown
+        return replace(self._inner.snapshot(), pattern_m=moved_m, pattern_load_n=self._load)
 
     def write_checkpoint(self, folder: Path) -> None:
         """Write the engine's state and the loop's."""
@@ -211,6 +218,7 @@ class CoupledSession:
         arrays: dict[str, Any] = {
             "shown": self._shown,
             "next": self._next,
+            "load": self._load,
             "work_j": self._work_j,
             "gain": self._gain,
             "ledger_bytes": size,
@@ -222,7 +230,7 @@ class CoupledSession:
     def _take_up(self, checkpoint: Path) -> tuple[int, int]:
         """Read what ``write_checkpoint`` wrote; give the trusted parts of the tables."""
         with np.load(checkpoint / CHECKPOINT) as kept:
-            self._shown, self._next = kept["shown"], kept["next"]
+            self._shown, self._next, self._load = kept["shown"], kept["next"], kept["load"]
             self._work_j = float(kept["work_j"])
             self._gain = float(kept["gain"])
             start = "relaxation_"

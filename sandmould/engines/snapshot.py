@@ -39,6 +39,9 @@ class Snapshot:
     ``record.orientation`` does not ask for it."""
     pattern_m: NDArray[np.float64] | None = None
     """(nv, d) float64, m: vertices of the pattern's outer line, where it bends."""
+    pattern_load_n: NDArray[np.float64] | None = None
+    """(nv, d) float64, N: the sand's force on each, its mean over the last record, or that of the
+    last step where the pattern is stepped with the grains."""
 
     def save(self, path: Path) -> None:
         """Write to an ``.npz`` file, first under a temporary name."""

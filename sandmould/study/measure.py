@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.coordination import contacts
+from analysis.deflection import fill_under
 from analysis.density import apparent_density
 from analysis.export import solids_to_vtk, to_ovito, to_vtk
 from analysis.layers import mixing_index
@@ -63,6 +64,8 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         "largest_overlap_fraction": touching.largest_overlap_fraction,
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
+    if snapshot.pattern_m is not None:
+        row["pattern_under_fraction"] = fill_under(snapshot.pattern_m, position, radius)
     return row | measure_outflow(scenario, snapshot)
 
 
@@ -89,11 +92,18 @@ def write_picture(folder: Path, out: Path) -> None:
 
 
 def write_exports(folder: Path, out: Path) -> None:
-    """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks."""
+    """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks.
+
+    A pattern's bent surface is always written: it is what the run was made for.
+    """
     scenario = read_run(folder / "scenario.yaml").scenario
     wanted = scenario.record.export
     out.mkdir(exist_ok=True)
     moments = list_moments(folder)
+    if scenario.pattern is not None:
+        from sandmould.study.bent_files import write_bent  # scikit-fem: few studies need it
+
+        write_bent(scenario, folder, out)
     if wanted == "none" or not moments:
         return
     if scenario.scene.solids:
@@ -137,15 +147,24 @@ def write_measures(folder: Path, out: Path) -> None:
     other rows stay good.
     """
     scenario = read_run(folder / "scenario.yaml").scenario
+    bent = None
+    if scenario.pattern is not None:
+        from sandmould.study.bending import BentPattern, add_loop  # scikit-fem: few studies need it
+
+        bent = BentPattern(scenario)
     rows = []
     for path in sorted((folder / "snapshots").glob("*.npz")):
         try:
-            rows.append(measure_snapshot(scenario, Snapshot.load(path)))
+            snapshot = Snapshot.load(path)
+            row = measure_snapshot(scenario, snapshot)
+            rows.append(row if bent is None else row | bent.row(snapshot))
         except ValueError as error:
             rows.append({"stage": f"unreadable: {error}"})
     columns = ["time_s", "vibration_time_s", "stage", "grains"]
     table = pd.DataFrame(rows) if rows else pd.DataFrame(columns=columns)
     table = add_outflow(table, folder)
+    if bent is not None:
+        table = add_loop(table, folder, bent.reach_m)
     partial = out.with_name(out.name + ".partial")
     table.to_csv(partial, sep="\t", index=False, float_format="%.8g")
     os.replace(partial, out)

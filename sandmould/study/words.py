@@ -24,6 +24,10 @@ _NAMES = {
     "rolling_arm_fraction": "rolling arm",
     "solid_fraction": "solid fraction",
     "bed_height_m": "bed height",
+    "pattern_tip_deflection_m": "deflection of the pattern's tip",
+    "pattern_tip_filled_m": "deflection of the pattern's tip after filling",
+    "pattern_tip_recovered_m": "what vibration gave back of the tip's deflection",
+    "pattern_under_fraction": "sand in the space under the pattern",
     "apparent_density_raw_kg_m3": "apparent density, as eq. (55) prints it",
     "apparent_density_corrected_kg_m3": "apparent density, corrected for walls",
 }

@@ -43,11 +43,19 @@
     points.forEach(([x, y], i) => (i ? v.pen.lineTo(v.x(x), v.y(y)) : v.pen.moveTo(v.x(x), v.y(y))));
   }
 
+  // vertices of a bent pattern, in m
+  function outline(flat) {
+    const points = [];
+    for (let i = 0; i < flat.length; i += 2) points.push([scene.bent_m * flat[i], scene.bent_m * flat[i + 1]]);
+    return points;
+  }
+
   function drawScene(v) {
     v.pen.lineWidth = 1.2;
     v.pen.strokeStyle = "#404040";
     v.pen.fillStyle = "#cccccc";
-    for (const solid of scene.solids) { trace(v, solid); v.pen.closePath(); v.pen.fill(); v.pen.stroke(); }
+    const bent = film.bent.length ? [outline(film.bent[Number(slider.value)])] : [];
+    for (const solid of [...scene.solids, ...bent]) { trace(v, solid); v.pen.closePath(); v.pen.fill(); v.pen.stroke(); }
     v.pen.lineWidth = 2;
     for (const wall of scene.walls) { trace(v, wall); v.pen.stroke(); }
     v.pen.lineWidth = 1;

@@ -79,16 +79,26 @@ def test_distance_counts_what_leaves_the_drawing_not_what_slides_along_it() -> N
     pattern = Pattern(mesh_of(bar(0.02, 0.01), 0.01), FOOT, thickness_m=0.1)
     found = pattern.distance(np.tile([1e-3, 0.0], (len(pattern.space.node_m), 1)))
     # of 12 vertices 5 mm apart, three on the right leave and one on the left goes inside
-    assert found.largest_mm == pytest.approx(1.0)
-    assert found.rms_mm == pytest.approx(np.sqrt(4.0 / 12.0))
+    assert found.largest_m == pytest.approx(1e-3)
+    assert found.rms_m == pytest.approx(1e-3 * np.sqrt(4.0 / 12.0))
+    assert sorted(np.round(found.vertex_m, 9)) == [-1e-3, *[0.0] * 8, *[1e-3] * 3]
+
+
+def test_distance_from_a_drawing_with_a_hole_is_positive_in_the_hole() -> None:
+    pattern = Pattern(mesh_of(frame(0.01, 0.06, 0.08), 0.01), FOOT, thickness_m=0.02)
+    found = pattern.distance(np.tile([1e-3, 0.0], (len(pattern.space.node_m), 1)))
+    x, y = pattern.surface.vertices_m.T
+    into = np.isclose(x, 0.01) & (y > 0.01 + 1e-9) & (y < 0.07 - 1e-9)  # left side of the hole
+    assert found.vertex_m[into] == pytest.approx(1e-3)
+    assert found.largest_m == pytest.approx(1e-3)
 
 
 def test_distance_in_3d_is_that_to_the_nearest_triangle() -> None:
     pattern = pattern_of_kind("hexahedra", 1)
     found = pattern.distance(0.05 * (pattern.space.node_m - 0.01))
     # a cube 5 % larger: corners sqrt(3)/2 mm away, faces 0.5 mm
-    assert found.largest_mm == pytest.approx(np.sqrt(3.0) * 0.5)
-    assert 0.5 < found.rms_mm < np.sqrt(3.0) * 0.5
+    assert found.largest_m == pytest.approx(np.sqrt(3.0) * 0.5e-3)
+    assert 0.5e-3 < found.rms_m < np.sqrt(3.0) * 0.5e-3
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -132,7 +142,23 @@ def test_fields_for_paraview_come_back(tmp_path: Path, kind: str) -> None:
     write_surface(tmp_path / "surface.vtu", pattern.surface, on_surface, load)
     surface = meshio.read(tmp_path / "surface.vtu")
     assert surface.point_data["pressure_pa"] == pytest.approx(1500.0)
+    assert np.allclose(surface.points[:, :d], pattern.surface.vertices_m + on_surface)
+    away_m = surface.point_data["distance_m"]
+    assert np.abs(away_m).max() == pytest.approx(pattern.distance(displacement).largest_m)
+    write_surface(tmp_path / "bare.vtu", pattern.surface, on_surface)
+    bare = meshio.read(tmp_path / "bare.vtu")
+    assert set(bare.point_data) == {"displacement_m", "distance_m"}
     assert np.array_equal(surface.point_data["displacement_m"][:, :d], on_surface)
+
+
+def test_inner_nodes_follow_the_outer_line_as_under_loads_on_it() -> None:
+    pattern = l_pattern()
+    line = pattern.surface.outer_line
+    load = np.zeros_like(pattern.surface.vertices_m)
+    load[line] = -1500.0 * pattern.surface.vertex_area_vector_m2[line]
+    answer = pattern.solve_linear(pattern.on_nodes(load))
+    spread = pattern.spread(pattern.on_surface(answer)[line])
+    assert spread == pytest.approx(answer, abs=1e-12)
 
 
 def test_loads_of_a_wrong_shape_or_value_are_refused() -> None:

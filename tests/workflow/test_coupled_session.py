@@ -120,9 +120,14 @@ def after(session: CoupledSession, folder: Path) -> tuple[pd.DataFrame, Any]:
     return ledger, ledger.iloc[-1]
 
 
-def test_shapes_hold_every_record(tmp_path: Path) -> None:
+def test_shapes_and_loads_are_those_of_every_record(tmp_path: Path) -> None:
     session = coupled(tmp_path)
     records = filled(session, records=4)
+    loads, snapshot = session.surface_loads(), session.snapshot()
+    assert loads is not None
+    assert snapshot.pattern_load_n is not None
+    np.testing.assert_allclose(snapshot.pattern_load_n.sum(axis=0), loads["pattern"], rtol=1e-9)
+    np.testing.assert_array_equal(snapshot.pattern_m, SLAB_M + session.displacement_m)
     session.close()
     time_s, shapes_m = read_shapes(tmp_path / SHAPES, len(SLAB_M), 2)
     assert len(time_s) == records
@@ -171,9 +176,11 @@ def test_a_stopped_loop_goes_on_as_if_never_stopped(engine: str, tmp_path: Path)
         for _ in range(6):
             session.advance()
         session.write_checkpoint(folder)
+    load_n = first.snapshot().pattern_load_n
     first.advance()  # beyond what the checkpoint vouches for
     first.close()
     second = coupled(tmp_path / "stopped", engine, checkpoints[1], scheme="aitken")
+    np.testing.assert_array_equal(second.snapshot().pattern_load_n, load_n)
     for _ in range(3):
         straight.advance()
         second.advance()

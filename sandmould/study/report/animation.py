@@ -23,6 +23,8 @@ BUDGET_BYTES = 2_500_000
 _MOST_FRAMES = 240
 _LEVELS = 8191
 """Quanta across the longest side: a tenth of a pixel on a screen."""
+BENT_M = 5e-5
+"""Unit of the outlines of a pattern: a twentieth of a millimetre."""
 ABSENT = 65535
 """Coordinate of a grain that has not been filled in yet."""
 
@@ -43,6 +45,9 @@ class Film:
     origin_m: tuple[float, ...]
     quantum_m: float
     largest_radius_m: float
+    bent: tuple[tuple[int, ...], ...]
+    """Outline of a pattern at each frame, x and y of one vertex after another in ``BENT_M``; empty
+    without one."""
     data: str
     """Base64 of deflated bytes: coordinates by axis, frame and grain; radii (uint16, shares of
     the largest, low bytes first); layers (uint8)."""
@@ -131,8 +136,14 @@ def _pack(
         origin_m=tuple(origin_m.tolist()),
         quantum_m=quantum_m,
         largest_radius_m=largest_m,
+        bent=tuple(_outline(f) for f in frames if f.pattern_m is not None),
         data=base64.b64encode(zlib.compress(raw, 6)).decode("ascii"),
     )
+
+
+def _outline(frame: Snapshot) -> tuple[int, ...]:
+    assert frame.pattern_m is not None
+    return tuple(np.rint(frame.pattern_m / BENT_M).astype(np.int64).ravel().tolist())
 
 
 def changes(place: NDArray[np.uint16]) -> NDArray[np.uint16]:

@@ -84,6 +84,18 @@ class Mark:
 
 
 @dataclass(frozen=True)
+class Area:
+    """What runs of one setting spread over; it lies within their lines."""
+
+    x: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    """(k,) float64, in the units of the axes."""
+    tint: Tint = PLAIN
+    title: str = ""
+
+
+@dataclass(frozen=True)
 class Chart:
     """What a chart shows, in the units of its axes."""
 
@@ -98,6 +110,7 @@ class Chart:
     """Names of settings that have no scale: y counts them from the top and the intervals lie."""
     band: tuple[float, float] | None = None
     """Values along x between which the chart is shaded."""
+    areas: tuple[Area, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -143,6 +156,14 @@ class LaidMark:
 
 
 @dataclass(frozen=True)
+class LaidArea:
+    """An area in pixels."""
+
+    area: Area
+    path: str
+
+
+@dataclass(frozen=True)
 class Laid:
     """A chart in pixels, as ``chart.svg`` draws it."""
 
@@ -155,6 +176,7 @@ class Laid:
     x_ticks: tuple[Tick, ...]
     y_ticks: tuple[Tick, ...]
     rows: tuple[Tick, ...]
+    areas: tuple[LaidArea, ...]
     lines: tuple[LaidLine, ...]
     marks: tuple[LaidMark, ...]
 
@@ -197,6 +219,7 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
         x_ticks=_not_touching([Tick(x.at(t), _text(t, x_ticks)) for t in x_ticks]),
         y_ticks=tuple(Tick(y.at(t), s) for t, s in zip(y_ticks, y_text, strict=True)),
         rows=tuple(Tick(y.at(i), name) for i, name in enumerate(chart.rows)),
+        areas=tuple(_laid_area(area, x, y) for area in chart.areas),
         lines=_laid_lines(chart.lines, x, y),
         marks=tuple(_laid_mark(m, x, y, bool(chart.rows)) for m in chart.marks),
     )
@@ -259,6 +282,13 @@ def _not_touching(ticks: Sequence[Tick]) -> tuple[Tick, ...]:
         shown.append(tick if fits else Tick(tick.at, ""))
         free_from = tick.at + half if fits else free_from
     return tuple(shown)
+
+
+def _laid_area(area: Area, x: Axis, y: Axis) -> LaidArea:
+    along = np.concatenate([area.x, area.x[::-1]]).tolist()
+    up = np.concatenate([area.low, area.high[::-1]]).tolist()
+    points = (f"{x.at(u):.1f},{y.at(v):.1f}" for u, v in zip(along, up, strict=True))
+    return LaidArea(area, f"M{'L'.join(points)}Z")
 
 
 def _laid_lines(lines: Sequence[Line], x: Axis, y: Axis) -> tuple[LaidLine, ...]:

@@ -22,7 +22,7 @@ from PIL import Image
 
 from analysis.density import apparent_density
 from analysis.plots import draw_by_layer, draw_grains, draw_scene
-from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.scenario.box import Tube
 from sandmould.scenario.geometry import Block
 from sandmould.scenario.scenario import FILLING, Scenario
@@ -86,12 +86,14 @@ def cut_m(scenario: Scenario) -> float | None:
     return scenario.box.depth_m / 2
 
 
-def _draw_scene(scenario: Scenario, ax: Axes, height_m: float, stage: str = "") -> None:
+def _draw_scene(scenario: Scenario, ax: Axes, height_m: float, at: Snapshot | str = "") -> None:
     """Box, solids and bores, cut where all pictures of the scenario are.
 
-    Without a stage of the run its last is shown: with the gate that was taken away only before.
+    At a snapshot a pattern is bent, in a stage it is as drawn. Without either the last stage is
+    shown: with the gate that was taken away only before.
     """
-    draw_scene(scenario.scene_in(stage), ax, height_m, cut_m(scenario))
+    scene = scenario.scene_in(at) if isinstance(at, str) else scene_at(scenario, at)
+    draw_scene(scene, ax, height_m, cut_m(scenario))
 
 
 def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
@@ -255,7 +257,7 @@ def draw_densities(
     """
     found = [
         apparent_density(
-            s.position_m, s.radius_m, scenario.sand.density_kg_m3, scene=scenario.scene_in(s.stage)
+            s.position_m, s.radius_m, scenario.sand.density_kg_m3, scene=scene_at(scenario, s)
         ).corrected_kg_m3
         for s in snapshots
     ]
@@ -291,7 +293,7 @@ def panel(
     figure = Figure(figsize=(8.0, 8.0 * span[1] / span[0]), dpi=_PANEL_PX / 8.0)
     ax = figure.add_axes((0, 0, 1, 1))
     draw(ax, snapshot)
-    _draw_scene(scenario, ax, height_m, snapshot.stage)
+    _draw_scene(scenario, ax, height_m, snapshot)
     _scale_bar(ax, width, height)
     ax.set_xlim(-margin, width + margin)
     ax.set_ylim(-margin, height + margin)

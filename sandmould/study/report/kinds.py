@@ -91,6 +91,7 @@ def kind_pages(
     collected: Collected,
     verdict: Verdict,
     film_budget_bytes: int,
+    href: str,
 ) -> KindPages:
     """Draw what the kind of study shows.
 
@@ -104,6 +105,8 @@ def kind_pages(
     verdict : Verdict
     film_budget_bytes : int
         Most that the film of one run may weigh.
+    href : str
+        Address of the study's folder, seen from the report.
     """
     of_sweep = collected.of_sweep
     if isinstance(scenario, OwnDeck):
@@ -126,22 +129,24 @@ def kind_pages(
             {"pages": solid_pages(study_folder, reference, scenario, of_sweep, verdict, shown)},
         )
     if isinstance(scenario, MetalFlow):
-        pages = flow_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes)
-        return KindPages(
-            "flow.html",
-            flow_method(scenario, collected.keys),
-            "the end of the run",
-            (),
-            {"pages": pages},
-        )
+        flow = flow_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes)
+        method = flow_method(scenario, collected.keys)
+        return KindPages("flow.html", method, "the end of the run", (), {"pages": flow})
     filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
+    pages = sand_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes)
+    bending = None
+    if scenario.pattern is not None:
+        from sandmould.study.report.bending import bending_pages  # scikit-fem: few studies need it
+
+        bending = bending_pages(study_folder, href, scenario, of_sweep, verdict, pages.shown_run)
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),
         "the end of vibration" if scenario.vibration else "the end",
         filling.advice if filling else (),
         {
-            "pages": sand_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes),
+            "pages": pages,
+            "bending": bending,
             "dimension": scenario.dimension,
             "vibrates": bool(scenario.vibration),
             "filling": filling,

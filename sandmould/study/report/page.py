@@ -133,7 +133,13 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         charts = tuple(with_surface(c, optimum.optimum, verdict.measure) for c in charts)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
     of_kind = kind_pages(
-        page.study_folder, page.study, page.scenario, page.collected, verdict, film_budget_bytes
+        page.study_folder,
+        page.study,
+        page.scenario,
+        page.collected,
+        verdict,
+        film_budget_bytes,
+        page.href,
     )
     method: tuple[Row, ...] = (
         *of_kind.method,

@@ -18,7 +18,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected
 from sandmould.study.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.study.report import figures
-from sandmould.study.report.animation import Film, make_film
+from sandmould.study.report.animation import BENT_M, Film, make_film
 from sandmould.study.report.measured import (
     Curve,
     late_conclusion,
@@ -208,8 +208,10 @@ def _films(
 
 
 def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
-    """The scene for the page's canvas, in m."""
-    outline = figures.scene_outline(scenario, height_m)
+    """The scene for the page's canvas, in m; a pattern is drawn as it bends, with the film."""
+    obstacles = [o for o in scenario.obstacles if o.name != _bending_name(scenario)]
+    still = scenario.model_copy(update={"obstacles": tuple(obstacles), "pattern": None})
+    outline = figures.scene_outline(still, height_m)
     return {
         "width_m": scenario.box.width_m,
         "height_m": height_m,
@@ -219,7 +221,12 @@ def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
         "bores": [np.round(b, 6).tolist() for b in outline.bores],
         "tubes": [_round(bore) for bore in scenario.scene.bores] if scenario.dimension == 3 else [],
         "layer_colours": list(LAYER_COLOURS),
+        "bent_m": BENT_M,
     }
+
+
+def _bending_name(scenario: Scenario) -> str:
+    return "" if scenario.pattern is None else scenario.pattern.name
 
 
 def _round(bore: Bore) -> dict[str, object]:

@@ -1,0 +1,131 @@
+"""Whether a coupled run is to be trusted: its ledger read in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+LAST_SHARE = 0.1
+"""Of the time of a ledger: its last part, which is judged."""
+RESIDUAL_SHARE = 0.1
+"""Residual over displacement up to which a loop holds. Equally good loops end some ten per cent
+apart, for the rest of sand under a pattern depends on the way there."""
+MADE_SHARE = 0.1
+"""Of the stored energy: what the loop may have added to the work of the sand."""
+State = Literal["holds", "lags", "one way", "cycles", "diverged"]
+_MEANS: dict[State, str] = {
+    "holds": "the sand saw the pattern where its loads bend it",
+    "lags": "the sand saw the pattern bend later than it did, so shapes are right at rest only",
+    "one way": "the sand never felt the pattern give way",
+    "cycles": "the loop itself shakes the sand, so the shape is no answer",
+    "diverged": "the shape means nothing",
+}
+_VERBS: dict[State, str] = {
+    "holds": "holds", "lags": "lags", "one way": "is one way", "cycles": "goes in cycles",
+    "diverged": "diverged",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LoopVerdict:
+    """What the last part of a ledger says."""
+
+    state: State
+    residual_fraction: float
+    """Median of residual over displacement; NaN of a scheme that steps with the grains."""
+    spikes: int
+    """Windows whose residual is larger than the displacement."""
+    made_j: float
+    """Energy stored in the end less the work of the sand; above 0 the loop itself gave it."""
+    stored_j: float
+    """Median of the elastic energy."""
+    last_s: float
+    """Length of the last part."""
+
+    @property
+    def sentence(self) -> str:
+        """The verdict with its reasons."""
+        told = []
+        if self.state == "one way":
+            return f"One way: {_MEANS[self.state]}."
+        if np.isfinite(self.residual_fraction):
+            told.append(f"a residual of {100 * self.residual_fraction:.0f} % of the displacement")
+        if self.spikes:
+            told.append(f"{self.spikes} windows where it is larger than that")
+        if self.made_j > MADE_SHARE * self.stored_j:
+            told.append(
+                f"{self.made_j:.2g} J that no sand gave beside {self.stored_j:.2g} J in the foam"
+            )
+        reasons = f"; in the last {self.last_s:.2g} s {', '.join(told)}" if told else ""
+        return f"{self.state.capitalize()}: {_MEANS[self.state]}{reasons}."
+
+
+def judge_loop(ledger: pd.DataFrame, stopped: bool = False) -> LoopVerdict | None:
+    """Judge the last part of a ledger.
+
+    Energy stored above the work of the sand was never given by sand: such a loop goes in cycles,
+    that shake the sand, and it diverged where the median residual is above the displacement too, or
+    where it was stopped for that or has values that are not finite. Work above the stored energy is
+    only lost in the loop's delay, as in a dashpot: such a loop lags while its residual is large,
+    and it holds where that is small in the median and in no window above the displacement.
+
+    Parameters
+    ----------
+    ledger : DataFrame
+        Of any scheme; rows in order of time. Without ``residual_m`` it has no windows: the pattern
+        was stepped with the grains.
+    stopped : bool
+        Whether the run ended because its pattern ran away.
+
+    Returns
+    -------
+    LoopVerdict or None
+        None where the sand has not yet moved the pattern.
+    """
+    if ledger.empty or not ledger["load_n"].any():
+        return None
+    start_s, end_s = ledger["time_s"].iloc[[0, -1]]
+    last_s = LAST_SHARE * float(end_s - start_s)
+    last = ledger[ledger["time_s"] >= end_s - last_s]
+    stored_j = float(stored_energy_j(last).median())
+    made_j = stored_j - float(last["work_j"].median())
+    residual, spikes = np.nan, 0
+    if "residual_m" in ledger:
+        # Before the first move there is nothing that a residual could be a share of.
+        shares = last["residual_m"] / last["displacement_m"].where(last["displacement_m"] > 0.0)
+        residual, spikes = float(shares.median()), int((shares > 1.0).sum())
+    state: State = "holds"
+    is_fed = made_j > MADE_SHARE * stored_j
+    if stopped or not np.isfinite(last[["displacement_m", "work_j"]]).to_numpy().all():
+        state = "diverged"
+    elif "factor" in ledger and not ledger["factor"].any():
+        state = "one way"
+    elif is_fed:
+        state = "diverged" if residual > 1.0 else "cycles"
+    elif residual > RESIDUAL_SHARE or spikes:
+        state = "lags"
+    return LoopVerdict(state, residual, spikes, made_j, stored_j, last_s)
+
+
+def stored_energy_j(ledger: pd.DataFrame) -> pd.Series[float]:
+    """Elastic energy in the ledger of any scheme."""
+    return ledger["energy_j" if "energy_j" in ledger else "elastic_j"]
+
+
+def study_sentence(verdicts: Sequence[LoopVerdict]) -> str:
+    """How many runs of a study hold, and what the others do."""
+    found = [v.state for v in verdicts]
+    if not found:
+        return "No run has a ledger that tells of its loop."
+    count = f"all {len(found)} runs" if len(found) > 1 else "the one run"
+    if len(set(found)) == 1:
+        told = f"The loop {_VERBS[found[0]]} in {count}"
+    else:
+        told = ", ".join(f"{_VERBS[s]} in {found.count(s)}" for s in _VERBS if s in found)
+        told = f"The loop {told} of {len(found)} runs"
+    rest = "" if set(found) == {"holds"} else ": only where it holds is a shape an answer"
+    return f"{told}{rest}."

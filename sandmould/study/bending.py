@@ -1,0 +1,161 @@
+"""Measures of a run that bends a pattern: its shape, its load, the error of the loop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.deflection import deflection, farthest_corner
+from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.verdict import LoopVerdict, judge_loop, stored_energy_j
+from pattern_fe.distance import distance_from_drawing
+from pattern_fe.large_displacement import LoadNotReachedError
+from pattern_fe.pattern import Pattern
+from pattern_fe.perimeter import Perimeter
+from pattern_fe.scene import pattern_of
+from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.scenario import Scenario
+
+Row = dict[str, Any]
+
+
+class BentPattern:
+    """The pattern of a run beside its drawing; made once, asked for every snapshot."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take the pattern of a scenario that has one."""
+        told = scenario.pattern
+        assert told is not None
+        self.pattern: Pattern = pattern_of(scenario)
+        self.drawn: Perimeter = self.pattern.surface.outer
+        """The line that the sand meets, as drawn."""
+        held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
+        self.tip = farthest_corner(self.drawn.vertices_m, held)
+        """Its vertex farthest from the supports."""
+        self._body = FoamBody(self.pattern, told.statics == "large")
+
+    @property
+    def reach_m(self) -> float:
+        """Diagonal of the drawing."""
+        return float(np.linalg.norm(np.ptp(self.drawn.vertices_m, axis=0)))
+
+    def row(self, snapshot: Snapshot) -> Row:
+        """Shape of a snapshot, and where the mean load of its record alone would bend the tip."""
+        if snapshot.pattern_m is None:
+            return {}
+        drawn, now_m = self.drawn, snapshot.pattern_m
+        bent = deflection(drawn.vertices_m, now_m, self.tip)
+        away = distance_from_drawing(drawn, drawn.moved(now_m - drawn.vertices_m))
+        found = {
+            "pattern_tip_deflection_m": bent.tip_m,
+            "pattern_largest_displacement_m": bent.largest_m,
+            "pattern_distance_largest_m": away.largest_m,
+            "pattern_distance_rms_m": away.rms_m,
+        }
+        if snapshot.pattern_load_n is not None:
+            found["pattern_tip_answered_m"] = self._answered_m(snapshot.pattern_load_n)
+        return found
+
+    def _answered_m(self, load_n: np.ndarray) -> float:
+        """Deflection of the tip at rest under a load; NaN where there is no rest."""
+        try:
+            return -float(self._body.answer(load_n).displacement_m[self.tip, -1])
+        except LoadNotReachedError:
+            return np.nan
+
+
+def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
+    """Add to the measures of a run what its ledger tells of the windows up to each snapshot.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows of ``measures.tsv`` in order of time.
+    folder : Path
+        The run's folder.
+    reach_m : float, m
+        Arm that a moment left over is compared with.
+
+    Returns
+    -------
+    DataFrame
+        As given where the run has no ledger.
+    """
+    ledger = ledger_of(folder)
+    if ledger is None or "pattern_tip_deflection_m" not in table:
+        return table
+    filled_m = _filled_m(table)
+    verdict = verdict_of(folder)
+    return table.assign(
+        **_by_snapshot(ledger, table["time_s"], reach_m),
+        pattern_tip_filled_m=filled_m,
+        pattern_tip_recovered_m=filled_m - table["pattern_tip_deflection_m"],
+        pattern_outside_fraction=_outside_fraction(ledger, folder),
+        pattern_loop="untouched" if verdict is None else verdict.state,
+    )
+
+
+def ledger_of(folder: Path) -> pd.DataFrame | None:
+    """The ledger of a run; None where it has none."""
+    path = folder / LEDGER
+    ledger = read_ledger(path) if path.is_file() else None
+    return None if ledger is None or ledger.empty else ledger
+
+
+def verdict_of(folder: Path, until_s: float = np.inf) -> LoopVerdict | None:
+    """Judge the loop of a run, or its part up to a time; None where nothing can be told."""
+    ledger, outcome = ledger_of(folder), folder / "outcome.json"
+    if ledger is None:
+        return None
+    stopped = np.isinf(until_s) and outcome.is_file() and (
+        RunOutcome.read(outcome).outcome is Outcome.COUPLING_DIVERGED
+    )  # fmt: skip
+    return judge_loop(ledger[ledger["time_s"] <= until_s], stopped)
+
+
+def _by_snapshot(ledger: pd.DataFrame, time_s: pd.Series[float], reach_m: float) -> dict[str, Any]:
+    """Columns of the ledger over the windows since the snapshot before, or the last known."""
+    ends_s = time_s.dropna().to_numpy() * (1 + 1e-9)
+    rows = ledger.assign(energy_j=stored_energy_j(ledger))
+    if "residual_m" in ledger:
+        load_n = ledger["load_n"].where(ledger["load_n"] > 0.0)
+        rows["force_left"] = ledger["imbalance_n"] / load_n
+        rows["moment_left"] = ledger["moment_left_n_m"] / load_n
+    by = rows.groupby(np.searchsorted(ends_s, ledger["time_s"]))
+    found = {"pattern_work_j": by["work_j"].last(), "pattern_energy_j": by["energy_j"].mean()}
+    found["pattern_stored_fraction"] = found["pattern_energy_j"] / found["pattern_work_j"]
+    if "residual_m" in ledger:
+        found |= {
+            "pattern_residual_fraction": by["residual_m"].sum() / by["displacement_m"].sum(),
+            "pattern_force_left_fraction": by["force_left"].max(),
+            "pattern_moment_left_fraction": by["moment_left"].max() / reach_m,
+            "pattern_factor": by["factor"].last(),
+            "pattern_gain": by["gain"].last(),
+            "pattern_windows": by["passes"].size().cumsum(),
+            "pattern_passes": by["passes"].sum().cumsum(),
+        }
+    at = time_s.dropna().index
+    return {
+        name: pd.Series(values.reindex(range(len(at))).ffill().to_numpy(), at)
+        for name, values in found.items()
+    }
+
+
+def _filled_m(table: pd.DataFrame) -> float:
+    """Deflection of the tip as vibration begins, or at the end of a run without vibration."""
+    shaken = table[table["vibration_time_s"] >= 0.0]
+    known = (shaken if len(shaken) else table.iloc[::-1])["pattern_tip_deflection_m"].dropna()
+    return float(known.iloc[0]) if len(known) else np.nan
+
+
+def _outside_fraction(ledger: pd.DataFrame, folder: Path) -> float:
+    """Share of the wall time that went into the pattern's own part."""
+    path = folder / "cost.tsv"
+    if "solve_s" not in ledger or not path.is_file():
+        return np.nan
+    return float(ledger["solve_s"].sum() / pd.read_csv(path, sep="\t")["wall_s"].iloc[-1])

@@ -1,0 +1,110 @@
+"""Whether a loop holds, on ledgers made up for each answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pattern_fe.coupling.verdict import LoopVerdict, judge_loop, study_sentence
+
+WINDOWS = 200
+
+
+def ledger(**columns: object) -> pd.DataFrame:
+    """Sand that has bent the pattern by 10 mm and given it what it stores."""
+    time_s = 0.01 * np.arange(1, WINDOWS + 1)
+    share = np.minimum(1.0, time_s)
+    return pd.DataFrame(
+        {
+            "time_s": time_s, "factor": 0.02, "residual_m": 1e-4, "displacement_m": 0.01 * share,
+            "load_n": 5.0 * share, "work_j": 0.02 * share**2, "energy_j": 0.02 * share**2,
+        }
+    ).assign(**columns)  # fmt: skip
+
+
+def judged(**columns: object) -> LoopVerdict:
+    found = judge_loop(ledger(**columns))
+    assert found is not None
+    return found
+
+
+def test_a_loop_whose_answer_is_what_the_sand_saw_holds() -> None:
+    found = judged()
+    assert found.state == "holds"
+    assert found.residual_fraction == pytest.approx(0.01)
+    assert found.made_j == pytest.approx(0.0)
+    assert found.sentence == (
+        "Holds: the sand saw the pattern where its loads bend it; in the last 0.2 s a residual of "
+        "1 % of the displacement."
+    )
+
+
+def test_work_lost_on_the_way_is_no_fault() -> None:
+    assert judged(work_j=0.05).state == "holds"
+
+
+def test_only_the_last_part_counts() -> None:
+    early = np.where(np.arange(WINDOWS) < 150, 0.1, 1e-4)
+    assert judged(residual_m=early).state == "holds"
+
+
+def test_a_surface_that_comes_too_late_lags() -> None:
+    found = judged(residual_m=0.004, work_j=0.03)
+    assert found.state == "lags"
+    assert "40 % of the displacement" in found.sentence
+
+
+def test_a_spike_is_told() -> None:
+    spike = np.where(np.arange(WINDOWS) == WINDOWS - 5, 0.012, 1e-4)
+    found = judged(residual_m=spike)
+    assert (found.state, found.spikes) == ("lags", 1)
+
+
+@pytest.mark.parametrize(("residual_m", "state"), [(0.004, "cycles"), (0.012, "diverged")])
+def test_a_loop_that_gives_energy_shakes_the_sand(residual_m: float, state: str) -> None:
+    found = judged(residual_m=residual_m, work_j=-0.03 * np.arange(WINDOWS) / WINDOWS)
+    assert found.state == state
+    assert found.made_j == pytest.approx(0.02 + 0.03 * 0.95, rel=0.01)
+    assert "0.048 J that no sand gave beside 0.02 J in the foam" in found.sentence
+
+
+def test_a_run_that_was_stopped_diverged() -> None:
+    found = judge_loop(ledger(), stopped=True)
+    assert found is not None
+    assert found.state == "diverged"
+    broken = ledger()
+    broken.loc[WINDOWS - 1, "displacement_m"] = np.inf
+    found = judge_loop(broken)
+    assert found is not None
+    assert found.state == "diverged"
+
+
+def test_one_way_loads_are_no_loop() -> None:
+    found = judged(factor=0.0, displacement_m=0.0, residual_m=0.01, work_j=0.0)
+    assert found.state == "one way"
+    assert found.sentence == "One way: the sand never felt the pattern give way."
+
+
+def test_a_pattern_stepped_with_the_grains_has_no_residual() -> None:
+    told = ledger().rename(columns={"energy_j": "elastic_j"}).drop(columns=["residual_m", "factor"])
+    found = judge_loop(told.assign(work_j=0.025))
+    assert found is not None
+    assert found.state == "holds"
+    assert found.sentence == "Holds: the sand saw the pattern where its loads bend it."
+
+
+def test_without_sand_on_it_nothing_is_told() -> None:
+    assert judge_loop(ledger(load_n=0.0)) is None
+    assert judge_loop(ledger().iloc[:0]) is None
+
+
+def test_a_study_counts_its_runs() -> None:
+    holds, lags, cycles = judged(), judged(residual_m=0.004), judged(work_j=0.0)
+    assert study_sentence([holds, holds]) == "The loop holds in all 2 runs."
+    assert study_sentence([holds, cycles, lags, lags]) == (
+        "The loop holds in 1, lags in 2, goes in cycles in 1 of 4 runs: only where it holds is a "
+        "shape an answer."
+    )
+    assert study_sentence([lags]).startswith("The loop lags in the one run: only where")
+    assert study_sentence([]) == "No run has a ledger that tells of its loop."

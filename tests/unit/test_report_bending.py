@@ -1,0 +1,85 @@
+"""The report of runs that bend a pattern: band, verdicts, files, what the paper states."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.scene import pattern_of, with_surface
+from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.collect import Collected, gather
+from sandmould.study.expand import Run
+from sandmould.study.measure import write_exports, write_measures
+from sandmould.study.plan import write_plan
+from sandmould.study.report import figures
+from sandmould.study.report.bending import TIP, deflection_chart
+from sandmould.study.report.page import write_report
+from sandmould.study.verdict import Verdict, judge
+from tests.bent_run import SCENE, write_bent_run
+from tests.unit.test_report_page import Page
+
+SHARES = {"one": 0.8, "two": 1.0, "three": 1.2}
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three replicates that bend by a different share; vibration gives half of it back."""
+    folder = tmp_path_factory.mktemp("results") / "bent"
+    scenario = with_surface(Scenario.model_validate(SCENE))
+    runs = [Run("bent", name, {}, i, scenario, {}) for i, name in enumerate(SHARES, 1)]
+    write_plan(runs, folder)
+    told = f"title: How far does it bend?\nobjective: {{measure: {TIP}, better: neither}}\n"
+    (folder / "study.yaml").write_text(told)
+    body = FoamBody(pattern_of(scenario))
+    for name, share in SHARES.items():
+        run = folder / "runs" / name
+        write_bent_run(run, body, share)
+        RunOutcome(Outcome.FINISHED, "", 0.06, 0.06).write(run / "outcome.json")
+        write_measures(run, run / "measures.tsv")
+        write_exports(run, run / "exports")
+    return folder
+
+
+def gathered(study: Path) -> tuple[Collected, Verdict]:
+    collected = gather(study)
+    return collected, judge(collected.summary, (), TIP, "neither")
+
+
+def test_the_band_lies_between_the_least_and_the_greatest_run(study: Path) -> None:
+    chart = deflection_chart(*gathered(study))
+    assert chart is not None
+    (area,) = chart.areas
+    np.testing.assert_allclose(area.x, [-0.02, 0.0, 0.0, 0.02], atol=1e-12)
+    (mean,) = (line for line in chart.lines if line.thick)
+    tip_mm = mean.xy[1, 1]
+    assert area.low == pytest.approx(0.8 * tip_mm * np.array([0.0, 1.0, 1.0, 0.5]))
+    assert area.high == pytest.approx(1.2 * tip_mm * np.array([0.0, 1.0, 1.0, 0.5]))
+    assert chart.y_title == "deflection of the tip, mm"
+
+
+def test_the_page_tells_what_became_of_the_pattern(
+    study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "_PANEL_PX", 60)
+    write_report(study, study / "report.html")
+    text = (study / "report.html").read_text()
+    page = Page(text)
+    assert page.open == []
+    assert "The loop holds in all 3 runs." in page.text
+    assert "vibration gave back a part of it, as the paper states" in page.text
+    assert "with factor 1" in page.text
+    links = {a["href"] for a in page.of("a") if "pattern_final" in a["href"]}
+    assert links == {f"runs/{n}/exports/pattern_final.{s}" for n in SHARES for s in ("vtu", "stl")}
+    assert all((study / link).is_file() for link in links)
+
+
+def test_a_film_shows_the_pattern_bent(study: Path) -> None:
+    text = (study / "report.html").read_text()
+    (scene,) = (t for t in text.splitlines() if 'id="film-scene"' in t)
+    assert '"solids": []' in scene
+    film = next(t for t in text.splitlines() if 'class="film"' in t)
+    assert '"bent": [[' in film
