@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigvalsh
+from scipy.linalg import eigh, eigvalsh
 from scipy.sparse import csc_array
 
 from pattern_fe.factor import factorised
@@ -74,6 +74,22 @@ class CondensedSurface:
         stiffness = self.stiffness_n_m[np.ix_(free, free)]
         stiffness = stiffness + contact_n_m * np.eye(len(root))
         return np.asarray(eigvalsh(root[:, None] * stiffness * root))
+
+    def modes(self) -> tuple[Array, Array]:
+        """Free oscillations of the masses.
+
+        Returns
+        -------
+        square_1_s2 : (m,) float64, 1/s2
+            Squares of the angular frequencies, ascending, of as many modes as free components.
+        shape : (n, m) float64, kg^-1/2
+            Columns of unit modal mass, 0 where held.
+        """
+        free = np.isfinite(self.mass_kg)
+        square, part = eigh(self.stiffness_n_m[np.ix_(free, free)], np.diag(self.mass_kg[free]))
+        shape = np.zeros((len(free), len(square)))
+        shape[free] = part
+        return square, shape
 
     def frequencies_hz(self) -> Array:
         """Natural frequencies, ascending; those of rigid motions are near 0."""
