@@ -98,44 +98,50 @@ def _product(matrix: Floats, vector: Floats, result: Floats) -> None:
 @njit(**OPTIONS)
 def _push(foam: FoamArrays) -> None:
     """Add the impulse of a step to the momenta, and these to the momenta's sums."""
-    numbers, force, momentum, moved_mass = foam.numbers, foam.force, foam.momentum, foam.moved_mass
-    omega2, keeps, gains = numbers[OMEGA2], numbers[KEEPS], numbers[GAINS]
+    # Names of their own: taking an array out of a tuple inside the loop counts references.
+    force, mass, free, displacement = foam.force, foam.mass, foam.free, foam.displacement
+    momentum, mean_momentum, moved_mass = foam.momentum, foam.mean_momentum, foam.moved_mass
+    numbers = foam.numbers
+    dt, keeps, gains, omega2 = numbers[STEP], numbers[KEEPS], numbers[GAINS], numbers[OMEGA2]
     for i in range(len(force)):
-        elastic = omega2 * (moved_mass[i] - foam.mass[i] * foam.displacement[i])
+        elastic = omega2 * (moved_mass[i] - mass[i] * displacement[i])
         old = momentum[i]
-        momentum[i] = foam.free[i] * (keeps * old + gains * (force[i] - elastic))
-        foam.mean_momentum[i] = 0.5 * (old + momentum[i])
-        moved_mass[i] += numbers[STEP] * momentum[i]
+        new = free[i] * (keeps * old + gains * (force[i] - elastic))
+        momentum[i] = new
+        mean_momentum[i] = 0.5 * (old + new)
+        moved_mass[i] += dt * new
 
 
 @njit(**OPTIONS)
 def _move(foam: FoamArrays) -> float:
     """Find displacements and velocities from the momenta; gives the largest displacement, m."""
-    dt, alpha, velocity = foam.numbers[STEP], foam.numbers[DAMPING], foam.velocity
-    foam.before[:] = foam.displacement
-    _product(foam.inverse, foam.moved_mass, foam.displacement)
+    force, mean_momentum, velocity = foam.force, foam.mean_momentum, foam.velocity
+    displacement, before, sums = foam.displacement, foam.before, foam.sums
+    dt, alpha = foam.numbers[STEP], foam.numbers[DAMPING]
+    before[:] = displacement
+    _product(foam.inverse, foam.moved_mass, displacement)
     work = damped = largest = 0.0
     for i in range(len(velocity)):
-        new = (foam.displacement[i] - foam.before[i]) / dt
+        new = (displacement[i] - before[i]) / dt
         mean = 0.5 * (velocity[i] + new)
         velocity[i] = new
-        work += foam.force[i] * mean
-        damped += foam.mean_momentum[i] * mean
-        if not abs(foam.displacement[i]) <= largest:
-            largest = abs(foam.displacement[i])
-    foam.sums[WORK] += dt * work
-    foam.sums[DAMPED] += dt * alpha * damped
+        work += force[i] * mean
+        damped += mean_momentum[i] * mean
+        if not abs(displacement[i]) <= largest:
+            largest = abs(displacement[i])
+    sums[WORK] += dt * work
+    sums[DAMPED] += dt * alpha * damped
     return largest
 
 
 @njit(**OPTIONS)
 def step_foam(foam: FoamArrays) -> None:
     """Go on by one step under the loads of the last one; stand still after having run away."""
-    sums, pressed = foam.sums, foam.pressed
+    sums, pressed, force, velocity = foam.sums, foam.pressed, foam.force, foam.velocity
     load, speed, load_sum = foam.load.ravel(), foam.speed.ravel(), foam.load_sum.ravel()
     if sums[STOPPED] == 0.0:
         for k in range(len(pressed)):
-            foam.force[pressed[k]] = load[k]
+            force[pressed[k]] = load[k]
             load_sum[k] += load[k]
         _push(foam)
         largest = _move(foam)
@@ -143,7 +149,7 @@ def step_foam(foam: FoamArrays) -> None:
         if not largest <= foam.numbers[LIMIT]:
             sums[STOPPED] = 1.0
     for k in range(len(pressed)):
-        speed[k] = foam.velocity[pressed[k]] if sums[STOPPED] == 0.0 else 0.0
+        speed[k] = velocity[pressed[k]] if sums[STOPPED] == 0.0 else 0.0
 
 
 @njit(**OPTIONS)
