@@ -10,6 +10,7 @@ from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.in_step import InStepSession
 from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.pattern import Pattern
+from pattern_fe.scene import with_surface
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import Session
@@ -28,3 +29,23 @@ def in_step(
     else:
         inner = ReferenceSession(build_program(scenario), checkpoint)
     return InStepSession(inner, body, FoamBody(pattern), "pattern", folder, checkpoint)
+
+
+def bed_scene(**changes: Any) -> Scenario:
+    """Coarse sand in layers over a small L, coupled in step."""
+    told = {
+        "shape": {"kind": "l_shape", "thickness_m": 0.006, "height_m": 0.03, "reach_m": 0.045},
+        "position_m": [0.02, 0.0],
+        "element_m": 0.006,
+        "loop": {"scheme": "in_step"},
+    }
+    scene: dict[str, Any] = {
+        "box": {"width_m": 0.08, "height_m": 0.08},
+        "sand": {"size_scale": 8.0, "size_classes": 3},
+        "pattern": told,
+        "fill": {"layers": [{"count": 60, "repeat": 2}]},
+        "time_step": {"fraction": 0.4},
+        "vibration": [],
+        "engine": {"name": "reference"},
+    }
+    return with_surface(Scenario.model_validate(scene | changes))

@@ -19,11 +19,12 @@ from pattern_fe.pattern import Pattern
 from pattern_fe.scene import with_surface
 from pattern_fe.shapes import bar, mesh_of
 from pattern_fe.supports import Supports
+from sandmould.dem import pairs as pairs_module
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from sandmould.scenario.scenario import Scenario
-from tests.instep import in_step
+from tests.instep import bed_scene, in_step
 from tests.patterns import _one_thread  # noqa: F401
 from tests.verification.one_grain import RADIUS_M, one_grain_scene
 from tests.wedge import (
@@ -196,6 +197,23 @@ def test_a_stopped_session_goes_on_as_if_never_stopped(engine: str, tmp_path: Pa
     again.close()
     np.testing.assert_array_equal(again.displacement_m, straight.displacement_m)
     assert read_ledger(tmp_path / LEDGER).drop(columns="solve_s").equals(table)
+
+
+def test_threads_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pairs_module, "CHUNK", 8)
+    found = []
+    for threads in (1, 2):
+        session: Any = open_coupled(build_program(bed_scene()), tmp_path, tmp_path / "engine.log")
+        session.insert_layer(1)
+        session.start_stage(session.stage)
+        session.advance(0.12)
+        session.solver._threads = threads  # also where the machine has one core
+        session.advance(2e-3)
+        assert len(session.solver.moving.chunks.bound) > 4
+        found.append(session.displacement_m)
+        session.close()
+    assert np.abs(found[0]).max() > 1e-5
+    np.testing.assert_array_equal(*found)
 
 
 def test_it_goes_back_to_what_it_kept(tmp_path: Path) -> None:
