@@ -34,14 +34,25 @@ class ContactRows:
         one_kg = 0.0
         for size in scenario.sand.classes(scenario.dimension):
             one_kg = ContactBound.of_grain(scenario, size.diameter_m).mass_kg(scenario.step_s)
-            share = _shares(pattern, size.diameter_m)
+            share = shares_along(pattern, size.diameter_m)
             row_kg = one_kg * np.kron(share.T @ share, np.eye(scenario.dimension))
             rows.append(row_kg.astype(np.float64))
         return cls(tuple(rows), one_kg)
 
 
-def _shares(pattern: Pattern, apart_m: float) -> Array:
-    """Shape functions at points along the outer line, (points, nv) float64."""
+def shares_along(pattern: Pattern, apart_m: float) -> Array:
+    """Shape functions at points along the outer line of a pattern, an even distance apart.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    apart_m : float, m
+
+    Returns
+    -------
+    (points, nv) float64
+        Shares of all vertices of the surface.
+    """
     vertices, line = pattern.surface.vertices_m, pattern.surface.outer_line
     number = np.arange(line.start, line.stop)
     following = np.roll(number, -1)

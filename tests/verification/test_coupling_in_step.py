@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.contact_rows import ContactRows
+from pattern_fe.coupling.contact_rows import ContactRows, shares_along
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
 from pattern_fe.coupling.opening import MASSES_LOG, open_coupled
 from pattern_fe.coupling.selective_mass import selective_mass
@@ -254,6 +254,19 @@ def largest_growth(scenario: Scenario, pattern: Pattern, lighter: float) -> floa
     new_v = np.hstack([-step_s * inverse @ surface.stiffness_n_m, one - step_s * inverse @ dashpot])
     step = np.vstack([np.hstack([one, np.zeros((n, n))]) + step_s * new_v, new_v])
     return float(np.abs(np.linalg.eigvals(step)).max())
+
+
+def test_a_row_of_grains_goes_round_the_plank_at_even_distances() -> None:
+    pattern = plank_pattern(6.4e6)
+    apart_m = 2 * RADIUS_M
+    places = shares_along(pattern, apart_m) @ pattern.surface.vertices_m
+    ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert len(places) == math.ceil(0.07 / apart_m)
+    # shorter only across the plank's corners
+    assert np.sum(np.abs(ways - apart_m) < 1e-12) >= len(ways) - 4
+    contacts = ContactRows.of(wedge_scene(pattern), pattern)
+    # along x and y; the scene's only size may differ by a thousandth, and so a row by one grain
+    assert contacts.row_kg[0].sum() / (2.0 * contacts.one_kg) == pytest.approx(len(places), abs=1.1)
 
 
 @pytest.mark.parametrize("young_pa", [1e5, 6.4e6])
