@@ -73,7 +73,14 @@ def selective_mass(
     scale : float, optional
         Factor of the pattern's own masses; unless given the least from 1 on that leaves the
         first frequency to them: the rest of M takes one hundredth of it at most.
+
+    Raises
+    ------
+    ValueError
+        When a given scale is not positive.
     """
+    if scale is not None and not 0.0 < scale < math.inf:
+        raise ValueError(f"mass scale of the pattern is {scale:g}, valid is above 0")
     square, shape = surface.modes()
     rows = [shape.T @ row @ shape for row in contacts.row_kg]
 
