@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from pattern_fe.coupling.contact_rows import ContactRows, shares_along
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
-from pattern_fe.coupling.opening import MASSES_LOG, open_coupled
+from pattern_fe.coupling.opening import open_coupled
 from pattern_fe.coupling.selective_mass import selective_mass
 from pattern_fe.material import Foam
 from pattern_fe.pattern import Pattern
-from pattern_fe.scene import with_surface
 from pattern_fe.shapes import bar, mesh_of
 from pattern_fe.supports import Supports
 from sandmould.dem import pairs as pairs_module
@@ -26,15 +25,17 @@ from sandmould.engines.session import EngineStop
 from sandmould.scenario.scenario import Scenario
 from tests.instep import bed_scene, in_step
 from tests.patterns import _one_thread  # noqa: F401
-from tests.verification.one_grain import RADIUS_M, one_grain_scene
+from tests.verification.one_grain import RADIUS_M
 from tests.wedge import (
-    FILL,
     SQUEEZE_M,
     WALL_N_M,
     end_moved_m,
     end_stiffness_n_m,
     judge,
+    plate_pattern,
+    plate_scene,
     put_disc,
+    rest_on_plate,
     wedge_pattern,
     wedge_scene,
 )
@@ -158,24 +159,17 @@ def test_a_thrown_disc_moves_the_bar_as_the_judge_says(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_plate_under_discs_rests_as_the_judges(engine: str, tmp_path: Path) -> None:
-    plate = mesh_of(bar(0.045, 0.005), 0.005).translated(np.array([0.0025, 0.01]))
-    supports = Supports(bedding_n_m3=1.2e7)
-    pattern = Pattern(plate, supports, order=1, thickness_m=0.1)
-    scene = {"gravity_m_s2": 9.80665, "fill": FILL | {"layers": [{"count": 8}]}}
-    places = np.column_stack([np.linspace(0.006, 0.044, 8), np.full(8, 0.015 + RADIUS_M)])
+    pattern = plate_pattern()
     rests = []
     for opened, name in ((judge, "reference"), (in_step, engine)):
-        scenario = wedge_scene(pattern, engine={"name": name}, **scene)
+        scenario = plate_scene(pattern, engine={"name": name})
         session: Any = opened(pattern, scenario, tmp_path, damping_ratio=1.0)
-        session.insert_layer(1)
-        session.set_state(places, np.zeros((8, 2)), np.zeros((8, 3)))
-        session.start_stage(session.stage)
-        for _ in range(15):
-            session.advance()
+        rest_on_plate(session)
         rests.append(session.displacement_m)
         session.close()
     judged, found = rests
     assert np.abs(judged).max() > 1e-7
+    # both still swing a little
     np.testing.assert_allclose(found, judged, atol=1e-3 * np.abs(judged).max())
 
 
@@ -286,20 +280,3 @@ def test_masses_that_need_no_help_stay_the_foams() -> None:
     whole = pattern.natural_frequencies_hz()[0]
     # mass shared among the vertices by area sits farther out than it is
     assert 0.9 * whole < mass.own_first_hz < whole
-
-
-def test_a_scenario_opens_it_and_its_log_tells_of_the_masses(tmp_path: Path) -> None:
-    told = {
-        "shape": {"kind": "bar", "width_m": 0.01, "height_m": 0.01},
-        "position_m": [0.02, 0.0],
-        "loop": {"scheme": "in_step"},
-    }
-    scenario = with_surface(one_grain_scene(pattern=told, engine={"name": "reference"}))
-    session = open_coupled(build_program(scenario), tmp_path, tmp_path / "engine.log")
-    session.insert_layer(1)
-    session.start_stage(session.stage)
-    session.advance()
-    snapshot = session.snapshot()
-    session.close()
-    assert snapshot.pattern_m is not None
-    assert "own masses times 1 and stiffness over" in (tmp_path / MASSES_LOG).read_text()
