@@ -113,25 +113,26 @@ def _push(foam: FoamArrays) -> None:
 
 
 @njit(**OPTIONS)
-def _move(foam: FoamArrays) -> float:
-    """Find displacements and velocities from the momenta; gives the largest displacement, m."""
+def _move(foam: FoamArrays) -> bool:
+    """Find displacements and velocities from the momenta; gives whether all are within bounds."""
     force, mean_momentum, velocity = foam.force, foam.mean_momentum, foam.velocity
     displacement, before, sums = foam.displacement, foam.before, foam.sums
-    dt, alpha = foam.numbers[STEP], foam.numbers[DAMPING]
+    numbers = foam.numbers
+    dt, alpha, limit = numbers[STEP], numbers[DAMPING], numbers[LIMIT]
     before[:] = displacement
     _product(foam.inverse, foam.moved_mass, displacement)
-    work = damped = largest = 0.0
+    work = damped = 0.0
+    bounded = True
     for i in range(len(velocity)):
         new = (displacement[i] - before[i]) / dt
         mean = 0.5 * (velocity[i] + new)
         velocity[i] = new
         work += force[i] * mean
         damped += mean_momentum[i] * mean
-        if not abs(displacement[i]) <= largest:
-            largest = abs(displacement[i])
+        bounded = bounded and abs(displacement[i]) <= limit
     sums[WORK] += dt * work
     sums[DAMPED] += dt * alpha * damped
-    return largest
+    return bounded
 
 
 @njit(**OPTIONS)
@@ -144,9 +145,8 @@ def step_foam(foam: FoamArrays) -> None:
             force[pressed[k]] = load[k]
             load_sum[k] += load[k]
         _push(foam)
-        largest = _move(foam)
         sums[STEPS] += 1.0
-        if not largest <= foam.numbers[LIMIT]:
+        if not _move(foam):
             sums[STOPPED] = 1.0
     for k in range(len(pressed)):
         speed[k] = velocity[pressed[k]] if sums[STOPPED] == 0.0 else 0.0
