@@ -34,6 +34,8 @@ WALL_N_M = 2e4
 HEIGHT_M = 0.015
 """Of the disc and of the middle of the bar."""
 LENGTH_M = 0.02
+DISCS = 8
+"""On the plate."""
 FILL: dict[str, Any] = {"layers": [{"count": 1}], "settling": {"shortest_s": 1.9}}
 
 
@@ -102,3 +104,26 @@ def end_moved_m(session: Any, pattern: Pattern) -> float:
     vertices = pattern.surface.vertices_m[pattern.surface.outer_line]
     end = vertices[:, 0] < vertices[:, 0].min() + 1e-9
     return float(session.displacement_m[end, 0].mean())
+
+
+def plate_pattern() -> Pattern:
+    """A plate that lies on springs, free to bend."""
+    plate = mesh_of(bar(0.045, 0.005), 0.005).translated(np.array([0.0025, 0.01]))
+    return Pattern(plate, Supports(bedding_n_m3=1.2e7), order=1, thickness_m=0.1)
+
+
+def plate_scene(pattern: Pattern, **changes: Any) -> Scenario:
+    """The scene of discs that press on the plate by their weight."""
+    fill = FILL | {"layers": [{"count": DISCS}]}
+    return wedge_scene(pattern, gravity_m_s2=9.80665, fill=fill, **changes)
+
+
+def rest_on_plate(session: Any) -> None:
+    """Place the discs on the plate and let them come to rest."""
+    across = np.linspace(0.006, 0.044, DISCS)
+    places = np.column_stack([across, np.full(DISCS, 0.015 + RADIUS_M)])
+    session.insert_layer(1)
+    session.set_state(places, np.zeros((DISCS, 2)), np.zeros((DISCS, 3)))
+    session.start_stage(session.stage)
+    for _ in range(15):
+        session.advance()

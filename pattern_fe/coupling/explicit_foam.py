@@ -24,16 +24,22 @@ class ContactBound:
     damping_n_s_m: float
 
     @classmethod
-    def of(cls, scenario: Scenario, pattern: Pattern) -> ContactBound:
-        """Contacts of the largest grains, eq. (19), as many as find room on a facet."""
-        law, classes = scenario.contact.grain_wall, scenario.sand.classes(scenario.dimension)
-        mass_kg = scenario.sand.grain_mass_kg(classes[-1].diameter_m, scenario.dimension)
+    def of_grain(cls, scenario: Scenario, diameter_m: float) -> ContactBound:
+        """One contact of a grain, eq. (19)."""
+        law = scenario.contact.grain_wall
+        mass_kg = scenario.sand.grain_mass_kg(diameter_m, scenario.dimension)
         dashpot = 2.0 * law.damping_ratio * math.sqrt(mass_kg * law.normal_stiffness_n_m)
-        stiffness = max(law.normal_stiffness_n_m, law.tangential_stiffness_n_m)
+        return cls(max(law.normal_stiffness_n_m, law.tangential_stiffness_n_m), dashpot)
+
+    @classmethod
+    def of(cls, scenario: Scenario, pattern: Pattern) -> ContactBound:
+        """Contacts of the largest grains, as many as find room on a facet."""
+        classes = scenario.sand.classes(scenario.dimension)
+        one = cls.of_grain(scenario, classes[-1].diameter_m)
         corner = pattern.surface.vertices_m[pattern.surface.facets]
         longest_m = float(np.linalg.norm(corner[:, 1] - corner[:, 0], axis=1).max())
         contacts = 1 + math.floor(longest_m / classes[0].diameter_m)
-        return cls(contacts * stiffness, contacts * dashpot)
+        return cls(contacts * one.stiffness_n_m, contacts * one.damping_n_s_m)
 
     def mass_kg(self, step_s: float) -> float:
         """Least mass of a vertex that such contacts do not throw.

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import cast
 
 from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.in_step import InStepSession
 from pattern_fe.coupling.judge import JudgeSession
-from pattern_fe.coupling.schemes import explicit_foam
+from pattern_fe.coupling.schemes import explicit_foam, in_step_foam
+from pattern_fe.coupling.selective_mass import SelectiveMass
 from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.scene import pattern_of
 from sandmould.engines.choosing import engine_of
 from sandmould.engines.program import Program
 from sandmould.engines.session import Session
 from sandmould.engines.step_counts import StepCounts
+
+MASSES_LOG = "pattern.log"
 
 
 def open_coupled(
@@ -36,11 +41,26 @@ def open_coupled(
     assert told is not None
     if told.loop.scheme == "monolithic":
         return cast(Session, _open_judge(program, log, checkpoint))
-    body = FoamBody(pattern_of(scenario), told.statics == "large")
+    pattern = pattern_of(scenario)
+    body = FoamBody(pattern, told.statics == "large")
     inner = engine_of(scenario).open_session(program, folder, log, checkpoint)
+    if told.loop.scheme == "in_step":
+        foam = in_step_foam(scenario, pattern)
+        (log.parent / MASSES_LOG).write_text(_told_masses(foam.mass), encoding="utf-8")
+        in_step = InStepSession(inner, foam, body, told.name, log.parent, checkpoint)
+        return cast(Session, in_step)
     counts = StepCounts.of(scenario)
     session = CoupledSession(inner, body, told.name, told.loop, counts, log.parent, checkpoint)
     return cast(Session, session)
+
+
+def _told_masses(mass: SelectiveMass) -> str:
+    """How the pattern's masses are scaled, and what is left of its first frequency."""
+    return (
+        f"pattern in every step: own masses times {mass.scale:.4g} and stiffness over the square "
+        f"of 2 pi {mass.omega_1_s / (2.0 * math.pi):.4g} Hz, one step in one of the grains, first "
+        f"frequency {mass.first_hz:.4g} Hz ({mass.own_first_hz:.4g} Hz with its own masses)\n"
+    )
 
 
 def _open_judge(program: Program, log: Path, checkpoint: Path | None) -> JudgeSession:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
+from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.pattern import Pattern
 from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
 
 REFERENCE_ALONE = ("measured", "monolithic")
 """Schemes that need what one engine has: to go back to a kept state, and to stop in every step."""
 ABOVE_VIBRATION = 5.0
 """Least ratio of the pattern's first frequency to that of the box, for an answer as if at rest."""
+LIKE_FOAM = 0.9
+"""Ratio of the pattern's first frequency to the foam's own from which on it moves like the foam."""
 
 
 def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
@@ -36,6 +41,8 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
     if scheme == "monolithic":
         explicit_foam(scenario, pattern)
+    if scheme == "in_step":
+        in_step_foam(scenario, pattern)
 
 
 def explicit_foam(scenario: Scenario, pattern: Pattern) -> ExplicitFoam:
@@ -47,26 +54,66 @@ def explicit_foam(scenario: Scenario, pattern: Pattern) -> ExplicitFoam:
         With large displacements, with masses too small for the contacts, or so large that the
         pattern swings with the box.
     """
-    told = scenario.pattern
-    assert told is not None
-    loop = told.loop
-    if told.statics == "large":
-        raise _bad("scheme", loop.scheme, "a staggered scheme with pattern.statics = large")
+    loop = _loop_of_small_displacements(scenario)
     bound = ContactBound.of(scenario, pattern)
     try:
         foam = ExplicitFoam(pattern, scenario.step_s, bound, loop.mass_scale, loop.damping_ratio)
     except ValueError as fault:
         raise _bad("mass_scale", loop.mass_scale, f"one that can be computed: {fault}") from fault
+    shaken_hz = _shaken_hz(scenario)
+    if foam.first_hz < ABOVE_VIBRATION * shaken_hz:
+        raise _swings(foam.mass_scale, foam.first_hz, shaken_hz)
+    return foam
+
+
+def in_step_foam(scenario: Scenario, pattern: Pattern) -> InStepFoam:
+    """The pattern of the in-step scheme, at rest.
+
+    Raises
+    ------
+    BadInputError
+        With large displacements, or with masses so large that the pattern swings with the box
+        where the foam's own would not.
+    """
+    loop = _loop_of_small_displacements(scenario)
+    foam = InStepFoam(
+        pattern,
+        scenario.step_s,
+        ContactRows.of(scenario, pattern),
+        loop.largest_displacement_m,
+        loop.mass_scale,
+        loop.damping_ratio,
+    )
+    mass, shaken_hz = foam.mass, _shaken_hz(scenario)
+    if mass.first_hz < min(ABOVE_VIBRATION * shaken_hz, LIKE_FOAM * mass.own_first_hz):
+        also = f" or {LIKE_FOAM:g} times the foam's own {mass.own_first_hz:.3g} Hz"
+        raise _swings(mass.scale, mass.first_hz, shaken_hz, also)
+    return foam
+
+
+def _loop_of_small_displacements(scenario: Scenario) -> Loop:
+    """The loop of a scheme that is linear; raises BadInputError where it shall not be."""
+    assert scenario.pattern is not None
+    loop = scenario.pattern.loop
+    if scenario.pattern.statics == "large":
+        raise _bad("scheme", loop.scheme, "a staggered scheme with pattern.statics = large")
+    return loop
+
+
+def _shaken_hz(scenario: Scenario) -> float:
+    """Highest frequency of the box, 0 where it stands still."""
     between = scenario.fill.vibration_between_layers
     stages = (*scenario.vibration, *((between,) if between else ()))
-    shaken_hz = max((stage.frequency_hz for stage in stages), default=0.0)
-    if foam.first_hz < ABOVE_VIBRATION * shaken_hz:
-        valid = (
-            f"a scale or a time step at which the pattern's first frequency, now "
-            f"{foam.first_hz:.3g} Hz, is {ABOVE_VIBRATION:g} times the box's {shaken_hz:g} Hz"
-        )
-        raise _bad("mass_scale", round(foam.mass_scale, 1), valid)
-    return foam
+    return max((stage.frequency_hz for stage in stages), default=0.0)
+
+
+def _swings(scale: float, first_hz: float, shaken_hz: float, also: str = "") -> BadInputError:
+    """What is told where scaled masses let the pattern swing with the box."""
+    valid = (
+        f"a scale or a time step at which the pattern's first frequency, now {first_hz:.3g} Hz, "
+        f"is {ABOVE_VIBRATION:g} times the box's {shaken_hz:g} Hz{also}"
+    )
+    return _bad("mass_scale", round(scale, 1), valid)
 
 
 def _bad(key: str, value: object, valid: str) -> BadInputError:

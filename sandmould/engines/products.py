@@ -78,6 +78,7 @@ SAND_PRODUCTS = (
     "loads.tsv",
     "snapshots",
     "engine.log",
+    "pattern.log",
     "pattern.tsv",
     "pattern_shapes.f8",
 )

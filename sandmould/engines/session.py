@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.step_mover import StepMover
 from sandmould.scenario.bad_input import Problem
 
 Array = NDArray[np.float64]
@@ -159,10 +160,10 @@ class Session(Protocol):
     def go_back(self, kept: Any) -> None:
         """Compute on from a kept state, which may be gone back to again."""
 
-    def attach_elastic_surface(
-        self, name: str, stiffness: Array, mass: Array, damping: Array
-    ) -> None:
-        """Attach a condensed elastic surface stepped inside the engine, or refuse.
+    def attach_mover(self, name: str, mover: StepMover) -> None:
+        """Let a surface be moved in every step by the loads on it, or refuse.
+
+        A session opened from a checkpoint is given it again.
 
         Raises
         ------

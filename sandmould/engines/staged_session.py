@@ -16,6 +16,7 @@ from sandmould.engines.program import Program, Stage
 from sandmould.engines.session import Array, RefusedError, Shared
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
+from sandmould.engines.step_mover import StepMover
 
 
 class StagedSession(ABC):
@@ -25,8 +26,8 @@ class StagedSession(ABC):
     """
 
     version: str
-    _valid_surface: ClassVar[str] = "a surface moved by move_surface"
-    """What is named as valid where an elastic surface is asked for."""
+    _valid_surface: ClassVar[str]
+    """What is named as valid where a mover of a surface is refused."""
 
     def __init__(self, program: Program) -> None:
         """Stand before the first stage.
@@ -204,10 +205,8 @@ class StagedSession(ABC):
         """Refuse as ``keep`` does."""
         self.keep()
 
-    def attach_elastic_surface(
-        self, name: str, stiffness: Array, mass: Array, damping: Array
-    ) -> None:
-        """Refuse: no engine steps an elastic surface."""
+    def attach_mover(self, name: str, mover: StepMover) -> None:
+        """Refuse: this engine calls nobody in its steps."""
         raise RefusedError("surface", name, self._valid_surface)
 
     @property

@@ -87,16 +87,17 @@ class Loop(Section):
         0.002, "Length of a window; rounded so that a record holds whole ones.", unit="s",
         source=ARGUED, gt=0, le=1,
     )  # fmt: skip
-    scheme: Literal["one_way", "fixed", "measured", "aitken", "quasi_newton", "monolithic"] = (
-        quantity(
-            "aitken",
-            "How far the surface is moved to where the last loads bend the pattern: not at all, a "
-            "fixed share, a share of the limit that a measured gain sets (reference engine), "
-            "Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no windows: "
-            "monolithic steps the pattern explicitly after every step of the grains; slow, the "
-            "judge of the others, reference engine.",
-            source=ARGUED,
-        )
+    scheme: Literal[
+        "one_way", "fixed", "measured", "aitken", "quasi_newton", "in_step", "monolithic"
+    ] = quantity(
+        "aitken",
+        "How far the surface is moved to where the last loads bend the pattern: not at all, a "
+        "fixed share, a share of the limit that a measured gain sets (reference engine), "
+        "Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no windows: "
+        "in_step steps the pattern, condensed on its surface, inside every step of the engine; "
+        "monolithic steps all of it after every step of the grains, slow, the judge of the "
+        "others, reference engine.",
+        source=ARGUED,
     )
     factor: float = quantity(
         0.02, "The fixed share, or that of the first window.", source=ARGUED, gt=0, le=1
@@ -123,12 +124,12 @@ class Loop(Section):
     )
     mass_scale: float | None = quantity(
         None,
-        "Factor of the pattern's masses in the monolithic scheme; just large enough for the step "
-        "of the grains and for their contacts unless given.",
+        "Factor of the pattern's masses in the monolithic and in-step schemes; just large enough "
+        "for the step of the grains and for their contacts unless given.",
         source=ARGUED, gt=0,
     )  # fmt: skip
     damping_ratio: float = quantity(
-        0.5, "Damping of the pattern's slowest mode in the monolithic scheme, by mass damping.",
+        0.5, "Damping of the pattern's slowest mode in these two schemes, by mass damping.",
         source=ARGUED, ge=0, le=10,
     )  # fmt: skip
     largest_displacement_m: float = quantity(

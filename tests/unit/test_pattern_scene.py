@@ -102,6 +102,9 @@ def test_a_pattern_that_cannot_be_computed_is_told(pattern: dict[str, Any], says
         ({"statics": "large"}, {}, "pattern.loop.scheme = 'monolithic' .* pattern.statics = large"),
         ({"loop": {"scheme": "monolithic", "mass_scale": 1.0}}, {}, "contacts would throw its li"),
         ({}, {"vibration": [{"acceleration_g": 1.0}]}, "pattern's first frequency, now .* Hz, is"),
+        ({"loop": {"scheme": "in_step"}, "statics": "large"}, {}, "scheme = 'in_step' .* = large"),
+        ({"loop": {"scheme": "in_step", "mass_scale": 1e4}},
+         {"vibration": [{"acceleration_g": 1.0}]}, "50 Hz or 0.9 times the foam's own"),
     ],
 )  # fmt: skip
 def test_what_a_scheme_lacks_is_told(
@@ -110,6 +113,15 @@ def test_what_a_scheme_lacks_is_told(
     told = {**L_SCENE["pattern"], "loop": {"scheme": "monolithic"}, **pattern}
     with pytest.raises(BadInputError, match=says):
         with_surface(Scenario.model_validate({**L_SCENE, "pattern": told, **scene}))
+
+
+def test_a_pattern_that_swings_like_the_foam_may_be_shaken() -> None:
+    told = {**L_SCENE["pattern"], "loop": {"scheme": "in_step"}}
+    shaken = {"vibration": [{"acceleration_g": 1.0, "frequency_hz": 65.0}]}
+    for engine in ("reference", "lammps"):
+        quick = {"time_step": {"fraction": 0.05}, "engine": {"name": engine}}
+        scene = {**L_SCENE, "pattern": told, **shaken, **quick}
+        with_surface(Scenario.model_validate(scene))
 
 
 def test_a_pattern_in_space_is_told() -> None:

@@ -14,23 +14,23 @@ from numpy.typing import NDArray
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
 from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.pattern import Pattern
 from pattern_fe.scene import with_surface
-from pattern_fe.shapes import bar, mesh_of
-from pattern_fe.supports import Supports
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from tests.patterns import _one_thread  # noqa: F401
 from tests.verification.one_grain import RADIUS_M, one_grain_scene
 from tests.wedge import (
-    FILL,
+    DISCS,
     SQUEEZE_M,
     WALL_N_M,
     end_moved_m,
     end_stiffness_n_m,
     judge,
+    plate_pattern,
+    plate_scene,
     put_disc,
+    rest_on_plate,
     staggered,
     wedge_pattern,
     wedge_scene,
@@ -120,24 +120,14 @@ def test_smaller_windows_lead_the_staggered_answer_to_the_judges(tmp_path: Path)
 
 
 def test_a_plate_on_springs_carries_its_discs_where_their_weight_says(tmp_path: Path) -> None:
-    plate = mesh_of(bar(0.045, 0.005), 0.005).translated(np.array([0.0025, 0.01]))
-    supports = Supports(bedding_n_m3=1.2e7)
-    pattern = Pattern(plate, supports, order=1, thickness_m=0.1)
-    discs = 8
-    scenario = wedge_scene(
-        pattern, gravity_m_s2=9.80665, fill=FILL | {"layers": [{"count": discs}]}
-    )
-    weight_n = discs * 9.80665 * scenario.sand.grain_mass_kg(2 * RADIUS_M, 2)
-    places = np.column_stack([np.linspace(0.006, 0.044, discs), np.full(discs, 0.015 + RADIUS_M)])
-    springs_n_m = supports.bedding_n_m3 * pattern.surface.vertex_area_m2
+    pattern = plate_pattern()
+    scenario = plate_scene(pattern)
+    weight_n = DISCS * 9.80665 * scenario.sand.grain_mass_kg(2 * RADIUS_M, 2)
+    springs_n_m = pattern.supports.bedding_n_m3 * pattern.surface.vertex_area_m2
     springs_n_m = springs_n_m[pattern.surface.outer_line]
     judged: Any = judge(pattern, scenario, tmp_path, damping_ratio=1.0)
     for session in (judged, staggered(pattern, scenario, tmp_path, scheme="aitken")):
-        session.insert_layer(1)
-        session.set_state(places, np.zeros((discs, 2)), np.zeros((discs, 3)))
-        session.start_stage(session.stage)
-        for _ in range(15):
-            session.advance()
+        rest_on_plate(session)
         # however the plate bends, its springs carry the weight; the loop still creeps towards it
         assert -springs_n_m @ session.displacement_m[:, 1] == pytest.approx(weight_n, rel=1e-3)
         session.close()
@@ -193,11 +183,20 @@ def test_masses_that_contacts_would_throw_are_told() -> None:
         ExplicitFoam(pattern, scenario.step_s, bound, mass_scale=1.0)
 
 
-def test_a_scenario_opens_the_judge_and_its_log_tells_of_the_masses(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("scheme", "log", "says"),
+    [
+        ("monolithic", "engine.log", r"masses times \d.*, first frequency \d"),
+        ("in_step", "pattern.log", r"own masses times 1 and stiffness .*, first\s+frequency \d"),
+    ],
+)
+def test_a_scenario_opens_a_scheme_whose_log_tells_of_the_masses(
+    scheme: str, log: str, says: str, tmp_path: Path
+) -> None:
     told = {
         "shape": {"kind": "bar", "width_m": 0.01, "height_m": 0.01},
         "position_m": [0.02, 0.0],
-        "loop": {"scheme": "monolithic"},
+        "loop": {"scheme": scheme},
     }
     scenario = with_surface(one_grain_scene(pattern=told, engine={"name": "reference"}))
     session = open_coupled(build_program(scenario), tmp_path, tmp_path / "engine.log")
@@ -207,6 +206,4 @@ def test_a_scenario_opens_the_judge_and_its_log_tells_of_the_masses(tmp_path: Pa
     snapshot = session.snapshot()
     session.close()
     assert snapshot.pattern_m is not None
-    assert re.search(
-        r"masses times \d.*, first frequency \d", (tmp_path / "engine.log").read_text()
-    )
+    assert re.search(says, (tmp_path / log).read_text())

@@ -12,6 +12,7 @@ from sandmould.engines.liggghts.grains_file import read_grains
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, RefusedError
+from sandmould.engines.step_mover import StepMover
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import (
     RADIUS_M,
@@ -230,6 +231,6 @@ def test_surfaces_are_rigid(tmp_path: Path) -> None:
     with pytest.raises(RefusedError, match="a rigid surface on engine liggghts"):
         session.move_surface("floor", np.zeros((2, 2)), 0.01)
     with pytest.raises(RefusedError, match="a rigid surface on engine liggghts"):
-        session.attach_elastic_surface("floor", np.eye(2), np.ones(2), np.ones(2))
+        session.attach_mover("floor", StepMover(0, 0, np.zeros((2, 2)), np.zeros((2, 2))))
     session.close()
     assert not list(tmp_path.glob("liggghts_*"))

@@ -16,6 +16,7 @@ from sandmould.engines.guard import grain_masses_kg
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.step_mover import StepMover
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.launch import _only_one, launch
 from tests.scenes import open_lammps, tube_scene
@@ -171,7 +172,7 @@ def test_session_advances_by_a_duration_in_a_folder_with_spaces(tmp_path: Path) 
     assert session.steps == restored.steps > steps
     with pytest.raises(RefusedError, match="a polygon or a mesh on engine lammps"):
         session.move_surface("floor", np.zeros((2, 2)), 0.01)
-    with pytest.raises(RefusedError, match="a surface moved by move_surface on engine lammps"):
-        session.attach_elastic_surface("floor", np.eye(2), np.ones(2), np.ones(2))
+    with pytest.raises(RefusedError, match="a polygon or a mesh on engine lammps"):
+        session.attach_mover("floor", StepMover(0, 0, np.zeros((2, 2)), np.zeros((2, 2))))
     session.close()
     restored.close()

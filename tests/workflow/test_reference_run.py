@@ -14,6 +14,7 @@ from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.step_mover import StepMover
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.launch import RESTARTABLE_EXIT
 from tests.scenes import tube_scene
@@ -152,8 +153,8 @@ def test_a_block_pushed_into_the_bed_carries_a_load(tmp_path: Path) -> None:
     assert session.snapshot().position_m[:, 1].mean() != before
     with pytest.raises(RefusedError, match="a surface made of facets"):
         session.move_surface("nothing", vertices, 0.02)
-    with pytest.raises(RefusedError):
-        session.attach_elastic_surface("tube_lower", np.eye(2), np.ones(2), np.ones(2))
+    with pytest.raises(RefusedError, match="a surface made of facets"):
+        session.attach_mover("nothing", StepMover(0, 0, vertices, vertices))
 
 
 @pytest.mark.parametrize("changes", [{}, SPHERES], ids=["2D", "3D"])

@@ -30,10 +30,22 @@ from sandmould.dem.contact_law import Law
 from sandmould.dem.motion import ISOTROPIC, damped
 from sandmould.dem.surface_contacts import press_on_surfaces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
-from sandmould.dem.vectors import OPTIONS, PLANE, SPACE, dot, load, load_spin, plus, store, times
+from sandmould.dem.vectors import (
+    OPTIONS,
+    PLANE,
+    SPACE,
+    add_to,
+    dot,
+    load,
+    load_spin,
+    plus,
+    store,
+    times,
+)
 from sandmould.dem.wall_history import WallHistory, carry_history
 
 LAST_STEP, ROWS, GRAINS, LISTED, FIRST_SHOWN, LOAD_EVERY, WINDOW, HANDLE, EXTRACT = range(9)
+MOVER_CALL, MOVER_TABLE, FIRST_MOVED = range(9, 12)
 """Places in ``Bridge.counts``."""
 ALPHA_TRANSLATION, ALPHA_ROTATION, SKIN, STEP = range(8, 12)
 """Places in ``Bridge.numbers`` after the law."""
@@ -46,9 +58,9 @@ class Bridge(NamedTuple):
     """Arrays that the session owns and the compiled function works on."""
 
     counts: Ints
-    """(9,) int64: last step done, rows and grains of the list, whether it holds, step of the first
+    """(12,) int64: last step done, rows and grains of the list, whether it holds, step of the first
     displacement, steps between load samples and in a window, addresses of LAMMPS and of its
-    function that gives an array."""
+    function that gives an array, addresses of a ``StepMover`` or 0, first vertex that it moves."""
     names: Ints
     """(6,) int64: addresses of the names in ``GRAIN_ARRAYS``."""
     numbers: Floats
@@ -81,8 +93,11 @@ class Bridge(NamedTuple):
     """See ``WallHistory``; longer than needed."""
     loads: Floats
     """(nv, d) float64, N: sum over the samples of a window."""
-    spare_loads: Floats
-    """(nv, d) float64, N: loads of steps that are no sample; nobody reads them."""
+    step_loads: Floats
+    """(nv, d) float64, N: loads of the last step."""
+    mover_load: Floats
+    mover_velocity: Floats
+    """See ``StepMover``; no rows without one."""
 
 
 _FIELDS = len(Bridge._fields)
@@ -116,6 +131,8 @@ def _open(address: Any) -> Bridge:
         rows_at(table, 20),
         rows_at(table, 21),
         rows_at(table, 22),
+        rows_at(table, 23),
+        rows_at(table, 24),
     )
 
 
@@ -214,6 +231,20 @@ def _list(
 
 
 @njit(**OPTIONS)
+def _set_motion(bridge: Bridge, step: int) -> None:
+    """Ask a mover how its vertices move in a step, and let them."""
+    first, load, velocity = bridge.counts[FIRST_MOVED], bridge.mover_load, bridge.mover_velocity
+    for i in range(load.shape[0]):
+        for k in range(load.shape[1]):
+            load[i, k] = bridge.step_loads[first + i, k]
+    call_with_two(bridge.counts[MOVER_CALL], bridge.counts[MOVER_TABLE], step)
+    for i in range(load.shape[0]):
+        bridge.steps_left[first + i] = 1
+        for k in range(load.shape[1]):
+            bridge.vertex_velocity[first + i, k] = velocity[i, k]
+
+
+@njit(**OPTIONS)
 def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, added: Floats) -> None:
     """Press the grains on the surfaces in one step.
 
@@ -234,6 +265,8 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
     moves_on = step > counts[LAST_STEP]
     dt = numbers[STEP]
     if moves_on:
+        if counts[MOVER_CALL]:
+            _set_motion(bridge, step)
         move_vertices(arrays, dt)
         counts[LAST_STEP] = step
     shown = min(max(step - counts[FIRST_SHOWN], 1), len(displacement) - 1)
@@ -244,11 +277,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
     part = bridge.part
     if _must_list(dim, bridge, arrays, position, shift):
         part = _list(dim, bridge, arrays, position, radius, ids, shift)
-    loads = bridge.spare_loads
-    if moves_on and step % counts[LOAD_EVERY] == 0:
-        loads = bridge.loads
-        if (step - counts[LOAD_EVERY]) % counts[WINDOW] == 0:
-            _clear(loads)
+    _clear(bridge.step_loads)
     law = Law(
         numbers[0],
         numbers[1],
@@ -278,8 +307,13 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         dt,
         moves_on,
         WallHistory(bridge.used, bridge.normal, bridge.friction, bridge.rolling),
-        loads,
+        bridge.step_loads,
     )
+    if moves_on and step % counts[LOAD_EVERY] == 0:
+        if (step - counts[LOAD_EVERY]) % counts[WINDOW] == 0:
+            _clear(bridge.loads)
+        for i in range(len(bridge.loads)):
+            add_to(load(dim, bridge.step_loads, i), 1.0, bridge.loads, i)
 
 
 @njit(**OPTIONS)

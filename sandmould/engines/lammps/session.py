@@ -19,6 +19,7 @@ from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program
 from sandmould.engines.session import Array, EngineStop, RefusedError, Shared, engine_stop
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.step_mover import StepMover
 from sandmould.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -63,7 +64,6 @@ class LammpsSession(DeckSession):
     """See ``sandmould.engines.session.Session``."""
 
     _restart = "lammps.restart"
-    _valid_surface = "a surface moved by move_surface on engine lammps"
 
     def __init__(
         self, program: Program, deck: Deck, folder: Path, log: Path, checkpoint: Path | None = None
@@ -218,6 +218,16 @@ class LammpsSession(DeckSession):
             For walls, plates and tubes: regions of LAMMPS move as a whole.
         """
         self._kernel_of(name).move(name, vertices_m, window_s)
+
+    def attach_mover(self, name: str, mover: StepMover) -> None:
+        """Let a polygon or mesh be moved in every step.
+
+        Raises
+        ------
+        RefusedError
+            As ``move_surface`` does.
+        """
+        self._kernel_of(name).attach_mover(name, mover)
 
     def _save(self, folder: Path) -> None:
         """Write LAMMPS's restart file and the memory of the callback."""

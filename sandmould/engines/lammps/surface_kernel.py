@@ -15,12 +15,15 @@ from sandmould.dem.wall_history import new_history
 from sandmould.engines.box_motion import displacements
 from sandmould.engines.lammps.callback import (
     EXTRACT,
+    FIRST_MOVED,
     FIRST_SHOWN,
     GRAIN_ARRAYS,
     HANDLE,
     LAST_STEP,
     LISTED,
     LOAD_EVERY,
+    MOVER_CALL,
+    MOVER_TABLE,
     ROWS,
     WINDOW,
     Bridge,
@@ -30,6 +33,7 @@ from sandmould.engines.program import Program, Stage
 from sandmould.engines.reference.model import add_solids, scene_of
 from sandmould.engines.session import Array
 from sandmould.engines.step_counts import StepCounts
+from sandmould.engines.step_mover import StepMover
 
 _KEPT = ("row_ids", "used", "normal", "friction", "rolling")
 _MOVED = ("vertices", "vertex_velocity", "steps_left")
@@ -70,7 +74,7 @@ class SurfaceKernel:
             self._counts.step_s,
         ]
         self._bridge = Bridge(
-            counts=np.zeros(9, dtype=np.int64),
+            counts=np.zeros(12, dtype=np.int64),
             names=np.array([ctypes.addressof(name) for name in self._names], dtype=np.int64),
             numbers=np.array(numbers),
             direction=np.zeros((1, d)),
@@ -84,7 +88,9 @@ class SurfaceKernel:
             row_ids=np.zeros(n, dtype=np.int64),
             **memory._asdict(),
             loads=np.zeros_like(arrays.vertices),
-            spare_loads=np.zeros_like(arrays.vertices),
+            step_loads=np.zeros_like(arrays.vertices),
+            mover_load=np.zeros((0, d)),
+            mover_velocity=np.zeros((0, d)),
         )
         counts = self._bridge.counts
         counts[LOAD_EVERY], counts[WINDOW] = self._counts.load, self._counts.window
@@ -147,6 +153,13 @@ class SurfaceKernel:
     def move(self, name: str, vertices_m: Array, window_s: float) -> None:
         """Let a surface move evenly to new vertices from the next step on."""
         self._surfaces.set_motion(name, vertices_m, window_s, self._counts.step_s)
+
+    def attach_mover(self, name: str, mover: StepMover) -> None:
+        """Let a surface be moved in every step from the next one on."""
+        counts = self._bridge.counts
+        counts[MOVER_CALL], counts[MOVER_TABLE] = mover.call, mover.table
+        counts[FIRST_MOVED] = self._surfaces.vertices_of(name).start
+        self._replace(mover_load=mover.load_n, mover_velocity=mover.velocity_m_s)
 
     def forget(self) -> None:
         """Drop the memory of all contacts."""

@@ -7,10 +7,10 @@ import numpy as np
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import COMPONENTWISE, ISOTROPIC, NONE, VISCOUS, Damping
-from sandmould.dem.solver import Solver
 from sandmould.dem.steps import Scene
 from sandmould.dem.surfaces import Surfaces
 from sandmould.engines.program import Stage
+from sandmould.engines.reference.moved_solver import MovedSolver
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.geometry import Scene as GeometricScene
 from sandmould.scenario.placement import PlannedLayer
@@ -87,11 +87,11 @@ def surfaces_of(scenario: Scenario) -> Surfaces:
     return surfaces
 
 
-def solver_of(scenario: Scenario, stage: Stage, step_s: float) -> Solver:
+def solver_of(scenario: Scenario, stage: Stage, step_s: float) -> MovedSolver:
     """Make the solver of a scenario, without grains."""
     classes = scenario.sand.classes(scenario.dimension)
     mean_m = sum(c.diameter_m * c.count_fraction for c in classes)
-    return Solver(
+    return MovedSolver(
         scene_of(scenario, stage, step_s),
         surfaces_of(scenario),
         SKIN_OVER_DIAMETER * mean_m,

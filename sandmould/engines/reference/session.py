@@ -18,6 +18,7 @@ from sandmould.engines.reference.model import grains_of, scene_of, solver_of
 from sandmould.engines.session import Array, EngineStop, RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.staged_session import StagedSession
+from sandmould.engines.step_mover import StepMover
 
 
 class ReferenceSession(StagedSession):
@@ -148,6 +149,11 @@ class ReferenceSession(StagedSession):
         """Move a surface's vertices evenly to new places over the next window."""
         self._vertices_of(name)
         self.solver.surfaces.set_motion(name, vertices_m, window_s, self.step_s)
+
+    def attach_mover(self, name: str, mover: StepMover) -> None:
+        """Let a surface be moved in every step."""
+        self._vertices_of(name)
+        self.solver.attach_mover(name, mover)
 
     def keep(self) -> Any:
         """Copies of the solver's arrays, loads of this record, where the stage stands."""

@@ -1,0 +1,165 @@
+"""Sand and pattern as one session: the pattern is stepped inside the engine, with the grains."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.body import ElasticBody
+from pattern_fe.coupling.in_step_foam import InStepFoam
+from pattern_fe.coupling.ledger import LEDGER, Entry, Ledger, imbalance_n, rms_m
+from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
+from sandmould.engines.outcome import Outcome
+from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.snapshot import Snapshot
+
+Array = NDArray[np.float64]
+CHECKPOINT = "pattern.npz"
+
+
+@dataclass(frozen=True)
+class InStepEntry(Entry):
+    """One record of the in-step scheme; the columns of all schemes and its own balance of energy.
+
+    Load and residual are those of the mean load over the record, work and energies those of all
+    steps.
+    """
+
+    kinetic_j: float
+    """Of the scaled masses."""
+    damped_j: float
+    """Taken by the mass damping."""
+    balance_j: float
+    """Work less all three energies: round-off."""
+
+
+class InStepSession:
+    """A session whose pattern gives way in every step; else the engine's own."""
+
+    def __init__(
+        self,
+        inner: Session,
+        foam: InStepFoam,
+        body: ElasticBody,
+        surface: str,
+        work: Path,
+        checkpoint: Path | None = None,
+    ) -> None:
+        """Start with the pattern at rest, or where a checkpoint left it.
+
+        Parameters
+        ----------
+        inner : Session
+            Of any engine that calls a mover in its steps.
+        foam : InStepFoam
+        body : ElasticBody
+            The same pattern at rest, for the residual.
+        surface : str
+            Its name in the engine, vertex for vertex that of the foam.
+        work : Path
+            Folder of the tables.
+        checkpoint : Path, optional
+            Folder that ``write_checkpoint`` wrote.
+        """
+        self._inner, self._foam, self._body = inner, foam, body
+        ledger_bytes, rows = None, 0
+        if checkpoint is not None:
+            with np.load(checkpoint / CHECKPOINT) as kept:
+                foam.restore({name: kept[name] for name in kept.files})
+                ledger_bytes, rows = (int(number) for number in kept["trusted"])
+        inner.attach_mover(surface, foam.mover)
+        self._ledger = Ledger(work / LEDGER, ledger_bytes, InStepEntry)
+        self._shapes = ShapesFile(work / SHAPES, rows, *foam.vertices_m.shape)
+
+    def __getattr__(self, name: str) -> Any:
+        """All else is the engine's own."""
+        return getattr(self._inner, name)
+
+    @property
+    def displacement_m(self) -> Array:
+        """Displacement of the surface, (nv, d) float64, m."""
+        return self._foam.displacement_m
+
+    def advance(self, duration_s: float | None = None) -> None:
+        """Compute for a duration, or up to the next record; see ``Session``.
+
+        Raises
+        ------
+        EngineStop
+            Also where the pattern runs away.
+        """
+        before = self._inner.steps
+        self._inner.advance(duration_s)
+        if self._foam.ran_away:
+            largest_m = np.abs(self.displacement_m).max()
+            raise EngineStop(
+                Outcome.COUPLING_DIVERGED,
+                f"the pattern has moved by {largest_m:.3g} m, more than pattern.loop."
+                f"largest_displacement_m allows, before {self._inner.time_s:.4g} s",
+            )
+        self._write(self._inner.steps - before)
+
+    def _write(self, steps: int) -> None:
+        foam, moved_m = self._foam, self.displacement_m
+        load = foam.take_mean_load_n()
+        begun = time.perf_counter()
+        answer = self._body.answer(load)
+        elastic_j, kinetic_j = foam.elastic_j, foam.kinetic_j
+        self._ledger.write(
+            InStepEntry(
+                time_s=self._inner.time_s,
+                window_s=steps * self._inner.step_s,
+                passes=1,
+                factor=1.0,
+                gain=np.nan,
+                residual_m=rms_m(answer.displacement_m - moved_m),
+                displacement_m=rms_m(moved_m),
+                largest_m=float(np.linalg.norm(moved_m, axis=1).max()),
+                load_n=float(np.linalg.norm(load.sum(axis=0))),
+                imbalance_n=imbalance_n(load, answer),
+                work_j=foam.work_j,
+                energy_j=elastic_j,
+                solve_s=time.perf_counter() - begun,
+                kinetic_j=kinetic_j,
+                damped_j=foam.damped_j,
+                balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j,
+            )
+        )
+        self._shapes.write(self._inner.time_s, moved_m)
+
+    def snapshot(self) -> Snapshot:
+        """State of all grains relative to the box, and the pattern among them."""
+        moved = self._foam.vertices_m + self.displacement_m
+        return replace(self._inner.snapshot(), pattern_m=moved)
+
+    def keep(self) -> Any:
+        """Copies of what grains and pattern are; the tables go on."""
+        return self._inner.keep(), self._foam.state()
+
+    def go_back(self, kept: Any) -> None:
+        """Compute on from what ``keep`` gave."""
+        grains, foam = kept
+        self._inner.go_back(grains)
+        self._foam.restore(foam)
+
+    def write_checkpoint(self, folder: Path) -> None:
+        """Write the engine's state and the pattern's."""
+        self._inner.write_checkpoint(folder)
+        self._shapes.flush()
+        trusted = np.array([self._ledger.size(), self._shapes.rows])
+        np.savez(
+            folder / CHECKPOINT,
+            trusted=trusted,
+            **self._foam.state(),  # type: ignore[arg-type]
+        )
+
+    def close(self) -> None:
+        """Close the tables and free the engine."""
+        self._ledger.close()
+        self._shapes.close()
+        self._inner.close()

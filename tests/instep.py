@@ -1,0 +1,51 @@
+"""Sessions of the in-step scheme that tests share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pattern_fe.coupling.contact_rows import ContactRows
+from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.in_step import InStepSession
+from pattern_fe.coupling.in_step_foam import InStepFoam
+from pattern_fe.pattern import Pattern
+from pattern_fe.scene import with_surface
+from sandmould.engines.program import build_program
+from sandmould.engines.reference.session import ReferenceSession
+from sandmould.engines.session import Session
+from sandmould.scenario.scenario import Scenario
+from tests.scenes import open_lammps
+
+
+def in_step(
+    pattern: Pattern, scenario: Scenario, folder: Path, checkpoint: Path | None = None, **foam: Any
+) -> InStepSession:
+    """The in-step scheme of a scene on its engine; see ``InStepFoam`` for the foam's settings."""
+    contacts = ContactRows.of(scenario, pattern)
+    body = InStepFoam(pattern, scenario.step_s, contacts, 0.01, **foam)
+    if scenario.engine.name == "lammps":
+        inner: Session = open_lammps(scenario, folder, checkpoint)
+    else:
+        inner = ReferenceSession(build_program(scenario), checkpoint)
+    return InStepSession(inner, body, FoamBody(pattern), "pattern", folder, checkpoint)
+
+
+def bed_scene(**changes: Any) -> Scenario:
+    """Coarse sand in layers over a small L, coupled in step."""
+    told = {
+        "shape": {"kind": "l_shape", "thickness_m": 0.006, "height_m": 0.03, "reach_m": 0.045},
+        "position_m": [0.02, 0.0],
+        "element_m": 0.006,
+        "loop": {"scheme": "in_step"},
+    }
+    scene: dict[str, Any] = {
+        "box": {"width_m": 0.08, "height_m": 0.08},
+        "sand": {"size_scale": 8.0, "size_classes": 3},
+        "pattern": told,
+        "fill": {"layers": [{"count": 60, "repeat": 2}]},
+        "time_step": {"fraction": 0.4},
+        "vibration": [],
+        "engine": {"name": "reference"},
+    }
+    return with_surface(Scenario.model_validate(scene | changes))
