@@ -5,18 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.ledger import LEDGER
 from pattern_fe.scene import pattern_of, with_surface
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, gather
 from sandmould.study.expand import Run
 from sandmould.study.measure import write_exports, write_measures
-from sandmould.study.plan import write_plan
+from sandmould.study.plan import read_run, write_plan
 from sandmould.study.report import figures
-from sandmould.study.report.bending import TIP, deflection_chart
+from sandmould.study.report.bending import TIP, bending_pages, deflection_chart
 from sandmould.study.report.page import write_report
 from sandmould.study.verdict import Verdict, judge
 from tests.bent_run import SCENE, write_bent_run
@@ -44,6 +46,14 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def text(study: Path) -> str:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "_PANEL_PX", 60)
+        write_report(study, study / "report.html")
+    return (study / "report.html").read_text()
+
+
 def gathered(study: Path) -> tuple[Collected, Verdict]:
     collected = gather(study)
     return collected, judge(collected.summary, (), TIP, "neither")
@@ -61,12 +71,7 @@ def test_the_band_lies_between_the_least_and_the_greatest_run(study: Path) -> No
     assert chart.y_title == "deflection of the tip, mm"
 
 
-def test_the_page_tells_what_became_of_the_pattern(
-    study: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(figures, "_PANEL_PX", 60)
-    write_report(study, study / "report.html")
-    text = (study / "report.html").read_text()
+def test_the_page_tells_what_became_of_the_pattern(study: Path, text: str) -> None:
     page = Page(text)
     assert page.open == []
     assert "The loop holds in all 3 runs." in page.text
@@ -77,8 +82,25 @@ def test_the_page_tells_what_became_of_the_pattern(
     assert all((study / link).is_file() for link in links)
 
 
-def test_a_film_shows_the_pattern_bent(study: Path) -> None:
-    text = (study / "report.html").read_text()
+def test_a_loop_that_does_not_hold_is_not_held_against_the_paper(study: Path) -> None:
+    collected, verdict = gathered(study)
+    ledger = study / "runs" / "one" / LEDGER
+    told = ledger.read_text()
+    # All of the energy is from the loop itself: the sand's work is taken away.
+    table = pd.read_csv(ledger, sep="\t").assign(work_j=-1.0)
+    table.to_csv(ledger, sep="\t", index=False)
+    scenario = read_run(study / "runs" / "one" / "scenario.yaml").scenario
+    pages = bending_pages(study, "", scenario, collected, verdict, "one")
+    ledger.write_text(told)
+    assert "cycles in 1 of 3 runs" in pages.sentences[0]
+    assert "gave back a part of it, by a loop that does not hold" in pages.sentences[-1]
+    assert pages.runs.marked == (True, False, False)
+    assert [c.chart.y_title for c in pages.ledger] == [
+        "displacement, mm", "energy, J", "share of the residual"
+    ]  # fmt: skip
+
+
+def test_a_film_shows_the_pattern_bent(text: str) -> None:
     (scene,) = (t for t in text.splitlines() if 'id="film-scene"' in t)
     assert '"solids": []' in scene
     film = next(t for t in text.splitlines() if 'class="film"' in t)

@@ -117,6 +117,8 @@ def _told(rows: pd.DataFrame, verdict: LoopVerdict | None, scenario: Scenario) -
         if abs(back) > _RECOVERS:
             way = "gave back a part of it" if back > 0.0 else "bent it farther"
         like = "as the paper states" if back > _RECOVERS else "other than the paper states"
+        if verdict is None or verdict.state != "holds":
+            like = "by a loop that does not hold"
         said.append(
             f"{last['vibration_time_s']:.3g} s of vibration {way}, {like}: "
             f"{_mm(last[TIP])} mm at the end{_under(last)}."
