@@ -13,7 +13,7 @@ INSTALLED := .venv/installed
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
-.PHONY: demo study plan status twins verification stability test lint decks schema lock results-check clean benchmarks peers scaling
+.PHONY: demo study plan status twins verification stability test lint decks schema lock results-check clean benchmarks peers scaling solidification
 
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
@@ -54,6 +54,10 @@ scaling: $(INSTALLED) .venv-peers/installed
 	$(PYTHON) -m venv .venv-peers
 	.venv-peers/bin/pip install --quiet --disable-pip-version-check --requirement $<
 	touch $@
+
+# Compiled loops of one thread wait for no other.
+solidification: $(INSTALLED)
+	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.arpm $(QUICK)
 
 test: lint
 	$(BIN)/pytest -n 2 --dist loadfile

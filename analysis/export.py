@@ -1,8 +1,9 @@
-"""Snapshots, and the solids among the grains, written for ParaView and OVITO."""
+"""Snapshots, the solids among the grains, and elements of heat, for ParaView and OVITO."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 import meshio
@@ -14,6 +15,7 @@ from sandmould.scenario.geometry import Array, Block, Scene, Solid
 from sandmould.scenario.outline import Outline
 from sandmould.scenario.revolved import Revolved
 
+_OF_ELEMENTS = ("frozen_s", "temperature_k", "melts")
 _COLUMNS = "id type x y z vx vy vz omegax omegay omegaz radius layer"
 
 
@@ -72,6 +74,42 @@ def solids_to_vtk(scene: Scene, path: Path) -> None:
     data = {"solid": [np.concatenate(numbers)]} if cells else {}
     partial = _partial(path)
     meshio.Mesh(np.concatenate(points_m), blocks, cell_data=data).write(partial, file_format="vtu")
+    os.replace(partial, path)
+
+
+_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+_CUBE = np.vstack([np.pad(_SQUARE, ((0, 0), (0, 1)), constant_values=z) for z in (0, 1)])
+
+
+def elements_to_vtk(fields: Mapping[str, Array], path: Path) -> None:
+    """Write elements of heat as squares or cubes with their data, for ParaView (.vtu).
+
+    Elements that touch share corners. Cells have ``frozen_s``, ``temperature_k`` and ``melts`` (1
+    in the casting).
+
+    Parameters
+    ----------
+    fields : mapping
+        Arrays ``position_m`` (n, d), ``size_m`` (n,) and those of the cells, (n,).
+    path : Path
+        Appears only when complete.
+    """
+    position_m, size_m = fields["position_m"], fields["size_m"]
+    dimensions = position_m.shape[1]
+    kind, corners = ("quad", _SQUARE) if dimensions == 2 else ("hexahedron", _CUBE)
+    low_m = (position_m - 0.5 * size_m[:, None]).min(axis=0)
+    # all corners lie on the grid of the smallest element's
+    start = np.rint((position_m - 0.5 * size_m[:, None] - low_m) / size_m.min())
+    span = np.rint(size_m / size_m.min())
+    places = (start[:, None] + corners * span[:, None, None]).astype(np.int64)
+    shape = tuple(places.reshape(-1, dimensions).max(axis=0) + 1)
+    numbers = np.ravel_multi_index(tuple(np.moveaxis(places, -1, 0)), shape)
+    points, cells = np.unique(numbers, return_inverse=True)
+    points_m = low_m + size_m.min() * np.column_stack(np.unravel_index(points, shape))
+    data = {name: [np.asarray(fields[name], dtype=np.float64)] for name in _OF_ELEMENTS}
+    blocks = [(kind, cells.reshape(-1, len(corners)))]
+    partial = _partial(path)
+    meshio.Mesh(_in_space(points_m), blocks, cell_data=data).write(partial, file_format="vtu")
     os.replace(partial, path)
 
 

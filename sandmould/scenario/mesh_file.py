@@ -38,7 +38,7 @@ def file_hash(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         reason = error.strerror or "it cannot be read"
-        raise MeshFileError(f"a readable STL file ({reason})") from error
+        raise MeshFileError(f"a readable file ({reason})") from error
 
 
 def read_surface(path: Path) -> tuple[Array, Triangles]:

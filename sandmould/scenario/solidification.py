@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from sandmould.scenario.outline import Outline, outline_fault
+from sandmould.scenario.casting_shapes import Place, Rectangle, Shape
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
 
 PAPER = "Hirata and Anzai 2019"
-Place = tuple[float, float]
 
 
 class MouldMaterial(Section):
@@ -62,77 +60,6 @@ class MetalAndMould(Section):
     )
 
 
-class Rectangle(Section):
-    """An upright rectangle."""
-
-    kind: Literal["rectangle"] = Field("rectangle", description="Shape.")
-    low_m: Place = quantity(..., "Its lower left corner.", unit="m", source="user")
-    high_m: Place = quantity(..., "Its upper right corner.", unit="m", source="user")
-
-    @model_validator(mode="after")
-    def _order(self) -> Rectangle:
-        if not all(a < b for a, b in zip(self.low_m, self.high_m, strict=True)):
-            raise PydanticCustomError("corners", "a high_m that is right of and above its low_m")
-        return self
-
-    @property
-    def outline(self) -> Outline:
-        """Its edge."""
-        (a, b), (c, d) = self.low_m, self.high_m
-        return Outline("the rectangle", np.array([(a, b), (c, b), (c, d), (a, d)]))
-
-
-class CastOutline(Section):
-    """A closed line of straight edges."""
-
-    kind: Literal["polygon"] = Field("polygon", description="Shape.")
-    vertices_m: tuple[Place, ...] = quantity(
-        ..., "Corners in turn; the last is joined to the first.", unit="m", source="user",
-        min_length=3,
-    )  # fmt: skip
-
-    @model_validator(mode="after")
-    def _closed(self) -> CastOutline:
-        if fault := outline_fault(np.array(self.vertices_m)):
-            raise PydanticCustomError("polygon", "{fault}", {"fault": fault})
-        return self
-
-    @property
-    def outline(self) -> Outline:
-        """Its edge."""
-        return Outline("the polygon", np.array(self.vertices_m))
-
-
-class FourPlates(Section):
-    """Plates of several thicknesses that meet at the origin, as in the paper's section 4."""
-
-    kind: Literal["plates"] = Field("plates", description="Shape.")
-    reach_m: float = quantity(..., "Of each plate from the origin.", unit="m", source="user", gt=0)
-    thickness_m: tuple[float, float, float, float] = quantity(
-        ..., "Upwards, to the right, downwards, to the left.", unit="m", source="user"
-    )
-
-    @model_validator(mode="after")
-    def _plates(self) -> FourPlates:
-        if not all(0.0 < t < 2.0 * self.reach_m for t in self.thickness_m):
-            raise PydanticCustomError("plates", "thicknesses above 0 and below twice reach_m")
-        return self
-
-    @property
-    def outline(self) -> Outline:
-        """Its edge."""
-        up, right, down, left = (0.5 * t for t in self.thickness_m)
-        r = self.reach_m
-        corners = [
-            (up, right), (up, r), (-up, r), (-up, left), (-r, left), (-r, -left),
-            (-down, -left), (-down, -r), (down, -r), (down, -right), (r, -right), (r, right),
-        ]  # fmt: skip
-        return Outline("plates", np.array(corners))
-
-
-Shape = Annotated[Rectangle | CastOutline | FourPlates, Field(discriminator="kind")]
-
-
 class Probe(Section):
     """A point whose temperature is recorded."""
 
@@ -141,7 +68,7 @@ class Probe(Section):
 
 
 class Solidification(MetalAndMould):
-    """One casting in its mould, complete: two dimensions, adiabatic box."""
+    """One casting in its mould, complete: an adiabatic box, of 2D or 3D as its corners are."""
 
     box: Rectangle = Field(..., description="The mould's outside; no heat passes it.")
     shapes: tuple[Shape, ...] = Field(
@@ -191,3 +118,8 @@ class Solidification(MetalAndMould):
         gt=0,
     )
     seed: int = quantity(1, "Nothing is drawn by lot: it changes no result.", source=ARGUED, ge=0)
+
+    @property
+    def dimensions(self) -> int:
+        """2 or 3."""
+        return len(self.box.low_m)

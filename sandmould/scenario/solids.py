@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 
@@ -26,6 +27,24 @@ class Cylinder(Section):
     axis: Literal["x", "y", "z"] = quantity("z", "Direction of the axis.", source="user")
     diameter_m: float = quantity(..., "Diameter.", unit="m", source="user", gt=0, le=100)
     length_m: float = quantity(..., "Length.", unit="m", source="user", gt=0, le=100)
+
+
+class NamesFile(Protocol):
+    """A section that names a file."""
+
+    @property
+    def path(self) -> Path:
+        """Where the file lies."""
+
+    @property
+    def sha256(self) -> str | None:
+        """Hash of the file."""
+
+    def model_copy(self, *, update: Mapping[str, Any]) -> Any:
+        """A changed copy."""
+
+
+Named = TypeVar("Named", bound=NamesFile)
 
 
 class SolidMesh(Section):
@@ -104,11 +123,12 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     return TriangleMesh(solid.name, placed_m, triangles)
 
 
-def with_hash(solid: SolidMesh) -> SolidMesh:
-    """The same solid with the hash of its file; unchanged if that is given or the file missing."""
+def with_hash(solid: Named) -> Named:
+    """The same section with its file's hash; unchanged if that is given or the file missing."""
     if solid.sha256 is not None:
         return solid
     try:
-        return solid.model_copy(update={"sha256": file_hash(solid.path)})
+        copy: Named = solid.model_copy(update={"sha256": file_hash(solid.path)})
     except MeshFileError:
         return solid
+    return copy

@@ -88,7 +88,7 @@ CASES: dict[str, tuple[str, str]] = {
     "mesh that is not there": (
         "based_on: bracket\nscenario: {obstacles: [{kind: mesh, file: absent.stl}]}",
         "trial.yaml: scenario.obstacles.0.file = 'absent.stl' cannot be used: "
-        "valid is a readable STL file (No such file or directory).",
+        "valid is a readable file (No such file or directory).",
     ),
     "mesh that is no STL": (
         "based_on: bracket\nscenario: {obstacles: [{kind: mesh, file: trial.yaml}]}",

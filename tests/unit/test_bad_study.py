@@ -28,7 +28,7 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "swept mesh that is not there": (
         "based_on: bracket\nsweep: {keys: {obstacles.0.file: [absent.stl]}}",
         "trial.yaml: sweep.keys.obstacles.0.file = 'absent.stl' cannot be used: "
-        "valid is a readable STL file (No such file or directory).",
+        "valid is a readable file (No such file or directory).",
     ),
     "swept key that does not exist": (
         "based_on: tube\nsweep: {keys: {vibration.0.frequenzy_hz: [25, 50]}}",

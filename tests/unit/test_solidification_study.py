@@ -5,12 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from PIL import Image
 
 from analysis.freezing import freezing
+from sandmould.casting.arpm import computation
+from sandmould.casting.arpm.solidification import Cooling
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.solidification import Solidification
@@ -51,7 +55,10 @@ BAR = SMALL["shapes"][0]
             {"shapes": [{"kind": "rectangle", "low_m": [0, 0], "high_m": [0.08, 0.08]}]},
             "there must be a mould",
         ),
-        ({"shapes": [BAR | {"high_m": [0.02, 0.06]}]}, "a high_m that is right of and above"),
+        (
+            {"shapes": [BAR | {"high_m": [0.02, 0.06]}]},
+            "a high_m with as many coordinates as low_m",
+        ),
         ({"element_m": 0.003}, r"shapes = .* multiple of cell_m = 0.003"),
         (
             {"probes": [{"name": "far", "at_m": [0.1, 0.0]}]},
@@ -150,6 +157,13 @@ def one_run(folder: Path, **scenario: Any) -> Path:
     return of_run
 
 
+def measured(folder: Path, **scenario: Any) -> Path:
+    """Compute and measure a study of one run; its folder."""
+    of_run = one_run(folder, **scenario)
+    measure_run(of_run)
+    return of_run
+
+
 def test_too_long_a_step_is_an_outcome(tmp_path: Path) -> None:
     folder = one_run(tmp_path, stepping="explicit", step_share=3.0)
     outcome = RunOutcome.read(folder / "outcome.json")
@@ -188,3 +202,119 @@ def test_hot_spots_are_the_latest_within_reach() -> None:
     assert liquid.hot_spots_m[0].tolist() == [2.0]
     with pytest.raises(ValueError, match="reach_m = 0"):
         freezing(place, np.ones(5), 0.0)
+
+
+TETRAHEDRON = """\
+solid corner
+{}
+endsolid corner
+"""
+
+
+def tetrahedron(path: Path, side: float) -> None:
+    """Write a corner cut off a cube as an ASCII STL file."""
+    corners = np.vstack([np.zeros(3), side * np.eye(3)])
+    facets = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    text = "\n".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "\n".join("vertex {} {} {}".format(*corners[i]) for i in facet)
+        + "\nendloop\nendfacet"
+        for facet in facets
+    )
+    path.write_text(TETRAHEDRON.format(text))
+
+
+def test_a_mesh_is_cast_in_3d_with_a_block_beside_it(tmp_path: Path) -> None:
+    tetrahedron(tmp_path / "corner.stl", 40.0)
+    mesh = {"kind": "mesh", "file": "corner.stl", "unit_m": 0.001, "position_m": [0.02] * 3}
+    block = {"kind": "rectangle", "low_m": [0.01, 0.02, 0.02], "high_m": [0.02, 0.06, 0.06]}
+    folder = measured(
+        tmp_path,
+        box={"low_m": [0.0] * 3, "high_m": [0.08] * 3},
+        shapes=[block, mesh],
+        probes=[{"name": "middle", "at_m": [0.03, 0.03, 0.03]}],
+        until_s=2000.0,
+    )
+    table = pd.read_csv(folder / "measures.tsv", sep="\t")
+    assert {"last_point_z_m", "middle_k"} <= set(table.columns)
+    assert abs(table["enthalpy_drift_fraction"]).max() < 1e-12  # faces conserve to round-off
+    with np.load(folder / "fields.npz") as fields:
+        cast_m3 = float(fields["melts"].sum() * 0.005**3)
+    # the block is 16 cm3, exactly of cells; the corner 40^3/6 mm3, to half a layer of cells
+    assert cast_m3 - 16e-6 == pytest.approx(0.04**3 / 6, rel=0.25)
+    vtk = meshio.read(folder / "fields.vtu")
+    assert [block.type for block in vtk.cells] == ["hexahedron"]
+    assert len(vtk.points) == 17**3
+    assert (folder / "final.png").stat().st_size > 10_000
+
+
+def test_touching_parts_are_one_casting(tmp_path: Path) -> None:
+    low, high = (
+        BAR | {"high_m": [0.05, 0.04]},
+        BAR | {"low_m": [0.03, 0.04]},
+    )
+    found = []
+    for number, shapes in enumerate(([BAR], [low, high])):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        found.append((one_run(folder, shapes=shapes) / "series.tsv").read_bytes())
+    assert found[0] == found[1]
+
+
+def test_dark_pixels_are_cast(tmp_path: Path) -> None:
+    rows = np.full((16, 16), 255, dtype=np.uint8)
+    rows[4:12, 6:10] = 0  # from the top: the bar of SMALL, upright
+    Image.fromarray(rows).save(tmp_path / "bar.png")
+    picture = {"kind": "image", "file": "bar.png", "pixel_m": 0.005}
+    runs = [one_run(tmp_path, shapes=[shape]) for shape in (picture, BAR)]
+    drawn, stated = (pd.read_csv(run / "series.tsv", sep="\t") for run in runs)
+    pd.testing.assert_frame_equal(drawn, stated)
+
+
+@pytest.mark.parametrize(
+    ("shape", "told"),
+    [
+        ({"kind": "image", "file": "none.png", "pixel_m": 0.005}, "a readable file"),
+        ({"kind": "image", "file": "trial.yaml", "pixel_m": 0.005}, "a picture, such as a PNG"),
+        ({"kind": "image", "file": "white.png", "pixel_m": 0.005}, "with dark pixels for"),
+        ({"kind": "mesh", "file": "corner.stl", "unit_m": 0.001}, "a shape of 2D as the box is"),
+    ],
+)
+def test_files_that_hold_no_casting_are_told(
+    tmp_path: Path, shape: dict[str, Any], told: str
+) -> None:
+    tetrahedron(tmp_path / "corner.stl", 40.0)
+    Image.fromarray(np.full((4, 4), 255, dtype=np.uint8)).save(tmp_path / "white.png")
+    with pytest.raises(BadInputError, match=told) as refused:
+        expand(open_study(opened(tmp_path, shapes=[shape])))
+    assert len(refused.value.problems) == 1
+
+
+def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    straight = (one_run(tmp_path, layers=[1]) / "series.tsv").read_bytes()
+    monkeypatch.setattr(computation, "KEPT_EVERY_S", 0.0)
+    (run,) = expand(open_study(opened(tmp_path, layers=[1])))
+    shown: list[float] = []
+    keep = computation._Kept.keep
+
+    def killed(self: computation._Kept, now: Cooling) -> None:
+        keep(self, now)
+        shown.append(now.heat.time_s)
+        if shown == [5.0, 10.0, 15.0]:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(computation._Kept, "keep", killed)
+    with pytest.raises(KeyboardInterrupt):
+        computation.compute(run.scenario, tmp_path, run.run)
+    computation.compute(run.scenario, tmp_path, run.run)
+    assert shown[3] == 20.0
+    assert (tmp_path / "work" / "series.tsv").read_bytes() == straight
+
+
+def test_a_torn_checkpoint_begins_again(tmp_path: Path) -> None:
+    (run,) = expand(open_study(opened(tmp_path, until_s=20.0)))
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / computation.CHECKPOINT).write_bytes(b"PK\x03\x04 torn")
+    computed = computation.compute(run.scenario, tmp_path, run.run)
+    assert computed.outcome.outcome is Outcome.FINISHED
+    assert computed.outcome.simulated_s == 20.0

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
@@ -15,15 +17,18 @@ from numpy.typing import NDArray
 
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.solidification import Cooling, UnstableError, solidify
 from sandmould.casting.arpm.solidification import Progress as Cooled
 from sandmould.casting.arpm.solidification import Solidification as Found
-from sandmould.casting.arpm.solidification import UnstableError, solidify
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.products import Computed, Cost, peak_memory_bytes
 from sandmould.engines.progress import Progress
 from sandmould.scenario.solidification import Solidification
 
 PRODUCTS = ("series.tsv", "fields.npz")
+CHECKPOINT = "checkpoint.npz"
+KEPT_EVERY_S = 20.0
+"""Wall time between checkpoints: what a killed run loses at most, beside one record."""
 
 
 @dataclass
@@ -51,6 +56,12 @@ def source_hash() -> str:
     return hashlib.sha256(b"".join(f.read_bytes() for f in source_files())).hexdigest()[:12]
 
 
+def computed_hash(scenario: Solidification) -> str:
+    """Hash of scenario and solver."""
+    text = scenario.model_dump_json(exclude={"seed"}) + source_hash()
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def engine_of(scenario: Solidification) -> str:
     """What computes it, as tables call it."""
     return "differences" if scenario.exchange == "difference" else "arpm"
@@ -62,7 +73,7 @@ def no_cost(scenario: Solidification) -> ElementCost:
 
 
 def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
-    """Solidify a casting from its beginning: runs are short and leave no checkpoint.
+    """Solidify a casting from its newest checkpoint, or from its beginning.
 
     Parameters
     ----------
@@ -79,29 +90,29 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     shown = Progress(run, work, scene.expected_element_steps(scenario), "element-steps")
     elements, filling = scene.elements_of(scenario), scene.filling_of(scenario)
     cost.elements = len(elements.size_m)
-    cooled = Cooled(0.0, 0.0, 0.0)
+    cooled = Cooled(0.0, 0.0, 0.0, 0)
+    kept = _Kept(scenario, work)
 
     def tell(now: Cooled) -> None:
         nonlocal cooled
         cooled = now
-        elapsed_s = time.monotonic() - stepping
-        shown.show("cooling", now.time_s, now.element_steps_per_s * elapsed_s,
-                   now.element_steps_per_s)  # fmt: skip
+        shown.show("cooling", now.time_s, now.element_steps, now.element_steps_per_s)
 
     try:
         marching = scene.method_of(scenario).marching(elements, filling, scene.raster_of(scenario))
         marching.advance(filling.heat(elements), 1e-9)  # compiled before it is timed
-        cost.time_step_s, stepping = marching.step_s, time.monotonic()
+        cost.time_step_s = marching.step_s
         probes_m = {probe.name: np.array(probe.at_m) for probe in scenario.probes}
         found = solidify(
-            elements, filling, marching, probes_m, scenario.record_s, scenario.until_s, tell
-        )
+            elements, filling, marching, probes_m, scenario.record_s, scenario.until_s, tell,
+            kept.newest(), kept.keep,
+        )  # fmt: skip
     except (UnstableError, ValueError) as stop:
         code = Outcome.UNSTABLE if isinstance(stop, UnstableError) else Outcome.BAD_INPUT
         outcome = RunOutcome(code, str(stop), cooled.time_s, planned_s)
         cost.wall_s = time.monotonic() - begun
         return Computed(outcome, cost, is_root=True)
-    _write(elements, filling.melts(elements), found, work)
+    _write(scenario, elements, filling.melts(elements), found, work)
     end_s = float(found.time_s[-1])
     shown.show("cooling", end_s, found.heat.element_steps,
                found.heat.element_steps / max(found.wall_s, 1e-9), last=True)  # fmt: skip
@@ -114,11 +125,43 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     return Computed(RunOutcome(Outcome.FINISHED, detail, end_s, planned_s), cost, is_root=True)
 
 
-def _write(elements: Elements, melts: NDArray[np.bool_], found: Found, work: Path) -> None:
+class _Kept:
+    """The checkpoint of a run: one file, whole or not there at all."""
+
+    def __init__(self, scenario: Solidification, work: Path) -> None:
+        self._path = work / CHECKPOINT
+        self._hash = computed_hash(scenario)
+        self._due_s = time.monotonic() + KEPT_EVERY_S
+
+    def newest(self) -> Cooling | None:
+        """What an earlier process of the same run kept; nothing if it cannot be read."""
+        try:
+            with np.load(self._path) as kept:
+                return Cooling.of(dict(kept)) if kept["hash"] == self._hash else None
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+            return None
+
+    def keep(self, now: Cooling) -> None:
+        """Write the state where it is due."""
+        if time.monotonic() < self._due_s:
+            return
+        partial = self._path.with_suffix(".partial.npz")
+        np.savez(partial, hash=self._hash, **now.arrays())
+        os.replace(partial, self._path)
+        self._due_s = time.monotonic() + KEPT_EVERY_S
+
+
+def _write(
+    scenario: Solidification,
+    elements: Elements,
+    melts: NDArray[np.bool_],
+    found: Found,
+    work: Path,
+) -> None:
     """Write the curves and the fields at the end."""
     frozen_s, volume = found.heat.frozen_s[melts], elements.volume_m3[melts]
     solid = [float(volume[frozen_s <= t].sum() / volume.sum()) for t in found.time_s]
-    clock, share, heat = scene.SERIES
+    clock, share, heat = scene.series_columns(scenario)
     probes = {f"{name}_k": curve for name, curve in found.probe_k.items()}
     table = pd.DataFrame({clock: found.time_s, **probes, share: solid, heat: found.enthalpy_j})
     table.to_csv(work / "series.tsv", sep="\t", index=False, float_format="%.10g")
@@ -132,4 +175,4 @@ def complete(scenario: Solidification, work: Path) -> None:
     """Make an empty table of curves where a broken run wrote none."""
     path = work / "series.tsv"
     if not path.exists():
-        path.write_text("\t".join(scene.SERIES) + "\n", encoding="utf-8")
+        path.write_text("\t".join(scene.series_columns(scenario)) + "\n", encoding="utf-8")

@@ -22,9 +22,9 @@ from sandmould.casting.arpm.material import Material
 from sandmould.casting.arpm.method import Method
 from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.solidification import Progress, Solidification, solidify
+from sandmould.scenario.casting_shapes import FourPlates
 from sandmould.scenario.outline import Outline
 from sandmould.scenario.reading import Origin, merge, read_yaml
-from sandmould.scenario.solidification import FourPlates
 
 Array = NDArray[np.float64]
 MATERIALS = ROOT / "config" / "materials" / "hirata_2019.yaml"
@@ -64,7 +64,7 @@ class Plates:
     @property
     def outline(self) -> Outline:
         """The casting."""
-        return FourPlates(reach_m=self.reach_m, thickness_m=self.thickness_m).outline
+        return FourPlates(reach_m=self.reach_m, thickness_m=self.thickness_m).solid
 
     @property
     def probes_m(self) -> dict[str, Array]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -14,23 +16,42 @@ from sandmould.casting.arpm.material import Material
 from sandmould.casting.arpm.method import Method
 from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.super_steps import STAGES
-from sandmould.scenario.bad_input import Problem
-from sandmould.scenario.solidification import Rectangle, Shape, Solidification
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.casting_shapes import Body, Rectangle, solid_of
+from sandmould.scenario.solidification import Solidification
 
 KERNEL_FORMS = ("printed", "corrected", "symmetric")
-SERIES = ("time_s", "solidified_fraction", "enthalpy_j_m")
-"""Columns of ``series.tsv`` beside the probes'."""
+CASTING = 1
+
+
+def series_columns(scenario: Solidification) -> tuple[str, str, str]:
+    """Columns of ``series.tsv`` beside the probes'; in 2D heat is that of a metre across."""
+    heat = "enthalpy_j_m" if scenario.dimensions == 2 else "enthalpy_j"
+    return "time_s", "solidified_fraction", heat
+
+
+def solids_of(scenario: Solidification) -> list[Body]:
+    """Geometry of the casting's parts.
+
+    Raises
+    ------
+    BadInputError
+        When a file cannot be read, bounds no solid or has changed since the plan.
+    """
+    return [solid_of(shape, f"shapes.{i}") for i, shape in enumerate(scenario.shapes)]
 
 
 @lru_cache(maxsize=8)
-def _raster(box: Rectangle, shapes: tuple[Shape, ...], element_m: float) -> Raster:
-    solids = {number: shape.outline for number, shape in enumerate(shapes, start=1)}
-    return painted(np.array(box.low_m), np.array(box.high_m), element_m, solids)
+def _raster(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Raster:
+    solids = {n: solid_of(shape, f"shapes.{n - 1}") for n, shape in enumerate(shapes, start=1)}
+    parts = painted(np.array(box.low_m), np.array(box.high_m), element_m, solids)
+    # parts that touch are one casting: nothing resists the heat between them
+    return replace(parts, material=np.minimum(parts.material, CASTING))
 
 
 @lru_cache(maxsize=8)
 def _elements(
-    box: Rectangle, shapes: tuple[Shape, ...], element_m: float, layers: tuple[int, ...]
+    box: Rectangle, shapes: tuple[Any, ...], element_m: float, layers: tuple[int, ...]
 ) -> Elements:
     return placed(_raster(box, shapes, element_m), layers)
 
@@ -46,16 +67,12 @@ def elements_of(scenario: Solidification) -> Elements:
 
 
 def filling_of(scenario: Solidification) -> Filling:
-    """Materials: the mould, then the metal once for each shape."""
+    """Materials: the mould, then the metal."""
     mould = Material(**scenario.mould.model_dump())
     metal = Material(**scenario.casting.model_dump())
-    shapes = len(scenario.shapes)
     transfer = scenario.heat_transfer_w_m2_k
-    return Filling(
-        (mould, *(metal,) * shapes),
-        (scenario.initial_k.mould, *(scenario.initial_k.casting,) * shapes),
-        1.0 / transfer if transfer else 0.0,
-    )
+    initial_k = (scenario.initial_k.mould, scenario.initial_k.casting)
+    return Filling((mould, metal), initial_k, 1.0 / transfer if transfer else 0.0)
 
 
 def method_of(scenario: Solidification) -> Method:
@@ -86,19 +103,33 @@ def _misfits(scenario: Solidification) -> Iterator[Problem]:
     if has_ratio and scenario.kernel_size < 2.0:
         valid = "at least 2 where sizes double, or any with refuse_ratio: false"
         yield Problem("kernel_size", scenario.kernel_size, valid)
+    yield from _places(scenario)
+    names = [probe.name for probe in scenario.probes]
+    for i, probe in enumerate(scenario.probes):
+        if probe.name in names[:i]:
+            yield Problem(f"probes.{i}.name", probe.name, "each name once")
+
+
+def _places(scenario: Solidification) -> Iterator[Problem]:
+    """Shapes and probes that are not in the box, or of another dimension."""
     low_m, high_m = np.array(scenario.box.low_m), np.array(scenario.box.high_m)
     room = f"the box from {low_m.tolist()} to {high_m.tolist()} m"
     for i, shape in enumerate(scenario.shapes):
-        corners = shape.outline.corners()
-        if (corners < low_m).any() or (corners > high_m).any():
+        try:
+            corners = solid_of(shape, f"shapes.{i}").corners()
+        except BadInputError as error:
+            yield from error.problems
+            continue
+        if corners.shape[1] != scenario.dimensions:
+            valid = f"a shape of {scenario.dimensions}D as the box is"
+            yield Problem(f"shapes.{i}.kind", shape.kind, valid)
+        elif (corners < low_m).any() or (corners > high_m).any():
             reach = [corners.min(axis=0).tolist(), corners.max(axis=0).tolist()]
             yield Problem(f"shapes.{i}", reach, f"a {shape.kind} inside {room}")
-    names = [probe.name for probe in scenario.probes]
     for i, probe in enumerate(scenario.probes):
-        if (np.array(probe.at_m) < low_m).any() or (np.array(probe.at_m) > high_m).any():
+        place = np.array(probe.at_m)
+        if len(place) != scenario.dimensions or (place < low_m).any() or (place > high_m).any():
             yield Problem(f"probes.{i}.at_m", list(probe.at_m), f"a point in {room}")
-        if probe.name in names[:i]:
-            yield Problem(f"probes.{i}.name", probe.name, "each name once")
 
 
 def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
@@ -114,7 +145,8 @@ def expected_s(scenario: Solidification) -> float:
     """Estimate when a casting is solid.
 
     Chvorinov's rule with the flux of a half space of mould at the solidus (Chvorinov, Giesserei 27
-    (1940) 177-186); its modulus is the radius of the largest circle in the casting.
+    (1940) 177-186); its modulus is the radius of the largest circle or
+    sphere in a part of the casting.
 
     Parameters
     ----------
@@ -128,7 +160,7 @@ def expected_s(scenario: Solidification) -> float:
     mould, metal = scenario.mould, scenario.casting
     raster = raster_of(scenario)
     inside = raster.centre_m[raster.material.reshape(-1) > 0]
-    modulus_m = max(float(-s.outline.distance_m(inside).min()) for s in scenario.shapes)
+    modulus_m = max(float(-solid.distance_m(inside).min()) for solid in solids_of(scenario))
     superheat_k = scenario.initial_k.casting - metal.solidus_k
     heat_j_m3 = metal.density_kg_m3 * (
         metal.latent_heat_j_kg + metal.heat_capacity_j_kg_k * superheat_k

@@ -6,9 +6,11 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.filling import Filling, check_casting
@@ -32,6 +34,7 @@ class Progress:
     percent: float
     """Of the casting's volume that is below the solidus, or of the time limit if that is more."""
     element_steps_per_s: float
+    element_steps: int
 
 
 @dataclass(frozen=True)
@@ -49,12 +52,45 @@ class Solidification:
     solidification_time_s: float
     """When the last element fell below its solidus; NaN where the time limit came before."""
     cpu_s: float
+    """Of the steps and records, those before a checkpoint included."""
     wall_s: float
 
     @property
     def drift_percent(self) -> Array:
         """Change of the total enthalpy over the first, (k,) float64, %: Fig. 14."""
         return np.asarray(100.0 * (self.enthalpy_j / self.enthalpy_j[0] - 1.0))
+
+
+@dataclass
+class Cooling:
+    """A run on its way: its heat, and what was recorded."""
+
+    heat: Heat
+    time_s: list[float]
+    probe_k: list[Array]
+    """One (probes,) float64 a record, K."""
+    enthalpy_j: list[float]
+    cpu_s: float = 0.0
+    wall_s: float = 0.0
+
+    def arrays(self) -> dict[str, Any]:
+        """All of it as arrays, for a checkpoint."""
+        return vars(self.heat) | {
+            "times_s": self.time_s, "probe_k": np.array(self.probe_k),
+            "enthalpies_j": self.enthalpy_j, "cpu_s": self.cpu_s, "wall_s": self.wall_s,
+        }  # fmt: skip
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Any]) -> Cooling:
+        """Take up what ``arrays`` gave."""
+        heat = Heat(
+            arrays["enthalpy_j_m3"], arrays["temperature_k"], arrays["frozen_s"],
+            float(arrays["time_s"]), int(arrays["element_steps"]),
+        )  # fmt: skip
+        return cls(
+            heat, arrays["times_s"].tolist(), list(arrays["probe_k"]),
+            arrays["enthalpies_j"].tolist(), float(arrays["cpu_s"]), float(arrays["wall_s"]),
+        )  # fmt: skip
 
 
 def solidify(
@@ -65,6 +101,8 @@ def solidify(
     record_s: float = 5.0,
     until_s: float = 20_000.0,
     progress: Callable[[Progress], None] | None = None,
+    start: Cooling | None = None,
+    keep: Callable[[Cooling], None] | None = None,
 ) -> Solidification:
     """Cool a casting until all of it is below its solidus.
 
@@ -81,6 +119,10 @@ def solidify(
         The run ends here if something is still liquid.
     progress : callable, optional
         Told after each record.
+    start : Cooling, optional
+        Where another run of the same arguments was; the rest comes out bit for bit as in one run.
+    keep : callable, optional
+        Given the state after each record.
 
     Returns
     -------
@@ -96,37 +138,64 @@ def solidify(
     if not (record_s > 0.0 and until_s > 0.0):
         raise ValueError(f"record_s is {record_s} and until_s {until_s}; both must be above 0")
     check_casting(elements, filling)
-    heat, melts = filling.heat(elements), filling.melts(elements)
+    melts = filling.melts(elements)
     weights = probe_weights(elements, probes_m or {})
-    begun, begun_cpu = time.perf_counter(), time.process_time()
-    records = [(0.0, weights @ heat.temperature_k, heat.enthalpy_j_m3 @ marching.volume_m3)]
+    now = start or _beginning(filling.heat(elements), marching, weights)
+    heat, clock = now.heat, _Clock(now)
     volume = marching.volume_m3[melts]
     solidus_j_m3 = filling.table.rows[elements.material[melts], 1]
-    frozen = np.zeros(len(volume), dtype=np.bool_)
-    for number in range(1, int(np.ceil(until_s / record_s)) + 1):
+    frozen = heat.enthalpy_j_m3[melts] < solidus_j_m3
+    for number in range(len(now.time_s), int(np.ceil(until_s / record_s)) + 1):
+        if frozen.all():
+            break
         target_s = min(number * record_s, until_s)
         marching.advance(heat, target_s - heat.time_s)
         heat.time_s = target_s
         _check_range(heat, filling)
-        total = heat.enthalpy_j_m3 @ marching.volume_m3
-        records.append((target_s, weights @ heat.temperature_k, total))
+        _record(now, marching, weights)
+        clock.read()
         frozen = heat.enthalpy_j_m3[melts] < solidus_j_m3
         if progress:
             share = max(volume[frozen].sum() / volume.sum(), target_s / until_s)
-            rate = heat.element_steps / (time.perf_counter() - begun)
-            progress(Progress(target_s, 100.0 * float(share), rate))
-        if frozen.all():
-            break
-    times, curves, totals = zip(*records, strict=True)
+            rate = heat.element_steps / now.wall_s
+            progress(Progress(target_s, 100.0 * float(share), rate, heat.element_steps))
+        if keep:
+            keep(now)
     return Solidification(
-        np.array(times),
-        dict(zip(probes_m or {}, np.array(curves).T, strict=True)),
-        np.array(totals),
+        np.array(now.time_s),
+        dict(zip(probes_m or {}, np.array(now.probe_k).T, strict=True)),
+        np.array(now.enthalpy_j),
         heat,
         float(heat.frozen_s[melts].max()) if frozen.all() else math.nan,
-        time.process_time() - begun_cpu,
-        time.perf_counter() - begun,
+        now.cpu_s,
+        now.wall_s,
     )
+
+
+class _Clock:
+    """Adds what a run costs from now on."""
+
+    def __init__(self, cooling: Cooling) -> None:
+        self._cooling = cooling
+        self._cpu_s = cooling.cpu_s - time.process_time()
+        self._wall_s = cooling.wall_s - time.perf_counter()
+
+    def read(self) -> None:
+        self._cooling.cpu_s = self._cpu_s + time.process_time()
+        self._cooling.wall_s = self._wall_s + time.perf_counter()
+
+
+def _beginning(heat: Heat, marching: Marching, weights: csr_array) -> Cooling:
+    now = Cooling(heat, [], [], [])
+    _record(now, marching, weights)
+    return now
+
+
+def _record(now: Cooling, marching: Marching, weights: csr_array) -> None:
+    now.time_s.append(now.heat.time_s)
+    now.probe_k.append(np.asarray(weights @ now.heat.temperature_k))
+    # not a product of BLAS: its threads wait for one another longer than a record takes
+    now.enthalpy_j.append(float(np.sum(now.heat.enthalpy_j_m3 * marching.volume_m3)))
 
 
 def _check_range(heat: Heat, filling: Filling) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section
@@ -14,17 +13,10 @@ from sandmould.scenario.quantity import Section
 if TYPE_CHECKING:
     from sandmould.study.expand import Run
 
-AScenario = TypeVar("AScenario", bound=Section)
-
 
 def defaults() -> dict[str, Any]:
     """Nothing: what is cast is the user's."""
     return {}
-
-
-def resolved(scenario: AScenario) -> AScenario:
-    """The scenario: it names no files."""
-    return scenario
 
 
 def lasts_s(scenario: Section) -> float:
@@ -40,12 +32,6 @@ def engine_problem(scenario: Section) -> Problem | None:
 def ranks(scenario: Section) -> int:
     """No MPI."""
     return 1
-
-
-def hash_with(scenario: Section, solver: str) -> str:
-    """Hash of a scenario without its seed, and of the solver that computes it."""
-    text = scenario.model_dump_json(exclude={"seed"}) + solver
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def write_given(run: Run, folder: Path, solver: str) -> None:

@@ -1,7 +1,4 @@
-"""Studies of solidification: a casting in its mould, by particles of several sizes.
-
-A run has no checkpoint: one that was killed begins again, which costs seconds to minutes.
-"""
+"""Studies of solidification: a casting in its mould, by particles of several sizes."""
 
 from __future__ import annotations
 
@@ -13,13 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from analysis.export import elements_to_vtk
 from analysis.freezing import freezing
 from sandmould.casting.arpm import computation, scene
 from sandmould.engines.products import Computed
+from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.kinds import own_solver
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.kinds.own_solver import hash_with, write_given
+from sandmould.study.kinds.own_solver import write_given
 from sandmould.study.moments import LAST_MEASURED
 
 if TYPE_CHECKING:
@@ -38,13 +37,19 @@ SLOWER = 10.0
 """Than that a machine may be, and a run longer than expected."""
 
 defaults = own_solver.defaults
-resolved = own_solver.resolved
 lasts_s = own_solver.lasts_s
 engine_problem = own_solver.engine_problem
 ranks = own_solver.ranks
 problems = scene.problems
 complete = computation.complete
+computed_hash = computation.computed_hash
 no_cost = computation.no_cost
+
+
+def resolved(scenario: Solidification) -> Solidification:
+    """The scenario with the hashes of its files, so that a changed mesh makes another run."""
+    shapes = tuple(with_file_hash(shape) for shape in scenario.shapes)
+    return scenario.model_copy(update={"shapes": shapes})
 
 
 def sources(scenario: Solidification) -> list[Path]:
@@ -55,11 +60,6 @@ def sources(scenario: Solidification) -> list[Path]:
 def template_hash(scenario: Solidification) -> str:
     """Hash of our solver."""
     return computation.source_hash()
-
-
-def computed_hash(scenario: Solidification) -> str:
-    """Hash of scenario and solver."""
-    return hash_with(scenario, computation.source_hash())
 
 
 def threads(scenario: Solidification) -> int:
@@ -93,8 +93,8 @@ def planned_s(scenario: Solidification) -> float:
 
 
 def speed_class(scenario: Solidification) -> SpeedClass:
-    """Elements or finite differences, in 2D."""
-    return computation.engine_of(scenario), 2
+    """Elements or finite differences."""
+    return computation.engine_of(scenario), scenario.dimensions
 
 
 def rate(scenario: Solidification, results: Path) -> float:
@@ -131,20 +131,23 @@ def measure(run: Run, folder: Path) -> None:
     from sandmould.study.report.freezing_figure import draw_freezing
 
     series = pd.read_csv(folder / "series.tsv", sep="\t")
+    _, _, heat_column = scene.series_columns(run.scenario)
     clock = {"time_s": series["time_s"], "vibration_time_s": -1.0, "stage": "cooling"}
-    table = pd.DataFrame({**clock, **series.drop(columns=["time_s", "enthalpy_j_m"])})
+    table = pd.DataFrame({**clock, **series.drop(columns=["time_s", heat_column])})
     figure = Figure(figsize=(6, 5), dpi=150, layout="constrained")
     if (folder / "fields.npz").exists():
         with np.load(folder / "fields.npz") as kept:
             fields = dict(kept)
-        melts, heat = fields["melts"], series["enthalpy_j_m"]
+        melts, heat = fields["melts"], series[heat_column]
         found = freezing(
             fields["position_m"][melts], fields["frozen_s"][melts], run.scenario.hot_spot_reach_m
         )
         table["enthalpy_drift_fraction"] = heat / heat.iloc[0] - 1.0
         table["solidification_time_s"] = found.solidification_time_s
-        table["last_point_x_m"], table["last_point_y_m"] = found.last_point_m
+        for axis, place_m in zip("xyz", found.last_point_m, strict=False):
+            table[f"last_point_{axis}_m"] = place_m
         table["hot_spots"] = len(found.hot_spots_m)
+        elements_to_vtk(fields, folder / "fields.vtu")
         draw_freezing(fields, found, figure.subplots())
     else:
         figure.text(0.5, 0.5, "No fields: the run broke off.", ha="center")

@@ -55,7 +55,8 @@ def notes_of(
     if isinstance(scenario, OwnDeck):
         return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
     if isinstance(scenario, Solidification):
-        return ("Two dimensions: heat that leaves a casting across the plane is not counted.",)
+        flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
+        return (flat,) if scenario.dimensions == 2 else ()
     if isinstance(scenario, MetalFlow):
         return _flow_notes(scenario)
     stage = scenario.vibration[0] if scenario.vibration else None

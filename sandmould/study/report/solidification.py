@@ -123,15 +123,19 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
     figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2)
     draw_freezing(fields, found, left)
-    draw_temperature(fields, right)
+    draw_temperature(fields, found, right)
     said = "Some of the casting is still liquid at the end of the run."
     if math.isfinite(found.solidification_time_s):
-        x, y = 1e3 * found.last_point_m
+        at = ", ".join(
+            f"{axis} = {number(1e3 * place_m)} mm"
+            for axis, place_m in zip("xyz", found.last_point_m, strict=False)
+        )
         said = (
             f"The casting is solid after {number(found.solidification_time_s, 4)} s; the last "
-            f"point to freeze lies at x = {number(x)} mm, y = {number(y)} mm."
+            f"point to freeze lies at {at}."
         )
-    columns = (Column("hot spot at x, mm"), Column("y, mm"), Column("frozen after, s"))
+    axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
+    columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
     rows = tuple(
         tuple(Cell(number(v, 4), str(v)) for v in (*(1e3 * place), time_s))
         for place, time_s in zip(found.hot_spots_m, found.hot_spot_s, strict=True)
@@ -216,8 +220,9 @@ def solid_method(scenario: Solidification, keys: Sequence[str]) -> tuple[Row, ..
     metal, mould, initial = scenario.casting, scenario.mould, scenario.initial_k
     transfer = scenario.heat_transfer_w_m2_k
     return (
-        Row("Method", "adaptive resolution particles of Hirata and Anzai (2019) in 2D, and finite "
-            "differences beside them; the box lets no heat through"),
+        Row("Method", "adaptive resolution particles of Hirata and Anzai (2019) in "
+            f"{scenario.dimensions}D, and finite differences beside them; the box lets no heat "
+            "through"),
         Row("Casting", f"{metal.name}: {_conducts(metal)}, latent heat "
             f"{metal.latent_heat_j_kg / 1e3:g} kJ/kg from {metal.liquidus_k:g} to "
             f"{metal.solidus_k:g} K; poured at {initial.casting:g} K"),
