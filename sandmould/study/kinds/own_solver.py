@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section
@@ -13,17 +13,10 @@ from sandmould.scenario.quantity import Section
 if TYPE_CHECKING:
     from sandmould.study.expand import Run
 
-AScenario = TypeVar("AScenario", bound=Section)
-
 
 def defaults() -> dict[str, Any]:
     """Nothing: what is cast is the user's."""
     return {}
-
-
-def resolved(scenario: AScenario) -> AScenario:
-    """The scenario: it names no files."""
-    return scenario
 
 
 def lasts_s(scenario: Section) -> float:
