@@ -72,7 +72,7 @@ class InStepSession:
         if checkpoint is not None:
             with np.load(checkpoint / CHECKPOINT) as kept:
                 foam.restore({name: kept[name] for name in kept.files})
-                self._load = kept["load"]
+                self._load = kept["mean_load"]
                 ledger_bytes, rows = (int(number) for number in kept["trusted"])
         inner.attach_mover(surface, foam.mover)
         self._ledger = Ledger(work / LEDGER, ledger_bytes, InStepEntry)
@@ -158,7 +158,7 @@ class InStepSession:
         np.savez(
             folder / CHECKPOINT,
             trusted=trusted,
-            load=self._load,
+            mean_load=self._load,
             **self._foam.state(),  # type: ignore[arg-type]
         )
 

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from sandmould.casting.hashing import hash_with
 from sandmould.casting.mps import computation, scene
 from sandmould.casting.mps.measured import by_window, measure_flow
 from sandmould.engines.outcome import RunOutcome
