@@ -67,10 +67,12 @@ class InStepSession:
             Folder that ``write_checkpoint`` wrote.
         """
         self._inner, self._foam, self._body = inner, foam, body
+        self._load = np.zeros_like(foam.vertices_m)
         ledger_bytes, rows = None, 0
         if checkpoint is not None:
             with np.load(checkpoint / CHECKPOINT) as kept:
                 foam.restore({name: kept[name] for name in kept.files})
+                self._load = kept["mean_load"]
                 ledger_bytes, rows = (int(number) for number in kept["trusted"])
         inner.attach_mover(surface, foam.mover)
         self._ledger = Ledger(work / LEDGER, ledger_bytes, InStepEntry)
@@ -106,7 +108,7 @@ class InStepSession:
 
     def _write(self, steps: int) -> None:
         foam, moved_m = self._foam, self.displacement_m
-        load = foam.take_mean_load_n()
+        load = self._load = foam.take_mean_load_n()
         begun = time.perf_counter()
         answer = self._body.answer(load)
         elastic_j, kinetic_j = foam.elastic_j, foam.kinetic_j
@@ -122,6 +124,7 @@ class InStepSession:
                 largest_m=float(np.linalg.norm(moved_m, axis=1).max()),
                 load_n=float(np.linalg.norm(load.sum(axis=0))),
                 imbalance_n=imbalance_n(load, answer),
+                moment_left_n_m=answer.moment_left_n_m,
                 work_j=foam.work_j,
                 energy_j=elastic_j,
                 solve_s=time.perf_counter() - begun,
@@ -135,7 +138,7 @@ class InStepSession:
     def snapshot(self) -> Snapshot:
         """State of all grains relative to the box, and the pattern among them."""
         moved = self._foam.vertices_m + self.displacement_m
-        return replace(self._inner.snapshot(), pattern_m=moved)
+        return replace(self._inner.snapshot(), pattern_m=moved, pattern_load_n=self._load)
 
     def keep(self) -> Any:
         """Copies of what grains and pattern are; the tables go on."""
@@ -155,6 +158,7 @@ class InStepSession:
         np.savez(
             folder / CHECKPOINT,
             trusted=trusted,
+            mean_load=self._load,
             **self._foam.state(),  # type: ignore[arg-type]
         )
 
