@@ -166,9 +166,10 @@ class Pixels:
         return self.pixel_m * found
 
     def corners(self) -> Array:
-        """Centres of the solid's pixels."""
+        """Two corners of the rectangle round the solid's pixels."""
         pixels = np.argwhere(self.distance_in_pixels < 0.0)
-        return np.asarray(self.low_m + (pixels + 0.5) * self.pixel_m)
+        extent = np.stack([pixels.min(axis=0), pixels.max(axis=0) + 1])
+        return np.asarray(self.low_m + extent * self.pixel_m)
 
 
 def solid_of(shape: Any, key: str) -> Body:

@@ -4,25 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.scenario.casting_shapes import Body
+
 Array = NDArray[np.float64]
 MOULD = 0
 """Material of all that is not painted."""
-
-
-class Solid(Protocol):
-    """A body that tells how far points are from its surface, negative inside."""
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-
-    def distance_m(self, position_m: Array) -> Array:
-        """Signed distance of points, (n,) float64, m."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +52,7 @@ class Raster:
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
-def painted(low_m: Array, high_m: Array, cell_m: float, solids: Mapping[int, Solid]) -> Raster:
+def painted(low_m: Array, high_m: Array, cell_m: float, solids: Mapping[int, Body]) -> Raster:
     """Paint solids into a box of mould; a cell is a solid's where its centre is inside.
 
     Parameters
@@ -70,7 +60,7 @@ def painted(low_m: Array, high_m: Array, cell_m: float, solids: Mapping[int, Sol
     low_m, high_m : (d,) float64, m
         Corners of the box.
     cell_m : float, m
-    solids : mapping of material to Solid
+    solids : mapping of material to Body
         Outlines in 2D, meshes in 3D; material 0 is the mould round them.
 
     Returns
@@ -93,7 +83,7 @@ def painted(low_m: Array, high_m: Array, cell_m: float, solids: Mapping[int, Sol
     for material, solid in solids.items():
         if material == MOULD:
             raise ValueError(f"{solid.name} has material {MOULD}, which is the mould's")
-        inside = solid.distance_m(centre) < 0.0
+        inside = _inside(solid, centre)
         if not inside.any():
             raise ValueError(f"{solid.name} holds no cell of {cell_m} m; it must lie in the box")
         if (taken := inside & (flat != MOULD)).any():
@@ -104,6 +94,15 @@ def painted(low_m: Array, high_m: Array, cell_m: float, solids: Mapping[int, Sol
             )
         flat[inside] = material
     return raster
+
+
+def _inside(solid: Body, position_m: Array) -> NDArray[np.bool_]:
+    """Which points a solid holds; only those among its corners are measured, which costs."""
+    corners = solid.corners()
+    low_m, high_m = corners.min(axis=0), corners.max(axis=0)
+    inside = ((position_m >= low_m) & (position_m <= high_m)).all(axis=1)
+    inside[inside] = solid.distance_m(position_m[inside]) < 0.0
+    return inside
 
 
 def from_image(mask: NDArray[np.bool_], cell_m: float) -> Raster:
