@@ -46,7 +46,7 @@ class Way:
 _UNIFORM, _FINE = (10.0, 5.0, 4.0, 2.5, 2.0), (5.0, 2.5, 2.0)
 # the paper's, the corrected, the conservative, local and super steps, and the competitors
 WAYS: dict[str, Way] = {
-    "uniform, printed or corrected": Way("2-1", Method("corrected", "explicit"), (*_UNIFORM, 1.0)),
+    "uniform, printed or corrected": Way("2-1", Method("corrected", "explicit"), _UNIFORM),
     "2-2A, corrected": Way("2-2A", Method("corrected", "explicit"), (2.0,)),
     "2-2B, corrected": Way("2-2B", Method("corrected", "explicit"), (2.0,)),
     "2-3A, corrected": Way("2-3A", Method("corrected", "explicit", refuse_ratio=False), (2.0,)),
