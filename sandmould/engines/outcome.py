@@ -52,7 +52,7 @@ _MEANING = {
     Outcome.UNSTABLE: "Energy grew beyond what fall and vibration can give, or was not a number.",
     Outcome.NO_FLOW: "The sand stopped flowing before it was meant to.",
     Outcome.NOT_SETTLED: "A layer did not come to rest within the longest time its rule allows.",
-    Outcome.COUPLING_DIVERGED: "The staggered loop of sand and pattern ran away.",
+    Outcome.COUPLING_DIVERGED: "The coupling of sand and pattern ran away.",
     Outcome.ESCAPED_METAL: "Metal left the mould.",
     Outcome.NO_FREE_SURFACE: "Metal without a free surface did not fit its place in the mould.",
     Outcome.ENGINE_FAILED: "The engine stopped with an error of its own.",

@@ -172,3 +172,13 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
     record["margins"]["solid_fraction"] = 0.5
     (kept / "record.json").write_text(json.dumps(record))
     assert evidence.stale_records() == [("engine_twins", "its margins were set after the runs")]
+
+
+def test_a_record_counts_the_work_of_any_kind() -> None:
+    summary = pd.DataFrame({
+        "engine": ["arpm", "differences", "arpm"], "version": ["a", "b", "c"],
+        "outcome_code": [0, 0, 300], "element_steps": [2.0, 3.0, 1.0],
+    })  # fmt: skip
+    assert evidence._work("element_steps", summary) == {"element_steps": 6.0}
+    assert evidence._work("grain_steps", summary) == {}
+    assert evidence._engines(summary) == {"arpm": "a", "differences": "b"}
