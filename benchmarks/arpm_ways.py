@@ -43,7 +43,7 @@ class Way:
         return nodes, steps(exchange, Substance(nodes.material, plates.filling.table))
 
 
-_UNIFORM, _FINE = (10.0, 5.0, 4.0, 2.5, 2.0), (5.0, 2.5, 2.0)
+_UNIFORM, _FINE = (10.0, 5.0, 4.0, 2.5, 2.0, 1.0), (5.0, 2.5, 2.0)
 # the paper's, the corrected, the conservative, local and super steps, and the competitors
 WAYS: dict[str, Way] = {
     "uniform, printed or corrected": Way("2-1", Method("corrected", "explicit"), _UNIFORM),
@@ -62,6 +62,11 @@ WAYS: dict[str, Way] = {
     FEM: Way("2-1", Method("faces", "explicit"), (10.0, *_FINE), is_fem=True),
 }
 REFERENCE = Way("2-1", Method("difference"), (1.0,))
+PAPERS = ("uniform, printed or corrected", "2-2A, corrected", "2-2B, corrected",
+          "2-3A, corrected", "2-3B, corrected")  # fmt: skip
+"""The paper's own cases: their courses over time are kept."""
+COURSE_S = 25.0
+"""Between the records that are kept of them, a multiple of 5 s."""
 
 
 def way_rows(plates: Plates, least_mm: float) -> list[dict[str, Any]]:
@@ -92,6 +97,8 @@ def way_rows(plates: Plates, least_mm: float) -> list[dict[str, Any]]:
                 f"drift {told['largest_drift_percent']:.1e} %",
                 flush=True,
             )
+            if name in PAPERS:
+                rows[-1] |= _courses(plates, run.found, reference.found)
     return rows
 
 
@@ -121,4 +128,17 @@ def _row(
         "mean_error_percent": {probe: mean for probe, (mean, _) in error.items()},
         "largest_error_percent": {probe: most for probe, (_, most) in error.items()},
         "largest_drift_percent": float(abs(found.drift_percent).max()),
+    }
+
+
+def _courses(plates: Plates, found: Solidification, reference: Solidification) -> dict[str, Any]:
+    """Error of the cooling curve at A and drift of the enthalpy over time: Figures 9, 11 and 14."""
+    kept = found.time_s[: len(reference.time_s)] % COURSE_S == 0.0
+    mould_k, pour_k = plates.filling.initial_k
+    count = len(kept)
+    warmer_k = found.probe_k["A"][:count] - reference.probe_k["A"][:count]
+    return {
+        "course_s": found.time_s[:count][kept].tolist(),
+        "course_error_percent": (100.0 * warmer_k[kept] / (pour_k - mould_k)).round(4).tolist(),
+        "course_drift_percent": found.drift_percent[:count][kept].round(5).tolist(),
     }

@@ -6,7 +6,7 @@ import pytest
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.faces import faces_of
 from sandmould.casting.arpm.kernel import kernel_exchange, neighbours, volume_weight, weight
-from sandmould.casting.arpm.raster import Raster, from_image, painted
+from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.outline import Outline
 from tests.unit.meshes import CORNERS, FACETS
@@ -96,17 +96,10 @@ def test_solids_are_painted_and_overlaps_refused() -> None:
         painted(low, high, 0.1, {0: square("block", 0.2, 0.5)})
 
 
-def test_a_mesh_and_a_picture() -> None:
+def test_a_mesh_is_painted() -> None:
     cube = TriangleMesh("cube", CORNERS, FACETS)
     raster = painted(np.full(3, -0.5), np.full(3, 1.5), 0.25, {1: cube})
     assert (raster.material == 1).sum() == 4**3
-    mask = np.zeros((4, 4), dtype=np.bool_)
-    mask[1:3, 1:3] = True
-    assert from_image(mask, 0.1).material.sum() == 4
-    with pytest.raises(ValueError, match="all of one material"):
-        from_image(~np.zeros((4, 4), dtype=np.bool_), 0.1)
-    with pytest.raises(ValueError, match="must hold booleans"):
-        from_image(np.zeros((4, 4)), 0.1)  # type: ignore[arg-type]
 
 
 def test_ratios_beyond_the_kernel_are_refused() -> None:

@@ -1,4 +1,4 @@
-"""Materials on a grid of cells, painted from outlines, meshes or images."""
+"""Materials on a grid of cells, painted from outlines, meshes or pictures."""
 
 from __future__ import annotations
 
@@ -103,25 +103,3 @@ def _inside(solid: Body, position_m: Array) -> NDArray[np.bool_]:
     inside = ((position_m >= low_m) & (position_m <= high_m)).all(axis=1)
     inside[inside] = solid.distance_m(position_m[inside]) < 0.0
     return inside
-
-
-def from_image(mask: NDArray[np.bool_], cell_m: float) -> Raster:
-    """Take a picture: true is casting (material 1), false is mould.
-
-    Parameters
-    ----------
-    mask : (nx, ny) or (nx, ny, nz) bool
-        The first axis is x; a picture of rows from the top is ``rows[::-1].T``.
-    cell_m : float, m
-        Width of a pixel.
-
-    Raises
-    ------
-    ValueError
-        When the picture is not of booleans, or all of it is casting or mould.
-    """
-    if mask.dtype != np.bool_:
-        raise ValueError(f"the picture holds {mask.dtype}; it must hold booleans")
-    if mask.all() or not mask.any():
-        raise ValueError("the picture is all of one material; it needs casting and mould")
-    return Raster(mask.astype(np.int64), cell_m, np.zeros(mask.ndim))
