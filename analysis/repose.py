@@ -7,6 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from sandmould.engines.neighbours import touching_pairs
 
 Array = NDArray[np.float64]
 
@@ -15,6 +19,8 @@ HEAP_FOOT, FOOT, CREST = 0.35, 0.2, 0.8
 crest that falling grains hit is round above. Sand that falls on a heap splashes: at its foot an
 apron lies flatter than its slope, up to a third of its height."""
 FEWEST_POINTS = 5
+GAP = 0.05
+"""Of the mean radius: grains no farther apart lie on each other. Rolling ones bounce a little."""
 SECTORS = 4
 """Flanks of a cone, each an equal part of the circle."""
 
@@ -64,6 +70,33 @@ class Surface:
     """(m, d - 1) float64, m."""
     height_m: Array
     """(m,) float64, m; 0 where there is no sand."""
+
+
+def lying(position_m: Array, radius_m: Array, floor_m: float) -> NDArray[np.bool_]:
+    """Find the grains that hang together with the floor: those that still fall do not.
+
+    Parameters
+    ----------
+    position_m : (n, d) float64, m
+    radius_m : (n,) float64, m
+    floor_m : float, m
+        Height of the floor.
+
+    Returns
+    -------
+    (n,) bool
+    """
+    n = len(radius_m)
+    if not n:
+        return np.zeros(0, dtype=np.bool_)
+    gap_m = GAP * float(radius_m.mean())
+    floor = np.flatnonzero(position_m[:, -1] - radius_m < floor_m + gap_m)
+    pairs = [(first, second) for first, second, _ in touching_pairs(position_m, radius_m, gap_m)]
+    first, second = np.hstack([*pairs, (floor, np.full(len(floor), n))])  # the floor is number n
+    joined = coo_array((np.ones(len(first)), (first, second)), shape=(n + 1, n + 1))
+    part = connected_components(joined, directed=False)[1]
+    held: NDArray[np.bool_] = part[:n] == part[n]
+    return held
 
 
 def free_surface(
@@ -132,7 +165,7 @@ def profiles(surface: Surface, width_m: float, axis_m: Array) -> dict[str, tuple
         names = [f"{360 * k // SECTORS} deg" for k in range(SECTORS)]
         turn = np.arctan2(apart[:, 1], apart[:, 0]) / (2 * math.pi) % 1.0
         part = np.minimum((turn * SECTORS).astype(np.int64), SECTORS - 1)
-    # A ring holds many points: a grain that still falls on the cone is not to raise it.
+    # A ring holds many points: a single grain on the cone is not to raise it.
     middle = np.mean if apart.shape[1] == 1 else np.median
     found = {}
     for number, name in enumerate(names):

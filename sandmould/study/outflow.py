@@ -15,6 +15,7 @@ from analysis.repose import (
     Surface,
     free_surface,
     heap_slope,
+    lying,
     residue_slope,
     walls_touched,
 )
@@ -45,7 +46,7 @@ def slopes(scenario: Scenario, snapshot: Snapshot) -> tuple[Slope, Slope]:
         pouring[:, 1],
         gate.centre_m[-1] + gate.size_m[-1] / 2,
     )
-    heap = _surface_of(scenario, snapshot, _fallen(gate, snapshot))
+    heap = _heap_surface(scenario, gate, snapshot)
     return heap_slope(heap, width_m, axis), residue_slope(hopper, width_m, axis)
 
 
@@ -59,12 +60,11 @@ def measure_outflow(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
 
 def _heap(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, Any]:
     """What fell through an outlet, and what stayed round it."""
-    fallen = _fallen(gate, snapshot)
     heap, stayed = slopes(scenario, snapshot)
-    surface = _surface_of(scenario, snapshot, fallen)
+    surface = _heap_surface(scenario, gate, snapshot)
     touched = walls_touched(surface, *_floor(scenario), HEAP_DEPTH * _largest_m(scenario))
     row: dict[str, Any] = {
-        "outflow_fraction": _share(snapshot, fallen),
+        "outflow_fraction": _share(snapshot, _fallen(gate, snapshot)),
         "heap_angle_deg": heap.angle_deg,
         "heap_angle_se_deg": heap.se_deg,
     }
@@ -103,7 +103,16 @@ def _share(snapshot: Snapshot, chosen: NDArray[np.bool_]) -> float:
     return float(sand[chosen].sum() / sand.sum())
 
 
-def _surface_of(scenario: Scenario, snapshot: Snapshot, chosen: NDArray[np.bool_]) -> Surface:
+def _heap_surface(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> Surface:
+    """Top of the sand on the floor, without grains that still fall."""
+    position, radius = snapshot.position_m, snapshot.radius_m
+    fallen = np.flatnonzero(_fallen(gate, snapshot))
+    return _surface_of(scenario, snapshot, fallen[lying(position[fallen], radius[fallen], 0.0)])
+
+
+def _surface_of(
+    scenario: Scenario, snapshot: Snapshot, chosen: NDArray[np.bool_] | NDArray[np.int64]
+) -> Surface:
     """Top of some grains over the whole floor."""
     position, radius = snapshot.position_m[chosen], snapshot.radius_m[chosen]
     return free_surface(position, radius, *_floor(scenario), 0.0)

@@ -12,6 +12,7 @@ from analysis.repose import (
     fit_flank,
     free_surface,
     heap_slope,
+    lying,
     profiles,
     residue_slope,
     walls_touched,
@@ -79,6 +80,22 @@ def test_what_stays_round_an_outlet_is_measured_from_the_hopper_floor(dimension:
     surface = free_surface(position, radius, np.zeros(axes), np.full(axes, 0.2), 0.25)
     slope = residue_slope(surface, 4e-3, np.full(axes, 0.1))
     assert slope.angle_deg == pytest.approx(35.0, abs=0.7)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_grains_that_fall_do_not_lie_on_the_heap(dimension: int) -> None:
+    heap = lattice(dimension, 1e-3, (0.01,) * dimension)
+    over = np.full(dimension, 5e-3)
+    # Two that fall touching each other, one a tenth of a radius above the heap, one on the floor.
+    falling = over + np.zeros((3, dimension))
+    falling[:, -1] = [0.05, 0.052, 0.0111]
+    beside = np.full((1, dimension), 0.05)
+    beside[:, -1] = 1e-3
+    position = np.vstack([falling, heap, beside])
+    held = lying(position, np.full(len(position), 1e-3), 0.0)
+    assert not held[:3].any()
+    assert held[3:].all()
+    assert len(lying(np.zeros((0, dimension)), np.zeros(0), 0.0)) == 0
 
 
 def test_the_surface_is_the_highest_place_of_each_cell() -> None:
