@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,8 @@ def part(name: str, quick: bool) -> dict[str, Any]:
     """Compute one part; it says where and with what."""
     origin = provenance(Scenario())
     found: dict[str, Any] = {
-        "machine": origin["machine"], "commit": origin["commit"], "solver": source_hash()
+        "machine": origin["machine"], "commit": origin["commit"], "solver": source_hash(),
+        "load_before": round(os.getloadavg()[0], 1),
     }  # fmt: skip
     if name == "contact":
         return found | {"rows": contact_rows()}

@@ -32,12 +32,13 @@ def draw_ways(ways: Sequence[Row], space: Sequence[Row], path: Path) -> None:
 
 
 def _draw_cost(panel: Axes, rows: Sequence[Row], probe: str) -> None:
+    colours = matplotlib.colormaps["tab20"]
     for place, name in enumerate(dict.fromkeys(r["way"] for r in rows)):
         own = [r for r in rows if r["way"] == name]
         rival = name in COMPETITORS
         panel.loglog(
             [r["cpu_s"] for r in own], [r["mean_error_percent"][probe] for r in own],
-            marker="osD^vP*X<>hpd8"[place], color="black" if rival else f"C{place % 10}",
+            marker="osD^vP*X<>hpd8"[place], color="black" if rival else colours(place),
             ls="--" if rival else "-", lw=1.2, ms=5, label=name,
         )  # fmt: skip
     panel.set_xlabel("processor time, s")

@@ -17,8 +17,8 @@ LAYOUTS = (("2-1", 0.001, "faces"), ("2-2A", 0.002, "corrected"), ("2-3B", 0.002
 """Case, smallest element in m, and exchange: those the paper shows."""
 SHOWN_M, PANEL_POINTS = 0.3, 240.0
 """Half the width that is shown, and the width of a panel in print."""
-DOT = 0.75
-"""Width of a dot over that of the smallest element."""
+DOT, CLOSED = 0.75, 1.2
+"""Width of a dot over that of the smallest element, where there are several sizes and where not."""
 
 
 def draw_fields(plates: Plates, least_m: float, path: Path) -> None:
@@ -51,7 +51,9 @@ def _draw(panel: matplotlib.axes.Axes, run: PlatesRun, plates: Plates
           ) -> matplotlib.collections.PathCollection:  # fmt: skip
     """One small dot an element, whatever its size, as in the paper: their density is seen."""
     x, y = run.elements.position_m.T
-    width = DOT * float(run.elements.size_m.min()) * PANEL_POINTS / (2.0 * SHOWN_M)
+    smallest_m, largest_m = run.elements.size_m.min(), run.elements.size_m.max()
+    dot = DOT if smallest_m < largest_m else CLOSED
+    width = dot * float(smallest_m) * PANEL_POINTS / (2.0 * SHOWN_M)
     panel.set_facecolor("0.8")
     shown = panel.scatter(
         x, y, c=run.found.heat.temperature_k, s=width**2, marker="s", linewidths=0, cmap="inferno",

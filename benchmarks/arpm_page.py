@@ -41,7 +41,8 @@ def write(kept: Mapping[str, Any]) -> None:
     draw_courses(ways, COURSES)
     draw_contact(contact, CONTACT)
     origin = "; ".join(
-        f"{name}: commit {part['commit']}, solver {part['solver']}, {part['machine']['processor']}"
+        f"{name}: commit {part['commit']}, solver {part['solver']}, "
+        f"{part['machine']['processor']}, load before {part['load_before']}"
         for name, part in kept.items()
     )
     text = Template(WORDS.read_text(encoding="utf-8")).substitute(
