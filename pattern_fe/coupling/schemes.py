@@ -12,6 +12,8 @@ from sandmould.scenario.scenario import Scenario
 
 REFERENCE_ALONE = ("measured", "monolithic")
 """Schemes that need what one engine has: to go back to a kept state, and to stop in every step."""
+WITHOUT_WINDOWS = ("in_step", "monolithic")
+"""Schemes in which the pattern moves in every step."""
 ABOVE_VIBRATION = 5.0
 """Least ratio of the pattern's first frequency to that of the box, for an answer as if at rest."""
 LIKE_FOAM = 0.9
@@ -39,6 +41,10 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         raise _bad("repeats", loop.repeats, f"0 on engine {engine}, or engine reference")
     if scheme in REFERENCE_ALONE and engine != "reference":
         raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
+    if loop.exchange == "files" and scheme in WITHOUT_WINDOWS:
+        raise _bad(
+            "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"
+        )
     if scheme == "monolithic":
         explicit_foam(scenario, pattern)
     if scheme == "in_step":
