@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from pattern_fe.coupling.verdict import State
+from sandmould.study.collect import Collected
 from sandmould.study.report.coupling_map import FACTOR, LIMIT, MODULUS, SCHEME, coupling_map
 
 WINDOW = "pattern.loop.window_s"
@@ -16,9 +17,12 @@ STATES: dict[str, State] = {
 }  # fmt: skip
 
 
-def summary(**columns: Any) -> pd.DataFrame:
-    """Two runs below the limit and two above it in each of two windows; one cannot be judged."""
-    return pd.DataFrame(
+def collected(keys: tuple[str, ...], **columns: Any) -> Collected:
+    """Two runs below the limit and two above it that can be judged, and three that cannot.
+
+    The limit is that of the last snapshot.
+    """
+    summary = pd.DataFrame(
         {
             "run": ["a", "b", "c", "d", "e", "f", "g"],
             MODULUS: [1e6, 1e6, 1e7, 1e7, 1e6, 1e6, 1e6],
@@ -27,10 +31,12 @@ def summary(**columns: Any) -> pd.DataFrame:
             LIMIT: [0.1, 0.1, 0.2, 0.2, 0.1, float("nan"), 0.1],
         }
     ).assign(**columns)
+    curves = pd.concat([summary.assign(**{LIMIT: 2.0 * summary[LIMIT]}), summary])
+    return Collected(summary.drop(columns=LIMIT), curves, keys)
 
 
 def test_right_and_wrong_predictions_are_counted() -> None:
-    found = coupling_map(summary(), (MODULUS, FACTOR, WINDOW), STATES)
+    found = coupling_map(collected((MODULUS, FACTOR, WINDOW)), STATES)
     assert found is not None
     assert found.picture.startswith("data:image/png")
     assert found.sentence == (
@@ -41,16 +47,17 @@ def test_right_and_wrong_predictions_are_counted() -> None:
 
 def test_only_fixed_shares_are_counted() -> None:
     schemes = ["fixed", "aitken", "fixed", "fixed", "fixed", "fixed", "fixed"]
-    found = coupling_map(summary(**{SCHEME: schemes}), (MODULUS, FACTOR, SCHEME), STATES)
+    found = coupling_map(collected((MODULUS, FACTOR, SCHEME), **{SCHEME: schemes}), STATES)
     assert found is not None
     assert found.sentence.startswith("The limit predicted before the runs is right in 2 of 3: 1 ")
 
 
 @pytest.mark.parametrize("keys", [(MODULUS, WINDOW), (FACTOR,)])
 def test_without_modulus_and_share_there_is_no_map(keys: tuple[str, ...]) -> None:
-    assert coupling_map(summary(), keys, STATES) is None
+    assert coupling_map(collected(keys), STATES) is None
 
 
 def test_runs_that_nobody_can_judge_make_no_map() -> None:
-    assert coupling_map(summary(), (MODULUS, FACTOR), {}) is None
-    assert coupling_map(summary().drop(columns=LIMIT), (MODULUS, FACTOR), STATES) is None
+    assert coupling_map(collected((MODULUS, FACTOR)), {}) is None
+    unknown = {LIMIT: float("nan")}
+    assert coupling_map(collected((MODULUS, FACTOR), **unknown), STATES) is None

@@ -89,9 +89,7 @@ def bending_pages(
         deflection=deflection_chart(collected, verdict),
         outlines=picture,
         outlines_note=note,
-        map=coupling_map(
-            collected.summary, collected.keys, {run: v.state for run, v in found.items()}
-        ),
+        map=coupling_map(collected, {run: v.state for run, v in found.items()}),
         ledger=() if ledger is None else ledger_charts(ledger, _begins_s(own)),
         shown_run=shown,
         runs=_runs_table(study_folder, href, collected, verdict, found),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pandas as pd
@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pattern_fe.coupling.verdict import State
+from sandmould.study.collect import Collected
 from sandmould.study.report.figures import png
-from sandmould.study.words import setting_text
+from sandmould.study.words import name_of, setting_text
 
 MODULUS, FACTOR = "pattern.young_modulus_pa", "pattern.loop.factor"
 SCHEME = "pattern.loop.scheme"
@@ -37,17 +38,12 @@ class CouplingMap:
     sentence: str
 
 
-def coupling_map(
-    summary: pd.DataFrame, keys: Sequence[str], states: Mapping[str, State]
-) -> CouplingMap | None:
+def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingMap | None:
     """Draw verdicts and predicted limits, a panel for each setting of the other swept keys.
 
     Parameters
     ----------
-    summary : DataFrame
-        One row a run.
-    keys : sequence of str
-        Swept keys.
+    collected : Collected
     states : mapping of run to state
         Of the runs that can be judged.
 
@@ -56,10 +52,14 @@ def coupling_map(
     CouplingMap or None
         None unless modulus and fixed share are swept and predictions are known.
     """
-    if not {MODULUS, FACTOR} <= set(keys) or LIMIT not in summary:
+    keys, curves = collected.keys, collected.curves
+    if not {MODULUS, FACTOR} <= set(keys) or LIMIT not in curves:
         return None
-    state = summary["run"].astype(str).map(states)
-    rows = summary.assign(state=state)[state.isin(list(SIGNS)) & summary[LIMIT].notna()]
+    run = collected.summary["run"].astype(str)
+    # Of the snapshots: the summary has none of a run that was stopped.
+    limit = run.map(curves.groupby(curves["run"].astype(str))[LIMIT].last())
+    rows = collected.summary.assign(**{"state": run.map(states), LIMIT: limit})
+    rows = rows[rows["state"].isin(list(SIGNS)) & limit.notna()]
     if SCHEME in keys:
         rows = rows[rows[SCHEME] == "fixed"]
     if rows.empty:
@@ -74,7 +74,8 @@ def coupling_map(
         axes.set_axis_off()
     for axes, (values, part) in zip(grid.ravel(), panels, strict=False):
         _draw(axes, part)
-        title = [setting_text({k: v}) for k, v in zip(others, values, strict=True)]
+        named = zip(others, values, strict=True)
+        title = [f"{name_of(key)} {setting_text({key: value})}" for key, value in named]
         axes.set_title("\n".join(title), fontsize=8)
     for axes in grid[:, 0]:
         axes.set_ylabel("share of the residual")
