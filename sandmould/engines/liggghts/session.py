@@ -124,16 +124,22 @@ class LiggghtsSession(DeckSession):
         return around_run(self._blocks[self.stage.name])
 
     def _compute_to(self, target: int) -> None:
-        """Compute in pieces between samples where a mesh bends, or at once."""
-        every = target - self.steps if self._bending is None else self._counts.load
+        """Compute at once, or from sample to sample of the loads on a mesh that bends."""
+        if self._bending is not None:
+            self._sample_to(target, self._bending)
+            return
+        super()._compute_to(target)
+        self.steps = target
+
+    def _sample_to(self, target: int, mesh: BendingMesh) -> None:
+        every = self._counts.load
         while self.steps < target:
-            begins_record = self.steps % self._counts.window == 0
+            begins_record = self.steps % self._counts.window < every
             step = min(target, (self.steps // every + 1) * every)
             super()._compute_to(step)
             self.steps = step
-            if self._bending is not None and step % every == 0:
-                loads = self.triangle_loads(self._bending.name)
-                self._bending.add(loads, begins_record)
+            if step % every == 0:
+                mesh.add(self.triangle_loads(mesh.name), begins_record)
 
     def _rests(self) -> bool:
         return self.values(["v_at_rest"])[0] == 1.0
