@@ -115,6 +115,8 @@ def write_mesh(path: Path, mesh: Any) -> None:
     """Write a mesh with its named boundaries in a format that the file's name asks for.
 
     The names go along as cell data of scikit-fem, which ``read_mesh`` understands; formats
-    without cell data lose them.
+    without cell data lose them. Points of 2D lie at z = 0.
     """
-    meshio.write(path, to_meshio(mesh))
+    written = to_meshio(mesh)
+    written.points = np.pad(written.points, ((0, 0), (0, 3 - written.points.shape[1])))
+    meshio.write(path, written)

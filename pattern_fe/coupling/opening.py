@@ -6,6 +6,8 @@ import math
 from pathlib import Path
 from typing import cast
 
+from pattern_fe.coupling.body import ElasticBody
+from pattern_fe.coupling.files_body import EXCHANGE, FilesBody
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.in_step import InStepSession
 from pattern_fe.coupling.judge import JudgeSession
@@ -42,8 +44,10 @@ def open_coupled(
     if told.loop.scheme == "monolithic":
         return cast(Session, _open_judge(program, log, checkpoint))
     pattern = pattern_of(scenario)
-    body = FoamBody(pattern, told.statics == "large")
+    body: ElasticBody = FoamBody(pattern, told.statics == "large")
     inner = engine_of(scenario).open_session(program, folder, log, checkpoint)
+    if told.loop.exchange == "files":
+        body = FilesBody(pattern, told.statics == "large", folder / EXCHANGE, inner)
     if told.loop.scheme == "in_step":
         foam = in_step_foam(scenario, pattern)
         (log.parent / MASSES_LOG).write_text(_told_masses(foam.mass), encoding="utf-8")

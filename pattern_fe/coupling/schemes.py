@@ -12,6 +12,10 @@ from sandmould.scenario.scenario import Scenario
 
 REFERENCE_ALONE = ("measured", "monolithic")
 """Schemes that need what one engine has: to go back to a kept state, and to stop in every step."""
+WITH_LIGGGHTS = ("one_way", "fixed", "aitken", "quasi_newton")
+"""Schemes whose windows need a mesh to be exchanged and its loads read, no more."""
+WITHOUT_WINDOWS = ("in_step", "monolithic")
+"""Schemes in which the pattern moves in every step."""
 ABOVE_VIBRATION = 5.0
 """Least ratio of the pattern's first frequency to that of the box, for an answer as if at rest."""
 LIKE_FOAM = 0.9
@@ -28,9 +32,12 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
     assert scenario.pattern is not None
     loop, engine = scenario.pattern.loop, scenario.engine.name
     scheme = loop.scheme
-    if engine == "liggghts":
-        valid = "lammps or reference in a scene with a pattern: its meshes do not bend"
-        raise BadInputError([Problem("engine.name", engine, valid)])
+    if engine == "liggghts" and scheme not in WITH_LIGGGHTS:
+        raise _bad("scheme", scheme, f"{', '.join(WITH_LIGGGHTS)} on engine liggghts")
+    if engine == "liggghts" and scenario.frame == "laboratory":
+        # A mesh that moves with the box cannot be exchanged.
+        valid = "box in a scene with a pattern on engine liggghts"
+        raise BadInputError([Problem("frame", scenario.frame, valid)])
     if scenario.discharge is not None:
         # Loads on vertices are forgotten when a gate is taken away.
         valid = "absent in a scene with a pattern"
@@ -39,6 +46,10 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         raise _bad("repeats", loop.repeats, f"0 on engine {engine}, or engine reference")
     if scheme in REFERENCE_ALONE and engine != "reference":
         raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
+    if loop.exchange == "files" and scheme in WITHOUT_WINDOWS:
+        raise _bad(
+            "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"
+        )
     if scheme == "monolithic":
         explicit_foam(scenario, pattern)
     if scheme == "in_step":

@@ -40,7 +40,8 @@ class LoopVerdict:
     spikes: int
     """Windows whose residual is larger than the displacement."""
     made_j: float
-    """Energy stored in the end less the work of the sand; above 0 the loop itself gave it."""
+    """Energy of the shape that the sand saw in the end less the work of the sand; above 0 the loop
+    itself gave it."""
     stored_j: float
     """Median of the elastic energy."""
     last_s: float
@@ -67,7 +68,8 @@ class LoopVerdict:
 def judge_loop(ledger: pd.DataFrame, stopped: bool = False) -> LoopVerdict | None:
     """Judge the last part of a ledger.
 
-    Energy stored above the work of the sand was never given by sand: such a loop goes in cycles,
+    Energy of the shape that the sand saw above the work of the sand was never given by sand: such
+    a loop goes in cycles,
     that shake the sand, and it diverged where the median residual is above the displacement too, or
     where it was stopped for that or has values that are not finite. Work above the stored energy is
     only lost in the loop's delay, as in a dashpot: such a loop lags while its residual is large,
@@ -91,13 +93,17 @@ def judge_loop(ledger: pd.DataFrame, stopped: bool = False) -> LoopVerdict | Non
     start_s, end_s = ledger["time_s"].iloc[[0, -1]]
     last_s = LAST_SHARE * float(end_s - start_s)
     last = ledger[ledger["time_s"] >= end_s - last_s]
-    stored_j = float(stored_energy_j(last).median())
-    made_j = stored_j - float(last["work_j"].median())
+    stored = shown = stored_energy_j(last)
     residual, spikes = np.nan, 0
     if "residual_m" in ledger:
         # Before the first move there is nothing that a residual could be a share of.
         shares = last["residual_m"] / last["displacement_m"].where(last["displacement_m"] > 0.0)
         residual, spikes = float(shares.median()), int((shares > 1.0).sum())
+        # The ledger has the energy of the answer, which a slow loop is far from: what is shown
+        # stores at least as much less as if both had one form.
+        shown = stored / (1.0 + shares) ** 2
+    stored_j = float(stored.median())
+    made_j = float(shown.median()) - float(last["work_j"].median())
     state: State = "holds"
     is_fed = made_j > MADE_SHARE * stored_j
     if stopped or not np.isfinite(last[["displacement_m", "work_j"]]).to_numpy().all():

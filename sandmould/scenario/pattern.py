@@ -111,6 +111,12 @@ class Loop(Section):
     limit_share: float = quantity(
         0.5, "Share in the measured scheme of the limit 2 / (1 + gain).", source=ARGUED, gt=0, le=1
     )
+    exchange: Literal["memory", "files"] = quantity(
+        "memory",
+        "How sand and pattern tell each other loads and displacements: at once, or by files in "
+        "the run's folder exchange, where the run stops until another program has answered.",
+        source=ARGUED,
+    )
     repeats: int = quantity(
         0, "Times that a window is computed again at most; reference engine.", source=ARGUED,
         ge=0, le=100,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import pandas as pd
 from analysis.deflection import deflection, farthest_corner
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.predicted import predicted_gain
+from pattern_fe.coupling.schemes import WITHOUT_WINDOWS
 from pattern_fe.coupling.verdict import LoopVerdict, judge_loop, stored_energy_j
 from pattern_fe.distance import distance_from_drawing
 from pattern_fe.large_displacement import LoadNotReachedError
@@ -31,6 +34,7 @@ class BentPattern:
         """Take the pattern of a scenario that has one."""
         told = scenario.pattern
         assert told is not None
+        self._scenario = scenario
         self.pattern: Pattern = pattern_of(scenario)
         self.drawn: Perimeter = self.pattern.surface.outer
         """The line that the sand meets, as drawn."""
@@ -59,7 +63,17 @@ class BentPattern:
         }
         if snapshot.pattern_load_n is not None:
             found["pattern_tip_answered_m"] = self._answered_m(snapshot.pattern_load_n)
-        return found
+        return found | self._predicted
+
+    @cached_property
+    def _predicted(self) -> Row:
+        """What the scenario alone tells of its loop; nothing of a scheme without windows."""
+        told = self._scenario.pattern
+        assert told is not None
+        if told.loop.scheme in WITHOUT_WINDOWS:
+            return {}
+        gain = predicted_gain(self._scenario, self.pattern, told.loop.window_s)
+        return {"pattern_predicted_gain": gain.gain, "pattern_predicted_limit": gain.limit}
 
     def _answered_m(self, load_n: np.ndarray) -> float:
         """Deflection of the tip at rest under a load; NaN where there is no rest."""

@@ -154,12 +154,18 @@ def test_windows_fill_a_record_with_whole_samples() -> None:
 @pytest.mark.parametrize(
     ("engine", "loop", "says"),
     [
-        ("liggghts", {}, "engine.name = 'liggghts' cannot be used: valid is lammps or reference"),
+        (
+            "liggghts",
+            {"scheme": "in_step"},
+            "scheme = 'in_step' .* valid is one_way, fixed, aitken",
+        ),
+        ("liggghts", {}, "frame = 'laboratory' cannot be used: valid is box in a scene with"),
         ("lammps", {"repeats": 3}, "pattern.loop.repeats = 3 cannot be used: valid is 0 on engine"),
+        ("lammps", {"scheme": "in_step", "exchange": "files"}, "exchange = 'files' .* no windows"),
     ],
 )
 def test_what_an_engine_cannot_couple_is_told(engine: str, loop: dict[str, Any], says: str) -> None:
-    tree = {**L_SCENE, "engine": {"name": engine}}
+    tree = {**L_SCENE, "engine": {"name": engine}, "frame": "laboratory"}
     tree["pattern"] = {**L_SCENE["pattern"], "loop": loop}
     with pytest.raises(BadInputError, match=says):
         sand.resolved(Scenario.model_validate(tree))

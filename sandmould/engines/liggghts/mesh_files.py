@@ -43,12 +43,12 @@ def surface_triangles(
     surfaces = {wall.name: _wall(wall, low, high) for wall in scene.walls}
     for block in scene.blocks:
         surfaces[block.name] = (
-            _prism(block.corners()[block.facets()[:, 0]], span)
+            outline_strips(block.corners()[block.facets()[:, 0]], span)
             if scene.dimension == 2
             else _cuboid(block)
         )
     for outline in scene.outlines:
-        surfaces[outline.name] = _prism(outline.vertices_m, span)
+        surfaces[outline.name] = outline_strips(outline.vertices_m, span)
     for mesh in scene.meshes:
         surfaces[mesh.name] = mesh.corners_m
     return surfaces
@@ -97,7 +97,7 @@ def _wall(wall: Wall, low: Array, high: Array) -> Array:
     return _rectangle(corner, first, second)
 
 
-def _prism(outline_m: Array, span_m: tuple[float, float]) -> Array:
+def outline_strips(outline_m: Array, span_m: tuple[float, float]) -> Array:
     """Sides of an outline drawn out along z; the ends, out of the grains' reach, are left open."""
     if signed_area_m2(outline_m) < 0:
         outline_m = outline_m[::-1]

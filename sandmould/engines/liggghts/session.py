@@ -11,7 +11,9 @@ import numpy as np
 
 from sandmould.engines.deck import Block, Deck
 from sandmould.engines.deck_session import DeckSession
+from sandmould.engines.liggghts.bending_mesh import BendingMesh
 from sandmould.engines.liggghts.grains_file import read_grains
+from sandmould.engines.liggghts.mesh_files import outline_strips, write_stl
 from sandmould.engines.liggghts.process import (
     Conversation,
     LiggghtsDied,
@@ -48,7 +50,7 @@ class LiggghtsSession(DeckSession):
 
     steps = 0
     _restart = "liggghts.restart"
-    _valid_surface = "a rigid surface on engine liggghts"
+    _valid_surface = "the pattern of the scenario on engine liggghts"
 
     def __init__(
         self, program: Program, deck: Deck, folder: Path, log: Path, checkpoint: Path | None = None
@@ -81,6 +83,7 @@ class LiggghtsSession(DeckSession):
         super().__init__(program, deck)
         self.version = version
         self._surfaces = list(surface_meshes(program))
+        self._bending = BendingMesh.of(program.scenario)
         self._scratch = tempfile.TemporaryDirectory(prefix="liggghts_", dir=log.absolute().parent)
         self._liggghts = Conversation(path, folder, log)
         self._set_up(checkpoint)
@@ -121,8 +124,22 @@ class LiggghtsSession(DeckSession):
         return around_run(self._blocks[self.stage.name])
 
     def _compute_to(self, target: int) -> None:
+        """Compute at once, or from sample to sample of the loads on a mesh that bends."""
+        if self._bending is not None:
+            self._sample_to(target, self._bending)
+            return
         super()._compute_to(target)
         self.steps = target
+
+    def _sample_to(self, target: int, mesh: BendingMesh) -> None:
+        every = self._counts.load
+        while self.steps < target:
+            begins_record = self.steps % self._counts.window < every
+            step = min(target, (self.steps // every + 1) * every)
+            super()._compute_to(step)
+            self.steps = step
+            if step % every == 0:
+                mesh.add(self.triangle_loads(mesh.name), begins_record)
 
     def _rests(self) -> bool:
         return self.values(["v_at_rest"])[0] == 1.0
@@ -165,12 +182,30 @@ class LiggghtsSession(DeckSession):
         return read_triangle_loads(path)
 
     def _vertex_sums(self, name: str) -> tuple[Array, int]:
-        """Refuse: LIGGGHTS gives a mesh's loads by triangle."""
-        raise RefusedError("surface", name, "triangle_loads on engine liggghts")
+        """Loads of triangles, shared evenly by the two vertices of their side."""
+        mesh = self._bending_mesh(name)
+        return mesh.sums_n.copy(), mesh.samples
 
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
-        """Refuse: meshes of LIGGGHTS move as a whole."""
-        raise RefusedError("surface", name, self._valid_surface)
+        """Exchange the pattern's mesh for one at its new place, at once.
+
+        Meshes of LIGGGHTS move as a whole only. Grains do not see the velocity of the new one, and
+        tangential springs with all meshes begin anew, for it keeps them together.
+        """
+        mesh = self._bending_mesh(name)
+        path = Path(self._scratch.name) / "bent.stl"
+        mesh.move(vertices_m)
+        drawn_m = surface_meshes(self._program)[name]
+        span_m = float(drawn_m[..., 2].min()), float(drawn_m[..., 2].max())
+        write_stl(path, name, outline_strips(vertices_m, span_m))
+        self.send(mesh.exchange(self._blocks["walls"].text, path))
+        self._setup_due = True
+
+    def _bending_mesh(self, name: str) -> BendingMesh:
+        """The mesh of a name, if it is the one that bends; refuse any other."""
+        if self._bending is None or name != self._bending.name:
+            raise RefusedError("surface", name, self._valid_surface)
+        return self._bending
 
     def close(self) -> None:
         """End LIGGGHTS."""

@@ -19,6 +19,7 @@ from sandmould.study.bending import ledger_of, verdict_of
 from sandmould.study.collect import Collected
 from sandmould.study.report.bending_figure import draw_outlines
 from sandmould.study.report.chart import Area, Chart
+from sandmould.study.report.coupling_map import CouplingMap, coupling_map
 from sandmould.study.report.curves import runs_of, setting_tints, time_chart
 from sandmould.study.report.ledger_charts import LedgerChart, ledger_charts
 from sandmould.study.report.many import drawn_part, listed_runs
@@ -45,6 +46,7 @@ class BendingPages:
     outlines: str
     """Picture; empty where the shown run has no shape."""
     outlines_note: str
+    map: CouplingMap | None
     ledger: tuple[LedgerChart, ...]
     shown_run: str
     runs: Table
@@ -87,6 +89,7 @@ def bending_pages(
         deflection=deflection_chart(collected, verdict),
         outlines=picture,
         outlines_note=note,
+        map=coupling_map(collected, {run: v.state for run, v in found.items()}),
         ledger=() if ledger is None else ledger_charts(ledger, _begins_s(own)),
         shown_run=shown,
         runs=_runs_table(study_folder, href, collected, verdict, found),

@@ -1,0 +1,183 @@
+"""Pattern, loads and answers in files: what two programs need that couple without meeting.
+
+``pattern.yaml`` names the foam, its supports and its mesh, ``pattern.vtu``. Each ``loads_*.tsv``
+holds the sand's mean forces of a window, ``answer_*.tsv`` of the same name the surface that they
+bend. Columns carry their units; what holds for the whole table stands in lines of ``# key: value``
+above it. Numbers are written so that they read back the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.body import Answer
+from pattern_fe.loads import vertex_pressure_pa
+from pattern_fe.material import Foam
+from pattern_fe.mesh_file import read_mesh, write_mesh
+from pattern_fe.pattern import Pattern
+from pattern_fe.perimeter import Perimeter
+from pattern_fe.supports import Supports
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+PATTERN = "pattern.yaml"
+MESH = "pattern.vtu"
+LOADS = "loads_"
+ANSWER = "answer_"
+_PLACE = ("x_m", "y_m")
+_FORCE = ("force_x_n", "force_y_n", "pressure_pa")
+_MOVED = ("displacement_x_m", "displacement_y_m")
+_WHOLE = ("energy_j", "reaction_x_n", "reaction_y_n", "moment_left_n_m")
+_NEAR = 1e-6
+"""Share of the drawing's extent by which a vertex may be off: other programs write fewer digits."""
+
+
+def write_pattern(folder: Path, pattern: Pattern, large: bool) -> None:
+    """Write what a pattern in 2D is made of and how it is held.
+
+    Parameters
+    ----------
+    folder : Path
+    pattern : Pattern
+    large : bool
+        Whether displacements are large.
+    """
+    folder.mkdir(exist_ok=True)
+    write_mesh(folder / MESH, pattern.space.mesh)
+    foam, supports = pattern.foam, pattern.supports
+    told = {
+        "mesh": MESH,
+        "order": pattern.space.order,
+        "thickness_m": pattern.space.thickness_m,
+        "young_modulus_pa": foam.young_pa,
+        "poisson_ratio": foam.poisson,
+        "density_kg_m3": foam.density_kg_m3,
+        "clamped": list(supports.clamped),
+        "resting": list(supports.resting),
+        "statics": "large" if large else "linear",
+    }
+    (folder / PATTERN).write_text(yaml.safe_dump(told, sort_keys=False), encoding="utf-8")
+
+
+def read_pattern(folder: Path) -> tuple[Pattern, bool]:
+    """Read what ``write_pattern`` wrote: the pattern, and whether displacements are large.
+
+    Raises
+    ------
+    ValueError
+        When a file or a key is missing, or the pattern cannot be computed.
+    """
+    path = folder / PATTERN
+    try:
+        told = yaml.safe_load(path.read_text(encoding="utf-8"))
+        foam = Foam(told["young_modulus_pa"], told["poisson_ratio"], told["density_kg_m3"])
+        supports = Supports(tuple(told["clamped"]), tuple(told["resting"]))
+        mesh, order, thickness_m = folder / told["mesh"], told["order"], told["thickness_m"]
+        large = told["statics"] == "large"
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from error
+    except KeyError as error:
+        raise ValueError(
+            f"{path} has no key {error}; valid is what the sand's run wrote"
+        ) from error
+    except (TypeError, yaml.YAMLError) as error:
+        raise ValueError(f"{path} is not a list of keys and values") from error
+    return Pattern(read_mesh(mesh), supports, foam, order, thickness_m), large
+
+
+def write_loads(path: Path, outer: Perimeter, load_n: Array, time_s: float) -> None:
+    """Write mean forces of a window and their pressures, eq. (56), per area as drawn.
+
+    Parameters
+    ----------
+    path : Path
+    outer : Perimeter
+        Line that the sand meets, as drawn.
+    load_n : (nv, 2) float64, N
+    time_s : float
+        End of the window.
+    """
+    pressure_pa = vertex_pressure_pa(outer, load_n)
+    rows = np.column_stack([outer.vertices_m, load_n, pressure_pa])
+    _write(path, {"time_s": time_s}, (*_PLACE, *_FORCE), rows)
+
+
+def read_loads(path: Path, outer: Perimeter) -> tuple[Array, float]:
+    """Read what ``write_loads`` wrote: forces (nv, 2) in N, and the time in s.
+
+    Raises
+    ------
+    ValueError
+        When the file is damaged, or belongs to another pattern.
+    """
+    whole, rows = _read(path, ("time_s",), (*_PLACE, *_FORCE), outer)
+    return rows[:, 2:4], whole["time_s"]
+
+
+def write_answer(path: Path, outer: Perimeter, answer: Answer, time_s: float) -> None:
+    """Write where loads bend the line; arguments as ``write_loads``."""
+    energetic = (answer.energy_j, *answer.reaction_n, answer.moment_left_n_m)
+    whole = {"time_s": time_s} | dict(zip(_WHOLE, energetic, strict=True))
+    rows = np.column_stack([outer.vertices_m, answer.displacement_m])
+    _write(path, whole, (*_PLACE, *_MOVED), rows)
+
+
+def read_answer(path: Path, outer: Perimeter) -> Answer:
+    """Read what ``write_answer`` or another program wrote; errors as ``read_loads``."""
+    whole, rows = _read(path, _WHOLE, (*_PLACE, *_MOVED), outer)
+    reaction_n = np.array([whole["reaction_x_n"], whole["reaction_y_n"]])
+    return Answer(rows[:, 2:], whole["energy_j"], reaction_n, whole["moment_left_n_m"])
+
+
+def _write(path: Path, whole: Values, columns: tuple[str, ...], rows: Array) -> None:
+    """Write a table, first under a temporary name: where it is, it is whole."""
+    partial = path.with_name(path.name + ".partial")
+    head = [f"# {name}: {float(value)!r}" for name, value in whole.items()]
+    lines = ("\t".join(map(repr, row)) for row in rows.tolist())
+    partial.write_text("\n".join([*head, "\t".join(columns), *lines]) + "\n", encoding="utf-8")
+    partial.replace(path)
+
+
+def _read(
+    path: Path, keys: tuple[str, ...], columns: tuple[str, ...], outer: Perimeter
+) -> tuple[dict[str, float], Array]:
+    """Read a table whose first columns are the vertices of a line."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        head = [line[1:].split(":", 1) for line in lines if line.startswith("#")]
+        whole = {pair[0].strip(): float(pair[1]) for pair in head if len(pair) == 2}
+        names, *body = [line.split("\t") for line in lines if not line.startswith("#")]
+        rows = np.array(body, dtype=np.float64)
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ValueError(f"{path} is not a whole table of numbers ({error})") from error
+    missing = [key for key in keys if key not in whole]
+    if missing:
+        raise ValueError(f"{path} has no line '# {missing[0]}: value' above its table")
+    if tuple(names) != columns:
+        raise ValueError(f"{path} has columns {', '.join(names)}; valid are {', '.join(columns)}")
+    _check_rows(path, rows, outer)
+    return whole, rows
+
+
+def _check_rows(path: Path, rows: Array, outer: Perimeter) -> None:
+    drawn_m = outer.vertices_m
+    if len(rows) != len(drawn_m):
+        raise ValueError(f"{path} has {len(rows)} vertices; valid are the pattern's {len(drawn_m)}")
+    if not np.isfinite(rows).all():
+        row = int(np.argmin(np.isfinite(rows).all(axis=1)))
+        raise ValueError(f"{path} has a number that is not finite at vertex {row}")
+    off_m = np.abs(rows[:, :2] - drawn_m).max(axis=1)
+    if off_m.max() > _NEAR * np.ptp(drawn_m, axis=0).max():
+        row = int(off_m.argmax())
+        (x, y), (drawn_x, drawn_y) = rows[row, :2], drawn_m[row]
+        raise ValueError(
+            f"{path} has vertex {row} at ({x:.6g}, {y:.6g}) m; "
+            f"valid is where it is drawn, ({drawn_x:.6g}, {drawn_y:.6g}) m"
+        )

@@ -1,0 +1,95 @@
+"""A pattern that another program bends: the loop asks by files, and the run stops meanwhile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.body import Answer
+from pattern_fe.coupling.exchange import (
+    ANSWER,
+    LOADS,
+    read_answer,
+    read_loads,
+    write_loads,
+    write_pattern,
+)
+from pattern_fe.pattern import Pattern
+from sandmould.engines.outcome import Outcome
+from sandmould.engines.session import EngineStop, Session
+
+Array = NDArray[np.float64]
+EXCHANGE = "exchange"
+_SAME = 1e-6
+"""Share of the largest force up to which loads are those that were answered: a run that goes on
+from a checkpoint repeats windows, on LAMMPS to some digits."""
+
+
+class FilesBody:
+    """An ``ElasticBody`` behind a folder of files; see ``exchange``.
+
+    An answer that is not there stops the run. Continued, it repeats the windows since its
+    checkpoint, finds their answers, and comes to the one that it waited for.
+    """
+
+    def __init__(self, pattern: Pattern, large: bool, folder: Path, session: Session) -> None:
+        """Write the pattern.
+
+        Parameters
+        ----------
+        pattern : Pattern
+        large : bool
+            Whether displacements are large.
+        folder : Path
+            Of the files; made where it is missing.
+        session : Session
+            Whose step names them.
+        """
+        self._folder, self._session = folder, session
+        self._outer = pattern.surface.outer
+        self._last = (-1, 0)
+        write_pattern(folder, pattern, large)
+
+    @property
+    def vertices_m(self) -> Array:
+        """Vertices of the outer line as drawn, (nv, 2) float64, m."""
+        return self._outer.vertices_m
+
+    def answer(self, load_n: Array) -> Answer:
+        """Write the loads and read the answer to them.
+
+        Raises
+        ------
+        EngineStop
+            Where there is none yet, or none that can be used.
+        """
+        name = self._name()
+        loads, answered = (self._folder / f"{head}{name}.tsv" for head in (LOADS, ANSWER))
+        if not self._is_written(loads, load_n):
+            answered.unlink(missing_ok=True)
+            write_loads(loads, self._outer, load_n, self._session.time_s)
+        if not answered.exists():
+            detail = (
+                f"{loads} has the loads up to {self._session.time_s:.4g} s, and {answered.name} is "
+                f"not there: python -m pattern_fe.coupling.from_files {self._folder} writes it"
+            )
+            raise EngineStop(Outcome.AWAITS_PATTERN, detail)
+        try:
+            return read_answer(answered, self._outer)
+        except ValueError as fault:
+            raise EngineStop(Outcome.AWAITS_PATTERN, str(fault)) from fault
+
+    def _name(self) -> str:
+        """The step, and how often it was asked about before: a window may be repeated."""
+        step, before = self._session.steps, self._last
+        self._last = (step, before[1] + 1 if step == before[0] else 0)
+        return f"{step:09d}_{self._last[1]}"
+
+    def _is_written(self, loads: Path, load_n: Array) -> bool:
+        try:
+            written, _ = read_loads(loads, self._outer)
+        except ValueError:
+            return False
+        return bool(np.allclose(written, load_n, rtol=0.0, atol=_SAME * np.abs(load_n).max()))

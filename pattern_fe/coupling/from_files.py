@@ -1,0 +1,55 @@
+"""The pattern's part of a loop by files: ``python -m pattern_fe.coupling.from_files FOLDER``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from pattern_fe.coupling.exchange import ANSWER, LOADS, read_loads, read_pattern, write_answer
+from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.large_displacement import LoadNotReachedError
+
+
+def answer_all(folder: Path) -> list[Path]:
+    """Bend the pattern of a folder under every file of loads that has no answer yet.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds what ``exchange`` describes.
+
+    Returns
+    -------
+    list of Path
+        Answers that were written.
+
+    Raises
+    ------
+    ValueError
+        With one sentence on the file that cannot be used.
+    LoadNotReachedError
+        When large displacements find no rest under the loads.
+    """
+    pattern, large = read_pattern(folder)
+    body, outer, written = FoamBody(pattern, large), pattern.surface.outer, []
+    for loads in sorted(folder.glob(f"{LOADS}*.tsv")):
+        path = folder / loads.name.replace(LOADS, ANSWER)
+        if path.exists():
+            continue
+        load_n, time_s = read_loads(loads, outer)
+        write_answer(path, outer, body.answer(load_n), time_s)
+        written.append(path)
+    return written
+
+
+def main(folder: Path) -> None:
+    """Answer, and say which files are new."""
+    try:
+        written = answer_all(folder)
+    except (ValueError, LoadNotReachedError) as fault:
+        raise SystemExit(str(fault)) from fault
+    print(f"{folder}: {len(written)} answers written")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,83 @@
+"""The gain of the staggered loop told from the scenario alone, before any sand has moved.
+
+Grains lie in a full row on all that faces up. Each stands on a contact, spring and dashpot, and
+carries a column of sand that is free to move: in a window T a chain of springs k and masses m
+answers an even motion by its impedance sqrt(k m), until the wave has run through the whole column
+and its mass goes along. Contact and column are in series; what stiffness they have against the
+mean displacement of a window, over that of the pattern, is the gain. The fixed share w then holds
+while abs(1 - w (1 + g)) < 1. Left out are sand beside and under the pattern, arches, which make
+the column a spring, and the friction of grains, which lets contacts go.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.contact_rows import shares_along
+from pattern_fe.coupling.explicit_foam import ContactBound
+from pattern_fe.coupling.gain import Gain
+from pattern_fe.pattern import Pattern
+from sandmould.scenario.placement import plan_counts
+from sandmould.scenario.scenario import Scenario
+
+Array = NDArray[np.float64]
+_UP = 0.5
+"""Share of a vertex's area that must face up for grains to lie on it."""
+
+
+def predicted_gain(scenario: Scenario, pattern: Pattern, window_s: float) -> Gain:
+    """Stiffness of a grain times the largest compliance of the pattern under the whole row.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    pattern : Pattern
+        Of the scenario; in 2D.
+    window_s : float
+
+    Returns
+    -------
+    Gain
+        Its ``limit`` is the largest fixed factor that holds.
+    """
+    row = _row(scenario, pattern)
+    compliance_m_n = np.zeros((len(row), 2, len(row), 2))
+    for grain, shares in enumerate(row):
+        for axis in range(2):
+            load = np.zeros_like(pattern.surface.vertices_m)
+            load[:, axis] = shares
+            moved = pattern.on_surface(pattern.solve_linear(pattern.on_nodes(load)))
+            compliance_m_n[:, :, grain, axis] = row @ moved
+    square = compliance_m_n.reshape(2 * len(row), -1)
+    softest_m_n = float(np.linalg.eigvalsh(square)[-1]) if len(row) else 0.0
+    return Gain(_grain_n_m(scenario, window_s) * softest_m_n)
+
+
+def _row(scenario: Scenario, pattern: Pattern) -> Array:
+    """Shape functions under mean grains side by side on what faces up, (grains, nv) float64."""
+    area = pattern.surface.vertex_area_vector_m2
+    faces_up = area[:, 1] > _UP * np.linalg.norm(area, axis=1)
+    shares = shares_along(pattern, _diameter_m(scenario))
+    return np.asarray(shares[shares @ faces_up > 1.0 - 1e-9])
+
+
+def _grain_n_m(scenario: Scenario, window_s: float) -> float:
+    """Stiffness of one contact and the column on it against the mean motion of a window."""
+    diameter_m = _diameter_m(scenario)
+    contact = ContactBound.of_grain(scenario, diameter_m)
+    contact_n_m = contact.stiffness_n_m + 2.0 * contact.damping_n_s_m / window_s
+    mass_kg = scenario.sand.grain_mass_kg(diameter_m, 2)
+    spring_n_m = scenario.contact.grain_grain.normal_stiffness_n_m
+    in_column = sum(plan_counts(scenario)) * diameter_m / scenario.box.width_m
+    reached = window_s * math.sqrt(spring_n_m / mass_kg)
+    column_n_m = 2.0 * mass_kg * max(1.0, min(in_column, reached)) / window_s**2
+    return 1.0 / (1.0 / contact_n_m + 1.0 / column_n_m)
+
+
+def _diameter_m(scenario: Scenario) -> float:
+    """Mean over the grains by number."""
+    classes = scenario.sand.classes(scenario.dimension)
+    return sum(size.count_fraction * size.diameter_m for size in classes)
