@@ -120,7 +120,7 @@ class MetalFlow(Section):
     )
     courant: float = quantity(0.1, "C_n of eq. (8).", source=PAPER, gt=0, le=1)
     tolerance: float = quantity(
-        1e-2, "Of the Poisson equation: residual over source.", source=ARGUED, gt=0, lt=1
+        3e-3, "Of the Poisson equation: residual over source.", source=ARGUED, gt=0, lt=1
     )
     tension: bool = quantity(
         False, "Whether pressures below zero, which pull particles together, are kept.",

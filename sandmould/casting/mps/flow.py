@@ -109,20 +109,23 @@ class Flow:
         self.fluid = particles.fluid
         self.pressure_pa = np.zeros(len(particles.kind))
         """(n,) float64, Pa: sum over the relaxations of the last step, whose impulse it is."""
+        self._solved_pa = np.zeros((self.scheme.relaxations, len(particles.kind)))
+        """Of each relaxation of the last step, close to that of the same one in the next."""
         self._listed: Candidates | None = None
 
     def pour(self, particles: Particles) -> None:
         """Add particles."""
-        pressure = self.pressure_pa
+        pressure, solved = self.pressure_pa, self._solved_pa
         self._set(self.particles.joined(particles))
         self.pressure_pa[: len(pressure)] = pressure
+        self._solved_pa[:, : len(pressure)] = solved
 
     def arrays(self) -> dict[str, Any]:
         """All that the next step depends on, and the cost so far, for a checkpoint."""
-        listed = np.empty((0, 3)) if self._listed is None else self._listed.listed_m
         cost = {f"cost_{name}": value for name, value in vars(self.cost).items()}
         return vars(self.particles) | cost | {
-            "flow_pressure_pa": self.pressure_pa, "time_s": self.time_s, "listed_m": listed
+            "flow_pressure_pa": self.pressure_pa, "solved_pa": self._solved_pa,
+            "time_s": self.time_s,
         }  # fmt: skip
 
     def take_up(self, kept: Mapping[str, Any]) -> None:
@@ -130,9 +133,7 @@ class Flow:
         self._set(Particles(kept["position_m"], kept["velocity_m_s"], kept["kind"]))
         self.pressure_pa, self.time_s = kept["flow_pressure_pa"], float(kept["time_s"])
         self.cost = Cost(*(kept[f"cost_{name}"].item() for name in vars(self.cost)))
-        # listed at other places, candidates come in another order, and sums differ by round-off
-        if len(kept["listed_m"]):
-            self._listed = find_candidates(self.kernel, kept["listed_m"], self.particles.kind)
+        self._solved_pa = kept["solved_pa"]
 
     def speed(self) -> Floats:
         """Speeds of the fluid, (m,) float64, m/s."""
@@ -171,8 +172,8 @@ class Flow:
         u[self.fluid] += dt * (friction[self.fluid] + np.asarray(self.metal.gravity_m_s2))
         x[self.fluid] += dt * u[self.fluid]
         self.pressure_pa = np.zeros(len(state.kind))
-        for _ in range(scheme.relaxations):
-            self._relax(dt, compression_before, rate_before)
+        for number in range(scheme.relaxations):
+            self._relax(number, dt, compression_before, rate_before)
         if scheme.shifting > 0.0:
             self._shift()
         self.time_s += dt
@@ -221,8 +222,10 @@ class Flow:
         self.cost.neighbours_s += time.perf_counter() - begin
         return near
 
-    def _relax(self, dt: float, compression_before: Floats, rate_before: Floats) -> None:
-        """Correct velocities and positions once."""
+    def _relax(
+        self, number: int, dt: float, compression_before: Floats, rate_before: Floats
+    ) -> None:
+        """Correct velocities and positions once, for the number-th time in a step."""
         state, kernel, scheme = self.particles, self.kernel, self.scheme
         near = self._neighbours()
         compression = near.density / kernel.lattice_density - 1.0
@@ -235,10 +238,12 @@ class Flow:
         factor = scheme.source_share * self.metal.density_kg_m3 / dt**2
         begin = time.perf_counter()
         pressure, iterations = solve_pressure(
-            kernel, near, state.kind, surface, factor * asked, scheme.tolerance
-        )
+            kernel, near, state.kind, surface, factor * asked, self._solved_pa[number],
+            scheme.tolerance,
+        )  # fmt: skip
         self.cost.pressure_s += time.perf_counter() - begin
         self.cost.iterations += iterations
+        self._solved_pa[number] = pressure
         if not scheme.tension:
             np.maximum(pressure, 0.0, out=pressure)
         gradient = pressure_gradient(kernel, near, pressure, state.kind, scheme.gradient)

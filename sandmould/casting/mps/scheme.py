@@ -47,7 +47,7 @@ class Scheme:
     """beta, eq. (7): number density over n0 below which a particle is at the surface."""
     courant: float = 0.1
     """C_n, eq. (8)."""
-    tolerance: float = 1e-2
+    tolerance: float = 3e-3
     """Of the Poisson equation: residual over source."""
     tension: bool = False
     """Whether pressures below zero are kept, which pull particles together."""
