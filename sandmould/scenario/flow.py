@@ -111,6 +111,11 @@ class MetalFlow(Section):
         "Pressure gradient: against the least pressure around, which only repels, or another form.",
         source=ARGUED,
     )
+    laplacian: Literal["lattice", "fitted"] = quantity(
+        "lattice",
+        "Laplacian of the velocity: eq. (4), or a fit that is exact off the lattice.",
+        source=PAPER,
+    )
     surface: float = quantity(
         0.985,
         "beta of eq. (7): number density below which a particle is at the surface.",

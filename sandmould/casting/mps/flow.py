@@ -20,13 +20,13 @@ from sandmould.casting.mps.neighbours import (
 from sandmould.casting.mps.operators import (
     crowding,
     density_rate,
-    laplacian,
     pressure_gradient,
 )
 from sandmould.casting.mps.particles import Floats, Particles
 from sandmould.casting.mps.pressure import solve_pressure
 from sandmould.casting.mps.scheme import VISCOUS_SHARE, Metal, Scheme
 from sandmould.casting.mps.sources import SOURCES, Tentative
+from sandmould.casting.mps.viscosity import LAPLACIANS
 from sandmould.casting.mps.weight import Kernel
 
 MOULD_SHARE = 0.2
@@ -168,7 +168,9 @@ class Flow:
         x, u = state.position_m, state.velocity_m_s
         compression_before = near.density / kernel.lattice_density - 1.0
         rate_before = density_rate(kernel, near, u) / kernel.lattice_density
-        friction = self.metal.viscosity_m2_s * laplacian(kernel, near, u, state.kind)
+        friction = self.metal.viscosity_m2_s * LAPLACIANS[scheme.laplacian](
+            kernel, near, u, state.kind
+        )
         u[self.fluid] += dt * (friction[self.fluid] + np.asarray(self.metal.gravity_m_s2))
         x[self.fluid] += dt * u[self.fluid]
         self.pressure_pa = np.zeros(len(state.kind))
