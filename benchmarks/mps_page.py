@@ -137,7 +137,9 @@ def _peers_words(rows: Sequence[Row], duration_s: float) -> str:
         for row in ran
     ]  # fmt: skip
     said = (f"Set as in PySPH's own dam_break_2d, quintic kernel, one thread, {duration_s:g} s; in "
-            "an environment of its own (`benchmarks/peers/requirements_flow.txt`).")  # fmt: skip
+            "an environment of its own (`benchmarks/peers/requirements_flow.txt`). What differs, and why, "
+            "is said in `benchmarks/peers/run_pysph.py`. Where the mean speed is metres a second "
+            "the metal has left the tank.")  # fmt: skip
     return "\n\n".join([said, table(head, lines).rstrip(), *failed])
 
 

@@ -1,5 +1,8 @@
 """The paper's tank of metal at rest by PySPH's implicit schemes, set as in its dam_break_2d.
 
+But for iisph's adaptive steps, which shrink to 2e-8 s here. Where metal is half a particle off the
+walls iisph throws it out at 6 m/s; a quarter more on all sides is dam_break_2d's own remedy.
+
 ``python run_pysph.py iisph|sisph SECONDS`` prints one JSON object: times, pressure of the particle
 nearest to 70 mm below the surface, mean speed, and processor seconds without compiling.
 """
@@ -26,6 +29,8 @@ SIZE_M, COLUMNS, ROWS, WALL_ROWS, LAYERS = 2e-3, 20, 40, 51, 3
 DENSITY, NU, G = 2500.0, 1e-5, 9.8
 SMOOTHING = 1.3
 """Of the particle size, as in dam_break_2d."""
+GAP = 0.25
+"""Particles that iisph's metal is further off the walls."""
 PROBE_M = (0.02, 0.01)
 FASTEST_M_S = (2.0 * G * ROWS * SIZE_M) ** 0.5
 
@@ -61,9 +66,8 @@ class Tank(Application):
         """Steps as in dam_break_2d."""
         h = SMOOTHING * SIZE_M
         kernel = QuinticSpline(dim=2)
-        adaptive = self.wanted == "iisph"
         self.scheme.configure_solver(
-            kernel=kernel, dt=0.125 * h / FASTEST_M_S, tf=self.until_s, adaptive_timestep=adaptive,
+            kernel=kernel, dt=0.125 * h / FASTEST_M_S, tf=self.until_s, adaptive_timestep=False,
             pfreq=10**9,
         )  # fmt: skip
 
@@ -72,6 +76,10 @@ class Tank(Application):
         x, y = lattice(range(-LAYERS, COLUMNS + LAYERS), range(-LAYERS, WALL_ROWS))
         outside = (x < 0.0) | (x > COLUMNS * SIZE_M) | (y < 0.0)
         fx, fy = lattice(range(COLUMNS), range(ROWS))
+        if self.wanted == "iisph":
+            half_m = 0.5 * COLUMNS * SIZE_M
+            fx = half_m + (fx - half_m) * (1.0 - 2.0 * GAP / COLUMNS)
+            fy = fy + GAP * SIZE_M
         same = {"m": SIZE_M**2 * DENSITY, "rho": DENSITY, "h": SMOOTHING * SIZE_M}
         fluid = get_particle_array(name="fluid", x=fx, y=fy, **same)
         boundary = get_particle_array(name="boundary", x=x[outside], y=y[outside], **same)
