@@ -136,10 +136,12 @@ def _peers_words(rows: Sequence[Row], duration_s: float) -> str:
          f"{row['mean_pressure_over_ideal']:.3f}", f"{row['mean_speed_m_s']:.4f}")
         for row in ran
     ]  # fmt: skip
-    said = (f"Set as in PySPH's own dam_break_2d, quintic kernel, one thread, {duration_s:g} s; in "
-            "an environment of its own (`benchmarks/peers/requirements_flow.txt`). What differs, and why, "
-            "is said in `benchmarks/peers/run_pysph.py`. Where the mean speed is metres a second "
-            "the metal has left the tank.")  # fmt: skip
+    said = (
+        f"Set as in PySPH's own dam_break_2d, quintic kernel, one thread, {duration_s:g} s; in "
+        "an environment of its own (`benchmarks/peers/requirements_flow.txt`). What differs, and "
+        "why, is said in `benchmarks/peers/run_pysph.py`. Where the mean speed is metres a "
+        "second the metal has left the tank."
+    )
     return "\n\n".join([said, table(head, lines).rstrip(), *failed])
 
 
