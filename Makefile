@@ -3,7 +3,8 @@
 # The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, status, decks, schema, lock,
 # twins (the engines compared, docs/engine_twins.md), verification (docs/verification.md),
 # stability (docs/stability.md), benchmarks (docs/speed.md), peers (docs/calibration_peers.md),
-# scaling (docs/scaling.md), results-check, clean.
+# scaling (docs/scaling.md), solidification (docs/solidification.md), flow (docs/metal_flow.md),
+# results-check, clean.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= $(shell nproc)
@@ -13,7 +14,7 @@ INSTALLED := .venv/installed
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
-.PHONY: demo study plan status twins verification stability test lint decks schema lock results-check clean benchmarks peers scaling solidification
+.PHONY: demo study plan status twins verification stability test lint decks schema lock results-check clean benchmarks peers scaling solidification flow
 
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
@@ -54,6 +55,14 @@ scaling: $(INSTALLED) .venv-peers/installed
 	$(PYTHON) -m venv .venv-peers
 	.venv-peers/bin/pip install --quiet --disable-pip-version-check --requirement $<
 	touch $@
+
+.venv-peers-flow/installed: benchmarks/peers/requirements_flow.txt
+	$(PYTHON) -m venv .venv-peers-flow
+	.venv-peers-flow/bin/pip install --quiet --disable-pip-version-check --requirement $<
+	touch $@
+
+flow: $(INSTALLED) .venv-peers-flow/installed
+	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.mps $(QUICK)
 
 # Compiled loops of one thread wait for no other.
 solidification: $(INSTALLED)

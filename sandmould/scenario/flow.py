@@ -111,6 +111,11 @@ class MetalFlow(Section):
         "Pressure gradient: against the least pressure around, which only repels, or another form.",
         source=ARGUED,
     )
+    laplacian: Literal["lattice", "fitted"] = quantity(
+        "lattice",
+        "Laplacian of the velocity: eq. (4), or a fit that is exact off the lattice.",
+        source=PAPER,
+    )
     surface: float = quantity(
         0.985,
         "beta of eq. (7): number density below which a particle is at the surface.",
@@ -120,7 +125,7 @@ class MetalFlow(Section):
     )
     courant: float = quantity(0.1, "C_n of eq. (8).", source=PAPER, gt=0, le=1)
     tolerance: float = quantity(
-        1e-2, "Of the Poisson equation: residual over source.", source=ARGUED, gt=0, lt=1
+        3e-3, "Of the Poisson equation: residual over source.", source=ARGUED, gt=0, lt=1
     )
     tension: bool = quantity(
         False, "Whether pressures below zero, which pull particles together, are kept.",

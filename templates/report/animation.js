@@ -7,8 +7,7 @@
   const measure = JSON.parse(byId("film-measure").textContent);
   const stored = [...document.querySelectorAll("script.film")];
   const ABSENT = 65535, FRAMES_PER_S = 20, MARGIN_PX = 8;
-  const films = [];
-  let film = null, timer = null;
+  let film = null;
 
   async function unpack(packed) {
     const raw = await inflate(packed.data);
@@ -50,11 +49,11 @@
     return points;
   }
 
-  function drawScene(v) {
+  function drawScene(v, frame) {
     v.pen.lineWidth = 1.2;
     v.pen.strokeStyle = "#404040";
     v.pen.fillStyle = "#cccccc";
-    const bent = film.bent.length ? [outline(film.bent[Number(slider.value)])] : [];
+    const bent = film.bent.length ? [outline(film.bent[frame])] : [];
     for (const solid of [...scene.solids, ...bent]) { trace(v, solid); v.pen.closePath(); v.pen.fill(); v.pen.stroke(); }
     v.pen.lineWidth = 2;
     for (const wall of scene.walls) { trace(v, wall); v.pen.stroke(); }
@@ -108,22 +107,24 @@
       v.pen.stroke();
     };
     if (!cut.checked) {
-      drawScene(v);
+      drawScene(v, frame);
       order.forEach(drawGrain);
       return;
     }
     order.filter((i) => !inside(i)).forEach(drawGrain);
     v.pen.fillStyle = "#eeeeee";
     for (const bore of scene.bores) { trace(v, bore); v.pen.closePath(); v.pen.fill(); }
-    drawScene(v);
+    drawScene(v, frame);
     order.filter(inside).forEach(drawGrain);
   }
 
-  function draw() {
-    const frame = Number(slider.value), v = view();
+  function draw(shown, frame) {
+    if (film !== shown) phases(shown);
+    film = shown;
+    const v = view();
     if (film.dimension === 2) {
       drawDiscs(v, film.at(0, frame), film.at(1, frame));
-      drawScene(v);
+      drawScene(v, frame);
     } else {
       drawSpheres(v, frame);
     }
@@ -135,23 +136,7 @@
     slider.setAttribute("aria-valuetext", clock);
   }
 
-  function pause() {
-    clearInterval(timer);
-    timer = null;
-    play.textContent = "Play";
-  }
-
-  function start() {
-    if (Number(slider.value) >= film.frames - 1) slider.value = 0;
-    play.textContent = "Pause";
-    timer = setInterval(() => {
-      slider.value = Number(slider.value) + 1;
-      draw();
-      if (Number(slider.value) >= film.frames - 1) pause();
-    }, 1000 / FRAMES_PER_S);
-  }
-
-  function phases() {
+  function phases(film) {
     const filling = film.vibration_time_s.filter((t) => t < 0).length;
     byId("film-phases").innerHTML = "";
     for (const [name, frames] of [["filling", filling], ["vibration", film.frames - filling]]) {
@@ -166,30 +151,16 @@
   }
 
   // another run is shown at the moment nearest to the one before
-  async function show(number) {
-    pause();
+  function frameFor(next, before, frame) {
     // vibration time is below zero all the while the box is filled
-    const moment = (it, frame) => (it.vibration_time_s[frame] < 0 ? it.time_s[frame] - 1e6 : it.vibration_time_s[frame]);
-    const now = film && moment(film, Number(slider.value));
-    try {
-      films[number] = films[number] || (await unpack(JSON.parse(stored[number].textContent)));
-    } catch (error) {
-      time.textContent = `This browser cannot unpack the film (${error.message}).`;
-      return;
-    }
-    film = films[number];
-    slider.max = film.frames - 1;
-    const gaps = film.time_s.map((t, frame) => Math.abs(moment(film, frame) - now));
-    const start = film.vibration_time_s.findIndex((t) => t >= 0);
-    slider.value = now === null ? Math.max(start, 0) : gaps.indexOf(Math.min(...gaps));
-    phases();
-    draw();
+    const moment = (it, n) => (it.vibration_time_s[n] < 0 ? it.time_s[n] - 1e6 : it.vibration_time_s[n]);
+    if (!before) return Math.max(next.time_s.findIndex((_, n) => next.vibration_time_s[n] >= 0), 0);
+    const gaps = next.time_s.map((_, n) => Math.abs(moment(next, n) - moment(before, frame)));
+    return gaps.indexOf(Math.min(...gaps));
   }
 
-  play.addEventListener("click", () => (timer === null ? start() : pause()));
-  slider.addEventListener("input", () => { pause(); draw(); });
-  choice.addEventListener("change", () => show(Number(choice.value)));
-  if (cut) cut.addEventListener("change", draw);
-  new ResizeObserver(() => film && draw()).observe(canvas.parentElement);
-  show(0);
+  const redraw = playFilms({
+    page: { slider, play, choice, time, canvas }, stored, framesPerS: FRAMES_PER_S, unpack, draw, frameFor,
+  });
+  if (cut) cut.addEventListener("change", redraw);
 }

@@ -6,8 +6,6 @@
   const stored = [...document.querySelectorAll("script.flow-film")];
   const scale = JSON.parse(byId("flow-scale").textContent);
   const ABSENT = 65535, FRAMES_PER_S = 15, HIGHEST_PX = 640;
-  const films = [];
-  let film = null, timer = null;
 
   async function unpack(packed) {
     const raw = await inflate(packed.data);
@@ -17,8 +15,8 @@
     return { ...packed, data: null, frames, at, shade };
   }
 
-  function draw() {
-    const frame = Number(slider.value), up = film.dimension - 1, ratio = window.devicePixelRatio || 1;
+  function draw(film, frame) {
+    const up = film.dimension - 1, ratio = window.devicePixelRatio || 1;
     const wide_m = film.high_m[0] - film.low_m[0], high_m = film.high_m[up] - film.low_m[up];
     const pxPerM = Math.min(canvas.parentElement.clientWidth / wide_m, HIGHEST_PX / high_m);
     const width = pxPerM * wide_m, height = pxPerM * high_m;
@@ -55,41 +53,10 @@
     slider.setAttribute("aria-valuetext", time.textContent);
   }
 
-  function pause() {
-    clearInterval(timer);
-    timer = null;
-    play.textContent = "Play";
-  }
-
-  function start() {
-    if (Number(slider.value) >= film.frames - 1) slider.value = 0;
-    play.textContent = "Pause";
-    timer = setInterval(() => {
-      slider.value = Number(slider.value) + 1;
-      draw();
-      if (Number(slider.value) >= film.frames - 1) pause();
-    }, 1000 / FRAMES_PER_S);
-  }
-
-  async function show(number) {
-    pause();
-    const now = film ? film.time_s[Number(slider.value)] : Infinity;
-    try {
-      films[number] = films[number] || (await unpack(JSON.parse(stored[number].textContent)));
-    } catch (error) {
-      time.textContent = `This browser cannot unpack the film (${error.message}).`;
-      return;
-    }
-    film = films[number];
-    slider.max = film.frames - 1;
-    slider.value = film.time_s.filter((t) => t <= now).length - 1;
-    draw();
-  }
-
-  play.addEventListener("click", () => (timer === null ? start() : pause()));
-  slider.addEventListener("input", () => { pause(); draw(); });
-  choice.addEventListener("change", () => show(Number(choice.value)));
-  shown.addEventListener("change", draw);
-  new ResizeObserver(() => film && draw()).observe(canvas.parentElement);
-  show(0);
+  const redraw = playFilms({
+    page: { slider, play, choice, time, canvas }, stored, framesPerS: FRAMES_PER_S, unpack, draw,
+    frameFor: (next, before, frame) =>
+      next.time_s.filter((t) => t <= (before ? before.time_s[frame] : Infinity)).length - 1,
+  });
+  shown.addEventListener("change", redraw);
 }

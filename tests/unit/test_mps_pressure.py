@@ -37,11 +37,16 @@ def test_solution_is_that_of_a_direct_solver():
     assert not rows.closed.any()
     source = np.random.default_rng(2).normal(size=len(tank.kind))
     direct = rows.scale * spsolve(matrix.tocsc(), rows.scale * source[rows.number])
-    pressure, iterations = solve_pressure(kernel, near, tank.kind, surface, source, 1e-10)
+    asked = (kernel, near, tank.kind, surface, source)
+    pressure, iterations = solve_pressure(*asked, 0 * source, 1e-10)
     # the residual is 1e-10 of the source; the condition number is about 1000
     assert pressure[rows.number] == pytest.approx(direct, abs=1e-6 * np.abs(direct).max())
     assert 5 < iterations < len(direct)
     assert not pressure[surface | (tank.kind == DUMMY)].any()
+    # a close guess spares iterations, one worse than nothing is not taken
+    assert solve_pressure(*asked, pressure, 1e-8)[1] == 0
+    assert 0 < solve_pressure(*asked, 0.99 * pressure, 1e-10)[1] < iterations
+    assert solve_pressure(*asked, 1e3 * pressure[::-1], 1e-10)[1] == iterations
 
 
 def test_a_uniform_source_makes_the_pressure_of_a_column():
@@ -55,7 +60,7 @@ def test_a_uniform_source_makes_the_pressure_of_a_column():
     # the lowest row has nothing under it: no flux, as at a wall
     surface = height > (cells - 2) * SIZE_M
     pressure, _ = solve_pressure(
-        kernel, near, strip.kind, surface, np.full(len(height), source), 1e-8
+        kernel, near, strip.kind, surface, np.full(len(height), source), 0 * height, 1e-8
     )
     depth = height[surface].min() - 0.5 * SIZE_M
     exact = 0.5 * source * (depth**2 - height**2)
@@ -74,7 +79,7 @@ def test_a_region_without_surface_has_its_least_pressure_at_zero():
     surface = np.zeros(cells**2, dtype=bool)
     # the constant part of the source cannot be met and is left out
     source = 1000.0 * np.cos(x) + 300.0
-    pressure, _ = solve_pressure(kernel, near, fluid.kind, surface, source, 1e-8)
+    pressure, _ = solve_pressure(kernel, near, fluid.kind, surface, source, 0 * source, 1e-8)
     assert pressure.min() == 0.0
     wave = pressure - pressure.mean()
     exact = 1000.0 * (length_m / (2 * np.pi)) ** 2 * np.cos(x)

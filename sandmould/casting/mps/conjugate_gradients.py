@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sandmould.casting.mps.particles import Floats
-from sandmould.casting.mps.weight import OPTIONS
+from sandmould.casting.mps.weight import INLINED, OPTIONS
 
 RELAXATION = 1.5
 MOST_ITERATIONS = 2000
@@ -29,39 +29,63 @@ class System(NamedTuple):
     middle: NDArray[np.int64]
     """(m,) int64: where the entries left of the diagonal end and those right of it begin."""
     column: NDArray[np.uint32]
-    """(e,) uint32."""
+    """(e,) uint32: rising within each row."""
     value: Floats
     """(e,) float64."""
 
 
-@njit(**OPTIONS)
-def _sweep_up(system: System, diagonal: float, right: Floats, out: Floats) -> None:
-    """Solve (diagonal + U) out = right."""
+@njit(**INLINED)
+def _sweep_up(system: System, right: Floats, out: Floats) -> None:
+    """Solve (1/RELAXATION + U) out = right, nearest columns last: they are waited for."""
     for q in range(len(right) - 1, -1, -1):
         total = right[q]
-        for k in range(system.middle[q], system.start[q + 1]):
+        for k in range(system.start[q + 1] - 1, system.middle[q] - 1, -1):
             total -= system.value[k] * out[system.column[k]]
-        out[q] = total / diagonal
+        out[q] = RELAXATION * total
 
 
-@njit(**OPTIONS)
-def _sweep_down(system: System, diagonal: float, right: Floats, out: Floats) -> None:
-    """Solve (diagonal + L) out = right."""
+@njit(**INLINED)
+def _sweep_down(system: System, right: Floats, out: Floats) -> None:
+    """Solve (1/RELAXATION + L) out = right, likewise."""
     for q in range(len(right)):
         total = right[q]
         for k in range(system.start[q], system.middle[q]):
             total -= system.value[k] * out[system.column[k]]
-        out[q] = total / diagonal
+        out[q] = RELAXATION * total
+
+
+@njit(**INLINED)
+def _norm2(values: Floats) -> float:
+    total = 0.0
+    for q in range(len(values)):
+        total += values[q] * values[q]
+    return total
 
 
 @njit(**OPTIONS)
-def solve(system: System, right: Floats, tolerance: float) -> tuple[Floats, int, bool]:
+def _rest(system: System, right: Floats, solution: Floats) -> Floats:
+    """What a solution leaves of the right-hand side."""
+    left = np.empty(len(right))
+    for q in range(len(right)):
+        total = right[q] - solution[q]
+        for k in range(system.start[q], system.start[q + 1]):
+            total -= system.value[k] * solution[system.column[k]]
+        left[q] = total
+    return left
+
+
+@njit(**OPTIONS)
+def solve(
+    system: System, right: Floats, guess: Floats, tolerance: float
+) -> tuple[Floats, int, bool]:
     """Solve a system, or, if it is singular, find a solution where there is one.
 
     Parameters
     ----------
     system : System
     right : (m,) float64
+    guess : (m,) float64
+        Where the iteration starts, unless 0 leaves a smaller residual.
     tolerance : float
         Residual over right-hand side, both in the norm of the preconditioner.
 
@@ -73,23 +97,27 @@ def solve(system: System, right: Floats, tolerance: float) -> tuple[Floats, int,
         Whether the tolerance was reached in ``MOST_ITERATIONS``.
     """
     m = len(right)
-    diagonal = 1.0 / RELAXATION
+    between = 1.0 - 2.0 / RELAXATION
     # with K = diagonal + L, A = K + K' + (1 - 2 diagonal): iterate on K^-1 A K'^-1, y = K' x
-    solution = np.zeros(m)
-    residual = np.empty(m)
-    _sweep_down(system, diagonal, right, residual)
-    norm2 = 0.0
-    for q in range(m):
-        norm2 += residual[q] * residual[q]
+    residual, direction = np.empty(m), np.empty(m)
+    _sweep_down(system, right, residual)
+    norm2 = _norm2(residual)
     limit = tolerance * tolerance * norm2
-    direction = residual.copy()
+    _sweep_down(system, _rest(system, right, guess), direction)
+    guessed2 = _norm2(direction)
+    solution = np.zeros(m)
+    if guessed2 < norm2:
+        solution[:] = guess
+        residual[:] = direction
+        norm2 = guessed2
+    direction[:] = residual
     inner, middle, product = np.empty(m), np.empty(m), np.empty(m)
     count = 0
     while norm2 > limit and count < MOST_ITERATIONS:
-        _sweep_up(system, diagonal, direction, inner)
+        _sweep_up(system, direction, inner)
         for q in range(m):
-            middle[q] = direction[q] + (1.0 - 2.0 * diagonal) * inner[q]
-        _sweep_down(system, diagonal, middle, product)
+            middle[q] = direction[q] + between * inner[q]
+        _sweep_down(system, middle, product)
         curvature = 0.0
         for q in range(m):
             product[q] += inner[q]

@@ -23,7 +23,7 @@ class Candidates(NamedTuple):
     start: NDArray[np.int64]
     """(n + 1,) int64: candidates of particle i are start[i] to start[i + 1]."""
     other: NDArray[np.uint32]
-    """(p,) uint32."""
+    """(p,) uint32: rising within each row, so that no sum depends on when the list was made."""
     listed_m: Floats
     """(n, 3) float64, m: positions that the list was made at."""
 
@@ -37,8 +37,6 @@ class Neighbours(NamedTuple):
     """(e,) uint32."""
     away_m: Floats
     """(e, 3) float64, m: from particle i to the nearest image of its neighbour."""
-    weight: Floats
-    """(e,) float64: w, eq. (1)."""
     share: Floats
     """(e,) float64, 1/m2: w / r^2."""
     density: Floats
@@ -49,7 +47,7 @@ class Neighbours(NamedTuple):
 def _both_ways(
     n: int, pair: NDArray[np.int64], kind: Kinds
 ) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Rows of candidates from pairs; dummies need none of each other."""
+    """Rows of candidates from pairs, in rising order; dummies need none of each other."""
     start = np.zeros(n + 1, dtype=np.int64)
     for k in range(len(pair)):
         i, j = pair[k, 0], pair[k, 1]
@@ -59,13 +57,21 @@ def _both_ways(
     for i in range(n):
         start[i + 1] += start[i]
     place = start[:-1].copy()
-    other = np.empty(start[n], dtype=np.uint32)
+    mixed = np.empty(start[n], dtype=np.uint32)
     for k in range(len(pair)):
         i, j = pair[k, 0], pair[k, 1]
         if kind[i] != DUMMY or kind[j] != DUMMY:
-            other[place[i]] = j
-            other[place[j]] = i
+            mixed[place[i]] = j
+            mixed[place[j]] = i
             place[i] += 1
+            place[j] += 1
+    # whoever has i as a candidate is one of i: handing i out row after row sorts the rows
+    other = np.empty(start[n], dtype=np.uint32)
+    place = start[:-1].copy()
+    for i in range(n):
+        for k in range(start[i], start[i + 1]):
+            j = mixed[k]
+            other[place[j]] = i
             place[j] += 1
     return start, other
 
@@ -126,34 +132,42 @@ def find_neighbours(
     position : (n, 3) float64, m
     kind : (n,) int8
     """
-    n = len(position)
+    n, most = len(position), len(listed.other)
     start = np.zeros(n + 1, dtype=np.int64)
-    other = np.empty(len(listed.other), dtype=np.uint32)
-    away = np.empty((len(listed.other), 3))
-    weights = np.empty(len(listed.other))
-    share = np.empty(len(listed.other))
-    density = np.zeros(n)
+    other = np.empty(most, dtype=np.uint32)
+    away = np.empty((most, 3))
+    distance2 = np.empty(most)
     reach2 = kernel.reach_m**2
     period = kernel.period_m
     e = 0
     for i in range(n):
         if kind[i] != DUMMY:
             x, y, z = position[i, 0], position[i, 1], position[i, 2]
-            total = 0.0
             for k in range(listed.start[i], listed.start[i + 1]):
                 j = listed.other[k]
                 dx = _nearest(position[j, 0] - x, period[0])
                 dy = _nearest(position[j, 1] - y, period[1])
                 dz = _nearest(position[j, 2] - z, period[2])
                 r2 = dx * dx + dy * dy + dz * dz
-                if r2 < reach2:
-                    w = weight(kernel, math.sqrt(r2))
-                    other[e] = j
-                    away[e, 0], away[e, 1], away[e, 2] = dx, dy, dz
-                    weights[e] = w
-                    share[e] = w / r2
-                    total += w
-                    e += 1
-            density[i] = total
+                # written in any case, kept in reach: no processor could predict the branch
+                other[e] = j
+                away[e, 0], away[e, 1], away[e, 2] = dx, dy, dz
+                distance2[e] = r2
+                e += r2 < reach2
         start[i + 1] = e
-    return Neighbours(start, other[:e], away[:e], weights[:e], share[:e], density)
+    share, density = _weigh(kernel, start, distance2[:e])
+    return Neighbours(start, other[:e], away[:e], share, density)
+
+
+@njit(**OPTIONS)
+def _weigh(kernel: Kernel, start: NDArray[np.int64], distance2: Floats) -> tuple[Floats, Floats]:
+    """Weights over squared distances, and their number densities."""
+    weights, share = np.empty(len(distance2)), np.empty(len(distance2))
+    for k in range(len(distance2)):
+        weights[k] = weight(kernel, math.sqrt(distance2[k]))
+        share[k] = weights[k] / distance2[k]
+    density = np.zeros(len(start) - 1)
+    for i in range(len(density)):
+        for k in range(start[i], start[i + 1]):
+            density[i] += weights[k]
+    return share, density

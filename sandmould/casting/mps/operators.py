@@ -67,7 +67,8 @@ def density_rate(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
     rate = np.zeros(len(velocity))
     for i in range(len(velocity)):
         for k in range(near.start[i], near.start[i + 1]):
-            r = math.sqrt(near.weight[k] / near.share[k]) if near.share[k] > 0.0 else kernel.reach_m
+            away = near.away_m[k]
+            r = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
             rate[i] += weight_slope(kernel, r) / r * _approach(near, velocity, k, i)
     return rate
 

@@ -85,16 +85,14 @@ def assemble(kernel: Kernel, near: Neighbours, kind: Kinds, surface: Flags) -> R
     e = 0
     for q in range(m):
         i = number[q]
-        # earlier columns first: the sweeps of the solver go through either part of a row
-        for later in (False, True):
-            if later:
-                middle[q] = e
-            for k in range(near.start[i], near.start[i + 1]):
-                c = row[near.other[k]]
-                if c >= 0 and (c > q) == later:
-                    column[e] = c
-                    value[e] = -factor * near.share[k] * scale[q] * scale[c]
-                    e += 1
+        middle[q] = e
+        for k in range(near.start[i], near.start[i + 1]):
+            c = row[near.other[k]]
+            if c >= 0:
+                column[e] = c
+                value[e] = -factor * near.share[k] * scale[q] * scale[c]
+                e += 1
+                middle[q] += c < q
         start[q + 1] = e
     system = System(start, middle, column[:e], value[:e])
     _spread(system, opened[:m])
@@ -128,6 +126,7 @@ def solve_pressure(
     kind: Kinds,
     surface: Flags,
     source: Floats,
+    guess: Floats,
     tolerance: float,
 ) -> tuple[Floats, int]:
     """Solve for the pressure by conjugate gradients.
@@ -141,6 +140,8 @@ def solve_pressure(
         As ``assemble``.
     source : (n,) float64, Pa/m2
         Minus the Laplacian wanted.
+    guess : (n,) float64, Pa
+        Where the iteration starts.
     tolerance : float
         As ``conjugate_gradients.solve``.
 
@@ -166,7 +167,8 @@ def solve_pressure(
         _refuse_crowd(near.density[rows.number[region]] / kernel.lattice_density - 1.0)
         null = 1.0 / rows.scale[region]
         wanted[region] -= null * float(null @ wanted[region]) / float(null @ null)
-    found, iterations, met = solve(rows.system, wanted, tolerance)
+    begin = guess[rows.number] / rows.scale
+    found, iterations, met = solve(rows.system, wanted, begin, tolerance)
     if not met:
         raise NotSolvedError(
             f"the pressure of {len(wanted)} particles did not converge to {tolerance:g} "

@@ -118,14 +118,15 @@ class Watch:
     def __init__(self, place_m: Floats) -> None:
         """Watch places, (k, 3) float64, m."""
         self._place = place_m
-        self._rows: list[tuple[float, ...]] = []
+        self.rows: list[tuple[float, ...]] = []
+        """One a step: time, speeds, energy, top, pressures around and of the nearest."""
 
     def __call__(self, flow: Flow) -> None:
         """Note the state after a step."""
         speed = flow.speed()
         g = np.asarray(flow.metal.gravity_m_s2)
         up = -g / max(float(np.linalg.norm(g)), 1e-300)
-        self._rows.append(
+        self.rows.append(
             (
                 flow.time_s,
                 float(speed.max(initial=0.0)),
@@ -140,7 +141,7 @@ class Watch:
     def history(self) -> History:
         """All that was noted so far."""
         k = len(self._place)
-        rows = np.array(self._rows).reshape(-1, 5 + 2 * k)
+        rows = np.array(self.rows).reshape(-1, 5 + 2 * k)
         time_s = rows[:, 0]
         around, nearest = rows[:, 5 : 5 + k], rows[:, 5 + k :]
         dt_s = np.diff(time_s, prepend=0.0)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from sandmould.casting.mps.operators import GRADIENTS
 from sandmould.casting.mps.sources import SOURCES
+from sandmould.casting.mps.viscosity import LAPLACIANS
 
 VISCOUS_SHARE = 0.2
 """Of r0^2/nu, the longest stable explicit step of the viscosity (0.3 on a square lattice)."""
@@ -43,11 +45,13 @@ class Scheme:
     """One of ``SOURCES``."""
     gradient: str = "least"
     """One of ``GRADIENTS``."""
+    laplacian: str = "lattice"
+    """One of ``LAPLACIANS``, for the viscosity."""
     surface: float = 0.985
     """beta, eq. (7): number density over n0 below which a particle is at the surface."""
     courant: float = 0.1
     """C_n, eq. (8)."""
-    tolerance: float = 1e-2
+    tolerance: float = 3e-3
     """Of the Poisson equation: residual over source."""
     tension: bool = False
     """Whether pressures below zero are kept, which pull particles together."""
@@ -69,6 +73,11 @@ class Scheme:
             raise ValueError(f"surface is {self.surface}: valid is 0.8 to 1")
         if not 0.0 <= self.shifting <= 0.5:
             raise ValueError(f"shifting is {self.shifting}: valid is 0 to 0.5")
-        for name, valid in (("source", SOURCES), ("gradient", GRADIENTS)):
+        choices: dict[str, Collection[str]] = {
+            "source": SOURCES,
+            "gradient": GRADIENTS,
+            "laplacian": LAPLACIANS,
+        }
+        for name, valid in choices.items():
             if getattr(self, name) not in valid:
                 raise ValueError(f"{name} is '{getattr(self, name)}': valid are {', '.join(valid)}")

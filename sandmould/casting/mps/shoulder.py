@@ -160,13 +160,14 @@ class Ladle:
         self._layer = np.column_stack((across, np.full(len(across), high_m)))
         self._rate = rate_kg_s
         self._mass_kg = flow.metal.density_kg_m3 * size_m**3
-        self._poured = 0
+        self.poured = 0
+        """Particles so far."""
         self._wanted = len(casting.filled_m(size_m)) - int(flow.fluid.sum())
 
     @property
     def poured_kg(self) -> float:
         """Mass poured so far."""
-        return self._poured * self._mass_kg
+        return self.poured * self._mass_kg
 
     @property
     def lasts_s(self) -> float:
@@ -175,13 +176,13 @@ class Ladle:
 
     def __call__(self, flow: Flow) -> None:
         """Add a layer whenever its mass is due; pass it to ``Flow.advance`` as ``each``."""
-        count = min(len(self._layer), self._wanted - self._poured)
+        count = min(len(self._layer), self._wanted - self.poured)
         if count <= 0 or self.poured_kg + count * self._mass_kg > self._rate * flow.time_s:
             return
         fresh = at_rest(self._layer[:count], FLUID)
         fresh.velocity_m_s[:, 2] = -POUR_M_S
         flow.pour(fresh)
-        self._poured += count
+        self.poured += count
 
 
 @dataclass(frozen=True)

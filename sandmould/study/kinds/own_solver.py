@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+import pandas as pd
+
+from sandmould.engines.products import Computed
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section
+from sandmould.study.moments import LAST_MEASURED
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from sandmould.study.expand import Run
+
+SLOWER = 10.0
+"""Than predicted a machine may be, and a run longer than expected."""
 
 
 def defaults() -> dict[str, Any]:
@@ -34,16 +45,79 @@ def ranks(scenario: Section) -> int:
     return 1
 
 
-def write_given(run: Run, folder: Path, solver: str) -> None:
-    """Write every value of a run's scenario with its source to ``deck.in``.
+class Solver(Protocol):
+    """What a module that computes runs offers."""
 
-    Parameters
-    ----------
-    run : Run
-    folder : Path
-    solver : str
-        Hash of the solver's files.
-    """
+    def source_files(self) -> list[Path]:
+        """Files of the solver."""
+
+    def source_hash(self) -> str:
+        """State of the solver."""
+
+    def compute(self, scenario: Any, folder: Path, run: str) -> Computed:
+        """Compute a run."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """Entries of a kind whose solver takes a whole scenario."""
+
+    solver: Solver
+    predicted_s: Callable[[Any], float]
+
+    def sources(self, scenario: Section) -> list[Path]:
+        """Our solver."""
+        return self.solver.source_files()
+
+    def template_hash(self, scenario: Section) -> str:
+        """Hash of our solver."""
+        return self.solver.source_hash()
+
+    def allowed_s(self, scenario: Section) -> float:
+        """Wall time on a slow machine."""
+        return SLOWER * self.predicted_s(scenario)
+
+    def render(self, run: Run, folder: Path) -> None:
+        """Write down all that the solver is given, each value with its source."""
+        _write_given(run, folder, self.solver.source_hash())
+
+    def compute(self, run: Run, folder: Path) -> Computed:
+        """Compute a run from its newest checkpoint, or from its beginning."""
+        return self.solver.compute(run.scenario, folder, run.run)
+
+
+def read_fields(folder: Path) -> dict[str, Any] | None:
+    """Arrays of ``fields.npz``; None where the run broke off before it wrote them."""
+    path = folder / "fields.npz"
+    if not path.exists():
+        return None
+    with np.load(path) as kept:
+        return dict(kept)
+
+
+def write_measures(folder: Path, table: pd.DataFrame) -> None:
+    """Write the measures of a run."""
+    partial = folder / "measures.tsv.partial"
+    table.to_csv(partial, sep="\t", index=False, float_format="%.10g")
+    os.replace(partial, folder / "measures.tsv")
+
+
+def write_picture(
+    folder: Path, size_inches: tuple[float, float], draw: Callable[[Axes], None] | None
+) -> None:
+    """Write the picture of a run's end; without fields to draw it says so."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size_inches, dpi=150, layout="constrained")
+    if draw:
+        draw(figure.subplots())
+    else:
+        figure.text(0.5, 0.5, "No fields: the run broke off.", ha="center")
+    figure.savefig(folder / LAST_MEASURED)
+
+
+def _write_given(run: Run, folder: Path, solver: str) -> None:
+    """Write every value of a run's scenario with its source to ``deck.in``."""
     lines = [
         f"# Study {run.study}, run {run.run}: what the solver {solver} is given",
         *_lines(run.scenario.model_dump(mode="json"), run.sources),

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pandas as pd
 
 from analysis.export import elements_to_vtk
 from analysis.freezing import freezing
 from sandmould.casting.arpm import computation, scene
-from sandmould.engines.products import Computed
 from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.kinds import own_solver
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.kinds.own_solver import write_given
-from sandmould.study.moments import LAST_MEASURED
 
 if TYPE_CHECKING:
     from sandmould.study.expand import Run
@@ -33,8 +29,6 @@ RATE = 2e7
 RATE_OF_DIFFERENCES = 1e8
 """Element-steps a second of one core: 1.9e7 and 1.3e8 on the machine where plates_small was first
 run; fixed, so that a study has the same batches everywhere."""
-SLOWER = 10.0
-"""Than that a machine may be, and a run longer than expected."""
 
 defaults = own_solver.defaults
 lasts_s = own_solver.lasts_s
@@ -52,16 +46,6 @@ def resolved(scenario: Solidification) -> Solidification:
     return scenario.model_copy(update={"shapes": shapes})
 
 
-def sources(scenario: Solidification) -> list[Path]:
-    """Our solver."""
-    return computation.source_files()
-
-
-def template_hash(scenario: Solidification) -> str:
-    """Hash of our solver."""
-    return computation.source_hash()
-
-
 def threads(scenario: Solidification) -> int:
     """Of one process."""
     return scenario.threads
@@ -72,11 +56,6 @@ def memory_mb(scenario: Solidification) -> int:
     return BASE_MEMORY_MB + len(scene.elements_of(scenario).size_m) // ELEMENTS_PER_MB
 
 
-def allowed_s(scenario: Solidification) -> float:
-    """Wall time on a slow machine."""
-    return SLOWER * predicted_s(scenario)
-
-
 def planned_work(scenario: Solidification) -> float:
     """Element-steps, by Chvorinov's rule."""
     return scene.expected_element_steps(scenario)
@@ -85,6 +64,14 @@ def planned_work(scenario: Solidification) -> float:
 def predicted_s(scenario: Solidification) -> float:
     """Wall time at fixed speeds."""
     return planned_work(scenario) / (_speed(scenario) * scenario.threads)
+
+
+_given = own_solver.Given(computation, predicted_s)
+sources = _given.sources
+template_hash = _given.template_hash
+allowed_s = _given.allowed_s
+render = _given.render
+compute = _given.compute
 
 
 def planned_s(scenario: Solidification) -> float:
@@ -114,30 +101,16 @@ def plan_cells(scenario: Solidification) -> Mapping[str, str]:
     }
 
 
-def render(run: Run, folder: Path) -> None:
-    """Write down all that the solver is given, each value with its source."""
-    write_given(run, folder, computation.source_hash())
-
-
-def compute(run: Run, folder: Path) -> Computed:
-    """Solidify the casting."""
-    return computation.compute(run.scenario, folder, run.run)
-
-
 def measure(run: Run, folder: Path) -> None:
     """Write the measures against time, those of the whole run in every row, and the picture."""
-    from matplotlib.figure import Figure
-
     from sandmould.study.report.freezing_figure import draw_freezing
 
     series = pd.read_csv(folder / "series.tsv", sep="\t")
     _, _, heat_column = scene.series_columns(run.scenario)
     clock = {"time_s": series["time_s"], "vibration_time_s": -1.0, "stage": "cooling"}
     table = pd.DataFrame({**clock, **series.drop(columns=["time_s", heat_column])})
-    figure = Figure(figsize=(6, 5), dpi=150, layout="constrained")
-    if (folder / "fields.npz").exists():
-        with np.load(folder / "fields.npz") as kept:
-            fields = dict(kept)
+    fields, draw = own_solver.read_fields(folder), None
+    if fields:
         melts, heat = fields["melts"], series[heat_column]
         found = freezing(
             fields["position_m"][melts], fields["frozen_s"][melts], run.scenario.hot_spot_reach_m
@@ -148,10 +121,6 @@ def measure(run: Run, folder: Path) -> None:
             table[f"last_point_{axis}_m"] = place_m
         table["hot_spots"] = len(found.hot_spots_m)
         elements_to_vtk(fields, folder / "fields.vtu")
-        draw_freezing(fields, found, figure.subplots())
-    else:
-        figure.text(0.5, 0.5, "No fields: the run broke off.", ha="center")
-    partial = folder / "measures.tsv.partial"
-    table.to_csv(partial, sep="\t", index=False, float_format="%.10g")
-    os.replace(partial, folder / "measures.tsv")
-    figure.savefig(folder / LAST_MEASURED)
+        draw = partial(draw_freezing, fields, found)
+    own_solver.write_measures(folder, table)
+    own_solver.write_picture(folder, (6, 5), draw)

@@ -267,8 +267,9 @@ def flow_method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Row, ...]:
         Row("Metal", f"{metal.name}: {metal.density_kg_m3:g} kg/m³, {metal.viscosity_m2_s:g} "
             f"m²/s; gravity {metal.gravity_m_s2:g} m/s²"),
         Row("Scheme", f"source {scenario.source.replace('_', ' ')}, gradient {scenario.gradient}, "
-            f"surface below {scenario.surface:g} of the full number density, Courant number "
-            f"{scenario.courant:g}; Poisson equation to {scenario.tolerance:g}"),
+            f"Laplacian {scenario.laplacian}, surface below {scenario.surface:g} of the full "
+            f"number density, Courant number {scenario.courant:g}; Poisson equation to "
+            f"{scenario.tolerance:g}"),
         Row("Measures", f"from {scenario.measured_from_s:g} to {scenario.duration_s:g} s, at the "
             "particle nearest to each probe; excellent: deviation at the deepest probe below "
             f"{scenario.quiet_pa:g} Pa and no hopping; good: the run ends; failed: a guard stops "

@@ -183,7 +183,7 @@ _COST = (
     ("cpu_s", "processor time", seconds),
     ("grain_steps_per_s", "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("element_steps_per_s", "element-steps/s", lambda v: f"{number(v / 1e6)} M"),
-    ("particle_steps_per_s", "particle-steps/s", lambda v: f"{number(v / 1e6)} M"),
+    ("particle_solves_per_s", "particle-solves/s", lambda v: f"{number(v / 1e6)} M"),
     ("solver_fraction", "time in the solver", lambda v: f"{100 * v:.0f} %"),
     ("peak_memory_bytes", "memory", size),
     ("time_step_fraction", "step / critical", number),

@@ -1,0 +1,63 @@
+"""The page on metal flow says what its numbers say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.mps_page import verdict, write
+from benchmarks.mps_peers import measured
+
+
+def row(scheme: str, relaxations: int, cost: float, noise: float, **more: Any) -> dict[str, Any]:
+    return {
+        "scheme": scheme, "verdict": "excellent", "stopped": "", "relaxations": relaxations,
+        "source": "density", "cpu_s_per_simulated_s": cost, "pressure_share": 0.4,
+        "neighbours_share": 0.3, "iterations_per_relaxation": 4.0, "mean_pressure_over_ideal": 0.95,
+        "pressure_noise_pa": noise, "mean_speed_m_s": 0.01, "largest_speed_m_s": 0.2,
+    } | more  # fmt: skip
+
+
+def test_several_relaxations_are_worth_it_where_no_cheaper_single_solve_is_calmer() -> None:
+    several, single = row("MR5-0.5", 5, 4.0, 20.0), row("MR1-0.5", 1, 3.0, 50.0)
+    assert "**1 of 1 settings" in verdict([several, single])
+    calmer = row("divergence", 1, 4.0, 10.0)
+    told = verdict([several, single, calmer])
+    assert "**0 of 1 settings" in told
+    assert "divergence: 4 s, 10 Pa" in told
+    # one that costs more, or that a guard stopped, does not compete
+    assert "**1 of 1" in verdict([several, single, calmer | {"cpu_s_per_simulated_s": 4.1}])
+    assert "**1 of 1" in verdict([several, single, calmer | {"stopped": "it diverged"}])
+    assert "Not answered" in verdict([several])
+
+
+def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
+    origin = {"machine": {"processor": "a core"}, "commit": "abc", "solver": "def",
+              "duration_s": 0.3}  # fmt: skip
+    large = {"metal": 100_000, "particles": 170_000, "relaxations": 5, "cpu_s_per_step": 3.0,
+             "pressure_share": 0.5, "iterations_per_step": 40.0,
+             "peak_memory_bytes": 1_000_000_000}  # fmt: skip
+    peer = measured(
+        {"version": "1", "cpu_s": 8.0, "time_s": [0.1, 0.2, 0.4],
+         "pressure_pa": [0.0, 1615.0, 1815.0], "mean_speed_m_s": [1.0, 0.1, 0.3]}, 0.3
+    )  # fmt: skip
+    assert peer["cpu_s_per_simulated_s"] == pytest.approx(20.0)
+    assert peer["mean_pressure_over_ideal"] == pytest.approx(1.0)
+    assert peer["pressure_noise_pa"] == pytest.approx(100.0)
+    assert peer["mean_speed_m_s"] == pytest.approx(0.2)
+    write(
+        {
+            "schemes": origin | {"rows": [row("MR5-0.5", 5, 4.0, 20.0), row("MR1", 1, 3.0, 50.0)]},
+            "large": origin | {"row": large},
+            "peers": origin | {"rows": [peer | {"scheme": "PySPH iisph"},
+                                        {"scheme": "PySPH sisph", "stopped": "no compiler"}]},
+        },
+        tmp_path,
+    )  # fmt: skip
+    page = (tmp_path / "metal_flow.md").read_text()
+    assert "takes 40 % of a step and finding neighbours 30 %" in page
+    assert "100 000 particles of metal and 70 000 of the mould" in page
+    assert "PySPH sisph gave no result: no compiler" in page
+    assert (tmp_path / "metal_flow.png").stat().st_size > 5000
