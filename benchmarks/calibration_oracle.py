@@ -17,10 +17,11 @@ from sandmould import ROOT
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import gather
 from sandmould.study.emulator import Emulator, TooFewRunsError, fit_emulator
-from sandmould.study.expand import Run, replicate_seed
+from sandmould.study.expand import replicate_seed
 from sandmould.study.measure import write_measures
 from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
+from sandmould.study.run import Run
 from sandmould.study.simulate import render_run, simulate
 from sandmould.study.verdict import finished_values
 

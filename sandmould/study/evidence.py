@@ -20,11 +20,12 @@ import pandas as pd
 
 from sandmould import ROOT
 from sandmould.engines.outcome import Outcome
-from sandmould.study.expand import Run, expand
+from sandmould.study.expand import expand
 from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import kind_of
 from sandmould.study.opening import OpenStudy, open_study
 from sandmould.study.rounds.ledger import LEDGER, read_ledger
+from sandmould.study.run import Run
 from sandmould.study.study import Study
 from sandmould.study.words import listed
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,39 +19,12 @@ from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import AnyScenario, kind_named
 from sandmould.study.labels import letters, run_label
 from sandmould.study.opening import OpenStudy
+from sandmould.study.run import Part, Run
 from sandmould.study.sweep import Point, points, value_at
 
-Part = str
-"""``sweep``, ``cross_check``, or a case of the certificate's controls."""
 MOST_PROBLEMS = 10
 """Problems told at once; the first few are those that teach."""
 ROOT_KEY = "scenario"
-RUN_NAME = "[a-z0-9_]+_r[0-9]+_[0-9a-f]{6}"
-"""Pattern of the name of any run."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """One run of a study, with all that its jobs need."""
-
-    study: str
-    run: str
-    """Short label, replicate and six digits of the hash of the resolved scenario."""
-    parameters: dict[str, Any]
-    """Value of each swept key, by key path."""
-    replicate: int
-    """Number of the replicate, from 1; a block, see ``replicate_seed``."""
-    scenario: Any
-    """Of the study's kind, see ``sandmould.study.kinds``."""
-    sources: dict[str, str]
-    """Where each leaf of the scenario came from, by key path."""
-    part: Part = "sweep"
-    """What it belongs to."""
-
-    @property
-    def seed(self) -> int:
-        """The scenario's seed."""
-        return int(self.scenario.seed)
 
 
 def replicate_seed(seed: int, replicate: int) -> int:

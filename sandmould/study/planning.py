@@ -16,11 +16,12 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.batches import Batch, plan_batches
 from sandmould.study.certificate.asked import provisional_hz
 from sandmould.study.comparing import ENGINE
-from sandmould.study.expand import Run, expand, swept_key
+from sandmould.study.expand import expand, swept_key
 from sandmould.study.kinds.kind import Kind, kind_named
 from sandmould.study.opening import OpenStudy, open_study
 from sandmould.study.plan import plan_table, write_plan, write_study
 from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.run import Run
 
 RESULTS = Path("results")
 DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"

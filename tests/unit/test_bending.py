@@ -15,9 +15,9 @@ from pattern_fe.scene import pattern_of, with_surface
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.bending import verdict_of
-from sandmould.study.expand import Run
 from sandmould.study.measure import write_exports, write_measures
 from sandmould.study.plan import write_plan
+from sandmould.study.run import Run
 from tests.bent_run import SCENE, tip_load, write_bent_run
 
 

@@ -14,10 +14,11 @@ import yaml
 from sandmould import ROOT
 from sandmould.engines.program import build_program
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.expand import Run, expand
+from sandmould.study.expand import expand
 from sandmould.study.opening import open_study
 from sandmould.study.plan import plan_table, read_run, write_plan
 from sandmould.study.planning import Plan, open_plan
+from sandmould.study.run import Run
 
 FREQUENCY = "vibration.0.frequency_hz"
 MARGINS = {"margins": {"tube_fill_fraction": 0.03}}

@@ -13,11 +13,12 @@ import pytest
 from sandmould import ROOT
 from sandmould.engines.snapshot import Snapshot
 from sandmould.study import evidence
-from sandmould.study.expand import Run, expand
+from sandmould.study.expand import expand
 from sandmould.study.measure import write_exports, write_measures, write_picture, write_profile
 from sandmould.study.opening import open_study
 from sandmould.study.plan import write_plan
 from sandmould.study.rounds.ledger import LEDGER, Ledger, Round, basis_of, write_ledger
+from sandmould.study.run import Run
 from tests.scenes import tube_scene
 
 R = 0.002

@@ -14,12 +14,12 @@ from pattern_fe.scene import pattern_of, with_surface
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, gather
-from sandmould.study.expand import Run
 from sandmould.study.measure import write_exports, write_measures
 from sandmould.study.plan import read_run, write_plan
 from sandmould.study.report import figures
 from sandmould.study.report.bending import TIP, bending_pages, deflection_chart
 from sandmould.study.report.page import write_report
+from sandmould.study.run import Run
 from sandmould.study.verdict import Verdict, judge
 from tests.bent_run import SCENE, write_bent_run
 from tests.unit.test_report_page import Page

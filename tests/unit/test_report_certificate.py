@@ -12,11 +12,11 @@ import pytest
 
 from sandmould.study.certificate.controls import SHAKE_G, SHAKEN_HZ, cases
 from sandmould.study.collect import gather, read_study
-from sandmould.study.expand import Run
 from sandmould.study.plan import write_plan
 from sandmould.study.report.certificate import certificate_pages
 from sandmould.study.report.page import write_report
 from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
+from sandmould.study.run import Run
 from tests.unit.report_study import KEY, scenario, write_run
 
 CERTIFIED_HZ = (35.7, 50.0, 70.0)

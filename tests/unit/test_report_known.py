@@ -19,10 +19,10 @@ from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
-from sandmould.study.expand import Run
 from sandmould.study.measure import write_measures
 from sandmould.study.plan import write_plan
 from sandmould.study.report.page import write_report
+from sandmould.study.run import Run
 
 FRICTION = "contact.grain_grain.friction"
 ARM = "contact.grain_grain.rolling_arm_fraction"

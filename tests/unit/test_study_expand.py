@@ -12,10 +12,11 @@ import yaml
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.expand import MOST_PROBLEMS, Run, expand, replicate_seed
+from sandmould.study.expand import MOST_PROBLEMS, expand, replicate_seed
 from sandmould.study.hashes import present, scenario_hash
 from sandmould.study.opening import open_study
 from sandmould.study.plan import read_run, write_plan
+from sandmould.study.run import Run
 from tests.bracket import BRACKET
 
 FREQUENCY = "vibration.0.frequency_hz"

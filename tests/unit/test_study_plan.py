@@ -17,11 +17,12 @@ from sandmould.engines.program import REST_AFTER_FALL_S, build_program
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import RUN_NAME, Run, expand
+from sandmould.study.expand import expand
 from sandmould.study.kinds.sand import planned_steps, planned_work
 from sandmould.study.opening import open_study
 from sandmould.study.plan import plan_table, read_run, write_plan
 from sandmould.study.planning import announce, open_plan
+from sandmould.study.run import RUN_NAME, Run
 
 LAMMPS = ("lammps", 2)
 THREE = """\

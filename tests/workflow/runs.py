@@ -19,10 +19,10 @@ from sandmould.engines.products import finish
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import Run
 from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.sand import PRODUCTS, complete
 from sandmould.study.plan import write_plan
+from sandmould.study.run import Run
 from sandmould.study.simulate import render_run
 
 

@@ -5,8 +5,8 @@ import sys
 
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.batches import alone
-from sandmould.study.expand import RUN_NAME
 from sandmould.study.planning import RESULTS, announce, open_plan, study_path
+from sandmould.study.run import RUN_NAME
 
 OVERRIDES = dict(workflow.config_settings.config)
 # Set by a profile: how long a job should last at least, where jobs cost more than short runs, how

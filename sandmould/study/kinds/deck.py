@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
@@ -19,9 +19,7 @@ from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.moments import LAST_MEASURED
-
-if TYPE_CHECKING:
-    from sandmould.study.expand import Run
+from sandmould.study.run import Run
 
 MODEL = OwnDeck
 WORK = "core-seconds"

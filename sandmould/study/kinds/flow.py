@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -15,9 +14,7 @@ from sandmould.engines.outcome import RunOutcome
 from sandmould.scenario.flow import MetalFlow, StillTank
 from sandmould.study.kinds import own_solver
 from sandmould.study.kinds.kind import SpeedClass
-
-if TYPE_CHECKING:
-    from sandmould.study.expand import Run
+from sandmould.study.run import Run
 
 MODEL = MetalFlow
 WORK = computation.WORK

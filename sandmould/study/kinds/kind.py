@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import Any, Protocol, cast
 
 from sandmould.engines.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
@@ -14,9 +14,7 @@ from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
-
-if TYPE_CHECKING:
-    from sandmould.study.expand import Run
+from sandmould.study.run import Run
 
 AnyScenario = Scenario | OwnDeck | Solidification | MetalFlow
 SpeedClass = tuple[str, int]

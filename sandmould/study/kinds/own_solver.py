@@ -15,11 +15,10 @@ from sandmould.engines.products import Computed
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section
 from sandmould.study.moments import LAST_MEASURED
+from sandmould.study.run import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from sandmould.study.expand import Run
 
 SLOWER = 10.0
 """Than predicted a machine may be, and a run longer than expected."""

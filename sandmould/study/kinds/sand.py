@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pattern_fe
 from sandmould.engines import choosing, recording
@@ -25,9 +25,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, with_hash
 from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import SpeedClass
-
-if TYPE_CHECKING:
-    from sandmould.study.expand import Run
+from sandmould.study.run import Run
 
 MODEL = Scenario
 WORK = "grain-steps"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -16,9 +15,7 @@ from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.kinds import own_solver
 from sandmould.study.kinds.kind import SpeedClass
-
-if TYPE_CHECKING:
-    from sandmould.study.expand import Run
+from sandmould.study.run import Run
 
 MODEL = Solidification
 WORK = "element-steps"

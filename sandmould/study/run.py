@@ -1,0 +1,35 @@
+"""One run of a study, as its plan leaves it to its jobs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+Part = str
+"""``sweep``, ``cross_check``, or a case of the certificate's controls."""
+RUN_NAME = "[a-z0-9_]+_r[0-9]+_[0-9a-f]{6}"
+"""Pattern of the name of any run."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a study, with all that its jobs need."""
+
+    study: str
+    run: str
+    """Short label, replicate and six digits of the hash of the resolved scenario."""
+    parameters: dict[str, Any]
+    """Value of each swept key, by key path."""
+    replicate: int
+    """Number of the replicate, from 1; a block, see ``replicate_seed``."""
+    scenario: Any
+    """Of the study's kind, see ``sandmould.study.kinds``."""
+    sources: dict[str, str]
+    """Where each leaf of the scenario came from, by key path."""
+    part: Part = "sweep"
+    """What it belongs to."""
+
+    @property
+    def seed(self) -> int:
+        """The scenario's seed."""
+        return int(self.scenario.seed)
