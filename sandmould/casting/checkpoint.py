@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 EVERY_S = 20.0
-"""Wall time between checkpoints: what a killed run loses at most, beside one step."""
+"""Wall time between checkpoints: what a killed run loses at most, beside one step or record."""
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,8 @@ import yaml
 from PIL import Image
 
 from analysis.freezing import freezing
+from sandmould.casting import checkpoint
 from sandmould.casting.arpm import computation
-from sandmould.casting.arpm.solidification import Cooling
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.solidification import Solidification
@@ -292,29 +293,30 @@ def test_files_that_hold_no_casting_are_told(
 
 def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     straight = (one_run(tmp_path, layers=[1]) / "series.tsv").read_bytes()
-    monkeypatch.setattr(computation, "KEPT_EVERY_S", 0.0)
+    monkeypatch.setattr(checkpoint, "EVERY_S", 0.0)
     (run,) = expand(open_study(opened(tmp_path, layers=[1])))
-    shown: list[float] = []
-    keep = computation._Kept.keep
+    kept_s: list[float] = []
+    keep = checkpoint.Checkpoint.keep
 
-    def killed(self: computation._Kept, now: Cooling) -> None:
-        keep(self, now)
-        shown.append(now.heat.time_s)
-        if shown == [5.0, 10.0, 15.0]:
+    def killed(self: checkpoint.Checkpoint, arrays: Callable[[], Mapping[str, Any]]) -> None:
+        keep(self, arrays)
+        kept_s.append(float(arrays()["time_s"]))
+        if kept_s == [5.0, 10.0, 15.0]:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(computation._Kept, "keep", killed)
+    monkeypatch.setattr(checkpoint.Checkpoint, "keep", killed)
     with pytest.raises(KeyboardInterrupt):
         computation.compute(run.scenario, tmp_path, run.run)
     computation.compute(run.scenario, tmp_path, run.run)
-    assert shown[3] == 20.0
+    assert kept_s[3] == 20.0
     assert (tmp_path / "work" / "series.tsv").read_bytes() == straight
 
 
-def test_a_torn_checkpoint_begins_again(tmp_path: Path) -> None:
+def test_a_torn_checkpoint_begins_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (run,) = expand(open_study(opened(tmp_path, until_s=20.0)))
     (tmp_path / "work").mkdir()
     (tmp_path / "work" / computation.CHECKPOINT).write_bytes(b"PK\x03\x04 torn")
     computed = computation.compute(run.scenario, tmp_path, run.run)
     assert computed.outcome.outcome is Outcome.FINISHED
     assert computed.outcome.simulated_s == 20.0
+    assert "the run begins again" in capsys.readouterr().err

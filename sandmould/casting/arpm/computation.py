@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
@@ -20,6 +18,7 @@ from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.solidification import Cooling, UnstableError, solidify
 from sandmould.casting.arpm.solidification import Progress as Cooled
 from sandmould.casting.arpm.solidification import Solidification as Found
+from sandmould.casting.checkpoint import Checkpoint
 from sandmould.casting.hashing import hash_with
 from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.products import Computed, Cost, peak_memory_bytes
@@ -27,9 +26,7 @@ from sandmould.engines.progress import Progress
 from sandmould.scenario.solidification import Solidification
 
 PRODUCTS = ("series.tsv", "fields.npz")
-CHECKPOINT = "checkpoint.npz"
-KEPT_EVERY_S = 20.0
-"""Wall time between checkpoints: what a killed run loses at most, beside one record."""
+CHECKPOINT = "checkpoint.bin"
 
 
 @dataclass
@@ -91,7 +88,8 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     elements, filling = scene.elements_of(scenario), scene.filling_of(scenario)
     cost.elements = len(elements.size_m)
     cooled = Cooled(0.0, 0.0, 0.0, 0)
-    kept = _Kept(scenario, work)
+    checkpoint = Checkpoint(work / CHECKPOINT, computed_hash(scenario))
+    newest = checkpoint.newest()
 
     def tell(now: Cooled) -> None:
         nonlocal cooled
@@ -105,7 +103,7 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
         probes_m = {probe.name: np.array(probe.at_m) for probe in scenario.probes}
         found = solidify(
             elements, filling, marching, probes_m, scenario.record_s, scenario.until_s, tell,
-            kept.newest(), kept.keep,
+            Cooling.of(newest) if newest else None, lambda now: checkpoint.keep(now.arrays),
         )  # fmt: skip
     except (UnstableError, ValueError) as stop:
         code = Outcome.UNSTABLE if isinstance(stop, UnstableError) else Outcome.BAD_INPUT
@@ -123,32 +121,6 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     if math.isnan(found.solidification_time_s):
         detail = f"some of the casting is still liquid at {end_s:g} s: raise until_s"
     return Computed(RunOutcome(Outcome.FINISHED, detail, end_s, planned_s), cost, is_root=True)
-
-
-class _Kept:
-    """The checkpoint of a run: one file, whole or not there at all."""
-
-    def __init__(self, scenario: Solidification, work: Path) -> None:
-        self._path = work / CHECKPOINT
-        self._hash = computed_hash(scenario)
-        self._due_s = time.monotonic() + KEPT_EVERY_S
-
-    def newest(self) -> Cooling | None:
-        """What an earlier process of the same run kept; nothing if it cannot be read."""
-        try:
-            with np.load(self._path) as kept:
-                return Cooling.of(dict(kept)) if kept["hash"] == self._hash else None
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
-            return None
-
-    def keep(self, now: Cooling) -> None:
-        """Write the state where it is due."""
-        if time.monotonic() < self._due_s:
-            return
-        partial = self._path.with_suffix(".partial.npz")
-        np.savez(partial, hash=self._hash, **now.arrays())
-        os.replace(partial, self._path)
-        self._due_s = time.monotonic() + KEPT_EVERY_S
 
 
 def _write(
