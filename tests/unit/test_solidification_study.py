@@ -146,6 +146,8 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     assert "All settings against element 0.005 m, exchange difference" in page
     assert "The casting is solid after" in page
     assert "Cooling curves" in page
+    assert "Stand-ins by their sources" in page
+    assert "casting.solidus_k" in page
 
 
 def one_run(folder: Path, **scenario: Any) -> Path:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from analysis.freezing import freezing
 from sandmould.scenario.solidification import MouldMaterial, Solidification
 from sandmould.study.collect import Collected
+from sandmould.study.plan import read_run
 from sandmould.study.report.figures import png
 from sandmould.study.report.freezing_figure import draw_freezing, draw_temperature
 from sandmould.study.report.measured import Curve, measure_curves
@@ -24,6 +25,8 @@ from sandmould.study.verdict import Verdict
 from sandmould.study.words import listed, name_of, number, seconds, setting_text
 
 MARKERS = "osD^vP*X<>"
+STAND_IN = "stand-in"
+"""How the source of a value begins that is not what it stands for."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +83,25 @@ def solid_pages(
     fields, sentences, spots = _fields(study_folder / "runs" / shown, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     return SolidPages(
-        shown_run=shown, fields=fields, sentences=sentences, spots=spots, curves=curves,
+        shown_run=shown, fields=fields,
+        sentences=(*sentences, *_stand_ins(study_folder / "runs" / shown / "scenario.yaml")),
+        spots=spots, curves=curves,
         reference=setting_text(reference)
         if reference
         else "",
         error_cost=_error_cost(errors) if errors else "",
         errors=_error_table(errors) if errors else None,
     )  # fmt: skip
+
+
+def _stand_ins(path: Path) -> tuple[str, ...]:
+    """Which values are not what they stand for, by their sources."""
+    sources = read_run(path).sources if path.is_file() else {}
+    keys = [key for key, source in sources.items() if source.startswith(STAND_IN)]
+    if not keys:
+        return ()
+    return (f"Stand-ins by their sources, so that times are those of no real casting: "
+            f"{listed(keys, most=20)}.",)  # fmt: skip
 
 
 def _silent(collected: Collected, verdict: Verdict, measure: str) -> str:
