@@ -3,7 +3,8 @@
 ``make peers`` runs ``python -m benchmarks.calibration``: it writes calibration.json beside this
 file and docs/calibration_peers.md. Runs come from the emulator of the study
 repose_map; with ``--oracle dem`` they are DEM runs, of one seed unless ``--seeds`` says more or 0,
-and truths are planted by DEM too, in two measures of the same runs.
+and truths are planted by DEM too, in two measures of the same runs. Runs by DEM are kept in
+results/benchmarks/calibration_runs.jsonl: what was killed goes on from there.
 ``--record`` takes the map that docs/results keeps. With ``--quick`` few seeds show that everything
 works, and their files go to results/benchmarks/quick/. ``--page`` writes the page of the json
 again.
