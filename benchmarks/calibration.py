@@ -39,6 +39,7 @@ from benchmarks.calibration_methods import (
 )
 from benchmarks.calibration_oracle import (
     ANGLE,
+    KEPT_RUNS,
     SECOND,
     Map,
     NoMapError,
@@ -125,6 +126,7 @@ def measure(file: Path, methods: Sequence[Method], settings: Settings) -> dict[s
         When the map of runs is missing or does not reach a target.
     """
     begun, load = time.perf_counter(), os.getloadavg()[0]
+    goes_on = settings.oracle == "dem" and KEPT_RUNS.exists()
     known = read_map(file)
     races = race_all(known, methods, settings) if settings.seeds else []
     truths = planted(known, settings.truths)
@@ -161,6 +163,7 @@ def measure(file: Path, methods: Sequence[Method], settings: Settings) -> dict[s
         "races": races,
         **found,
         "measured_s": round(time.perf_counter() - begun),
+        "goes_on": goes_on,
     }
 
 
