@@ -11,11 +11,8 @@ from pattern_fe.coupling.in_step import InStepSession
 from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.pattern import Pattern
 from pattern_fe.scene import with_surface
-from sandmould.engines.program import build_program
-from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.session import Session
 from sandmould.scenario.scenario import Scenario
-from tests.scenes import open_lammps
+from tests.scenes import open_engine
 
 
 def in_step(
@@ -24,10 +21,7 @@ def in_step(
     """The in-step scheme of a scene on its engine; see ``InStepFoam`` for the foam's settings."""
     contacts = ContactRows.of(scenario, pattern)
     body = InStepFoam(pattern, scenario.step_s, contacts, 0.01, **foam)
-    if scenario.engine.name == "lammps":
-        inner: Session = open_lammps(scenario, folder, checkpoint)
-    else:
-        inner = ReferenceSession(build_program(scenario), checkpoint)
+    inner = open_engine(scenario, folder, checkpoint)
     return InStepSession(inner, body, FoamBody(pattern), "pattern", folder, checkpoint)
 
 

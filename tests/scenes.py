@@ -9,6 +9,8 @@ from sandmould.engines.deck import Deck
 from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.lammps.session import LammpsSession
 from sandmould.engines.program import build_program
+from sandmould.engines.reference.session import ReferenceSession
+from sandmould.engines.session import Session
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 
@@ -42,3 +44,10 @@ def open_lammps(scenario: Scenario, folder: Path, checkpoint: Path | None = None
     write_deck(program, {}, folder, "test", "test")
     deck = Deck.read(folder / "deck.in")
     return LammpsSession(program, deck, folder, folder / "engine.log", checkpoint)
+
+
+def open_engine(scenario: Scenario, folder: Path, checkpoint: Path | None = None) -> Session:
+    """Open LAMMPS or the reference engine, whichever a scenario names."""
+    if scenario.engine.name == "lammps":
+        return open_lammps(scenario, folder, checkpoint)
+    return ReferenceSession(build_program(scenario), checkpoint)

@@ -21,10 +21,10 @@ from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, mesh_of
 from pattern_fe.supports import Supports
 from sandmould.engines.program import build_program
-from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
+from tests.scenes import open_engine
 from tests.verification.one_grain import RADIUS_M, one_grain_scene
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ def staggered(pattern: Pattern, scenario: Scenario, folder: Path, **changes: Any
     }  # fmt: skip
     # Unchecked: the limit of a factor may lie above 1, which no scenario may ask for.
     settings = Loop.model_construct(**(values | changes))
-    inner, counts = ReferenceSession(build_program(scenario)), StepCounts.of(scenario)
+    inner, counts = open_engine(scenario, folder), StepCounts.of(scenario)
     return CoupledSession(inner, FoamBody(pattern), "pattern", settings, counts, folder)
 
 

@@ -10,8 +10,6 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
 
-REFERENCE_ALONE = ("measured", "monolithic")
-"""Schemes that need what one engine has: to go back to a kept state, and to stop in every step."""
 WITH_LIGGGHTS = ("one_way", "fixed", "aitken", "quasi_newton")
 """Schemes whose windows need a mesh to be exchanged and its loads read, no more."""
 WITHOUT_WINDOWS = ("in_step", "monolithic")
@@ -42,9 +40,9 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         # Loads on vertices are forgotten when a gate is taken away.
         valid = "absent in a scene with a pattern"
         raise BadInputError([Problem("discharge.gate", scenario.discharge.gate, valid)])
-    if loop.repeats and engine != "reference":
-        raise _bad("repeats", loop.repeats, f"0 on engine {engine}, or engine reference")
-    if scheme in REFERENCE_ALONE and engine != "reference":
+    if loop.repeats and engine == "liggghts":
+        raise _bad("repeats", loop.repeats, "0 on engine liggghts, which cannot go back")
+    if scheme == "monolithic" and engine != "reference":
         raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
     if loop.exchange == "files" and scheme in WITHOUT_WINDOWS:
         raise _bad(

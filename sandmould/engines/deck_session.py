@@ -74,6 +74,10 @@ class DeckSession(StagedSession):
         """Read nothing: it was read before the walls were made, in place of an empty box."""
 
     def _take_up(self, checkpoint: Path) -> None:
-        """Go on inside the stage of a checkpoint: its commands again, its own start step."""
+        """Go on inside the stage of a checkpoint."""
         super()._take_up(checkpoint)
+        self._tell_stage_start()
+
+    def _tell_stage_start(self) -> None:
+        """Give a stage whose commands were executed again its own start step."""
         self.send(f"variable stage_start equal {self._stage_start}")

@@ -92,7 +92,7 @@ class Loop(Section):
     ] = quantity(
         "aitken",
         "How far the surface is moved to where the last loads bend the pattern: not at all, a "
-        "fixed share, a share of the limit that a measured gain sets (reference engine), "
+        "fixed share, a share of the limit that a measured gain sets (not on LIGGGHTS), "
         "Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no windows: "
         "in_step steps the pattern, condensed on its surface, inside every step of the engine; "
         "monolithic steps all of it after every step of the grains, slow, the judge of the "
@@ -118,7 +118,7 @@ class Loop(Section):
         source=ARGUED,
     )
     repeats: int = quantity(
-        0, "Times that a window is computed again at most; reference engine.", source=ARGUED,
+        0, "Times that a window is computed again at most; 0 on LIGGGHTS.", source=ARGUED,
         ge=0, le=100,
     )  # fmt: skip
     tolerance: float = quantity(

@@ -25,6 +25,8 @@ from tests.wedge import (
 )
 
 WINDOW_S = 2e-3
+ENGINES = ("reference", "lammps")
+BAND = 1e-3
 
 
 def shares(young_pa: float, damping_ratio: float) -> tuple[float, float]:
@@ -37,11 +39,16 @@ def shares(young_pa: float, damping_ratio: float) -> tuple[float, float]:
 
 
 def squeezed(
-    folder: Path, young_pa: float, damping_ratio: float, records: int, **changes: Any
+    folder: Path,
+    young_pa: float,
+    damping_ratio: float,
+    records: int,
+    engine: str = "reference",
+    **changes: Any,
 ) -> tuple[Any, float]:
     """The loop after some records, and how far the bar is from its exact rest, as a share."""
     pattern = wedge_pattern(young_pa)
-    scenario = wedge_scene(pattern, damping_ratio)
+    scenario = wedge_scene(pattern, damping_ratio, engine={"name": engine})
     session = staggered(pattern, scenario, folder, window_s=WINDOW_S, **changes)
     put_disc(session)
     for _ in range(records):
@@ -77,14 +84,42 @@ def test_a_fixed_factor_holds_up_to_its_limit_and_not_beyond(tmp_path: Path) -> 
     assert left[2] > 1.0
 
 
-def test_measured_scheme_finds_its_factor_and_comes_to_rest(tmp_path: Path) -> None:
-    session, left = squeezed(tmp_path, 5e4, 0.95, 30, scheme="measured", factor=1e-3)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_measured_scheme_finds_its_factor_and_comes_to_rest(engine: str, tmp_path: Path) -> None:
+    session, left = squeezed(tmp_path, 5e4, 0.95, 30, engine, scheme="measured", factor=1e-3)
     session.close()
     assert left < 1e-4
     a, b = shares(5e4, 0.95)
     ledger = read_ledger(tmp_path / LEDGER)
     assert ledger.gain.iloc[-1] == pytest.approx(a + 2.0 * b, rel=0.05)
     np.testing.assert_allclose(ledger.factor, 0.5 * 2.0 / (1.0 + ledger.gain), rtol=1e-6)
+
+
+def test_engines_measure_the_same_gain(tmp_path: Path) -> None:
+    gains = []
+    for engine in ENGINES:
+        session, _ = squeezed(tmp_path, 2e5, 0.3, 3, engine, scheme="fixed", factor=1e-3)
+        shown = session.displacement_m.copy()
+        found = measure_gain(session._inner, session._body, "pattern", shown, WINDOW_S)
+        session.close()
+        assert found is not None
+        gains.append(found.gain)
+    # 4e-4 apart: LAMMPS finds the first forces after going back with velocities of whole steps.
+    assert gains[1] == pytest.approx(gains[0], rel=BAND)
+
+
+def test_engines_repeat_windows_alike(tmp_path: Path) -> None:
+    ends, passes = [], []
+    for engine in ENGINES:
+        (folder := tmp_path / engine).mkdir()
+        loop = {"scheme": "quasi_newton", "repeats": 6, "tolerance": 1e-4}
+        session, _ = squeezed(folder, 2e5, 0.95, 3, engine, **loop)
+        session.close()
+        ends.append(session.displacement_m)
+        passes.append(read_ledger(folder / LEDGER).passes.tolist())
+    assert max(passes[0]) > 2
+    assert passes[1] == passes[0]
+    np.testing.assert_allclose(ends[1], ends[0], atol=BAND * np.abs(ends[0]).max())
 
 
 def test_measuring_leaves_the_session_as_it_was(tmp_path: Path) -> None:

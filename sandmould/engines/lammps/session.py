@@ -6,6 +6,7 @@ import ctypes
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from sandmould.engines.deck_lines import skin_m
 from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.render import needs_callback, surfaces
+from sandmould.engines.lammps.wall_loads import WallLoads
 from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program
 from sandmould.engines.session import Array, EngineStop, RefusedError, Shared, engine_stop
@@ -101,26 +103,32 @@ class LammpsSession(DeckSession):
             )
         self.version = str(self._lmp.version())
         self._set_up(checkpoint)
+        self._wall_loads: WallLoads | None = None
         self._kernel: SurfaceKernel | None = None
         if needs_callback(self._scenario):
-            self._kernel = self._start_kernel(checkpoint)
+            self._kernel = self._start_kernel()
+            if checkpoint is not None:
+                with np.load(checkpoint / "kernel.npz") as saved:
+                    self._kernel.restore(saved)
         if checkpoint is not None:
             self.grains = int(self._lmp.get_natoms())
             self._take_up(checkpoint)
 
-    def _start_kernel(self, checkpoint: Path | None) -> SurfaceKernel:
-        """Give LAMMPS the compiled functions that its deck asks for."""
+    def _start_kernel(self) -> SurfaceKernel:
+        """Make the session's side of the compiled functions that the deck asks for."""
         # Compiled code takes a while to load: only decks that call it wait for it.
         from sandmould.engines.lammps.surface_kernel import SurfaceKernel
 
         kernel = SurfaceKernel(self._lmp, self._program, skin_m(self._scenario))
+        self._register(kernel)
+        return kernel
+
+    def _register(self, kernel: SurfaceKernel) -> None:
+        """Give LAMMPS the compiled functions that its deck asks for."""
         if kernel.names:
             kernel.register("surface_kernel", "press")
         if self._scenario.background_damping.form == "nonviscous_isotropic":
             kernel.register("damping", "damp")
-        if checkpoint is not None:
-            kernel.restore(checkpoint / "kernel.npz")
-        return kernel
 
     def send(self, commands: str) -> None:
         """Execute commands of LAMMPS; an error becomes the outcome that fits."""
@@ -165,7 +173,23 @@ class LammpsSession(DeckSession):
     def _compute_to(self, target: int) -> None:
         if self._kernel is not None:
             self._kernel.show_motion(self.stage, self._stage_start, self.steps, target)
-        super()._compute_to(target)
+        if self._wall_loads is None:
+            super()._compute_to(target)
+        else:
+            self._compute_sampling(self._wall_loads, target)
+
+    def _compute_sampling(self, loads: WallLoads, target: int) -> None:
+        """Compute up to a step, runs cut where the loads on the walls are sampled."""
+        every, record = self._counts.load, self._counts.window
+        while self.steps < target:
+            if self.steps % record == 0:
+                loads.clear()
+            super()._compute_to(min(target, (self.steps // every + 1) * every))
+            if self.steps % every == 0:
+                loads.sample()
+            ended = self.steps % record == 0
+            if ended and self.stage.settling is not None and self._rests():
+                return
 
     def _rests(self) -> bool:
         return bool(self._lmp.extract_variable("at_rest") == 1.0)
@@ -188,16 +212,23 @@ class LammpsSession(DeckSession):
         )
 
     def _mean_loads(self) -> Mapping[str, Array]:
-        d = self._scenario.dimension
+        means = self._recorded_loads()
+        if self._wall_loads is not None:
+            means = self._wall_loads.sums / (self._counts.window // self._counts.load)
+        loads = dict(zip(self._surfaces, means, strict=True))
+        return loads | self._kernel.mean_loads() if self._kernel is not None else loads
+
+    def _recorded_loads(self) -> Array:
+        """Mean force on walls and blocks by the deck's own fix, one row a surface, N."""
         from lammps import LMP_STYLE_GLOBAL, LMP_TYPE_VECTOR
 
+        d = self._scenario.dimension
         # LAMMPS gives the force on the grains.
         values = -np.array([
             self._lmp.extract_fix("loads", LMP_STYLE_GLOBAL, LMP_TYPE_VECTOR, nrow=i)
             for i in range(d * len(self._surfaces))
         ])  # fmt: skip
-        loads = dict(zip(self._surfaces, values.reshape(-1, d), strict=True))
-        return loads | self._kernel.mean_loads() if self._kernel is not None else loads
+        return values.reshape(-1, d)
 
     def _kernel_of(self, name: str) -> SurfaceKernel:
         """The kernel that presses on a surface, or refuse: regions of LAMMPS have no vertices."""
@@ -229,11 +260,45 @@ class LammpsSession(DeckSession):
         """
         self._kernel_of(name).attach_mover(name, mover)
 
+    def keep(self) -> Any:
+        """Write LAMMPS's restart file to a temporary folder; copy what it does not hold.
+
+        Raises
+        ------
+        RefusedError
+            In a scene that LAMMPS computes alone; or first inside a record, for the samples of
+            loads that LAMMPS has begun to add up would be lost.
+        """
+        if self._kernel is None:
+            raise RefusedError("pattern", None, "a pattern, to go back on engine lammps")
+        if self._wall_loads is None:
+            if self.steps % self._counts.window:
+                raise RefusedError("first kept step", self.steps, "the start of a record")
+            self._wall_loads = WallLoads(self._lmp, self._surfaces, self._scenario.dimension)
+        folder = TemporaryDirectory(prefix="kept_", dir=self._folder)
+        super()._save(Path(folder.name))
+        stage = (self.stage_over, self.at_rest, self._ended_window, dict(self._asked))
+        return folder, self._kernel.state(), self._wall_loads.sums.copy(), stage
+
+    def go_back(self, kept: Any) -> None:
+        """Compute on from what ``keep`` gave: LAMMPS is set up anew, in the same stage."""
+        assert self._kernel is not None
+        assert self._wall_loads is not None
+        folder, memory, self._wall_loads.sums[:], stage = kept
+        self.send("clear")
+        self._set_up(Path(folder.name))
+        self._register(self._kernel)
+        self._kernel.restore(memory)
+        self._begin_stage()
+        self._tell_stage_start()
+        self.stage_over, self.at_rest, self._ended_window, asked = stage
+        self._asked = dict(asked)
+
     def _save(self, folder: Path) -> None:
         """Write LAMMPS's restart file and the memory of the callback."""
         super()._save(folder)
         if self._kernel is not None and self.is_root:
-            self._kernel.save(folder / "kernel.npz")
+            np.savez(folder / "kernel.npz", **self._kernel.state())
 
     def close(self) -> None:
         """Free LAMMPS."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.step_mover import StepMover
 
 _KEPT = ("row_ids", "used", "normal", "friction", "rolling")
-_MOVED = ("vertices", "vertex_velocity", "steps_left")
+_WHOLE = ("vertices", "vertex_velocity", "steps_left", "loads")
 
 
 class SurfaceKernel:
@@ -165,8 +165,8 @@ class SurfaceKernel:
         """Drop the memory of all contacts."""
         self._bridge.used[:] = 0
 
-    def save(self, path: Path) -> None:
-        """Write the memory of the contacts and where the surfaces stand."""
+    def state(self) -> dict[str, Any]:
+        """Copies of the memory of the contacts, where the surfaces stand, loads of this record."""
         bridge = self._bridge
         rows = bridge.counts[ROWS]
         slots = len(bridge.normal) // max(len(bridge.used), 1)
@@ -174,15 +174,15 @@ class SurfaceKernel:
             name: getattr(bridge, name)[: rows * (1 if name in ("row_ids", "used") else slots)]
             for name in _KEPT
         }
-        moved = {name: getattr(bridge, name) for name in _MOVED}
-        np.savez(path, last_step=bridge.counts[LAST_STEP], **kept, **moved)
+        arrays = kept | {name: getattr(bridge, name) for name in _WHOLE}
+        copies = {name: array.copy() for name, array in arrays.items()}
+        return {"last_step": int(bridge.counts[LAST_STEP]), **copies}
 
-    def restore(self, path: Path) -> None:
-        """Go on from what was written."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from what ``state`` gave."""
         bridge = self._bridge
-        with np.load(path) as saved:
-            for name in (*_KEPT, *_MOVED):
-                getattr(bridge, name)[: len(saved[name])] = saved[name]
-            bridge.counts[LAST_STEP] = int(saved["last_step"])
-            bridge.counts[ROWS] = len(saved["row_ids"])
+        for name in (*_KEPT, *_WHOLE):
+            getattr(bridge, name)[: len(state[name])] = state[name]
+        bridge.counts[LAST_STEP] = int(state["last_step"])
+        bridge.counts[ROWS] = len(state["row_ids"])
         bridge.counts[LISTED] = 0
