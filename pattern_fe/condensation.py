@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ class CondensedSurface:
     mass_kg: Array
     """(n,) float64, kg; infinite where held."""
 
+    @cached_property
     def modes(self) -> tuple[Array, Array]:
         """Free oscillations of the masses.
 

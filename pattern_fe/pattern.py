@@ -144,21 +144,22 @@ class Pattern:
         return solve_large(self.space, self.foam, self._bedding_n_m, self.fixed, load_n, settings)
 
     def spread(self, outer_m: Array) -> Array:
-        """Displacement of all nodes at rest for a given one of the outer line, in 2D; small ones.
+        """Displacement of all nodes at rest for a given one of the outer surface; small ones.
 
         Parameters
         ----------
-        outer_m : (nv, 2) float64, m
-            Of the vertices of the outer line.
+        outer_m : (nv, d) float64, m
+            Of the vertices of the outer surface.
 
         Returns
         -------
-        (n, 2) float64, m
+        (n, d) float64, m
         """
+        d = self.space.dimension
         whole = np.zeros_like(self.space.node_m)
         nodes = self.surface.outer.nodes
         whole[nodes] = outer_m
-        inner = np.setdiff1d(self._free, (2 * nodes[:, None] + [0, 1]).ravel())
+        inner = np.setdiff1d(self._free, (d * nodes[:, None] + np.arange(d)).ravel())
         if len(inner):
             pull_n = -(self.stiffness @ whole.ravel())[inner]
             whole.ravel()[inner] = factorised(self.stiffness[inner][:, inner]).solve(pull_n)
@@ -228,6 +229,7 @@ class Pattern:
         """Rayleigh's mass damping that gives the first natural frequency a damping ratio."""
         return 4.0 * math.pi * float(self.natural_frequencies_hz(1)[0]) * damping_ratio
 
+    @cached_property
     def condensed(self) -> CondensedSurface:
         """Stiffness and mass on the vertices of the surface, for an engine's own steps.
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from pattern_fe.checks import check_inside
 from pattern_fe.coupling.schemes import refuse_scheme
@@ -18,7 +20,7 @@ from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
 from pattern_fe.supports import Supports
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.box import Polygon
-from sandmould.scenario.pattern import Bar, LShape, MeshFile
+from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile
 from sandmould.scenario.pattern import Pattern as PatternSection
 from sandmould.scenario.scenario import Scenario
 
@@ -38,18 +40,39 @@ def pattern_of(scenario: Scenario) -> Pattern:
     if scenario.dimension == 3:
         valid = "a scene in 2D: a pattern is coupled in the plane alone"
         raise BadInputError([Problem("dimension", 3, valid)])
+    # what is shared by all runs of a study that differ in their sand or their loop
+    body = told.model_copy(update={"loop": Loop()})
+    size_m = (scenario.box.width_m, scenario.box.height_m)
+    return _computed(body, size_m, scenario.sand.disc_thickness_m, _changed_ns(told))
+
+
+def _changed_ns(told: PatternSection) -> int:
+    """When the mesh file of a pattern was last changed, 0 without one."""
+    shape = told.shape
+    there = isinstance(shape, MeshFile) and shape.path.is_file()
+    return shape.path.stat().st_mtime_ns if there else 0
+
+
+@lru_cache(maxsize=8)
+def _computed(
+    told: PatternSection, size_m: tuple[float, float], thickness_m: float, changed_ns: int
+) -> Pattern:
+    """The pattern of a section in a box; its matrices stay with it."""
     with _blaming("pattern.shape", told.shape.model_dump(mode="json")):
         mesh = _mesh(told).translated(np.array(told.position_m))
     with _blaming("pattern.position_m", list(told.position_m)):
-        size = np.array([scenario.box.width_m, scenario.box.height_m])
-        check_inside(mesh, np.zeros(2), size)
-    with _blaming("pattern.supports", told.supports.model_dump(mode="json")):
+        check_inside(mesh, np.zeros(2), np.array(size_m))
+    # Threads of small matrices wait for one another, longest beside other runs.
+    with (
+        threadpool_limits(1),
+        _blaming("pattern.supports", told.supports.model_dump(mode="json")),
+    ):
         pattern = Pattern(
             mesh,
             Supports(told.supports.clamped, told.supports.resting),
             Foam(told.young_modulus_pa, told.poisson_ratio, told.density_kg_m3),
             told.order,
-            scenario.sand.disc_thickness_m,
+            thickness_m,
         )
         pattern.solve_linear(np.zeros_like(pattern.space.node_m))
     return pattern

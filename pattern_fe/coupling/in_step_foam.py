@@ -63,7 +63,7 @@ class InStepFoam:
         damping_ratio : float
             Of the slowest mode, by mass damping.
         """
-        surface = pattern.condensed()
+        surface = pattern.condensed
         line = pattern.surface.outer_line
         self.vertices_m = pattern.surface.vertices_m[line]
         """Of the outer line as drawn, (nv, d) float64, m."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from threadpoolctl import threadpool_limits
+
 from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.in_step_foam import InStepFoam
@@ -85,14 +87,16 @@ def in_step_foam(scenario: Scenario, pattern: Pattern) -> InStepFoam:
         where the foam's own would not.
     """
     loop = _loop_of_small_displacements(scenario)
-    foam = InStepFoam(
-        pattern,
-        scenario.step_s,
-        ContactRows.of(scenario, pattern),
-        loop.largest_displacement_m,
-        loop.mass_scale,
-        loop.damping_ratio,
-    )
+    # Threads of small matrices wait for one another, longest beside other runs.
+    with threadpool_limits(1):
+        foam = InStepFoam(
+            pattern,
+            scenario.step_s,
+            ContactRows.of(scenario, pattern),
+            loop.largest_displacement_m,
+            loop.mass_scale,
+            loop.damping_ratio,
+        )
     mass, shaken_hz = foam.mass, _shaken_hz(scenario)
     if mass.first_hz < min(ABOVE_VIBRATION * shaken_hz, LIKE_FOAM * mass.own_first_hz):
         also = f" or {LIKE_FOAM:g} times the foam's own {mass.own_first_hz:.3g} Hz"

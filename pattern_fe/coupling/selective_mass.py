@@ -81,7 +81,7 @@ def selective_mass(
     """
     if scale is not None and not 0.0 < scale < math.inf:
         raise ValueError(f"mass scale of the pattern is {scale:g}, valid is above 0")
-    square, shape = surface.modes()
+    square, shape = surface.modes
     rows = [shape.T @ row @ shape for row in contacts.row_kg]
 
     def bears(scale: float, share_s2: float) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,9 @@ from pydantic import ValidationError
 
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.session import window_ends
+from pattern_fe.mesh_file import write_mesh
 from pattern_fe.scene import pattern_of, with_surface
+from pattern_fe.shapes import bar, mesh_of
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.bad_input import BadInputError
@@ -41,6 +45,22 @@ def test_the_sand_meets_the_vertices_of_the_elements() -> None:
     # stem and flange: 0.01 x 0.06 + 0.04 x 0.01
     assert outline.measure == pytest.approx(1.0e-3)
     assert with_surface(scenario) == scenario
+
+
+def test_runs_that_differ_in_their_sand_or_loop_share_a_pattern(tmp_path: Path) -> None:
+    pattern = pattern_of(l_scene())
+    assert pattern_of(l_scene(loop={"factor": 0.1}).model_copy(update={"seed": 7})) is pattern
+    assert pattern_of(l_scene(young_modulus_pa=1e6)) is not pattern
+    path = tmp_path / "bar.vtu"
+    shape = {"kind": "file", "file": str(path)}
+    widths = []
+    for changed, width_m in enumerate((0.02, 0.03)):
+        write_mesh(path, mesh_of(bar(width_m, 0.01), 0.01))
+        os.utime(path, (changed, changed))
+        told = {**L_SCENE, "pattern": {"shape": shape, "position_m": [0.01, 0.0]}}
+        drawn_m = pattern_of(Scenario.model_validate(told)).surface.vertices_m
+        widths.append(np.ptp(drawn_m[:, 0]))
+    assert widths == pytest.approx([0.02, 0.03])
 
 
 def test_a_scene_bends_with_its_snapshot() -> None:

@@ -77,7 +77,7 @@ def test_a_plucked_plank_swings_with_its_first_frequency(engine: str, tmp_path: 
 
 def pattern_mass(pattern: Pattern) -> Array:
     """Own mass of each component of the surface, 0 where held."""
-    mass = pattern.condensed().mass_kg
+    mass = pattern.condensed.mass_kg
     return np.where(np.isfinite(mass), mass, 0.0)
 
 
@@ -237,7 +237,7 @@ def test_a_bar_that_runs_away_stops_the_run(engine: str, tmp_path: Path) -> None
 
 def largest_growth(scenario: Scenario, pattern: Pattern, lighter: float) -> float:
     """Largest factor in a step of the pattern among still grains all round it, masses lighter."""
-    surface, contacts = pattern.condensed(), ContactRows.of(scenario, pattern)
+    surface, contacts = pattern.condensed, ContactRows.of(scenario, pattern)
     step_s = scenario.step_s
     mass = selective_mass(surface, contacts, step_s)
     inverse = lighter * mass.inverse_1_kg()
@@ -274,7 +274,7 @@ def test_masses_bear_a_row_of_grains_and_half_of_them_does_not(young_pa: float) 
 def test_masses_that_need_no_help_stay_the_foams() -> None:
     pattern = plank_pattern(6.4e6)
     scenario = wedge_scene(pattern, time_step={"step_s": 1e-7})
-    mass = selective_mass(pattern.condensed(), ContactRows.of(scenario, pattern), 1e-7)
+    mass = selective_mass(pattern.condensed, ContactRows.of(scenario, pattern), 1e-7)
     assert mass.scale == 1.0
     assert mass.first_hz == pytest.approx(mass.own_first_hz, rel=0.01)
     whole = pattern.natural_frequencies_hz()[0]

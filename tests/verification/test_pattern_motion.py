@@ -184,7 +184,7 @@ def test_impossible_steps_are_refused() -> None:
     with pytest.raises(ValueError, match="mass damping of the pattern is -1 1/s, valid is 0"):
         pattern.central_differences(1e-6, -1.0)
     with pytest.raises(ValueError, match="mass scale of the pattern is 0, valid is above 0"):
-        selective_mass(pattern.condensed(), ContactRows((), 0.0), 1e-6, scale=0.0)
+        selective_mass(pattern.condensed, ContactRows((), 0.0), 1e-6, scale=0.0)
 
 
 def _patterns_to_condense() -> list[Pattern]:
@@ -205,13 +205,13 @@ def test_condensed_surface_answers_loads_on_it_as_the_whole_pattern() -> None:
     for pattern in _patterns_to_condense():
         load = np.random.default_rng(8).standard_normal(pattern.surface.vertices_m.shape)
         whole = pattern.on_surface(pattern.solve_linear(pattern.on_nodes(load)))
-        condensed = _free_solution(pattern.condensed(), load)
+        condensed = _free_solution(pattern.condensed, load)
         assert np.allclose(condensed, whole, rtol=0.0, atol=1e-10 * np.abs(whole).max())
 
 
 def test_condensed_rows_of_held_components_give_the_reactions() -> None:
     pattern = l_pattern()
-    surface = pattern.condensed()
+    surface = pattern.condensed
     load = np.random.default_rng(8).standard_normal(pattern.surface.vertices_m.shape)
     held = pattern.on_surface(pattern.fixed)
     load[held] = 0.0
@@ -222,12 +222,12 @@ def test_condensed_rows_of_held_components_give_the_reactions() -> None:
 
 def test_condensed_mass_is_the_patterns_and_held_components_are_in_no_mode() -> None:
     pattern = l_pattern()
-    surface = pattern.condensed()
+    surface = pattern.condensed
     held = pattern.on_surface(pattern.fixed).ravel()
     assert (np.isinf(surface.mass_kg) == held).all()
-    free = Pattern(pattern.space.mesh, Supports(), thickness_m=THICKNESS_M).condensed()
+    free = Pattern(pattern.space.mesh, Supports(), thickness_m=THICKNESS_M).condensed
     assert free.mass_kg.reshape(-1, 2).sum(axis=0) == pytest.approx(pattern.mass_kg.sum())
-    square, shape = surface.modes()
+    square, shape = surface.modes
     assert not shape[held].any()
     mass = np.where(held, 0.0, surface.mass_kg)
     np.testing.assert_allclose(shape.T @ (mass[:, None] * shape), np.eye(len(square)), atol=1e-9)
@@ -237,7 +237,7 @@ def test_condensed_mass_is_the_patterns_and_held_components_are_in_no_mode() -> 
 
 def test_condensed_frequency_is_a_little_low() -> None:
     pattern = l_pattern()
-    square, _ = pattern.condensed().modes()
+    square, _ = pattern.condensed.modes
     first = pattern.natural_frequencies_hz()[0]
     # mass shared by area sits farther out than it is: 7 % low in this L
     assert math.sqrt(square[0]) / (2.0 * math.pi) == pytest.approx(0.93 * first, rel=0.01)
