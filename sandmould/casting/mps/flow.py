@@ -21,6 +21,7 @@ from sandmould.casting.mps.operators import (
     crowding,
     density_rate,
     pressure_gradient,
+    velocity_gradient,
 )
 from sandmould.casting.mps.particles import Floats, Particles
 from sandmould.casting.mps.pressure import solve_pressure
@@ -233,8 +234,9 @@ class Flow:
         compression = near.density / kernel.lattice_density - 1.0
         asked = SOURCES[scheme.source](
             Tentative(
-                kernel, near, state.velocity_m_s, dt, compression, compression_before, rate_before
-            )
+                kernel, near, state.kind, state.velocity_m_s, dt, compression, compression_before,
+                rate_before,
+            )  # fmt: skip
         )
         surface = near.density < scheme.surface * kernel.lattice_density
         factor = scheme.source_share * self.metal.density_kg_m3 / dt**2
@@ -255,12 +257,18 @@ class Flow:
         self.pressure_pa += pressure
 
     def _shift(self) -> None:
-        """Move inner particles to where fewer are; the surface keeps its place."""
+        """Move inner particles to where fewer are, and give them the velocity found there.
+
+        The surface keeps its place.
+        """
         state, kernel = self.particles, self.kernel
         near = self._neighbours()
         inner = self.fluid & (near.density >= self.scheme.surface * kernel.lattice_density)
-        step_m = self.scheme.shifting * kernel.spacing_m**2
-        state.position_m[inner] -= step_m * crowding(kernel, near, state.kind)[inner]
+        share_m2 = self.scheme.shifting * kernel.spacing_m**2
+        shift_m = -share_m2 * crowding(kernel, near, state.kind)[inner]
+        gradient = velocity_gradient(kernel, near, state.velocity_m_s, state.kind)[inner]
+        state.velocity_m_s[inner] += np.einsum("ia,iab->ib", shift_m, gradient)
+        state.position_m[inner] += shift_m
 
     def _check(self) -> None:
         """Stop a run that went wrong."""
