@@ -146,8 +146,8 @@ def test_vortices_converge():
     {"gradient": "least"}, {"gradient": "difference"}, {"source": "divergence"}, {"surface": 0.985},
 ])  # fmt: skip
 def test_each_of_these_spoils_the_vortices(change):
-    # measured 11, 8, 12 and 13 % where CONSISTENT leaves 1.6 %; `least` and `difference` lose 19 and
-    # 13 % of the energy
+    # measured 11, 8, 12 and 13 % where CONSISTENT leaves 1.6 %; against the least pressure around
+    # 19 % of the energy is lost
     assert vortices(20, replace(CONSISTENT, **change))[1] > 0.04
 
 

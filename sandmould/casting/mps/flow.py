@@ -232,12 +232,11 @@ class Flow:
         state, kernel, scheme = self.particles, self.kernel, self.scheme
         near = self._neighbours()
         compression = near.density / kernel.lattice_density - 1.0
-        asked = SOURCES[scheme.source](
-            Tentative(
-                kernel, near, state.kind, state.velocity_m_s, dt, compression, compression_before,
-                rate_before,
-            )  # fmt: skip
-        )
+        now = Tentative(
+            kernel, near, state.kind, state.velocity_m_s, dt, compression, compression_before,
+            rate_before,
+        )  # fmt: skip
+        asked = SOURCES[scheme.source](now)
         surface = near.density < scheme.surface * kernel.lattice_density
         factor = scheme.source_share * self.metal.density_kg_m3 / dt**2
         begin = time.perf_counter()

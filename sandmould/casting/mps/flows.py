@@ -77,7 +77,9 @@ def poiseuille_m_s(y_m: Floats, time_s: float, width_m: float, nu: float, force:
     return np.asarray(force / nu * (steady - 4.0 * width_m**2 / math.pi**3 * wave.sum(axis=0)))
 
 
-def taylor_green_m_s(position_m: Floats, time_s: float, nu: float, speed_m_s: float = 1.0) -> Floats:
+def taylor_green_m_s(
+    position_m: Floats, time_s: float, nu: float, speed_m_s: float = 1.0
+) -> Floats:
     """Velocity of four vortices in a periodic square of 1 m, (n, 3) float64, m/s.
 
     It decays as exp(-8 pi^2 nu t) (Taylor and Green 1937).
