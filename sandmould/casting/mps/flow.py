@@ -60,9 +60,9 @@ class Cost:
     steps: int = 0
     iterations: int = 0
     """Of the Poisson solver, over all relaxations."""
-    particle_solves: float = 0.0
+    particle_solves: int = 0
     """Particles over all steps, once and once for every relaxation; one of the mould counts as
-    ``MOULD_SHARE`` of one of fluid."""
+    ``MOULD_SHARE`` of one of fluid, and each step as a whole number."""
     wall_s: float = 0.0
     pressure_s: float = 0.0
     """Building and solving the Poisson equation."""
@@ -80,9 +80,9 @@ class Progress:
     """Wall time to the end, at the rate so far."""
 
 
-def solves(scheme: Scheme, fluid: int, particles: int) -> float:
+def solves(scheme: Scheme, fluid: int, particles: int) -> int:
     """Work of one step, as ``Cost.particle_solves``, from the fluid's particles and all."""
-    return (fluid + MOULD_SHARE * (particles - fluid)) * (1 + scheme.relaxations)
+    return round((fluid + MOULD_SHARE * (particles - fluid)) * (1 + scheme.relaxations))
 
 
 class Flow:
