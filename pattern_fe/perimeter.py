@@ -61,13 +61,17 @@ class Perimeter:
 
     @property
     def outer_line(self) -> slice:
-        """Vertices of the line that the sand meets in 2D: the outermost of a pattern with holes."""
+        """Vertices that the sand meets: in 2D those of the outermost line, in 3D all."""
         vertices = self.vertices_m
+        if not self.loops:
+            return slice(0, len(vertices))
         return max(self.loops, key=lambda loop: np.ptp(vertices[loop], axis=0).max())
 
     @property
     def outer(self) -> Perimeter:
-        """The line that the sand meets in 2D, as a surface of its own."""
+        """What the sand meets as a surface of its own; in 2D one line."""
+        if not self.loops:
+            return self
         line = self.outer_line
         of_line = self.facets[(self.facets >= line.start).all(1) & (self.facets < line.stop).all(1)]
         whole = slice(0, line.stop - line.start)

@@ -23,6 +23,7 @@ from sandmould.scenario.box import Polygon
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile
 from sandmould.scenario.pattern import Pattern as PatternSection
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import Triangles
 
 Array = NDArray[np.float64]
 
@@ -37,31 +38,37 @@ def pattern_of(scenario: Scenario) -> Pattern:
     """
     told = scenario.pattern
     assert told is not None
-    if scenario.dimension == 3:
-        valid = "a scene in 2D: a pattern is coupled in the plane alone"
-        raise BadInputError([Problem("dimension", 3, valid)])
+    box, d = scenario.box, scenario.dimension
+    if len(told.position_m) != d:
+        valid = f"{d} numbers, one a dimension"
+        raise BadInputError([Problem("pattern.position_m", list(told.position_m), valid)])
+    if told.depth_m is not None and (d == 2 or isinstance(told.shape, MeshFile)):
+        valid = "null in 2D and for a mesh file, which has its own"
+        raise BadInputError([Problem("pattern.depth_m", told.depth_m, valid)])
     # what is shared by all runs of a study that differ in their sand or their loop
     body = told.model_copy(update={"loop": Loop()})
-    size_m = (scenario.box.width_m, scenario.box.height_m)
-    return _computed(body, size_m, scenario.sand.disc_thickness_m, _changed_ns(told))
+    size_m = (box.width_m, box.height_m) if d == 2 else (box.width_m, box.depth_m, box.height_m)
+    thickness_m = scenario.sand.disc_thickness_m if d == 2 else None
+    return _computed(body, size_m, thickness_m, _changed_ns(told))
 
 
 def _changed_ns(told: PatternSection) -> int:
     """When the mesh file of a pattern was last changed, 0 without one."""
     shape = told.shape
-    there = isinstance(shape, MeshFile) and shape.path.is_file()
-    return shape.path.stat().st_mtime_ns if there else 0
+    if isinstance(shape, MeshFile) and shape.path.is_file():
+        return shape.path.stat().st_mtime_ns
+    return 0
 
 
 @lru_cache(maxsize=8)
 def _computed(
-    told: PatternSection, size_m: tuple[float, float], thickness_m: float, changed_ns: int
+    told: PatternSection, size_m: tuple[float, ...], thickness_m: float | None, changed_ns: int
 ) -> Pattern:
     """The pattern of a section in a box; its matrices stay with it."""
     with _blaming("pattern.shape", told.shape.model_dump(mode="json")):
-        mesh = _mesh(told).translated(np.array(told.position_m))
+        mesh = _mesh(told, size_m).translated(np.array(told.position_m))
     with _blaming("pattern.position_m", list(told.position_m)):
-        check_inside(mesh, np.zeros(2), np.array(size_m))
+        check_inside(mesh, np.zeros(len(size_m)), np.array(size_m))
     # Threads of small matrices wait for one another, longest beside other runs.
     with (
         threadpool_limits(1),
@@ -78,18 +85,25 @@ def _computed(
     return pattern
 
 
-def _mesh(told: PatternSection) -> Any:
+def _mesh(told: PatternSection, size_m: tuple[float, ...]) -> Any:
     shape = told.shape
     if isinstance(shape, MeshFile):
-        return read_mesh(shape.path, shape.unit_m)
+        mesh = read_mesh(shape.path, shape.unit_m)
+        if mesh.dim() != len(size_m):
+            valid = f"a mesh in {len(size_m)}D as the scene"
+            raise ValueError(f"mesh file {shape.path.name} is in {mesh.dim()}D, valid is {valid}")
+        return mesh
+    depth_m = None
+    if len(size_m) == 3:
+        depth_m = size_m[1] - told.position_m[1] if told.depth_m is None else told.depth_m
     if isinstance(shape, Bar):
-        return mesh_of(bar(shape.width_m, shape.height_m), told.element_m)
+        return mesh_of(bar(shape.width_m, shape.height_m), told.element_m, depth_m)
     across_m = shape.reach_m if isinstance(shape, LShape) else shape.width_m
     if shape.thickness_m >= min(shape.height_m, across_m):
         valid = "below its height and its reach or width"
         raise ValueError(f"thickness is {shape.thickness_m:g} m, valid is {valid}")
     make = l_shape if isinstance(shape, LShape) else t_shape
-    return mesh_of(make(shape.thickness_m, shape.height_m, across_m), told.element_m)
+    return mesh_of(make(shape.thickness_m, shape.height_m, across_m), told.element_m, depth_m)
 
 
 @contextmanager
@@ -114,9 +128,15 @@ def with_surface(scenario: Scenario) -> Scenario:
         return scenario
     pattern = pattern_of(scenario)
     refuse_scheme(scenario, pattern)
-    vertices = pattern.surface.vertices_m[pattern.surface.outer_line]
-    outline = Polygon(
-        kind="polygon", name=told.name, vertices_m=[tuple(v) for v in vertices.tolist()]
-    )
+    outer = pattern.surface.outer
+    vertices_m = [tuple(v) for v in outer.vertices_m.tolist()]
+    solid: Polygon | Triangles
+    if scenario.dimension == 2:
+        solid = Polygon(kind="polygon", name=told.name, vertices_m=vertices_m)
+    else:
+        triangles = [tuple(t) for t in outer.facets.tolist()]
+        solid = Triangles(
+            kind="triangles", name=told.name, vertices_m=vertices_m, triangles=triangles
+        )
     others = tuple(o for o in scenario.obstacles if o.name != told.name)
-    return scenario.model_copy(update={"obstacles": (*others, outline)})
+    return scenario.model_copy(update={"obstacles": (*others, solid)})

@@ -12,8 +12,15 @@ from pattern_fe.pattern import Pattern
 Array = NDArray[np.float64]
 
 
+def cross(place_m: Array, force_n: Array) -> Array:
+    """Moments of forces about the origin, (n, 1) in 2D or (n, 3) in 3D, N m."""
+    if place_m.shape[1] == 3:
+        return np.asarray(np.cross(place_m, force_n))
+    return place_m[:, :1] * force_n[:, 1:] - place_m[:, 1:] * force_n[:, :1]
+
+
 class FoamBody:
-    """A pattern at rest under the loads on its outer line."""
+    """A pattern at rest under the loads on its outer surface."""
 
     def __init__(self, pattern: Pattern, large: bool = False) -> None:
         """Stand as drawn.
@@ -30,11 +37,11 @@ class FoamBody:
 
     @property
     def vertices_m(self) -> Array:
-        """Vertices of the outer line as drawn, (nv, 2) float64, m."""
+        """Vertices of the outer surface as drawn, (nv, d) float64, m."""
         return self._pattern.surface.vertices_m[self._line]
 
     def answer(self, load_n: Array) -> Answer:
-        """Find the pattern at rest under loads on the outer line, (nv, 2) float64, N."""
+        """Find the pattern at rest under loads on the outer surface, (nv, d) float64, N."""
         pattern = self._pattern
         on_surface = np.zeros_like(pattern.surface.vertices_m)
         on_surface[self._line] = load_n
@@ -45,12 +52,12 @@ class FoamBody:
         # Small displacements balance on the drawing, large ones where the nodes have come to.
         place_m = pattern.space.node_m + (moved if self._large else 0.0)
         outer = load + reaction
-        moment = place_m[:, 0] * outer[:, 1] - place_m[:, 1] * outer[:, 0]
+        moment = cross(place_m, outer).sum(axis=0)
         return Answer(
             pattern.on_surface(moved)[self._line],
             pattern.energy_j(moved, self._large),
             np.asarray(reaction.sum(axis=0)),
-            abs(float(moment.sum())),
+            float(np.linalg.norm(moment)),
         )
 
     def _inner_force_n(self, moved_m: Array) -> Array:

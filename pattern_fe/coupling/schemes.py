@@ -46,6 +46,8 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         raise _bad("repeats", loop.repeats, "0 on engine liggghts, which cannot go back")
     if scheme == "monolithic" and engine != "reference":
         raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
+    if scenario.dimension == 3:
+        _refuse_in_space(loop, engine)
     if loop.exchange == "files" and scheme in WITHOUT_WINDOWS:
         raise _bad(
             "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"
@@ -54,6 +56,17 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         explicit_foam(scenario, pattern)
     if scheme == "in_step":
         in_step_foam(scenario, pattern)
+
+
+def _refuse_in_space(loop: Loop, engine: str) -> None:
+    """Refuse what is coupled in the plane alone."""
+    if engine == "liggghts":
+        valid = "reference or lammps in a scene in 3D with a pattern"
+        raise BadInputError([Problem("engine.name", engine, valid)])
+    if loop.scheme in WITHOUT_WINDOWS:
+        raise _bad("scheme", loop.scheme, "a scheme with windows in 3D")
+    if loop.exchange == "files":
+        raise _bad("exchange", loop.exchange, "memory in 3D")
 
 
 def explicit_foam(scenario: Scenario, pattern: Pattern) -> ExplicitFoam:

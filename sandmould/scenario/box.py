@@ -14,7 +14,7 @@ from sandmould.scenario.outline import Outline, signed_area_m2
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.revolved import Revolved
 from sandmould.scenario.sand import ARGUED
-from sandmould.scenario.solids import Cylinder, SolidMesh, cylinder_solid, mesh_solid
+from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
 
 
 class Box(Section):
@@ -97,7 +97,7 @@ class Polygon(Section):
     )
 
 
-AnyObstacle = Plate | Tube | Polygon | Cylinder | SolidMesh
+AnyObstacle = Plate | Tube | Polygon | Cylinder | SolidMesh | Triangles
 Obstacle = Annotated[AnyObstacle, Field(discriminator="kind")]
 ROUND_BORE_SIDES = 64
 """Sides of the polygon that stands for a round bore in measures. It has the circle's area and lies
@@ -262,6 +262,8 @@ def build_scene(box: Box, obstacles: tuple[AnyObstacle, ...], dimension: int) ->
             outlines.append(polygon_outline(obstacle))
         elif isinstance(obstacle, Cylinder):
             revolved.append(cylinder_solid(obstacle))
+        elif isinstance(obstacle, Triangles):
+            meshes.append(obstacle.solid)
         else:
             meshes.append(mesh_solid(obstacle, f"obstacles.{i}"))
     return Scene(

@@ -8,12 +8,13 @@ import numpy as np
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_blocks, tube_wall
+from sandmould.scenario.mesh_file import MeshFileError, check_surface
 from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import Cylinder, SolidMesh, cylinder_solid, mesh_solid
+from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
 
-KINDS = {2: ("plate", "tube", "polygon"), 3: ("plate", "tube", "cylinder", "mesh")}
+KINDS = {2: ("plate", "tube", "polygon"), 3: ("plate", "tube", "cylinder", "mesh", "triangles")}
 """Kinds of obstacles that a dimension has."""
 
 
@@ -60,6 +61,8 @@ def _obstacles(s: Scenario) -> Iterator[Problem]:
             if not _in_box(s, cylinder_solid(obstacle).corners()):
                 valid = f"a cylinder inside the box, {_size(s)}"
                 yield Problem(f"{key}.centre_m", list(obstacle.centre_m), valid)
+        elif isinstance(obstacle, Triangles):
+            yield from _triangles(s, obstacle, key)
         else:
             yield from _mesh(s, obstacle, key)
 
@@ -129,6 +132,17 @@ def _mesh(s: Scenario, solid: SolidMesh, key: str) -> Iterator[Problem]:
         low, high = (f"({', '.join(f'{x:.4g}' for x in end)})" for end in ends_m)
         valid = f"one that puts the mesh, now from {low} to {high} m, inside the box, {_size(s)}"
         yield Problem(f"{key}.position_m", list(solid.position_m), valid)
+
+
+def _triangles(s: Scenario, solid: Triangles, key: str) -> Iterator[Problem]:
+    shown = f"{len(solid.triangles)} triangles"
+    try:
+        check_surface(solid.solid.vertices_m, solid.solid.triangles)
+    except MeshFileError as fault:
+        yield Problem(f"{key}.triangles", shown, str(fault))
+        return
+    if not _in_box(s, solid.solid.corners()):
+        yield Problem(f"{key}.vertices_m", shown, f"a solid inside the box, {_size(s)}")
 
 
 def _in_box(s: Scenario, corners: np.ndarray, slack: float = 1e-9) -> bool:

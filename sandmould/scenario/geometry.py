@@ -7,6 +7,7 @@ moulding box, at rest.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from sandmould.scenario.outline import Outline
 from sandmould.scenario.revolved import Revolved
 
 Array = NDArray[np.float64]
+Facetted = TypeVar("Facetted", Outline, TriangleMesh)
 
 
 @dataclass(frozen=True)
@@ -187,12 +189,13 @@ class Scene:
         """The scene after one of its blocks was taken away."""
         return replace(self, blocks=tuple(b for b in self.blocks if b.name != block))
 
-    def bent(self, outline: str, vertices_m: Array) -> Scene:
-        """The scene with the vertices of one outline elsewhere, (k, 2) float64, m."""
-        bent = (
-            replace(o, vertices_m=vertices_m) if o.name == outline else o for o in self.outlines
-        )
-        return replace(self, outlines=tuple(bent))
+    def bent(self, name: str, vertices_m: Array) -> Scene:
+        """The scene with the vertices of one outline or mesh elsewhere, (k, d) float64, m."""
+
+        def bent(solids: tuple[Facetted, ...]) -> tuple[Facetted, ...]:
+            return tuple(replace(s, vertices_m=vertices_m) if s.name == name else s for s in solids)
+
+        return replace(self, outlines=bent(self.outlines), meshes=bent(self.meshes))
 
     def clearance_m(self, position_m: Array, reach_m: float = np.inf) -> Array:
         """Distance of points from the nearest wall or solid, negative where inside one.

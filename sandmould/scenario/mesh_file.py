@@ -74,6 +74,26 @@ def _read(path: Path, sha256: str) -> tuple[Array, Triangles]:
     return _outward(vertices, triangles, shell)
 
 
+def check_surface(vertices: Array, triangles: Triangles) -> None:
+    """Refuse triangles that bound no solid or do not face outwards.
+
+    Parameters
+    ----------
+    vertices : (nv, 3) float64
+    triangles : (nt, 3) int64
+
+    Raises
+    ------
+    MeshFileError
+    """
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise MeshFileError(f"triangles between its {len(vertices)} vertices, counted from 0")
+    _check_triangles(vertices, triangles)
+    _shells(vertices, triangles)
+    if not signed_volumes_m3(vertices, triangles).sum() > 0.0:
+        raise MeshFileError("triangles that run counter-clockwise seen from outside")
+
+
 def _parsed(path: Path) -> tuple[Array, Triangles]:
     # slow to import, and few scenes have meshes
     import meshio

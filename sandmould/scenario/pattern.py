@@ -13,7 +13,6 @@ from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 
 ROJEK = "Rojek 2004, section 4.3"
-Point = tuple[float, float]
 
 
 def _length(description: str) -> float:
@@ -49,7 +48,7 @@ class TShape(Section):
 
 
 class MeshFile(Section):
-    """A mesh of triangles or quadrilaterals, in any format that meshio reads."""
+    """A mesh that meshio reads: triangles or quadrilaterals, in 3D tetrahedra or hexahedra."""
 
     kind: Literal["file"]
     file: str = quantity(
@@ -72,7 +71,7 @@ Shape = Annotated[Bar | LShape | TShape | MeshFile, Field(discriminator="kind")]
 
 
 class Supports(Section):
-    """Named boundaries and what holds them: left, right, bottom, top, or a group of a mesh file."""
+    """What holds the pattern: left, right, bottom, top, front, back, or groups of a mesh file."""
 
     clamped: tuple[str, ...] = quantity(("bottom",), "Boundaries that do not move.", source=ARGUED)
     resting: tuple[str, ...] = quantity(
@@ -154,13 +153,18 @@ class Loop(Section):
 
 
 class Pattern(Section):
-    """A foam pattern that bends under the sand, 2D only."""
+    """A foam pattern that bends under the sand."""
 
     name: str = quantity("pattern", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
     shape: Shape = Field(..., description="Its shape.")
-    position_m: Point = quantity(
-        (0.0, 0.0), "Place of the shape's origin in the box.", unit="m", source="user"
-    )
+    position_m: tuple[float, ...] = quantity(
+        (0.0, 0.0), "Place of the shape's origin in the box, one number a dimension.", unit="m",
+        source="user", min_length=2, max_length=3,
+    )  # fmt: skip
+    depth_m: float | None = quantity(
+        None, "Extent of a shape along y in 3D; to the back of the box unless given. A mesh file "
+        "has its own.", unit="m", source="user", gt=0, le=100,
+    )  # fmt: skip
     element_m: float = quantity(
         0.005, "Longest side of an element; a mesh file has its own.", unit="m", source=ARGUED,
         gt=0, le=1,

@@ -1,4 +1,4 @@
-"""Obstacles of 3D that no flat plates can make: round cylinders and surfaces from files."""
+"""Obstacles of 3D that no flat plates can make: round cylinders and surfaces of triangles."""
 
 from __future__ import annotations
 
@@ -84,6 +84,29 @@ class SolidMesh(Section):
     def path(self) -> Path:
         """Where the file lies."""
         return Path(os.path.normpath(ROOT / self.file))
+
+
+class Triangles(Section):
+    """A solid bounded by triangles given in place, 3D only: a pattern stands in its scene so."""
+
+    kind: Literal["triangles"]
+    name: str = quantity(
+        "triangles", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$"
+    )
+    vertices_m: tuple[tuple[float, float, float], ...] = quantity(
+        ..., "Vertices.", unit="m", source="user", min_length=4
+    )
+    triangles: tuple[tuple[int, int, int], ...] = quantity(
+        ...,
+        "Vertices of each triangle, counted from 0, counter-clockwise seen from outside.",
+        source="user",
+        min_length=4,
+    )
+
+    @property
+    def solid(self) -> TriangleMesh:
+        """Its geometry."""
+        return TriangleMesh(self.name, np.array(self.vertices_m), np.array(self.triangles))
 
 
 def cylinder_solid(cylinder: Cylinder) -> Revolved:

@@ -37,7 +37,7 @@ class BentPattern:
         self._scenario = scenario
         self.pattern: Pattern = pattern_of(scenario)
         self.drawn: Perimeter = self.pattern.surface.outer
-        """The line that the sand meets, as drawn."""
+        """The surface that the sand meets, as drawn; in 2D a line."""
         held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
         self.tip = farthest_corner(self.drawn.vertices_m, held)
         """Its vertex farthest from the supports."""
@@ -67,10 +67,10 @@ class BentPattern:
 
     @cached_property
     def _predicted(self) -> Row:
-        """What the scenario alone tells of its loop; nothing of a scheme without windows."""
+        """What the scenario alone tells of its loop in 2D; nothing of one without windows."""
         told = self._scenario.pattern
         assert told is not None
-        if told.loop.scheme in WITHOUT_WINDOWS:
+        if self._scenario.dimension == 3 or told.loop.scheme in WITHOUT_WINDOWS:
             return {}
         gain = predicted_gain(self._scenario, self.pattern, told.loop.window_s)
         return {"pattern_predicted_gain": gain.gain, "pattern_predicted_limit": gain.limit}

@@ -64,7 +64,7 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         "largest_overlap_fraction": touching.largest_overlap_fraction,
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
-    if snapshot.pattern_m is not None:
+    if snapshot.pattern_m is not None and scenario.dimension == 2:
         row["pattern_under_fraction"] = fill_under(snapshot.pattern_m, position, radius)
     return row | measure_outflow(scenario, snapshot)
 

@@ -71,7 +71,7 @@ CASES: dict[str, tuple[str, str]] = {
         "based_on: bracket\nscenario: {obstacles: [{kind: polygon, "
         "vertices_m: [[0, 0], [0.1, 0], [0, 0.05]]}]}",
         "trial.yaml: scenario.obstacles.0.kind = 'polygon' cannot be used: "
-        "valid is plate, tube, cylinder or mesh in 3D.",
+        "valid is plate, tube, cylinder, mesh or triangles in 3D.",
     ),
     "cylinder in 2D": (
         "based_on: tube\nscenario: {obstacles: [{kind: cylinder, centre_m: [0, 0, 0], "

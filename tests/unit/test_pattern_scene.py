@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from skfem import MeshTet
 
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.session import window_ends
 from pattern_fe.mesh_file import write_mesh
 from pattern_fe.scene import pattern_of, with_surface
-from pattern_fe.shapes import bar, mesh_of
+from pattern_fe.shapes import bar, mesh_of, with_sides
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds import sand
@@ -143,9 +146,74 @@ def test_a_pattern_that_swings_like_the_foam_may_be_shaken() -> None:
         with_surface(Scenario.model_validate(scene))
 
 
-def test_a_pattern_in_space_is_told() -> None:
-    with pytest.raises(BadInputError, match="dimension = 3"):
-        with_surface(Scenario.model_validate({**L_SCENE, "dimension": 3}))
+SPACE: dict[str, Any] = {"dimension": 3, "box": {"depth_m": 0.08}, "engine": {"name": "reference"}}
+
+
+def in_space(scene: dict[str, Any] = SPACE, **pattern: Any) -> Scenario:
+    """The L between y = 20 mm and the back of a box, elements as long as it is thick."""
+    told = {"position_m": [0.06, 0.02, 0.0], "element_m": 0.02, **pattern}
+    tree = merge(l_scene().model_dump(mode="json"), scene, Origin(), "test")
+    return Scenario.model_validate({**tree, "pattern": {**tree["pattern"], **told}})
+
+
+@pytest.mark.parametrize(("depth_m", "exact_m"), [(None, 0.06), (0.03, 0.03)])
+def test_in_space_the_sand_meets_triangles(depth_m: float | None, exact_m: float) -> None:
+    scenario = with_surface(in_space(depth_m=depth_m))
+    (mesh,) = scenario.scene.meshes
+    body = FoamBody(pattern_of(scenario))
+    np.testing.assert_array_equal(mesh.vertices_m, body.vertices_m)
+    # stem and flange: 0.01 x 0.06 + 0.04 x 0.01
+    assert mesh.measure == pytest.approx(1.0e-3 * exact_m)
+    assert not problems(scenario)
+    assert with_surface(scenario) == scenario
+    lower = mesh.vertices_m - [0.0, 0.0, 0.003]
+    assert scenario.scene.bent("pattern", lower).top_m == pytest.approx(0.057)
+
+
+def test_a_mesh_file_of_tetrahedra_meets_the_sand(tmp_path: Path) -> None:
+    path, lines = tmp_path / "cube.vtu", [np.array([0.0, 0.02])] * 3
+    write_mesh(path, with_sides(MeshTet.init_tensor(*lines)))
+    scenario = with_surface(in_space(shape={"kind": "file", "file": str(path)}))
+    (mesh,) = scenario.scene.meshes
+    assert mesh.measure == pytest.approx(8e-6)
+    assert mesh.vertices_m.min(axis=0) == pytest.approx([0.06, 0.02, 0.0])
+    flat = {**L_SCENE, "pattern": {"shape": {"kind": "file", "file": str(path)}}}
+    with pytest.raises(BadInputError, match=r"cube.vtu is in 3D, valid is a mesh in 2D as the sce"):
+        pattern_of(Scenario.model_validate(flat))
+
+
+@pytest.mark.parametrize(
+    ("scene", "pattern", "says"),
+    [
+        ({}, {"position_m": [0.06, 0.0]}, r"pattern.position_m = \[0.06, 0.0\] .* 3 numbers, one"),
+        ({}, {"depth_m": 0.07}, r"pattern.position_m = .* reaches from \(0.06, 0.02, 0\) to"),
+        ({}, {"loop": {"scheme": "in_step"}}, r"loop.scheme = 'in_step' .* with windows in 3D"),
+        ({}, {"loop": {"scheme": "monolithic"}}, r"scheme = 'monolithic' .* with windows in 3D"),
+        ({}, {"loop": {"exchange": "files"}}, r"loop.exchange = 'files' .* memory in 3D"),
+        ({"engine": {"name": "liggghts"}, "frame": "box"}, {}, r"engine.name = 'liggghts' .* lamm"),
+        ({"dimension": 2}, {"depth_m": 0.1, "position_m": [0.06, 0.0]}, r"depth_m = 0.1 .* null"),
+    ],
+)
+def test_what_is_not_coupled_in_space_is_told(
+    scene: dict[str, Any], pattern: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(BadInputError, match=says):
+        with_surface(in_space({**SPACE, **scene}, **pattern))
+
+
+@pytest.mark.parametrize(
+    ("triangles", "says"),
+    [
+        ([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], r"counter-clockwise seen from outside"),
+        ([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 4]], r"between its 4 vertices"),
+        ([[0, 2, 1], [0, 1, 3], [0, 3, 2], [0, 3, 2]], r"triangles that differ"),
+    ],
+)
+def test_triangles_that_bound_no_solid_are_told(triangles: list[list[int]], says: str) -> None:
+    corners = [[0.01, 0.01, 0.01], [0.03, 0.01, 0.01], [0.01, 0.03, 0.01], [0.01, 0.01, 0.03]]
+    solid = {"kind": "triangles", "vertices_m": corners, "triangles": triangles}
+    (found,) = problems(Scenario.model_validate({"dimension": 3, "obstacles": [solid]}))
+    assert re.search(says, str(found))
 
 
 @pytest.mark.parametrize("ratio", [0.5, -1.0])

@@ -136,7 +136,7 @@ def _pack(
         origin_m=tuple(origin_m.tolist()),
         quantum_m=quantum_m,
         largest_radius_m=largest_m,
-        bent=tuple(_outline(f) for f in frames if f.pattern_m is not None),
+        bent=tuple(_outline(f) for f in frames if dimension == 2 and f.pattern_m is not None),
         data=base64.b64encode(zlib.compress(raw, 6)).decode("ascii"),
     )
 

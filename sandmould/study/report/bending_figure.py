@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.geometry import Array
+from sandmould.scenario.geometry import Array, Solid
+from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.bent_files import shape_moments
 from sandmould.study.moments import list_moments
@@ -21,7 +23,7 @@ _STYLES = {"filled": ("after filling", "#D55E00"), "final": ("at the end", "#007
 
 
 def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
-    """Draw the shapes of one run; displacements are not magnified.
+    """Draw the shapes of one run, in 3D cut through the middle; displacements are not magnified.
 
     Parameters
     ----------
@@ -36,7 +38,7 @@ def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
     """
     told = scenario.pattern
     assert told is not None
-    drawn = next(o for o in scenario.scene.outlines if o.name == told.name)
+    drawn = next(s for s in scenario.scene.solids if s.name == told.name)
     moments = shape_moments(list_moments(run_folder))
     shapes = {name: Snapshot.load(m.path).pattern_m for name, m in moments.items()}
     known = {name: shape for name, shape in shapes.items() if shape is not None}
@@ -44,15 +46,26 @@ def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
         return "", ""
     figure = Figure(dpi=110, layout="constrained")
     ax = figure.add_subplot()
-    ax.add_patch(Polygon(drawn.vertices_m * _MM, facecolor="0.9", edgecolor="0.35", ls="--"))
+    for line_m in _lines_m(drawn, drawn.corners()):
+        ax.add_patch(Polygon(line_m * _MM, facecolor="0.9", edgecolor="0.35", ls="--"))
     ax.plot([], [], color="0.35", ls="--", label="as drawn")
     for name, shape_m in known.items():
         label, colour = _STYLES[name]
-        ax.add_patch(Polygon(shape_m * _MM, fill=False, edgecolor=colour, lw=1.8))
+        for line_m in _lines_m(drawn, shape_m):
+            ax.add_patch(Polygon(line_m * _MM, fill=False, edgecolor=colour, lw=1.8))
         ax.plot([], [], color=colour, lw=1.8, label=label)
-    _frame(figure, np.concatenate([drawn.vertices_m, *known.values()]) * _MM)
+    _frame(figure, np.concatenate([drawn.corners(), *known.values()])[:, [0, -1]] * _MM)
     said = ", ".join(["as drawn (broken line)", *(_STYLES[name][0] for name in known)])
     return png(figure), said
+
+
+def _lines_m(drawn: Solid, vertices_m: Array) -> list[Array]:
+    """Outlines of a bent solid; in 3D where the plane y of the middle of the drawing cuts it."""
+    if not isinstance(drawn, TriangleMesh):
+        return [vertices_m]
+    y_m = drawn.vertices_m[:, 1]
+    middle_m = 0.5 * float(y_m.min() + y_m.max())
+    return replace(drawn, vertices_m=vertices_m).section_m(1, middle_m)
 
 
 def _frame(figure: Figure, points_mm: Array) -> None:
@@ -67,5 +80,5 @@ def _frame(figure: Figure, points_mm: Array) -> None:
     ax.set_aspect("equal")
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_xlabel("x, mm")
-    ax.set_ylabel("y, mm")
+    ax.set_ylabel("height, mm")
     ax.legend(frameon=False, loc="lower right")

@@ -226,7 +226,9 @@ def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
 
 
 def _bending_name(scenario: Scenario) -> str:
-    return "" if scenario.pattern is None else scenario.pattern.name
+    """The pattern that the film shows as it bends; in 3D it stands as drawn."""
+    bends = scenario.pattern is not None and scenario.dimension == 2
+    return scenario.pattern.name if scenario.pattern is not None and bends else ""
 
 
 def _round(bore: Bore) -> dict[str, object]:
