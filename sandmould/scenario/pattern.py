@@ -107,7 +107,7 @@ class Loop(Section):
         0.02, "The fixed share, or that of the first window.", source=ARGUED, gt=0, le=1
     )
     least_factor: float = quantity(
-        0.002, "Least share of Aitken's or measured.", source=ARGUED, gt=0, le=1
+        0.0005, "Least share of Aitken's or measured.", source=ARGUED, gt=0, le=1
     )
     most_factor: float = quantity(
         0.5, "Greatest share of Aitken's or measured.", source=ARGUED, gt=0, le=1
@@ -122,11 +122,11 @@ class Loop(Section):
         source=ARGUED,
     )
     repeats: int = quantity(
-        0, "Times that a window is computed again at most; 0 on LIGGGHTS.", source=ARGUED,
+        12, "Times that a window is computed again at most; 0 on LIGGGHTS.", source=ARGUED,
         ge=0, le=100,
     )  # fmt: skip
     tolerance: float = quantity(
-        0.01, "Residual over displacement below which no window is repeated.", source=ARGUED,
+        0.03, "Residual over displacement below which no window is repeated.", source=ARGUED,
         gt=0, lt=1,
     )  # fmt: skip
     predicts: bool = quantity(
@@ -147,9 +147,19 @@ class Loop(Section):
     )
 
     @property
+    def has_windows(self) -> bool:
+        """Whether sand and pattern take turns; otherwise the pattern moves in every step."""
+        return self.scheme not in ("in_step", "monolithic")
+
+    @property
+    def most_passes(self) -> int:
+        """Times that a window is computed at most: once where sand never feels the pattern."""
+        return 1 + self.repeats if self.has_windows and self.scheme != "one_way" else 1
+
+    @property
     def expected_passes(self) -> float:
         """Times that a window is expected to be computed."""
-        return min(1.0 + self.repeats, REPEATED_PASSES)
+        return min(float(self.most_passes), REPEATED_PASSES)
 
 
 class Pattern(Section):
