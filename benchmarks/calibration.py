@@ -3,7 +3,8 @@
 ``make peers`` runs ``python -m benchmarks.calibration``: it writes calibration.json beside this
 file and docs/calibration_peers.md. Runs come from the emulator of the study
 repose_map; with ``--oracle dem`` they are DEM runs, of one seed unless ``--seeds`` says more or 0,
-and truths are planted by DEM too, in two measures of the same runs.
+and truths are planted by DEM too, in two measures of the same runs. Runs by DEM are kept in
+results/benchmarks/calibration_runs.jsonl: what was killed goes on from there.
 ``--record`` takes the map that docs/results keeps. With ``--quick`` few seeds show that everything
 works, and their files go to results/benchmarks/quick/. ``--page`` writes the page of the json
 again.
@@ -38,6 +39,7 @@ from benchmarks.calibration_methods import (
 )
 from benchmarks.calibration_oracle import (
     ANGLE,
+    KEPT_RUNS,
     SECOND,
     Map,
     NoMapError,
@@ -124,6 +126,7 @@ def measure(file: Path, methods: Sequence[Method], settings: Settings) -> dict[s
         When the map of runs is missing or does not reach a target.
     """
     begun, load = time.perf_counter(), os.getloadavg()[0]
+    goes_on = settings.oracle == "dem" and KEPT_RUNS.exists()
     known = read_map(file)
     races = race_all(known, methods, settings) if settings.seeds else []
     truths = planted(known, settings.truths)
@@ -160,6 +163,7 @@ def measure(file: Path, methods: Sequence[Method], settings: Settings) -> dict[s
         "races": races,
         **found,
         "measured_s": round(time.perf_counter() - begun),
+        "goes_on": goes_on,
     }
 
 

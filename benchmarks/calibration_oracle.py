@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from benchmarks.kept_runs import KeptRuns, Measures, key_of
 from sandmould import ROOT
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import gather
@@ -33,6 +34,7 @@ KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fractio
 ANGLE = "heap_angle_deg"
 SECOND = "outflow_fraction"
 """What the same run tells besides and breaks the ridge best (docs/results)."""
+KEPT_RUNS = ROOT / "results" / "benchmarks" / "calibration_runs.jsonl"
 FIRST_REPLICATE = 1001
 """Of runs by DEM: none shares its filling with a run of the map."""
 
@@ -119,21 +121,22 @@ def by_emulator(known: Map, seed: int | Sequence[int]) -> Simulate:
     return lambda point: known.mean(point) + float(rng.normal(0.0, known.truth.noise_sd))
 
 
-def by_dem(seed: int) -> Simulate:
+def by_dem(seed: int, kept: Path = KEPT_RUNS) -> Simulate:
     """Heaps of the engine that the map's study names, each of another filling."""
-    run = rows_by_dem(seed)
+    run = rows_by_dem(seed, kept)
     return lambda point: float(run(point)[ANGLE])
 
 
-def rows_by_dem(seed: int) -> Callable[[Sequence[float]], dict[str, float]]:
-    """Both measures of such runs, NaN where a run gave none.
+def rows_by_dem(seed: int, kept: Path = KEPT_RUNS) -> Callable[[Sequence[float]], Measures]:
+    """Both measures of such runs, NaN where a run gave none; made ones are kept in a file.
 
     A run goes the workflow's way, plan, deck, engine, measures, in a folder that is then removed.
     """
+    runs = KeptRuns(kept)
     base = open_study(ROOT / "config" / "studies" / f"{STUDY}.yaml").study.scenario
     number = FIRST_REPLICATE + 1000 * seed
 
-    def run(point: Sequence[float]) -> dict[str, float]:
+    def run(point: Sequence[float]) -> Measures:
         nonlocal number
         number += 1
         tree = base.model_dump(mode="json")
@@ -146,13 +149,23 @@ def rows_by_dem(seed: int) -> Callable[[Sequence[float]], dict[str, float]]:
         tree["seed"] = replicate_seed(base.seed, number)
         parameters = dict(zip(KEYS, map(float, point), strict=True))
         one = Run(STUDY, "one", parameters, number, Scenario.model_validate(tree), {})
-        with tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            write_plan([one], folder)
-            render_run(folder / "runs" / "one")
-            simulate(folder / "runs" / "one")
-            write_measures(folder / "runs" / "one", folder / "runs" / "one" / "measures.tsv")
-            summary = gather(folder).summary
-        return {m: float(finished_values(summary, m).iloc[0]) for m in (ANGLE, SECOND)}
+        key = key_of(one.scenario)
+        measures = runs.get(key)
+        if measures is None:
+            measures = _measured(one)
+            runs.add(key, measures)
+        return measures
 
     return run
+
+
+def _measured(one: Run) -> Measures:
+    """Simulate and measure a run."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_plan([one], folder)
+        render_run(folder / "runs" / one.run)
+        simulate(folder / "runs" / one.run)
+        write_measures(folder / "runs" / one.run, folder / "runs" / one.run / "measures.tsv")
+        summary = gather(folder).summary
+    return {m: float(finished_values(summary, m).iloc[0]) for m in (ANGLE, SECOND)}

@@ -53,6 +53,7 @@ does not.
 
 def _machine(found: dict[str, Any]) -> str:
     known = found["machine"]
+    before = " after runs that an earlier call kept," if found.get("goes_on") else ","
     rows = [
         ["processor", f"{known['processor']}, {known['cores']} cores"],
         ["system", known["system"]],
@@ -63,7 +64,7 @@ def _machine(found: dict[str, Any]) -> str:
             for name, versions in found["peers"].items()
         ),
         ["map", f"`{found['map']['file']}`, {found['map']['runs']} runs"],
-        ["took", f"{found['measured_s']} s, load before {found['load_average']:.1f}"],
+        ["took", f"{found['measured_s']} s{before} load before {found['load_average']:.1f}"],
     ]
     return table(["", ""], rows)
 

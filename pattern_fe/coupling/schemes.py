@@ -14,8 +14,6 @@ from sandmould.scenario.scenario import Scenario
 
 WITH_LIGGGHTS = ("one_way", "fixed", "aitken", "quasi_newton")
 """Schemes whose windows need a mesh to be exchanged and its loads read, no more."""
-WITHOUT_WINDOWS = ("in_step", "monolithic")
-"""Schemes in which the pattern moves in every step."""
 ABOVE_VIBRATION = 5.0
 """Least ratio of the pattern's first frequency to that of the box, for an answer as if at rest."""
 LIKE_FOAM = 0.9
@@ -32,6 +30,8 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
     assert scenario.pattern is not None
     loop, engine = scenario.pattern.loop, scenario.engine.name
     scheme = loop.scheme
+    if scenario.dimension == 3:
+        _refuse_in_space(loop, engine)
     if engine == "liggghts" and scheme not in WITH_LIGGGHTS:
         raise _bad("scheme", scheme, f"{', '.join(WITH_LIGGGHTS)} on engine liggghts")
     if engine == "liggghts" and scenario.frame == "laboratory":
@@ -42,13 +42,11 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         # Loads on vertices are forgotten when a gate is taken away.
         valid = "absent in a scene with a pattern"
         raise BadInputError([Problem("discharge.gate", scenario.discharge.gate, valid)])
-    if loop.repeats and engine == "liggghts":
+    if loop.most_passes > 1 and engine == "liggghts":
         raise _bad("repeats", loop.repeats, "0 on engine liggghts, which cannot go back")
     if scheme == "monolithic" and engine != "reference":
         raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
-    if scenario.dimension == 3:
-        _refuse_in_space(loop, engine)
-    if loop.exchange == "files" and scheme in WITHOUT_WINDOWS:
+    if loop.exchange == "files" and not loop.has_windows:
         raise _bad(
             "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"
         )
@@ -63,7 +61,7 @@ def _refuse_in_space(loop: Loop, engine: str) -> None:
     if engine == "liggghts":
         valid = "reference or lammps in a scene in 3D with a pattern"
         raise BadInputError([Problem("engine.name", engine, valid)])
-    if loop.scheme in WITHOUT_WINDOWS:
+    if not loop.has_windows:
         raise _bad("scheme", loop.scheme, "a scheme with windows in 3D")
     if loop.exchange == "files":
         raise _bad("exchange", loop.exchange, "memory in 3D")

@@ -125,7 +125,7 @@ class CoupledSession:
     def _window(self, steps: int) -> None:
         """Compute one window, as often as is asked."""
         loop = self._loop
-        kept = self._inner.keep() if loop.repeats else None
+        kept = self._inner.keep() if loop.most_passes > 1 else None
         start, shown, passes = self._shown, self._next, 0
         self._solve_s = 0.0
         while True:
@@ -136,7 +136,7 @@ class CoupledSession:
                 return
             load, answer, target = told
             residual_m = rms_m(answer.displacement_m - shown)
-            if passes > loop.repeats or residual_m <= loop.tolerance * rms_m(shown):
+            if passes == loop.most_passes or residual_m <= loop.tolerance * rms_m(shown):
                 break
             self._inner.go_back(kept)
             shown = target

@@ -103,8 +103,13 @@ class MetalFlow(Section):
         gt=0,
         le=1,
     )
-    source: Literal["density", "divergence", "higher_order", "error_compensating"] = quantity(
-        "density", "Source of the Poisson equation; the paper's is density.", source=PAPER
+    source: Literal[
+        "density", "divergence", "corrected_divergence", "higher_order", "error_compensating"
+    ] = quantity(
+        "density",
+        "Source of the Poisson equation; the paper's is density. corrected_divergence is exact off "
+        "the lattice, for flow without a free surface: nothing but shifting keeps the volume.",
+        source=PAPER,
     )
     gradient: Literal["least", "difference", "sum", "corrected", "printed"] = quantity(
         "least",
@@ -132,7 +137,9 @@ class MetalFlow(Section):
         source=ARGUED,
     )  # fmt: skip
     shifting: float = quantity(
-        0.0, "Share of r0^2 by which inner particles move on to where fewer are; 0 for none.",
+        0.0,
+        "Share of r0^2 by which inner particles move on to where fewer are, with the velocity "
+        "found there; 0 for none.",
         source=ARGUED, ge=0, le=0.5,
     )  # fmt: skip
     duration_s: float = quantity(

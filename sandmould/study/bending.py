@@ -13,7 +13,6 @@ from analysis.deflection import deflection, farthest_corner
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
 from pattern_fe.coupling.predicted import predicted_gain
-from pattern_fe.coupling.schemes import WITHOUT_WINDOWS
 from pattern_fe.coupling.verdict import LoopVerdict, judge_loop, stored_energy_j
 from pattern_fe.distance import distance_from_drawing
 from pattern_fe.large_displacement import LoadNotReachedError
@@ -70,7 +69,7 @@ class BentPattern:
         """What the scenario alone tells of its loop in 2D; nothing of one without windows."""
         told = self._scenario.pattern
         assert told is not None
-        if self._scenario.dimension == 3 or told.loop.scheme in WITHOUT_WINDOWS:
+        if self._scenario.dimension == 3 or not told.loop.has_windows:
             return {}
         gain = predicted_gain(self._scenario, self.pattern, told.loop.window_s)
         return {"pattern_predicted_gain": gain.gain, "pattern_predicted_limit": gain.limit}

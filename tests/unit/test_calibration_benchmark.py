@@ -152,7 +152,7 @@ def test_a_map_that_cannot_be_used_is_told_in_a_sentence(summary: Path, tmp_path
 
 
 def test_a_run_by_dem_is_the_studys_with_the_point_and_another_filling(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     planned = []
 
@@ -163,7 +163,8 @@ def test_a_run_by_dem_is_the_studys_with_the_point_and_another_filling(
     monkeypatch.setattr(calibration_oracle, "simulate", simulated)
     monkeypatch.setattr(calibration_oracle, "render_run", lambda folder: None)
     monkeypatch.setattr(calibration_oracle, "write_measures", lambda folder, out: None)
-    run = by_dem(seed=1)
+    kept = tmp_path / "runs.jsonl"
+    run = by_dem(1, kept)
     # Nothing was computed, so there is no angle.
     assert [math.isnan(run(point)) for point in ((0.3, 0.1), (0.3, 0.2))] == [True, True]
     first, second = planned
@@ -171,6 +172,13 @@ def test_a_run_by_dem_is_the_studys_with_the_point_and_another_filling(
     assert second.contact.grain_grain.rolling_arm_fraction == 0.2
     assert first.sand.size_scale == 8
     assert first.seed != second.seed
+    # What was made is not made again, and what was cut off while it was written is.
+    kept.write_text(kept.read_text(encoding="utf-8")[:-10], encoding="utf-8")
+    run = by_dem(1, kept)
+    run((0.3, 0.1))
+    assert len(planned) == 2
+    run((0.3, 0.2))
+    assert planned[2:] == [second]
 
 
 def test_a_guess_counts_all_runs_before_it() -> None:

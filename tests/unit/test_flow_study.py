@@ -122,7 +122,7 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     assert held["h28_mean_pa"] == pytest.approx(686.0, abs=100.0)
     assert held["h28_error_pa"] == pytest.approx(held["h28_mean_pa"] - 686.0, abs=1e-6)
     mould = len(scene.open_flow(runs[0].scenario).fluid) - 32
-    assert held["particle_solves"] == pytest.approx(6 * (32 + 0.2 * mould) * held["steps"])
+    assert held["particle_solves"] == round(6 * (32 + 0.2 * mould)) * held["steps"]
     assert 0.0 < held["solver_fraction"] < 1.0
     assert np.isnan(failed["h28_sd_pa"])
     assert failed["simulated_s"] < 0.2

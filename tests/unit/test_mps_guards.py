@@ -104,7 +104,7 @@ def test_progress_is_told_after_every_step():
     assert len(told) == flow.cost.steps == 5
     # two relaxations and the prediction, a particle of the mould at a fifth
     mould = len(flow.fluid) - 36
-    assert flow.cost.particle_solves == pytest.approx(5 * 3 * (36 + 0.2 * mould))
+    assert flow.cost.particle_solves == 5 * round(3 * (36 + 0.2 * mould))
     assert [t.percent for t in told] == sorted(t.percent for t in told)
     assert told[-1].percent == pytest.approx(100.0)
     assert told[-1].left_s == pytest.approx(0.0, abs=1e-6)

@@ -248,7 +248,7 @@ def test_windows_fill_a_record_with_whole_samples() -> None:
         ),
         ("liggghts", {}, "frame = 'laboratory' cannot be used: valid is box in a scene with"),
         ("liggghts", {"scheme": "measured"}, "scheme = 'measured' .* valid is one_way, fixed, ait"),
-        ("liggghts", {"repeats": 3}, "pattern.loop.repeats = 3 cannot be used: valid is 0 on eng"),
+        ("liggghts", {}, "pattern.loop.repeats = 12 cannot be used: valid is 0 on eng"),
         ("lammps", {"scheme": "in_step", "exchange": "files"}, "exchange = 'files' .* no windows"),
     ],
 )

@@ -33,7 +33,7 @@ def plank_scene(engine: str) -> Scenario:
             "position_m": [0.0, 0.012],
             "young_modulus_pa": 3.2e6,
             "supports": {"clamped": ["left", "right"]},
-            "loop": {"scheme": "fixed", "factor": 0.3, "window_s": 0.005},
+            "loop": {"scheme": "fixed", "factor": 0.3, "window_s": 0.005, "repeats": 0},
         },
         "fill": {
             "layers": [{"count": 40}],

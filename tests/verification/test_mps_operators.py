@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sandmould.casting.mps.flow import Flow
 from sandmould.casting.mps.neighbours import Neighbours, find_candidates, find_neighbours
 from sandmould.casting.mps.operators import (
     crowding,
@@ -12,8 +13,10 @@ from sandmould.casting.mps.operators import (
     divergence,
     laplacian,
     pressure_gradient,
+    velocity_gradient,
 )
 from sandmould.casting.mps.particles import FLUID, Particles, at_rest, lattice
+from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.viscosity import fitted_laplacian
 from sandmould.casting.mps.weight import Kernel, make_kernel, weight, weight_slope
 
@@ -134,15 +137,40 @@ def test_laplacian_off_the_lattice_is_right_on_average():
     assert got.mean() == pytest.approx(4.0, rel=0.15)
 
 
+def turn_and_stretch(dimension: int) -> np.ndarray:
+    """Gradient of a linear velocity, 1/s: d u_a / d x_b."""
+    rates = np.array([[2.0, -5.0, 0.0], [5.0, 1.0, 0.0], [0.0, 0.0, -4.0]])
+    rates[dimension:] = 0.0
+    return rates
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_divergence_of_a_linear_velocity(dimension):
     kernel, fluid, near, inner = block(dimension)
-    turn_and_stretch = np.array([[2.0, -5.0, 0.0], [5.0, 1.0, 0.0], [0.0, 0.0, -4.0]])
-    if dimension == 2:
-        turn_and_stretch[2] = 0.0
-    velocity = fluid.position_m @ turn_and_stretch.T
-    expected = np.trace(turn_and_stretch)
-    assert divergence(kernel, near, velocity)[inner] == pytest.approx(expected, rel=1e-9)
+    rates = turn_and_stretch(dimension)
+    velocity = fluid.position_m @ rates.T
+    assert divergence(kernel, near, velocity)[inner] == pytest.approx(np.trace(rates), rel=1e-9)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_velocity_gradient_is_exact_off_the_lattice(dimension):
+    kernel, fluid, near, inner = block(dimension, jitter=0.15)
+    rates = turn_and_stretch(dimension)
+    got = velocity_gradient(kernel, near, fluid.position_m @ rates.T, fluid.kind)[inner]
+    # 36 or so round-offs of velocities over their distances
+    assert got == pytest.approx(np.broadcast_to(rates.T, got.shape), abs=1e-9)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_shifted_particles_have_the_velocity_of_their_new_place(dimension):
+    kernel, fluid, _, inner = block(dimension, jitter=0.15)
+    rates, before_m = turn_and_stretch(dimension), fluid.position_m.copy()
+    fluid.velocity_m_s[:] = before_m @ rates.T
+    flow = Flow(fluid, kernel, scheme=Scheme(surface=0.8, shifting=0.1))
+    flow._shift()
+    assert np.linalg.norm(fluid.position_m - before_m, axis=1)[inner].mean() > 0.01 * SIZE_M
+    moved = fluid.velocity_m_s[inner]
+    assert moved == pytest.approx(fluid.position_m[inner] @ rates.T, abs=1e-12)
 
 
 def test_density_rate_is_the_derivative_of_the_density():

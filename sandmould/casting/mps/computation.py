@@ -34,7 +34,7 @@ class FlowCost(Cost):
     """The cost row of a flow; compiling is left out of ``cpu_s``."""
 
     particles: int = 0
-    particle_solves: float = 0.0
+    particle_solves: int = 0
     poisson_iterations: int = 0
     solver_fraction: float = math.nan
     """Of the wall time of the steps, spent on the Poisson equation."""

@@ -21,6 +21,7 @@ from sandmould.casting.mps.operators import (
     crowding,
     density_rate,
     pressure_gradient,
+    velocity_gradient,
 )
 from sandmould.casting.mps.particles import Floats, Particles
 from sandmould.casting.mps.pressure import solve_pressure
@@ -59,9 +60,9 @@ class Cost:
     steps: int = 0
     iterations: int = 0
     """Of the Poisson solver, over all relaxations."""
-    particle_solves: float = 0.0
+    particle_solves: int = 0
     """Particles over all steps, once and once for every relaxation; one of the mould counts as
-    ``MOULD_SHARE`` of one of fluid."""
+    ``MOULD_SHARE`` of one of fluid, and each step as a whole number."""
     wall_s: float = 0.0
     pressure_s: float = 0.0
     """Building and solving the Poisson equation."""
@@ -79,9 +80,9 @@ class Progress:
     """Wall time to the end, at the rate so far."""
 
 
-def solves(scheme: Scheme, fluid: int, particles: int) -> float:
+def solves(scheme: Scheme, fluid: int, particles: int) -> int:
     """Work of one step, as ``Cost.particle_solves``, from the fluid's particles and all."""
-    return (fluid + MOULD_SHARE * (particles - fluid)) * (1 + scheme.relaxations)
+    return round((fluid + MOULD_SHARE * (particles - fluid)) * (1 + scheme.relaxations))
 
 
 class Flow:
@@ -231,11 +232,11 @@ class Flow:
         state, kernel, scheme = self.particles, self.kernel, self.scheme
         near = self._neighbours()
         compression = near.density / kernel.lattice_density - 1.0
-        asked = SOURCES[scheme.source](
-            Tentative(
-                kernel, near, state.velocity_m_s, dt, compression, compression_before, rate_before
-            )
-        )
+        now = Tentative(
+            kernel, near, state.kind, state.velocity_m_s, dt, compression, compression_before,
+            rate_before,
+        )  # fmt: skip
+        asked = SOURCES[scheme.source](now)
         surface = near.density < scheme.surface * kernel.lattice_density
         factor = scheme.source_share * self.metal.density_kg_m3 / dt**2
         begin = time.perf_counter()
@@ -255,12 +256,18 @@ class Flow:
         self.pressure_pa += pressure
 
     def _shift(self) -> None:
-        """Move inner particles to where fewer are; the surface keeps its place."""
+        """Move inner particles to where fewer are, and give them the velocity found there.
+
+        The surface keeps its place.
+        """
         state, kernel = self.particles, self.kernel
         near = self._neighbours()
         inner = self.fluid & (near.density >= self.scheme.surface * kernel.lattice_density)
-        step_m = self.scheme.shifting * kernel.spacing_m**2
-        state.position_m[inner] -= step_m * crowding(kernel, near, state.kind)[inner]
+        share_m2 = self.scheme.shifting * kernel.spacing_m**2
+        shift_m = -share_m2 * crowding(kernel, near, state.kind)[inner]
+        gradient = velocity_gradient(kernel, near, state.velocity_m_s, state.kind)[inner]
+        state.velocity_m_s[inner] += np.einsum("ia,iab->ib", shift_m, gradient)
+        state.position_m[inner] += shift_m
 
     def _check(self) -> None:
         """Stop a run that went wrong."""

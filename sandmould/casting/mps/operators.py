@@ -153,11 +153,11 @@ def _gradient(kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, f
 
 @njit(**OPTIONS)
 def _moments(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
-    """Matrices that a linear field's gradient is multiplied by, (n, 3, 3) float64."""
+    """Matrices that differences multiply a linear field's gradient by, (n, 3, 3) float64."""
     moment = np.zeros((len(kind), 3, 3))
     factor = kernel.dimension / kernel.lattice_density
     for i in range(len(kind)):
-        if kind[i] == FLUID:
+        if kind[i] != DUMMY:
             for k in range(near.start[i], near.start[i + 1]):
                 if kind[near.other[k]] != DUMMY:
                     for a in range(3):
@@ -168,13 +168,13 @@ def _moments(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
 
 
 def _corrected(kernel: Kernel, near: Neighbours, kind: Kinds, gradient: Floats) -> Floats:
-    """Gradients that are exact for a linear field from those of differences."""
+    """Gradients exact for linear fields from those of differences, (n, 3, fields) float64."""
     moment = _moments(kernel, near, kind)
     if kernel.dimension == 2:
         moment[:, 2, 2] = 1.0
     # where too few neighbours span the space, the uncorrected gradient stays
     moment[np.linalg.det(moment) < SMALLEST_MOMENT] = np.eye(3)
-    return np.linalg.solve(moment, gradient[:, :, None])[:, :, 0]
+    return np.linalg.solve(moment, gradient)
 
 
 def pressure_gradient(
@@ -198,7 +198,47 @@ def pressure_gradient(
         0 on walls and dummies.
     """
     gradient = _gradient(kernel, near, pressure, kind, GRADIENTS[form])
-    return _corrected(kernel, near, kind, gradient) if form == "corrected" else gradient
+    if form != "corrected":
+        return gradient
+    return _corrected(kernel, near, kind, gradient[:, :, None])[:, :, 0]
+
+
+@njit(**OPTIONS)
+def _velocity_differences(
+    kernel: Kernel, near: Neighbours, velocity: Floats, kind: Kinds
+) -> Floats:
+    """As ``velocity_gradient``, before correction."""
+    found = np.zeros((len(kind), 3, 3))
+    factor = kernel.dimension / kernel.lattice_density
+    for i in range(len(kind)):
+        for k in range(near.start[i], near.start[i + 1]):
+            j = near.other[k]
+            if kind[j] != DUMMY:
+                for a in range(3):
+                    along = factor * near.share[k] * near.away_m[k, a]
+                    for b in range(3):
+                        found[i, a, b] += along * (velocity[j, b] - velocity[i, b])
+    return found
+
+
+def velocity_gradient(kernel: Kernel, near: Neighbours, velocity: Floats, kind: Kinds) -> Floats:
+    """Gradient of the velocity, exact for a linear one on any positions, d u_b / d x_a.
+
+    As the corrected gradient of the pressure; dummies are left out.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    near : Neighbours
+    velocity : (n, 3) float64, m/s
+    kind : (n,) int8
+
+    Returns
+    -------
+    (n, 3, 3) float64, 1/s
+        At [i, a, b]; 0 on dummies.
+    """
+    return _corrected(kernel, near, kind, _velocity_differences(kernel, near, velocity, kind))
 
 
 @njit(**OPTIONS)

@@ -57,7 +57,7 @@ class Scheme:
     """Whether pressures below zero are kept, which pull particles together."""
     shifting: float = 0.0
     """Share of r0^2 times the gradient of concentration by which inner particles are moved on after
-    a step (Lind et al. 2012); 0 for none."""
+    a step (Lind et al. 2012), with the velocity found there; 0 for none."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run."""

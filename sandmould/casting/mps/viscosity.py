@@ -8,11 +8,25 @@ from numba import njit
 from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.operators import laplacian
 from sandmould.casting.mps.particles import DUMMY, FLUID, Floats, Kinds
-from sandmould.casting.mps.weight import OPTIONS, Kernel
+from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel
 
 WORST_FIT = 1e-3
 """Smallest over largest eigenvalue of a fit's matrix below which its particle keeps (4); 0.02 on
 the lattice, less where neighbours hardly span the space."""
+
+
+@njit(**INLINED)
+def _set_terms(kernel: Kernel, away_m: Floats, term: Floats) -> None:
+    """Terms of a quadratic field at a neighbour: x, x^2/2, then the products of two axes."""
+    d = kernel.dimension
+    last = 2 * d
+    for a in range(d):
+        x = away_m[a] / kernel.spacing_m
+        term[a] = x
+        term[d + a] = 0.5 * x * x
+        for b in range(a + 1, d):
+            term[last] = x * away_m[b] / kernel.spacing_m
+            last += 1
 
 
 @njit(**OPTIONS)
@@ -23,22 +37,12 @@ def _fits(kernel: Kernel, near: Neighbours, field: Floats, kind: Kinds) -> tuple
     matrix = np.zeros((len(kind), size, size))
     right = np.zeros((len(kind), size, 3))
     term = np.empty(size)
-    for i in range(len(kind)):
-        if kind[i] != FLUID:
-            continue
+    for i in np.flatnonzero(kind == FLUID):
         for k in range(near.start[i], near.start[i + 1]):
             j = near.other[k]
-            if kind[j] == DUMMY:
-                continue
-            last = 2 * d
-            for a in range(d):
-                x = near.away_m[k, a] / kernel.spacing_m
-                term[a] = x
-                term[d + a] = 0.5 * x * x
-                for b in range(a + 1, d):
-                    term[last] = x * near.away_m[k, b] / kernel.spacing_m
-                    last += 1
-            share = near.share[k] * kernel.spacing_m**2
+            # an unknown value weighs nothing
+            share = near.share[k] * kernel.spacing_m**2 * (kind[j] != DUMMY)
+            _set_terms(kernel, near.away_m[k], term)
             for a in range(size):
                 for b in range(size):
                     matrix[i, a, b] += share * term[a] * term[b]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -26,15 +27,6 @@ RECORD_BYTES = 28
 RATES = {2: 1e6, 3: 4e5}
 """Particle-solves a second of one core by dimension: 0.9e6 to 1.4e6 and 4.0e5 on the machine where
 tank_small was first run; fixed, so that a study has the same batches everywhere."""
-
-defaults = own_solver.defaults
-lasts_s = own_solver.lasts_s
-engine_problem = own_solver.engine_problem
-ranks = own_solver.ranks
-problems = scene.problems
-complete = computation.complete
-computed_hash = computation.computed_hash
-no_cost = computation.no_cost
 
 
 def resolved(scenario: MetalFlow) -> MetalFlow:
@@ -67,12 +59,12 @@ def predicted_s(scenario: MetalFlow) -> float:
     return planned_work(scenario) / RATES[speed_class(scenario)[1]]
 
 
-_given = own_solver.Given(computation, predicted_s)
-sources = _given.sources
-template_hash = _given.template_hash
-allowed_s = _given.allowed_s
-render = _given.render
-compute = _given.compute
+_given = own_solver.Given(computation, scene.problems, predicted_s)
+
+
+def __getattr__(name: str) -> Any:
+    """Entries that all kinds with our own solver have alike."""
+    return getattr(_given, name)
 
 
 def planned_s(scenario: MetalFlow) -> float:

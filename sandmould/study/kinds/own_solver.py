@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import pandas as pd
 
-from sandmould.engines.products import Computed
+from sandmould.engines.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section
 from sandmould.study.moments import LAST_MEASURED
@@ -24,26 +24,6 @@ SLOWER = 10.0
 """Than predicted a machine may be, and a run longer than expected."""
 
 
-def defaults() -> dict[str, Any]:
-    """Nothing: what is cast is the user's."""
-    return {}
-
-
-def lasts_s(scenario: Section) -> float:
-    """Measures are those of the end."""
-    return 0.0
-
-
-def engine_problem(scenario: Section) -> Problem | None:
-    """None: the solver is our own."""
-    return None
-
-
-def ranks(scenario: Section) -> int:
-    """No MPI."""
-    return 1
-
-
 class Solver(Protocol):
     """What a module that computes runs offers."""
 
@@ -53,8 +33,17 @@ class Solver(Protocol):
     def source_hash(self) -> str:
         """State of the solver."""
 
+    def computed_hash(self, scenario: Any) -> str:
+        """Hash of scenario and solver."""
+
+    def no_cost(self, scenario: Any) -> Cost:
+        """Cost of a run that has not begun."""
+
     def compute(self, scenario: Any, folder: Path, run: str) -> Computed:
         """Compute a run."""
+
+    def complete(self, scenario: Any, work: Path) -> None:
+        """Make the products that a broken run never wrote."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +51,24 @@ class Given:
     """Entries of a kind whose solver takes a whole scenario."""
 
     solver: Solver
+    problems: Callable[[Any], list[Problem]]
     predicted_s: Callable[[Any], float]
+
+    def defaults(self) -> dict[str, Any]:
+        """Nothing: what is cast is the user's."""
+        return {}
+
+    def lasts_s(self, scenario: Section) -> float:
+        """Measures are those of the end."""
+        return 0.0
+
+    def engine_problem(self, scenario: Section) -> Problem | None:
+        """None: the solver is our own."""
+        return None
+
+    def ranks(self, scenario: Section) -> int:
+        """No MPI."""
+        return 1
 
     def sources(self, scenario: Section) -> list[Path]:
         """Our solver."""
@@ -71,6 +77,14 @@ class Given:
     def template_hash(self, scenario: Section) -> str:
         """Hash of our solver."""
         return self.solver.source_hash()
+
+    def computed_hash(self, scenario: Section) -> str:
+        """Hash of scenario and solver."""
+        return self.solver.computed_hash(scenario)
+
+    def no_cost(self, scenario: Section) -> Cost:
+        """Cost of a run that has not begun."""
+        return self.solver.no_cost(scenario)
 
     def allowed_s(self, scenario: Section) -> float:
         """Wall time on a slow machine."""
@@ -83,6 +97,10 @@ class Given:
     def compute(self, run: Run, folder: Path) -> Computed:
         """Compute a run from its newest checkpoint, or from its beginning."""
         return self.solver.compute(run.scenario, folder, run.run)
+
+    def complete(self, scenario: Section, work: Path) -> None:
+        """Make the products that a broken run never wrote."""
+        self.solver.complete(scenario, work)
 
 
 def read_fields(folder: Path) -> dict[str, Any] | None:

@@ -112,8 +112,9 @@ def allowed_s(scenario: Scenario) -> float:
 
 
 def planned_work(scenario: Scenario) -> float:
-    """Steps times grains in the box at the time."""
-    return build_program(scenario).expected_grain_steps
+    """Steps times grains in the box at the time, and again where windows are repeated."""
+    passes = 1.0 if scenario.pattern is None else scenario.pattern.loop.expected_passes
+    return passes * build_program(scenario).expected_grain_steps
 
 
 def predicted_s(scenario: Scenario) -> float:
