@@ -68,8 +68,12 @@ def test_sampled_loads_are_those_of_the_decks_own_fix(tmp_path: Path) -> None:
     session.insert_layer(1)
     session.start_stage(session._program.stages[0])
     session.keep()
+    logged = (tmp_path / "engine.log").read_text(encoding="utf-8")
     while session.time_s < 0.1:
         session.advance()
+    assert (tmp_path / "engine.log").read_text(encoding="utf-8") == logged
+    assert "nothing more is logged" in logged
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith("kept_")]
     sampled = session.surface_loads()
     assert sampled is not None
     own = dict(zip(session._surfaces, session._recorded_loads(), strict=True))
