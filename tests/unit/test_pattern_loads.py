@@ -151,8 +151,9 @@ def test_fields_for_paraview_come_back(tmp_path: Path, kind: str) -> None:
     assert np.array_equal(surface.point_data["displacement_m"][:, :d], on_surface)
 
 
-def test_inner_nodes_follow_the_outer_line_as_under_loads_on_it() -> None:
-    pattern = l_pattern()
+@pytest.mark.parametrize("kind", ["an L", "hexahedra", "tetrahedra"])
+def test_inner_nodes_follow_the_outer_surface_as_under_loads_on_it(kind: str) -> None:
+    pattern = l_pattern() if kind == "an L" else pattern_of_kind(kind, 2)
     line = pattern.surface.outer_line
     load = np.zeros_like(pattern.surface.vertices_m)
     load[line] = -1500.0 * pattern.surface.vertex_area_vector_m2[line]

