@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from sandmould.casting.mps.flow import DivergedError, EscapedError, Flow, Guard, Progress
+from sandmould.casting.mps.operators import GRADIENTS
 from sandmould.casting.mps.particles import DUMMY, FLUID, WALL, at_rest, lattice
 from sandmould.casting.mps.pressure import ClosedRegionError
 from sandmould.casting.mps.scheme import Metal, Scheme
+from sandmould.casting.mps.sources import SOURCES
 from sandmould.casting.mps.stability import run_still
 from sandmould.casting.mps.tank import still_tank
+from sandmould.casting.mps.viscosity import LAPLACIANS
 from sandmould.casting.mps.weight import make_kernel
+from sandmould.scenario.flow import MetalFlow
 
 SIZE_M = 2e-3
 
@@ -36,6 +42,13 @@ def small_tank(guard: Guard | None = None, scheme: Scheme | None = None) -> Flow
 def test_schemes_that_cannot_run(wrong, word):
     with pytest.raises(ValueError, match=word):
         Scheme(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("key", "forms"), [("source", SOURCES), ("gradient", GRADIENTS), ("laplacian", LAPLACIANS)]
+)
+def test_a_scenario_offers_all_forms_that_there_are(key, forms):
+    assert get_args(MetalFlow.model_fields[key].annotation) == tuple(forms)
 
 
 def test_metals_and_kernels_that_cannot_be():
