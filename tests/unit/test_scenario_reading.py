@@ -110,5 +110,5 @@ def test_keys_of_a_path_are_known_from_the_types() -> None:
     assert known_keys(Scenario, ["seed"]) == []
     (thickness,) = fields_at(Scenario, "obstacles.0.wall_thickness_m")
     assert thickness.description == "Thickness of the tube's wall."
-    assert len(fields_at(Scenario, "obstacles.0.name")) == 5
+    assert len(fields_at(Scenario, "obstacles.0.name")) == 6
     assert fields_at(Scenario, "") == fields_at(Scenario, "0") == []
