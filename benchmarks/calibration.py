@@ -80,7 +80,7 @@ def settings_of(asked: argparse.Namespace) -> Settings:
     if asked.quick:
         seeds, truths = min(seeds, 2), min(truths, 10)
     seeds = seeds if asked.seeds is None else asked.seeds
-    # A run by DEM takes twenty seconds: two generations of the peers have to do.
+    # A run by DEM takes 20 s, on a busy core a minute: two generations of the peers have to do.
     caps = {"cap": 40, "held_after": 16} if dem else {}
     return Settings(asked.oracle, seeds, truths, **caps)
 

@@ -79,11 +79,6 @@ class Supports(Section):
     )
 
 
-REPEATED_PASSES = 4.0
-"""Mean of the times that a window of a loop with repeats is computed: 3.3 to 4.1 on the L while it
-is filled, in windows of 4 to 20 ms (study l_judged)."""
-
-
 class Loop(Section):
     """The staggered loop: in each window sand moves under a moving surface, then the pattern."""
 
@@ -155,11 +150,6 @@ class Loop(Section):
     def most_passes(self) -> int:
         """Times that a window is computed at most: once where sand never feels the pattern."""
         return 1 + self.repeats if self.has_windows and self.scheme != "one_way" else 1
-
-    @property
-    def expected_passes(self) -> float:
-        """Times that a window is expected to be computed."""
-        return min(float(self.most_passes), REPEATED_PASSES)
 
 
 class Pattern(Section):
