@@ -122,7 +122,12 @@ class _AtPoint:
         tree = self.base
         for key, value in point.items():
             tree = _put(tree, key.split("."), value, origin, f"sweep of {self.study.file}")
-        return self.kind.resolved(validated(self.kind.MODEL, tree, origin, ROOT_KEY))
+        scenario = validated(self.kind.MODEL, tree, origin, ROOT_KEY)
+        try:
+            return self.kind.resolved(scenario)
+        except BadInputError as error:
+            found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in error.problems]
+            raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found]) from error
 
     def _misfits(self, scenario: AnyScenario) -> list[Problem]:
         """What is wrong with a well-typed scenario of this study, keys from the study's root."""

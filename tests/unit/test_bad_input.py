@@ -10,6 +10,17 @@ from sandmould import ROOT
 from tests.unit.refusing import refused
 
 CASES: dict[str, tuple[str, str]] = {
+    "pattern outside the box": (
+        "based_on: l_pattern\nscenario: {pattern: {position_m: [0.2, 0.0]}}",
+        "trial.yaml: scenario.pattern.position_m = [0.2, 0.0] cannot be used: "
+        "valid is one that can be computed: pattern reaches from (0.2, 0) to (0.32, 0.1) m, "
+        "valid is inside the box from (0, 0) to (0.3, 0.3) m.",
+    ),
+    "default that an engine cannot take": (
+        "based_on: l_pattern\nscenario: {engine: {name: liggghts}, frame: box}",
+        "config/scenarios/l_pattern.yaml: scenario.pattern.loop.repeats = 12 cannot be used: "
+        "valid is 0 on engine liggghts, which cannot go back.",
+    ),
     "wrong type": (
         'based_on: tube\nscenario: {sand: {density_kg_m3: "heavy"}}',
         "trial.yaml: scenario.sand.density_kg_m3 = 'heavy' cannot be used: valid is a number.",
