@@ -43,7 +43,7 @@ that a study has the same batches on every machine."""
 IN_3D = 0.4
 """Share of that in 3D."""
 PASSES = 4.0
-"""Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.1 in the
+"""Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
 
 problems = checks.problems
