@@ -20,6 +20,7 @@ SCHEMES = {
     "MR2-0.5": Scheme(5e-4, 2, 0.5),
     "MR5-1.0": Scheme(1e-3, 5, 1.0),
     "MR5-0.5": Scheme(1e-3, 5, 0.5),
+    "MR5-0.5, collisions": Scheme(1e-3, 5, 0.5, collision_distance=0.8),
     "MR10-0.5": Scheme(2e-3, 10, 0.5),
     "MR1-0.5, 0.5 ms": Scheme(5e-4, 1, 0.5),
     "MR1-0.5, 1 ms": Scheme(1e-3, 1, 0.5),

@@ -142,6 +142,13 @@ class MetalFlow(Section):
         "found there; 0 for none.",
         source=ARGUED, ge=0, le=0.5,
     )  # fmt: skip
+    collision_distance: float = quantity(
+        0.0,
+        "Over the particle size: nearer than this particles that approach collide; 0 for none. "
+        "Metal that is poured needs it.",
+        source=PAPER, ge=0, le=1,
+    )  # fmt: skip
+    restitution: float = quantity(0.2, "Of these collisions.", source=ARGUED, ge=0, le=1)
     duration_s: float = quantity(
         2.0, "Simulated time.", unit="s", source=f"{PAPER}, section 3.1", gt=0
     )

@@ -35,6 +35,8 @@ def small_tank(guard: Guard | None = None, scheme: Scheme | None = None) -> Flow
         ({"surface": 0.5}, "surface"),
         ({"tolerance": -1.0}, "tolerance"),
         ({"shifting": 2.0}, "shifting"),
+        ({"collision_distance": 1.1}, "collision_distance"),
+        ({"restitution": -0.1}, "restitution"),
         ({"source": "mass"}, "source is 'mass'"),
         ({"gradient": "steep"}, "gradient is 'steep'"),
     ],

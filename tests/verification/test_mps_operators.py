@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sandmould.casting.mps.collisions import collisions
 from sandmould.casting.mps.flow import Flow
 from sandmould.casting.mps.neighbours import Neighbours, find_candidates, find_neighbours
 from sandmould.casting.mps.operators import (
@@ -15,8 +16,8 @@ from sandmould.casting.mps.operators import (
     pressure_gradient,
     velocity_gradient,
 )
-from sandmould.casting.mps.particles import FLUID, Particles, at_rest, lattice
-from sandmould.casting.mps.scheme import Scheme
+from sandmould.casting.mps.particles import FLUID, WALL, Particles, at_rest, lattice
+from sandmould.casting.mps.scheme import Metal, Scheme
 from sandmould.casting.mps.viscosity import fitted_laplacian
 from sandmould.casting.mps.weight import Kernel, make_kernel, weight, weight_slope
 
@@ -205,6 +206,33 @@ def test_crowding_points_to_where_particles_are():
     fluid.position_m[middle, 0] += 0.2 * SIZE_M
     moved = crowding(kernel, found(kernel, fluid), fluid.kind)
     assert moved[middle, 0] > 10.0
+
+
+def test_particles_that_collide_part_as_slowly_as_restitution_says():
+    # two of fluid head on along x, too near; one more that runs away from them; a wall below all
+    place = np.array([[0.0, 0.0], [0.7, 0.0], [-0.7, 0.0], [0.0, -0.6]]) * SIZE_M
+    four = at_rest(place, np.array([FLUID, FLUID, FLUID, WALL]))
+    four.velocity_m_s[:3] = [[1.0, -0.5, 0.0], [-0.4, 0.0, 0.0], [-3.0, 0.0, 0.0]]
+    near = found(make_kernel(2, SIZE_M), four)
+    change = collisions(near, four.velocity_m_s, four.kind, 0.8 * SIZE_M, 0.2)
+    after = four.velocity_m_s + change
+    assert after[1, 0] - after[0, 0] == pytest.approx(0.2 * 1.4)
+    assert after[0, 1] == pytest.approx(0.2 * 0.5)
+    assert change[:, 0].sum() == pytest.approx(0.0, abs=1e-15)
+    assert not change[2:].any()
+    assert not collisions(near, four.velocity_m_s, four.kind, 0.5 * SIZE_M, 0.2).any()
+
+
+def test_colliding_particles_move_on_with_their_new_velocity():
+    # as above, in a step without weight, friction or pressure: both are at a surface
+    two = at_rest(np.array([[0.0, 0.0], [0.75, 0.0]]) * SIZE_M, FLUID)
+    two.velocity_m_s[0, 0] = 1.0
+    weightless = Metal(viscosity_m2_s=0.0, gravity_m_s2=(0.0, 0.0, 0.0))
+    scheme = Scheme(collision_distance=0.8, restitution=0.0)
+    flow = Flow(two, make_kernel(2, SIZE_M), weightless, scheme)
+    flow.step(1e-5)
+    assert two.velocity_m_s[:, 0] == pytest.approx([0.5, 0.5])
+    assert two.position_m[:, 0] == pytest.approx([5e-6, 0.75 * SIZE_M + 5e-6])
 
 
 def test_periodic_neighbours_are_those_of_an_endless_lattice():

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.casting.mps.collisions import collisions
 from sandmould.casting.mps.neighbours import (
     Candidates,
     Neighbours,
@@ -174,6 +175,8 @@ class Flow:
         )
         u[self.fluid] += dt * (friction[self.fluid] + np.asarray(self.metal.gravity_m_s2))
         x[self.fluid] += dt * u[self.fluid]
+        if scheme.collision_distance > 0.0:
+            self._collide(dt)
         self.pressure_pa = np.zeros(len(state.kind))
         for number in range(scheme.relaxations):
             self._relax(number, dt, compression_before, rate_before)
@@ -254,6 +257,16 @@ class Flow:
         state.velocity_m_s -= change
         state.position_m -= dt * change
         self.pressure_pa += pressure
+
+    def _collide(self, dt: float) -> None:
+        """Let what came too near part, and move on with the change."""
+        state, scheme = self.particles, self.scheme
+        distance_m = scheme.collision_distance * self.kernel.spacing_m
+        change = collisions(
+            self._neighbours(), state.velocity_m_s, state.kind, distance_m, scheme.restitution
+        )
+        state.velocity_m_s += change
+        state.position_m += dt * change
 
     def _shift(self) -> None:
         """Move inner particles to where fewer are, and give them the velocity found there.

@@ -38,7 +38,7 @@ SMALLEST_MOMENT = 0.02
 
 
 @njit(**INLINED)
-def _approach(near: Neighbours, velocity: Floats, k: int, i: int) -> float:
+def approach(near: Neighbours, velocity: Floats, k: int, i: int) -> float:
     """Relative velocity times distance; negative where two particles come nearer."""
     j = near.other[k]
     return (
@@ -69,7 +69,7 @@ def density_rate(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
         for k in range(near.start[i], near.start[i + 1]):
             away = near.away_m[k]
             r = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
-            rate[i] += weight_slope(kernel, r) / r * _approach(near, velocity, k, i)
+            rate[i] += weight_slope(kernel, r) / r * approach(near, velocity, k, i)
     return rate
 
 
@@ -80,7 +80,7 @@ def divergence(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
     factor = kernel.dimension / kernel.lattice_density
     for i in range(len(velocity)):
         for k in range(near.start[i], near.start[i + 1]):
-            found[i] += factor * near.share[k] * _approach(near, velocity, k, i)
+            found[i] += factor * near.share[k] * approach(near, velocity, k, i)
     return found
 
 

@@ -58,6 +58,10 @@ class Scheme:
     shifting: float = 0.0
     """Share of r0^2 times the gradient of concentration by which inner particles are moved on after
     a step (Lind et al. 2012), with the velocity found there; 0 for none."""
+    collision_distance: float = 0.0
+    """Over r0, nearer than which particles that approach collide; 0 for none."""
+    restitution: float = 0.2
+    """Of these collisions."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run."""
@@ -73,6 +77,10 @@ class Scheme:
             raise ValueError(f"surface is {self.surface}: valid is 0.8 to 1")
         if not 0.0 <= self.shifting <= 0.5:
             raise ValueError(f"shifting is {self.shifting}: valid is 0 to 0.5")
+        for name in ("collision_distance", "restitution"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= 1.0:
+                raise ValueError(f"{name} is {value}: valid is 0 to 1")
         choices: dict[str, Collection[str]] = {
             "source": SOURCES,
             "gradient": GRADIENTS,
