@@ -14,7 +14,7 @@ def relaxation_of(loop: Loop) -> Relaxation:
     """A fresh memory of the scheme of a loop that has windows."""
     if loop.scheme == "one_way":
         return Fixed(0.0)
-    if loop.scheme == "fixed":
+    if loop.scheme in ("fixed", "per_layer"):
         return Fixed(loop.factor)
     if loop.scheme == "measured":
         return Measured(loop.factor, loop.least_factor, loop.most_factor, loop.limit_share)

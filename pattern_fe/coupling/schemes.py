@@ -12,7 +12,7 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
 
-WITH_LIGGGHTS = ("one_way", "fixed", "aitken", "quasi_newton")
+WITH_LIGGGHTS = ("one_way", "per_layer", "fixed", "aitken", "quasi_newton")
 """Schemes whose windows need a mesh to be exchanged and its loads read, no more."""
 ABOVE_VIBRATION = 5.0
 """Least ratio of the pattern's first frequency to that of the box, for an answer as if at rest."""

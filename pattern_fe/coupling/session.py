@@ -32,7 +32,8 @@ class CoupledSession:
     In a window the surface moves evenly to a displacement, the sand's mean load on its vertices is
     taken, the pattern answers with the displacement at rest under it, and the next window moves
     part of the way there. A window may be computed again from the state at its beginning until
-    the answer is what was shown.
+    the answer is what was shown. Loads of one way move no surface; with one solve a layer it goes
+    to where the loads at the end of the last stage bent the pattern.
     """
 
     def __init__(
@@ -73,6 +74,7 @@ class CoupledSession:
         rest = body.vertices_m
         self._shown = np.zeros_like(rest)
         self._next = np.zeros_like(rest)
+        self._answered = np.zeros_like(rest)
         self._load = np.zeros_like(rest)
         self._load_sum, self._load_steps = np.zeros_like(rest), 0
         self._work_j = self._solve_s = 0.0
@@ -89,8 +91,8 @@ class CoupledSession:
 
     @property
     def displacement_m(self) -> Array:
-        """Displacement of the surface that the sand sees, (nv, d) float64, m."""
-        return self._shown
+        """Displacement of the surface, (nv, d) float64, m; that the sand sees where it feels it."""
+        return self._shown if self._loop.feeds_back else self._answered
 
     def advance(self, duration_s: float | None = None) -> None:
         """Compute for a duration, or up to the next record, in windows of the loop."""
@@ -108,7 +110,7 @@ class CoupledSession:
                 self._measure(window * inner.step_s)
             self._window(min(window, end - inner.steps))
         if inner.is_root:
-            self._shapes.write(inner.time_s, self._shown)
+            self._shapes.write(inner.time_s, self.displacement_m)
 
     def _measure(self, window_s: float) -> None:
         """Measure the gain anew, at every record: sand that falls, settles or is shaken changes it.
@@ -158,7 +160,9 @@ class CoupledSession:
             return None
         begun = time.perf_counter()
         answer = self._body.answer(load)
-        target = self._relaxation.next(shown.ravel(), answer.displacement_m.ravel())
+        if self._loop.scheme != "per_layer" or inner.stage_over:
+            self._answered = answer.displacement_m
+        target = self._relaxation.next(shown.ravel(), self._answered.ravel())
         self._solve_s += time.perf_counter() - begun
         return load, answer, target.reshape(shown.shape)
 
@@ -207,7 +211,7 @@ class CoupledSession:
 
     def snapshot(self) -> Snapshot:
         """State of all grains relative to the box, and the pattern among them."""
-        moved_m = self._body.vertices_m + self._shown
+        moved_m = self._body.vertices_m + self.displacement_m
         return replace(self._inner.snapshot(), pattern_m=moved_m, pattern_load_n=self._load)
 
     def write_checkpoint(self, folder: Path) -> None:
@@ -218,6 +222,7 @@ class CoupledSession:
         arrays: dict[str, Any] = {
             "shown": self._shown,
             "next": self._next,
+            "answered": self._answered,
             "load": self._load,
             "work_j": self._work_j,
             "gain": self._gain,
@@ -231,6 +236,7 @@ class CoupledSession:
         """Read what ``write_checkpoint`` wrote; give the trusted parts of the tables."""
         with np.load(checkpoint / CHECKPOINT) as kept:
             self._shown, self._next, self._load = kept["shown"], kept["next"], kept["load"]
+            self._answered = kept["answered"]
             self._work_j = float(kept["work_j"])
             self._gain = float(kept["gain"])
             start = "relaxation_"

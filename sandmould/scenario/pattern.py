@@ -87,12 +87,21 @@ class Loop(Section):
         source=ARGUED, gt=0, le=1,
     )  # fmt: skip
     scheme: Literal[
-        "one_way", "fixed", "measured", "aitken", "quasi_newton", "in_step", "monolithic"
+        "one_way",
+        "per_layer",
+        "fixed",
+        "measured",
+        "aitken",
+        "quasi_newton",
+        "in_step",
+        "monolithic",
     ] = quantity(
         "aitken",
         "How far the surface is moved to where the last loads bend the pattern: not at all, a "
-        "fixed share, a share of the limit that a measured gain sets (not on LIGGGHTS), "
-        "Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no windows: "
+        "fixed share to where those at the end of the last layer or stage bend it, or to where "
+        "the last window's do: a fixed share, one of the limit that a measured gain sets (not on "
+        "LIGGGHTS), Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no "
+        "windows: "
         "in_step steps the pattern, condensed on its surface, inside every step of the engine; "
         "monolithic steps all of it after every step of the grains, slow, the judge of the "
         "others, reference engine.",
@@ -147,9 +156,14 @@ class Loop(Section):
         return self.scheme not in ("in_step", "monolithic")
 
     @property
+    def feeds_back(self) -> bool:
+        """Whether the sand of a window feels how the loads of the same window bend the pattern."""
+        return self.has_windows and self.scheme not in ("one_way", "per_layer")
+
+    @property
     def most_passes(self) -> int:
-        """Times that a window is computed at most: once where sand never feels the pattern."""
-        return 1 + self.repeats if self.has_windows and self.scheme != "one_way" else 1
+        """Times that a window is computed at most."""
+        return 1 + self.repeats if self.feeds_back else 1
 
 
 class Pattern(Section):

@@ -210,6 +210,42 @@ def test_repeated_windows_end_with_the_answer_that_was_shown(tmp_path: Path) -> 
     assert ledgers[1].passes.max() > 1
 
 
+def test_loads_of_one_way_bend_a_pattern_that_the_sand_never_sees_move(tmp_path: Path) -> None:
+    session = coupled(tmp_path, scheme="one_way", repeats=12)
+    filled(session, records=8)
+    ledger, last = after(session, tmp_path)
+    session.close()
+    assert not ledger.displacement_m.any()
+    assert (ledger.passes == 1).all()
+    sunk_m = -session.displacement_m[:, 1]
+    assert sunk_m[0] == pytest.approx(last.residual_m)  # of a plate all of whose vertices sink
+    assert sunk_m[0] > 0.0
+
+
+def test_one_solve_a_layer_bends_the_pattern_after_it_and_moves_it_under_the_next(
+    tmp_path: Path,
+) -> None:
+    session = coupled(tmp_path, scheme="per_layer", factor=0.1)
+    answers = []
+    for stage in build_program(tube_scene(**SCENE)).stages:
+        session.insert_layer(stage.layer)
+        session.start_stage(stage)
+        while not session.stage_over:
+            assert (session.displacement_m == (answers or [0.0])[-1]).all()
+            session.advance()
+        answers.append(session.displacement_m.copy())
+    ledger, last = after(session, tmp_path)
+    session.close()
+    first = ledger[ledger.displacement_m == 0.0]
+    second = ledger.drop(first.index)
+    assert len(first) > 100
+    assert len(second) > 100
+    assert (second.displacement_m.diff().dropna() >= 0.0).all()
+    # A tenth of the way in each of hundreds of windows; its last load is answered after it.
+    assert last.displacement_m == pytest.approx(-answers[0][0, 1], rel=1e-3)
+    assert answers[1][0, 1] < 1.5 * answers[0][0, 1] < 0.0
+
+
 def test_a_soft_plate_runs_away_in_the_plain_loop_and_holds_by_aitken(tmp_path: Path) -> None:
     (tmp_path / "plain").mkdir()
     (tmp_path / "aitken").mkdir()
