@@ -23,8 +23,9 @@ from sandmould.study.expand import expand
 from sandmould.study.opening import open_study
 from sandmould.study.plan import plan_table, read_run, write_plan, write_study
 from sandmould.study.report.animation import ABSENT
+from sandmould.study.report.flow import _hopping
 from sandmould.study.report.flow_film import make_flow_film
-from sandmould.study.report.flow_map import condition_text, said_of
+from sandmould.study.report.flow_map import _parts, condition_text, said_of, stability_map
 from sandmould.study.report.page import write_report
 from sandmould.study.simulate import measure_run, render_run, simulate
 
@@ -229,6 +230,39 @@ def test_the_shipped_grid_is_the_papers() -> None:
     assert condition_text(runs[9].parameters) == "MR5-0.5, 1 ms"
     assert said_of({"dt_max_s": 1e-4, "relaxations": 5, "source_share": 0.5}) == ""
     assert len(expand(open_study(Path("config/studies/tank_map.yaml")))) == 64
+
+
+CONDITIONS = pd.DataFrame({
+    "dt_max_s": [1e-4, 1e-3, 1e-3], "relaxations": [1, 5, 5], "source_share": [1.0, 0.5, 0.5],
+    "collision_distance": [0.8, 0.8, 0.0], "classification": ["good", "excellent", "failed"],
+    "hops": [1.0, 0.0, 0.0],
+})  # fmt: skip
+KEYS = ("dt_max_s", "relaxations", "source_share", "collision_distance")
+
+
+def test_a_map_has_a_panel_for_all_that_is_swept_beside_its_axes() -> None:
+    assert condition_text(dict(CONDITIONS.iloc[2][list(KEYS)])) == (
+        "MR5-0.5, 1 ms, collision distance 0"
+    )
+    parts = _parts(CONDITIONS, KEYS[2:])
+    assert [title for title, _ in parts] == [
+        "c_poi 1\ncollision distance 0.8",
+        "c_poi 0.5\ncollision distance 0.8",
+        "c_poi 0.5\ncollision distance 0",
+    ]
+    assert [part.index.tolist() for _, part in parts] == [[0], [1], [2]]
+    assert stability_map(CONDITIONS, KEYS).startswith("data:image/png")
+    assert stability_map(CONDITIONS, KEYS[2:]) == ""
+
+
+def test_a_report_says_where_metal_hops() -> None:
+    scenario = MetalFlow(case=SHOULDER)
+    assert _hopping(scenario, CONDITIONS, KEYS[:3]) == (
+        "When the casting is full, metal that rises faster than 0.5 m/s hops: it hops at MR1-1, "
+        "0.1 ms; it does not hop at MR5-0.5, 1 ms.",
+    )
+    assert _hopping(MetalFlow(case=TANK), CONDITIONS, KEYS[:3]) == ()
+    assert _hopping(scenario, CONDITIONS.drop(columns="hops"), KEYS[:3]) == ()
 
 
 def test_a_film_keeps_places_and_shades() -> None:

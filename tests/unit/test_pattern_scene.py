@@ -247,7 +247,11 @@ def test_windows_fill_a_record_with_whole_samples() -> None:
             "scheme = 'in_step' .* valid is one_way, per_layer, fixed, aitken",
         ),
         ("liggghts", {}, "frame = 'laboratory' cannot be used: valid is box in a scene with"),
-        ("liggghts", {"scheme": "measured"}, "scheme = 'measured' .* valid is one_way, per_layer, fixed, ait"),
+        (
+            "liggghts",
+            {"scheme": "measured"},
+            "scheme = 'measured' .* valid is one_way, per_layer, fixed, ait",
+        ),
         ("liggghts", {}, "pattern.loop.repeats = 12 cannot be used: valid is 0 on eng"),
         ("lammps", {"scheme": "in_step", "exchange": "files"}, "exchange = 'files' .* no windows"),
     ],

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from sandmould.casting.mps import scene
+from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
 from sandmould.casting.mps.stability import Verdict as Stability
 from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
@@ -87,7 +88,9 @@ def flow_pages(
     probes = [f"{name}_pa" for name in ideal_pa]
     return FlowPages(
         map=stability_map(ranked, collected.keys),
-        sentences=_sentences(scenario, ranked, ideal_pa),
+        sentences=(
+            *_sentences(scenario, ranked, ideal_pa), *_hopping(scenario, ranked, collected.keys)
+        ),
         noise=_noise(scenario, ranked, collected.keys),
         histories=_histories(shown, ideal_pa),
         fields=_fields(shown, max(ideal_pa.values())),
@@ -163,6 +166,21 @@ def _sentences(
             f"of {len(ranked)} runs. The paper does not say which it takes."
         )
     return tuple(said)
+
+
+def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> tuple[str, ...]:
+    """Where metal of a casting hops, and where it does not."""
+    if isinstance(scenario.case, StillTank) or "hops" not in ranked:
+        return ()
+    ended = ranked[ranked["classification"] != Stability.FAILED.value]
+    parts = []
+    for hops, verb in ((1, "hops"), (0, "does not hop")):
+        own = ended[ended["hops"] == hops]
+        where = [condition_text({key: row[key] for key in keys}) for _, row in own.iterrows()]
+        if where:
+            parts.append(f"it {verb} at {listed(where, most=6)}")
+    told = f"When the casting is full, metal that rises faster than {HOP_SPEED_M_S:g} m/s hops"
+    return (f"{told}: {'; '.join(parts)}.",) if parts else ()
 
 
 def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Table:
@@ -249,6 +267,14 @@ def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
     return figure, list(panels[:count])
 
 
+def _collisions(scenario: MetalFlow, keys: Sequence[str]) -> str:
+    """Whether particles that come too near collide."""
+    if "collision_distance" in keys:
+        return "collisions as swept"
+    near = scenario.collision_distance
+    return f"particles nearer than {near:g} of their size collide" if near else "no collisions"
+
+
 def flow_method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Row, ...]:
     """How the runs were computed; see ``sand_method``."""
     case, metal = scenario.case, scenario.metal
@@ -269,7 +295,7 @@ def flow_method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Row, ...]:
         Row("Scheme", f"source {scenario.source.replace('_', ' ')}, gradient {scenario.gradient}, "
             f"Laplacian {scenario.laplacian}, surface below {scenario.surface:g} of the full "
             f"number density, Courant number {scenario.courant:g}; Poisson equation to "
-            f"{scenario.tolerance:g}"),
+            f"{scenario.tolerance:g}; {_collisions(scenario, keys)}"),
         Row("Measures", f"from {scenario.measured_from_s:g} to {scenario.duration_s:g} s, at the "
             "particle nearest to each probe; excellent: deviation at the deepest probe below "
             f"{scenario.quiet_pa:g} Pa and no hopping; good: the run ends; failed: a guard stops "

@@ -17,7 +17,9 @@ from sandmould.study.report.figures import png
 from sandmould.study.words import setting_text
 
 AXES = ("dt_max_s", "relaxations")
-PANELS = "source_share"
+SHARE = "source_share"
+MOST_ACROSS = 4
+"""Panels in a row."""
 SIGNS = {
     Verdict.EXCELLENT: ("o", "#009E73"), Verdict.GOOD: ("D", "#E69F00"),
     Verdict.FAILED: ("x", "#D55E00"),
@@ -26,7 +28,7 @@ SIGNS = {
 
 
 def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
-    """Draw the map, a panel for each c_poi.
+    """Draw the map, a panel for each c_poi and each value of what else is swept.
 
     Parameters
     ----------
@@ -42,14 +44,17 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
     """
     if not set(AXES) <= set(keys) or summary.empty:
         return ""
-    shares: list[Any] = [None]
-    if PANELS in keys:
-        shares = sorted(summary[PANELS].unique().tolist(), reverse=True)
-    figure = Figure(figsize=(max(5.0, 2.9 * len(shares)), 3.4), dpi=110, layout="constrained")
-    panels = figure.subplots(1, len(shares), sharex=True, sharey=True, squeeze=False)[0]
+    others = [key for key in keys if key not in AXES]
+    parts = _parts(summary, others)
+    across = min(len(parts), MOST_ACROSS)
+    rows = -(-len(parts) // across)
+    figure = Figure(figsize=(max(5.0, 2.9 * across), 0.6 + 2.8 * rows), dpi=110,
+                    layout="constrained")  # fmt: skip
+    grid = figure.subplots(rows, across, sharex=True, sharey=True, squeeze=False)
     steps, counts = sorted(summary[AXES[0]].unique()), sorted(summary[AXES[1]].unique())
-    for axes, share in zip(panels, shares, strict=True):
-        part = summary if share is None else summary[summary[PANELS] == share]
+    for axes in grid.flat[len(parts) :]:
+        axes.set_axis_off()
+    for axes, (title, part) in zip(grid.flat, parts, strict=False):
         for verdict, (marker, colour) in SIGNS.items():
             own = part[part["classification"] == verdict.value]
             # evenly spaced, as the paper's: the values rise by doubling
@@ -61,9 +66,11 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
         axes.set_xticks(range(len(counts)), [f"{n}" for n in counts])
         axes.set_yticks(range(len(steps)), [f"{1e3 * dt:g}" for dt in steps])
         axes.set(xlim=(-0.5, len(counts) - 0.5), ylim=(-0.5, len(steps) - 0.5))
-        axes.set(xlabel="relaxations", title="" if share is None else f"c_poi = {share:g}")
+        axes.set_xlabel("relaxations")
+        axes.set_title(title, fontsize=9)
         axes.grid(alpha=0.3)
-    panels[0].set_ylabel("largest time step, ms")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("largest time step, ms")
     signs = [
         Line2D([], [], ls="", marker=marker, color=colour, mew=2.0, label=verdict.value,
                mfc="none" if verdict is not Verdict.GOOD else colour)
@@ -73,12 +80,26 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
     return png(figure)
 
 
+def _parts(summary: pd.DataFrame, others: Sequence[str]) -> list[tuple[str, pd.DataFrame]]:
+    """Title and runs of each panel, great values first."""
+    if not others:
+        return [("", summary)]
+    values = summary[list(others)].drop_duplicates().sort_values(list(others), ascending=False)
+    found = []
+    for _, one in values.iterrows():
+        title = setting_text({key: one[key] for key in others}).replace(", ", "\n")
+        found.append((title, summary[(summary[list(others)] == one).all(axis=1)]))
+    return found
+
+
 def condition_text(values: Mapping[str, Any]) -> str:
-    """A setting as the paper names it, ``MR5-0.5``, with its largest step; any other in full."""
-    if set(values) != {*AXES, PANELS}:
+    """A setting as the paper names it, ``MR5-0.5``, with its largest step; the rest in full."""
+    if not {*AXES, SHARE} <= set(values):
         return setting_text(values)
     dt_ms = 1e3 * float(values[AXES[0]])
-    return f"MR{values[AXES[1]]}-{float(values[PANELS]):.3g}, {dt_ms:g} ms"
+    papers = f"MR{values[AXES[1]]}-{float(values[SHARE]):.3g}, {dt_ms:g} ms"
+    rest = {key: value for key, value in values.items() if key not in (*AXES, SHARE)}
+    return ", ".join((papers, setting_text(rest))) if rest else papers
 
 
 def said_of(values: Mapping[str, Any]) -> str:
@@ -88,7 +109,7 @@ def said_of(values: Mapping[str, Any]) -> str:
     but MR1-1.0 and MR2-1.0; of MR1-0.5 figure 5(d) shows a noise that is not reduced enough.
     """
     try:
-        dt_s, share = float(values[AXES[0]]), float(values[PANELS])
+        dt_s, share = float(values[AXES[0]]), float(values[SHARE])
         count = int(values[AXES[1]])
     except (KeyError, TypeError, ValueError):
         return ""
