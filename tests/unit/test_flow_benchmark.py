@@ -51,7 +51,8 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
         {
             "schemes": origin | {"rows": [row("MR5-0.5", 5, 4.0, 20.0), row("MR1", 1, 3.0, 50.0)]},
             "large": origin | {"row": large},
-            "peers": origin | {"rows": [peer | {"scheme": "PySPH iisph"},
+            "peers": origin | {"own": row("MR5-0.5", 5, 4.5, 21.0),
+                               "rows": [peer | {"scheme": "PySPH iisph"},
                                         {"scheme": "PySPH sisph", "stopped": "no compiler"}]},
         },
         tmp_path,
@@ -59,5 +60,6 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
     page = (tmp_path / "metal_flow.md").read_text()
     assert "takes 40 % of a step and finding neighbours 30 %" in page
     assert "100 000 particles of metal and 70 000 of the mould" in page
+    assert "| MR5-0.5 | this | 4.50 | 21.0 |" in page
     assert "PySPH sisph gave no result: no compiler" in page
     assert (tmp_path / "metal_flow.png").stat().st_size > 5000
