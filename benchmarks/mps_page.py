@@ -9,6 +9,7 @@ from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from benchmarks.tables import number, table
 
@@ -148,22 +149,24 @@ def _peers_words(rows: Sequence[Row], own: Row, duration_s: float) -> str:
 
 
 def _draw(rows: Sequence[Row], path: Path) -> None:
-    """Pressure noise and residual speed against cost, one point a scheme."""
+    """Pressure noise and residual speed against cost, one numbered point a scheme."""
     figure = Figure(figsize=(11, 4.5), layout="constrained")
     axes = figure.subplots(1, 2)
     for axis, key, label in (
         (axes[0], "pressure_noise_pa", "standard deviation of pressure at 70 mm, Pa"),
         (axes[1], "mean_speed_m_s", "mean speed of metal at rest, m/s"),
     ):
-        for place, row in enumerate(rows):
+        for place, row in enumerate(rows, 1):
             colour = "C2" if "version" in row else "C0" if row["source"] == "density" else "C1"
-            point = (_cost(row), row[key])
-            axis.scatter(*point, s=24, color=colour)
+            axis.plot(_cost(row), row[key], "o", ms=4, color=colour)
             axis.annotate(
-                row["scheme"], point, xytext=(5, (3, -9)[place % 2]), textcoords="offset points",
-                fontsize=8,
+                f"{place}", (_cost(row), row[key]), xytext=(4, 2), textcoords="offset points",
+                fontsize=8, color=colour,
             )  # fmt: skip
-        axis.margins(x=0.2)
+        axis.margins(0.1)
         axis.set(xscale="log", yscale="log", ylabel=label)
         axis.set_xlabel("processor time for a simulated second, s")
+    names = [f"{place}  {row['scheme']}" for place, row in enumerate(rows, 1)]
+    handles = [Line2D([], [], ls="", label=name) for name in names]
+    figure.legend(handles=handles, loc="outside right upper", fontsize=8, handlelength=0)
     figure.savefig(path, dpi=120)
