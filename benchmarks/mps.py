@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.mps`` writes mps.json beside this file, docs/metal_flow.md and its picture.
 ``--part`` computes one part again and keeps the others; ``--quick`` writes what 0.3 s give to
-results/benchmarks/ instead; ``--page`` writes the page of mps.json again. The part ``peers`` needs
-an environment of its own, ``.venv-peers-flow`` (``make flow`` makes it).
+results/benchmarks/ instead; ``--page`` writes the page of mps.json again. The parts ``solvers`` and
+``peers`` need an environment of its own, ``.venv-peers-flow`` (``make flow`` makes it).
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 from benchmarks.mps_page import RECOMMENDED, write
 from benchmarks.mps_peers import peer_rows
 from benchmarks.mps_runs import SCHEMES, large_row, scheme_rows
+from benchmarks.mps_solvers import solver_rows
 from sandmould import ROOT
 from sandmould.casting.mps.computation import source_hash
 from sandmould.scenario.scenario import Scenario
@@ -23,7 +24,7 @@ from sandmould.study.simulate import provenance
 
 OUT = Path(__file__).with_name("mps.json")
 QUICK = ROOT / "results" / "benchmarks"
-PARTS = ("schemes", "large", "peers")
+PARTS = ("schemes", "solvers", "large", "peers")
 LONG_S, SHORT_S = 2.0, 0.3
 """The paper's duration, and one that shows that everything works: what is calm at first may not
 stay so."""
@@ -42,6 +43,8 @@ def part(name: str, duration_s: float) -> dict[str, Any]:
     }  # fmt: skip
     if name == "large":
         return found | {"row": large_row()}
+    if name == "solvers":
+        return found | {"rows": solver_rows()}
     if name == "schemes":
         return found | {"rows": scheme_rows(SCHEMES, duration_s)}
     own = scheme_rows([RECOMMENDED], duration_s)[0]

@@ -40,6 +40,7 @@ def write(kept: Mapping[str, Any], folder: Path) -> None:
         verdict=verdict(rows),
         schemes_table=_schemes_table(rows),
         share=_share_words(ran),
+        solvers=_solvers_table(kept["solvers"]["rows"]),
         large=_large_words(kept["large"]["row"]),
         peers=_peers_words(peers, kept["peers"]["own"], kept["peers"]["duration_s"]),
         origin=f"{origin}.",
@@ -111,6 +112,15 @@ def _share_words(ran: Sequence[Row]) -> str:
                f"{near:.0f} %. ")  # fmt: skip
     least, most = f"{min(pressure):.0f}", f"{max(pressure):.0f}"
     return f"{own}Over all schemes the Poisson equation takes {least} to {most} %."
+
+
+def _solvers_table(rows: Sequence[Row]) -> str:
+    head = ("unknowns", "solver", "iterations", "residual over right-hand side", "processor ms")
+    return table(head, [
+        (number(row["unknowns"]), row["solver"], f"{row['iterations'] or '-'}",
+         f"{row['residual_fraction']:.2g}", f"{1e3 * row['cpu_s']:.3g}")
+        for row in rows
+    ]).rstrip()  # fmt: skip
 
 
 def _large_words(row: Row) -> str:

@@ -9,6 +9,9 @@ import pytest
 
 from benchmarks.mps_page import verdict, write
 from benchmarks.mps_peers import measured
+from benchmarks.mps_solvers import poisson_of, rows_here
+from sandmould.casting.mps.scheme import Scheme
+from sandmould.casting.mps.tank import open_tank
 
 
 def row(scheme: str, relaxations: int, cost: float, noise: float, **more: Any) -> dict[str, Any]:
@@ -33,6 +36,19 @@ def test_several_relaxations_are_worth_it_where_no_cheaper_single_solve_is_calme
     assert "Not answered" in verdict([several])
 
 
+def test_solvers_solve_the_system_of_a_flow() -> None:
+    flow = open_tank(Scheme(), columns=8, rows=10)
+    flow.advance(2e-3)
+    poisson = poisson_of(flow)
+    rows = {row["solver"]: row for row in rows_here(poisson)}
+    assert {row["unknowns"] for row in rows.values()} == {len(poisson.right)}
+    # ours has its tolerance in the norm of its preconditioner
+    assert 1e-9 < rows["ours"]["residual_fraction"] < 10 * poisson.tolerance
+    assert 1e-9 < rows["SciPy cg"]["residual_fraction"] <= poisson.tolerance
+    assert rows["SciPy spsolve"]["residual_fraction"] < 1e-12
+    assert 0 < rows["ours"]["iterations"] < rows["SciPy cg"]["iterations"]
+
+
 def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
     origin = {"machine": {"processor": "a core"}, "commit": "abc", "solver": "def",
               "duration_s": 0.3}  # fmt: skip
@@ -50,6 +66,12 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
     write(
         {
             "schemes": origin | {"rows": [row("MR5-0.5", 5, 4.0, 20.0), row("MR1", 1, 3.0, 50.0)]},
+            "solvers": origin | {"rows": [
+                {"solver": "ours", "unknowns": 1000, "iterations": 18, "residual_fraction": 2e-3,
+                 "cpu_s": 8e-4},
+                {"solver": "SciPy spsolve", "unknowns": 1000, "iterations": 0,
+                 "residual_fraction": 1e-15, "cpu_s": 0.01},
+            ]},
             "large": origin | {"row": large},
             "peers": origin | {"own": row("MR5-0.5", 5, 4.5, 21.0),
                                "rows": [peer | {"scheme": "PySPH iisph"},
@@ -60,6 +82,8 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
     page = (tmp_path / "metal_flow.md").read_text()
     assert "takes 40 % of a step and finding neighbours 30 %" in page
     assert "100 000 particles of metal and 70 000 of the mould" in page
+    assert "| 1 000 | ours | 18 | 0.002 | 0.8 |" in page
+    assert "| SciPy spsolve | - |" in page
     assert "| MR5-0.5 | this | 4.50 | 21.0 |" in page
     assert "PySPH sisph gave no result: no compiler" in page
     assert (tmp_path / "metal_flow.png").stat().st_size > 5000
