@@ -91,8 +91,11 @@ class CoupledSession:
 
     @property
     def displacement_m(self) -> Array:
-        """Displacement of the surface, (nv, d) float64, m; that the sand sees where it feels it."""
-        return self._shown if self._loop.feeds_back else self._answered
+        """Displacement of the surface that the sand sees, (nv, d) float64, m.
+
+        Of loads of one way, which it never sees, where they bend the pattern.
+        """
+        return self._answered if self._loop.scheme == "one_way" else self._shown
 
     def advance(self, duration_s: float | None = None) -> None:
         """Compute for a duration, or up to the next record, in windows of the loop."""

@@ -71,8 +71,11 @@ class Snapshot:
 
 
 def scene_at(scenario: Scenario, snapshot: Snapshot) -> Scene:
-    """Geometry at the instant of a snapshot: opened gates away, the pattern bent."""
-    scene = scenario.scene_in(snapshot.stage)
-    if scenario.pattern is None or snapshot.pattern_m is None:
+    """Geometry that sand feels at a snapshot: opened gates away, the pattern bent.
+
+    Loads of one way bend a pattern that the sand feels as drawn.
+    """
+    scene, pattern = scenario.scene_in(snapshot.stage), scenario.pattern
+    if pattern is None or snapshot.pattern_m is None or pattern.loop.scheme == "one_way":
         return scene
-    return scene.bent(scenario.pattern.name, snapshot.pattern_m)
+    return scene.bent(pattern.name, snapshot.pattern_m)

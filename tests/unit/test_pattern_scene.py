@@ -78,6 +78,8 @@ def test_a_scene_bends_with_its_snapshot() -> None:
     top = np.array([[0.09, 0.06]])  # the highest edge as drawn
     assert scenario.scene.clearance_m(top) == pytest.approx(0.0)
     assert scene_at(scenario, snapshot).clearance_m(top) == pytest.approx(0.003)
+    one_way = with_surface(l_scene(loop={"scheme": "one_way"}))
+    assert scene_at(one_way, snapshot).clearance_m(top) == pytest.approx(0.0)
 
 
 def test_the_flange_hangs_by_its_load_and_the_supports_carry_it() -> None:
