@@ -156,14 +156,10 @@ class Loop(Section):
         return self.scheme not in ("in_step", "monolithic")
 
     @property
-    def feeds_back(self) -> bool:
-        """Whether the sand of a window feels how the loads of the same window bend the pattern."""
-        return self.has_windows and self.scheme not in ("one_way", "per_layer")
-
-    @property
     def most_passes(self) -> int:
-        """Times that a window is computed at most."""
-        return 1 + self.repeats if self.feeds_back else 1
+        """Times that a window is computed at most: once where its own loads move no surface."""
+        feeds_back = self.has_windows and self.scheme not in ("one_way", "per_layer")
+        return 1 + self.repeats if feeds_back else 1
 
 
 class Pattern(Section):
