@@ -73,6 +73,8 @@ def peak_memory_bytes() -> int:
     return sum(resource.getrusage(who).ru_maxrss for who in whose) * 1024
 
 
+LAST_WORK = "last_work"
+"""Folder of what a failed run leaves besides its products, its last checkpoint above all."""
 SAND_PRODUCTS = (
     "series.tsv",
     "loads.tsv",
@@ -93,7 +95,8 @@ def finish(
 ) -> None:
     """Move a run's products from its work folder into place.
 
-    A finished run's work folder is removed; any other keeps its last checkpoint there.
+    A finished run's work folder is removed, a failed one's renamed: asked for again, that run begins
+    anew, since its tables are no longer beside its checkpoint.
 
     Parameters
     ----------
@@ -119,6 +122,9 @@ def finish(
         writer.writerow(row)
     text = json.dumps(provenance, indent=1) + "\n"
     (folder / "provenance.json").write_text(text, encoding="utf-8")
+    shutil.rmtree(folder / LAST_WORK, ignore_errors=True)
     if outcome.outcome == 0:
         shutil.rmtree(work)
+    else:
+        os.replace(work, folder / LAST_WORK)
     outcome.write(folder / "outcome.json")

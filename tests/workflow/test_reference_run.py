@@ -57,6 +57,22 @@ def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
     assert {"floor", "left", "right", "tube_lower", "tube_upper"} == set(loads.surface)
 
 
+def test_failed_run_asked_for_again_begins_anew(tmp_path: Path) -> None:
+    guarded = scene(
+        guard={"largest_overlap_fraction": 0.002},
+        record={"series_every_s": 0.005, "checkpoint_every_s": 0.005},
+    )
+    ended = []
+    for _ in range(2):
+        outcome = drive(guarded, tmp_path)
+        ended.append((outcome, (tmp_path / "series.tsv").read_text(encoding="utf-8")))
+        assert list(tmp_path.glob("last_work/checkpoint_*/mark.json"))
+        for product in ("outcome.json", "series.tsv"):  # what Snakemake removes first
+            (tmp_path / product).unlink()
+    assert ended[0][0].outcome is Outcome.OVERLAP_TOO_LARGE
+    assert ended[0] == ended[1]
+
+
 def test_disk_that_takes_no_more_is_told_and_the_run_goes_on_with_room(
     straight: Path, tmp_path: Path
 ) -> None:

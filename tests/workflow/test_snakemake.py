@@ -218,7 +218,7 @@ def test_one_failing_run_leaves_the_others_alone_and_fails_the_study(checkout: P
     assert "overlap" in (results / "report.html").read_text()
     assert not (results / "all_runs_finished").exists()
     failed = next(results.glob("runs/*_0p001_*"))
-    assert (failed / "work").is_dir()  # what the failed run had is kept
+    assert (failed / "last_work").is_dir()  # what the failed run had is kept
 
 
 @pytest.mark.parametrize(
