@@ -95,8 +95,8 @@ def finish(
 ) -> None:
     """Move a run's products from its work folder into place.
 
-    A finished run's work folder is removed, a failed one's renamed: asked for again, that run begins
-    anew, since its tables are no longer beside its checkpoint.
+    A finished run's work folder is removed, a failed one's renamed: asked for again, that run
+    begins anew, since its tables are no longer beside its checkpoint.
 
     Parameters
     ----------
