@@ -85,9 +85,15 @@ def _noise(found: dict[str, Any]) -> str:
     )
 
 
-def _quartiles(found: list[float | None], cap: int) -> str:
+def _quartiles(found: list[float | None], cap: int, starts: int) -> str:
     low, median, high = (f"> {cap}" if n is None else f"{n:.0f}" for n in found)
-    return f"{median} ({low} to {high})"
+    return median if starts == 1 else f"{median} ({low} to {high})"
+
+
+_MEDIANS = (
+    "Medians over the starts, and quartiles in brackets; a failure counts as longer than anything."
+)
+_ONE = "From one start, which shows that each method gets there, and ranks none."
 
 
 def _races(found: dict[str, Any]) -> str:
@@ -98,17 +104,17 @@ def _races(found: dict[str, Any]) -> str:
             f"{row['target_deg']:g}",
             row["method"],
             row["guess"],
-            _quartiles(row["quartiles"], cap),
+            _quartiles(row["quartiles"], cap, row["seeds"]),
             f"{row['failures']} of {row['seeds']}",
-            _quartiles(row["since_quartiles"], held),
+            _quartiles(row["since_quartiles"], held, row["seeds"]),
             f"{row['not_good_after']} of {row['seeds']}",
         ])  # fmt: skip
     head = ["target, degrees", "method", "guess", "runs to the first good guess",
             f"none in {cap} runs", f"runs since which all are good, up to {held}",
             f"not good after {held}"]  # fmt: skip
+    starts = _ONE if found["races"][0]["seeds"] == 1 else _MEDIANS
     words = (
-        "\nMedians over the starts, and quartiles in brackets; a failure counts as longer than "
-        "anything. The least possible is 6 runs for sandmould, 10 for GrainLearning and 8 for "
+        f"\n{starts} The least possible is 6 runs for sandmould, 10 for GrainLearning and 8 for "
         "coexist: their first guess. One good guess may be luck, as the control shows, so the "
         f"table also tells since when every guess was good, up to {held} runs. A guess after every "
         "run has more chances of the first and more chances to fail the second.\n"
