@@ -33,6 +33,8 @@ class Compared:
     second: str
     at: str
     """What else is swept, at the values both have; empty where nothing is."""
+    at_values: str
+    """These values alone."""
     agreement: Agreement
 
     @property
@@ -76,8 +78,9 @@ def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> t
         for key, value in study.cross_check.at.items():
             alike = alike[alike[key] == value]
         engines = (study.scenario.engine.name, study.cross_check.engine)
-        at = setting_text(study.cross_check.at) if study.cross_check.at else ""
-        found += _compare("engine.name", engines, at, (alike, checked), equivalence)
+        found += _compare(
+            "engine.name", engines, study.cross_check.at, (alike, checked), equivalence
+        )
     return found
 
 
@@ -98,10 +101,9 @@ def compare_keys(
         others = [k for k in keys if k != key]
         over = [k for k in others if k in equivalence.over]
         for rest, alike in group_settings(summary, [k for k in others if k not in over]):
-            at = setting_text(rest) if rest else ""
             for (a, rows), (b, other_rows) in combinations(group_settings(alike, [key]), 2):
                 pair = shown_value(key, a[key]), shown_value(key, b[key])
-                found += _compare(key, pair, at, (rows, other_rows), equivalence, over)
+                found += _compare(key, pair, rest, (rows, other_rows), equivalence, over)
     return tuple(sorted(found, key=lambda c: list(equivalence.margins).index(c.measure)))
 
 
@@ -113,18 +115,20 @@ def shown_value(key: str, value: Any) -> str:
 def _compare(
     key: str,
     pair: tuple[str, str],
-    at: str,
+    at: Mapping[str, Any],
     rows: tuple[pd.DataFrame, pd.DataFrame],
     equivalence: Equivalence,
     over: Sequence[str] = (),
 ) -> tuple[Compared, ...]:
     """One pair of settings in every measure that has a margin."""
+    where = setting_text(at) if at else ""
+    at_values = ", ".join(value_text(k, v) for k, v in at.items())
     found = []
     for measure, margin in equivalence.margins.items():
         values = [finished_values(r, measure).dropna() for r in rows]
         first, second = (by_block(r, v, over) for r, v in zip(rows, values, strict=True))
         judged = agree(first, second, margin, equivalence.confidence)
-        found.append(Compared(measure, key, *pair, at, judged))
+        found.append(Compared(measure, key, *pair, where, at_values, judged))
     return tuple(found)
 
 

@@ -107,7 +107,7 @@ def judge(
     resolved = first is not None and first.separated
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
     caveats = [
-        *_run_caveats(settings, len(summary), int(values.notna().sum())),
+        *_run_caveats(settings, len(summary), int(values.notna().sum()), seeks_best),
         *(_edge_caveats(best, settings, keys) if seeks_best else ()),
         *_identical([c.other for c in comparisons if _is_identical(c, found, best)]),
         *notes,
@@ -220,7 +220,9 @@ def _identical(others: list[str]) -> list[str]:
     ]
 
 
-def _run_caveats(settings: Sequence[Setting], planned: int, used: int) -> list[str]:
+def _run_caveats(
+    settings: Sequence[Setting], planned: int, used: int, seeks_best: bool
+) -> list[str]:
     caveats = []
     if used < planned:
         were = "was" if planned - used == 1 else "were"
@@ -230,7 +232,8 @@ def _run_caveats(settings: Sequence[Setting], planned: int, used: int) -> list[s
         )
     empty = [s.label for s in settings if s.n == 0]
     if empty and used:
-        caveats.append(f"No run finished at {listed(empty)}: the best may lie there.")
+        so = ": the best may lie there" if seeks_best else ""
+        caveats.append(f"No run finished at {listed(empty)}{so}.")
     few = [s.label for s in settings if 0 < s.n < _FEW]
     if few:
         caveats.append(f"Fewer than {_FEW} finished replicates at {listed(few)}.")

@@ -22,6 +22,7 @@ from sandmould.study.agreement import (
     sweep_part,
 )
 from sandmould.study.collect import collect, gather, read_study
+from sandmould.study.report.agreement import row_name
 from sandmould.study.study import Equivalence
 from tests.unit.report_study import ENGINES, KEY, write_cross_check, write_twins
 
@@ -79,6 +80,19 @@ def test_numbers_are_named_and_words_stand_alone() -> None:
     keys = list(table.columns[:1])
     (one,) = compare_keys(table, keys, Equivalence(keys=tuple(keys), margins={FILL: 0.03}))
     assert one.pair == "rolling arm 0 − rolling arm 0.1"
+
+
+def test_rows_of_a_chart_are_told_apart_where_their_names_are_cut() -> None:
+    values: dict[str, list[object]] = {
+        FORM: ["none", "viscous"],
+        "pattern.statics": ["large", "linear"],
+        "pattern.young_modulus_pa": [6.4e6, 6.4e8],
+    }
+    keys = list(values)
+    found = compare_keys(summary(**values), keys, Equivalence(keys=(FORM,), margins={FILL: 0.03}))
+    rows = [row_name(c) for c in found]
+    assert len(set(rows)) == len(found) == 4
+    assert rows[0].startswith("none − viscous, large, 6.4e+06 Pa: ")
 
 
 def test_planted_difference_between_engines_is_found(tmp_path: Path) -> None:

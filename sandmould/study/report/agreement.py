@@ -133,14 +133,16 @@ def _chart(compared: Sequence[Compared]) -> Chart:
         "",
         f"Differences in {what} against a margin of {margin:g}. {'; '.join(said)}.",
         marks=tuple(marks),
-        rows=tuple(_row_name(c) for c in compared),
+        rows=tuple(row_name(c) for c in compared),
         band=(-margin, margin),
     )
 
 
-def _row_name(compared: Compared) -> str:
+def row_name(compared: Compared) -> str:
     """Name of a pair with its verdict, short enough for a phone."""
     name = f"{compared.pair}, {compared.at}" if compared.at else compared.pair
+    if len(name) > _LONGEST and compared.at:
+        name = f"{compared.pair}, {compared.at_values}"
     name = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
     return f"{name}: {compared.agreement.judged}"
 
