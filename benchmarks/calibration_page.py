@@ -93,7 +93,7 @@ def _quartiles(found: list[float | None], cap: int, starts: int) -> str:
 _MEDIANS = (
     "Medians over the starts, and quartiles in brackets; a failure counts as longer than anything."
 )
-_ONE = "From one start, which shows that each method gets there, and ranks none."
+_ONE = "From one start, which ranks no methods."
 
 
 def _races(found: dict[str, Any]) -> str:
