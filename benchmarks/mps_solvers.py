@@ -1,4 +1,4 @@
-"""The Poisson equation of the same two moments by our solver, SciPy's and PyAMG's."""
+"""The Poisson equation of the same two moments as we solve it, and by SciPy and PyAMG alone."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from scipy.sparse.linalg import cg, spsolve
 
 from benchmarks.mps_peers import PYTHON
 from benchmarks.mps_runs import LARGE_M
-from sandmould.casting.mps.conjugate_gradients import System, solve
 from sandmould.casting.mps.flow import Flow
+from sandmould.casting.mps.overrelaxation import System, solve
 from sandmould.casting.mps.pressure import assemble
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.shoulder import open_shoulder
@@ -80,7 +80,7 @@ def rows_here(poisson: Poisson) -> list[dict[str, Any]]:
         return found, len(seen)
 
     ways: dict[str, Callable[[], tuple[Array, int]]] = {
-        "ours": lambda: solve(poisson.own, right, zero, tolerance)[:2],
+        "SciPy cg, overrelaxed": lambda: solve(poisson.own, right, zero, tolerance)[:2],
         "SciPy cg": by_scipy,
     }
     if len(right) <= MOST_DIRECT:

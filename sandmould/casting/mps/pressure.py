@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from sandmould.casting.mps.conjugate_gradients import System, solve
 from sandmould.casting.mps.neighbours import Neighbours
+from sandmould.casting.mps.overrelaxation import System, solve
 from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
 from sandmould.casting.mps.weight import OPTIONS, Kernel
 
@@ -143,7 +143,7 @@ def solve_pressure(
     guess : (n,) float64, Pa
         Where the iteration starts.
     tolerance : float
-        As ``conjugate_gradients.solve``.
+        As ``overrelaxation.solve``.
 
     Returns
     -------
