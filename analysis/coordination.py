@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.engines.neighbours import touching_pairs
-from sandmould.scenario.geometry import Array, Scene, Solid, Wall
-from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.geometry import Array, Scene, Solid, Wall, distance_within
 
 
 @dataclass(frozen=True)
@@ -69,11 +68,7 @@ def contacts(
     if scene is not None:
         surfaces = (*scene.walls, *scene.solids)
     for surface in surfaces:
-        if isinstance(surface, TriangleMesh):
-            distance_m = surface.distance_m(position_m, reach_m)
-        else:
-            distance_m = surface.distance_m(position_m)
-        overlap_m = radius_m - distance_m
+        overlap_m = radius_m - distance_within(surface, position_m, reach_m)
         touch = overlap_m > -tolerance_m
         count += touch
         grain_wall += int(touch.sum())

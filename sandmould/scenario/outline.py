@@ -20,24 +20,29 @@ class Outline:
     vertices_m: Array
     """(k, 2) float64, m: counter-clockwise; the last is joined to the first."""
 
-    def distance_m(self, position_m: Array) -> Array:
+    def distance_m(self, position_m: Array, reach_m: float = np.inf) -> Array:
         """Signed distance of points from the outline, negative inside.
 
         Parameters
         ----------
         position_m : (n, 2) float64, m
+        reach_m : float, m, optional
+            Distances beyond it need not be exact: they are never below it, nor above the true
+            ones.
 
         Returns
         -------
         (n,) float64, m
         """
         start_m, end_m = self.vertices_m, np.roll(self.vertices_m, -1, axis=0)
-        parts = max(1, -(-len(position_m) * len(start_m) // _CHUNK))
-        found = [
-            np.where(_is_inside(p, start_m, end_m), -1.0, 1.0) * _nearest_edge_m(p, start_m, end_m)
-            for p in np.array_split(position_m, parts)
-        ]
-        return np.concatenate(found)
+        beyond_m = np.maximum(start_m.min(axis=0) - position_m, position_m - start_m.max(axis=0))
+        distance_m = np.linalg.norm(np.maximum(beyond_m, 0.0), axis=1)
+        near = np.flatnonzero(distance_m <= reach_m)
+        for part in np.array_split(near, max(1, -(-len(near) * len(start_m) // _CHUNK))):
+            p = position_m[part]
+            sign = np.where(_is_inside(p, start_m, end_m), -1.0, 1.0)
+            distance_m[part] = sign * _nearest_edge_m(p, start_m, end_m)
+        return distance_m
 
     def corners(self) -> Array:
         """Corners of the outline, (k, 2) float64, m."""

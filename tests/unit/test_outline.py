@@ -52,6 +52,16 @@ def test_distance_against_winding_number_and_samples(radii: list[float]) -> None
     np.testing.assert_array_equal(found < 0, np.abs(winding_number(point, vertices)) > 0.5)
 
 
+def test_distance_is_exact_within_a_reach_and_never_too_large_beyond() -> None:
+    outline, point = Outline("u", NOTCHED), RNG.uniform(-0.1, 0.15, (400, 2))
+    exact, found = outline.distance_m(point), outline.distance_m(point, 0.02)
+    near = exact <= 0.02
+    np.testing.assert_array_equal(found[near], exact[near])
+    assert (found[~near] > 0.02).all()
+    assert (found <= exact).all()
+    assert (found < exact).any()
+
+
 def test_distance_in_a_notch() -> None:
     outline = Outline("u", NOTCHED)
     point = np.array([[0.03, 0.03], [0.03, 0.015], [0.01, 0.03], [0.03, 0.005], [-0.03, -0.04]])

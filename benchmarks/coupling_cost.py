@@ -1,0 +1,60 @@
+"""What share of a recorded study of bent patterns went into anything but grains.
+
+``python -m benchmarks.coupling_cost docs/results/l_deflection`` prints, for each run, the share of
+its wall time outside the engine (opening, guards, tables), in the pattern's solves, and in the
+pattern's own steps inside the engine: their number times what one takes on this machine now.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+
+from pattern_fe.coupling.schemes import in_step_foam
+from pattern_fe.scene import pattern_of
+from sandmould import ROOT
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.evidence import runs_in
+from sandmould.study.opening import open_study
+
+STEPS = 50_000
+
+
+def step_s(scenario: Scenario) -> float:
+    """Time of one step of a pattern, s; 0 unless it moves in step with the grains."""
+    pattern = scenario.pattern
+    if pattern is None or pattern.loop.scheme != "in_step":
+        return 0.0
+    foam = in_step_foam(scenario, pattern_of(scenario))
+    go = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(foam.mover.call)
+    begun = time.perf_counter()
+    for step in range(STEPS):
+        go(foam.mover.table, step)
+    return (time.perf_counter() - begun) / STEPS
+
+
+def main(folder: Path) -> None:
+    """Print the shares of each run and of all together."""
+    kept = json.loads((folder / "record.json").read_text())
+    study = open_study(ROOT / kept["study"])
+    scenarios = {run.run: run.scenario for run in runs_in(study, folder)}
+    summary = pd.read_csv(folder / "summary.tsv", sep="\t").set_index("run")
+    shares = pd.DataFrame({"wall_s": summary["wall_s"]})
+    shares["outside_engine_s"] = summary["wall_s"] - summary["engine_wall_s"]
+    shares["solves_s"] = summary["pattern_outside_fraction"] * summary["wall_s"]
+    took_s = [step_s(scenarios[run]) for run in summary.index]
+    shares["pattern_steps_s"] = took_s * summary["steps"]
+    shares.loc["all"] = shares.sum()
+    for part in ("outside_engine", "solves", "pattern_steps"):
+        shares[f"{part}_fraction"] = shares.pop(f"{part}_s") / shares["wall_s"]
+    shares["sum_fraction"] = shares.filter(like="_fraction").sum(axis=1)
+    print(shares.round(3).to_string())
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
