@@ -53,13 +53,13 @@ def test_distance_against_winding_number_and_samples(radii: list[float]) -> None
 
 
 def test_distance_is_exact_within_a_reach_and_never_too_large_beyond() -> None:
-    outline, point = Outline("u", NOTCHED), RNG.uniform(-0.1, 0.15, (400, 2))
+    outline, point = Outline("u", NOTCHED), np.random.default_rng(5).uniform(-0.1, 0.15, (400, 2))
     exact, found = outline.distance_m(point), outline.distance_m(point, 0.02)
     near = exact <= 0.02
     np.testing.assert_array_equal(found[near], exact[near])
     assert (found[~near] > 0.02).all()
-    assert (found <= exact).all()
-    assert (found < exact).any()
+    assert (found <= exact + 1e-15).all()  # round-off: the box may touch at the nearest edge
+    assert (found < exact - 1e-3).any()
 
 
 def test_distance_in_a_notch() -> None:
