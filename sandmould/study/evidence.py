@@ -1,8 +1,8 @@
 """Committed results and whether they still stand for what the code would compute.
 
-``python -m sandmould.study.evidence record STUDY.yaml`` copies a finished study's tables with
-what was run; ``check`` lists the records that are stale and computes the smallest one of each
-kind again.
+``python -m sandmould.study.evidence record STUDY.yaml`` copies a finished study's tables and
+figures with what was run; ``check`` lists the records that are stale and computes the smallest one
+of each kind again.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from sandmould.study.expand import expand
 from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import kind_of
 from sandmould.study.opening import OpenStudy, open_study
+from sandmould.study.report.figure_files import FIGURES
 from sandmould.study.rounds.ledger import LEDGER, read_ledger
 from sandmould.study.run import Run
 from sandmould.study.study import Study
@@ -61,7 +62,7 @@ def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
 
 
 def record(path: Path, results: Path) -> Path:
-    """Keep a study: its tables, what was run, on what, and the hash of the study.
+    """Keep a study: its tables and figures, what was run, on what, and the hash of the study.
 
     Runs that failed are named in the record.
 
@@ -98,6 +99,9 @@ def record(path: Path, results: Path) -> Path:
     target.mkdir(parents=True, exist_ok=True)
     for name in names:
         shutil.copy(folder / name, target / name)
+    shutil.rmtree(target / FIGURES, ignore_errors=True)
+    if (folder / FIGURES).exists():
+        shutil.copytree(folder / FIGURES, target / FIGURES)
     (target / "record.json").write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     return target
 

@@ -159,11 +159,14 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
     pd.DataFrame(rows).to_csv(folder / "summary.tsv", sep="\t", index=False)
     for name in ("runs.tsv", "agreement.tsv", "report.html"):
         (folder / name).write_text("")
+    (folder / "figures").mkdir()
+    (folder / "figures" / "objective.svg").write_text("<svg/>")
     monkeypatch.setattr(evidence, "RECORDS", tmp_path / "records")
     # Hundreds of decks: another test hashes a study.
     monkeypatch.setattr(evidence, "_computed_hash", lambda run: run.scenario.engine.name)
     kept = evidence.record(path, tmp_path / "results")
     assert (kept / "agreement.tsv").exists()
+    assert (kept / "figures" / "objective.svg").read_text() == "<svg/>"
     record = json.loads((kept / "record.json").read_text())
     assert set(record["engines"]) == {"lammps", "liggghts", "reference"}
     assert record["failed"] == {runs[5].run: "lost grains"}

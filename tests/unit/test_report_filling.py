@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -80,6 +81,17 @@ def test_the_page_shows_it(tmp_path: Path) -> None:
     page = (folder / "report.html").read_text()
     assert "Filling over what is swept" in page
     assert "the box moves" in page
+
+
+def test_its_figures_are_files_too(tmp_path: Path) -> None:
+    folder = write_study(tmp_path / "tube")
+    write_report(folder, folder / "report.html")
+    names = {path.name for path in (folder / "figures").iterdir()}
+    assert {"objective.svg", "filling.svg", "curves.svg"} <= names
+    drawing = ElementTree.parse(folder / "figures" / "filling.svg").getroot()
+    titles = [element.text for element in drawing.iter("{http://www.w3.org/2000/svg}title")]
+    assert "after 2 s of vibration" in titles
+    assert 'href="figures"' in (folder / "report.html").read_text()
 
 
 def test_other_measures_have_no_filling(tmp_path: Path) -> None:

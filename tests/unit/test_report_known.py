@@ -93,9 +93,26 @@ def test_one_setting_is_told_beside_what_was_reported(tmp_path: Path) -> None:
     write_report(folder, folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")
     assert "The heap angle is 29" in text
+    assert "interval of the mean of 2 runs)" in text
     assert "A paper reports 25" in text
     assert "Heap and hopper of run f0p5_a0p1_r1" in text
     assert "Settings compared with the best" not in text
+
+
+def test_one_run_has_no_interval_and_a_failed_one_no_say_in_what_is_typical(
+    tmp_path: Path,
+) -> None:
+    folder = write_planted(tmp_path / "one", {(0.5, 0.1): 29.0}, "")
+    place = folder / "runs" / "f0p5_a0p1_r2"
+    RunOutcome(Outcome.UNSTABLE, "", 0.1, 2.0).write(place / "outcome.json")
+    for run, grains in ((folder / "runs" / "f0p5_a0p1_r1", 400), (place, 100)):
+        cost = pd.read_csv(run / "cost.tsv", sep="\t").assign(grains=grains)
+        cost.to_csv(run / "cost.tsv", sep="\t", index=False)
+    collect(folder)
+    write_report(folder, folder / "report.html")
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "(one run, no interval)" in text
+    assert "<dt>grains in a run</dt><dd>400</dd>" in text
 
 
 @pytest.fixture(scope="module")

@@ -71,6 +71,7 @@ rule report:
             category="Study",
             labels={"table": "findings, pictures, verdict"},
         ),
+        figures=directory(f"{FOLDER}/figures"),
     log:
         f"{FOLDER}/logs/report.log",
     conda:

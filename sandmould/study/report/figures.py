@@ -315,12 +315,17 @@ def _scale_bar(ax: Axes, width: float, height: float) -> None:
 
 def png(figure: Figure) -> str:
     """A figure as a PNG of few colours, a ``data:`` address."""
+    return _address("image/png", png_bytes(figure))
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """A figure as a PNG of few colours."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=figure.dpi)
     picture = Image.open(buffer).convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)
     small = io.BytesIO()
     picture.save(small, format="png", optimize=True)
-    return _address("image/png", small.getvalue())
+    return small.getvalue()
 
 
 def _address(kind: str, content: bytes) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,13 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.collect import Collected
 from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.report.filling import filling_pages
+from sandmould.study.report.chart import Chart
+from sandmould.study.report.figure_files import strip
+from sandmould.study.report.filling import FillingPages, filling_pages
 from sandmould.study.report.flow import flow_method, flow_pages
 from sandmould.study.report.measured import Curve, measure_curves, whole_conclusion
 from sandmould.study.report.method import Row, deck_method, sand_method
-from sandmould.study.report.sand import sand_pages
+from sandmould.study.report.sand import SandPages, sand_pages
 from sandmould.study.report.solidification import shown_run, solid_method, solid_pages
 from sandmould.study.study import SolidificationStudy, Study
 from sandmould.study.verdict import Verdict, rank_runs, sand_notes
@@ -38,6 +40,8 @@ class KindPages:
     """What follows the verdict."""
     context: Mapping[str, Any]
     """What the template is given beside what all are given."""
+    figures: Mapping[str, Chart | bytes] = field(default_factory=dict)
+    """What is written as files too, by name."""
 
 
 def notes_of(
@@ -152,7 +156,20 @@ def kind_pages(
             "filling": filling,
             "reported_best": study.objective.reported_best,
         },
+        _sand_figures(pages, filling),
     )
+
+
+def _sand_figures(pages: SandPages, filling: FillingPages | None) -> dict[str, Chart | bytes]:
+    """The sand at its moments, filling over what is swept, and over time."""
+    found: dict[str, Chart | bytes] = {}
+    if pages.panels:
+        found["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
+    if filling and filling.chart:
+        found["filling"] = filling.chart
+    for place, curve in enumerate(pages.tubes):
+        found["curves" if not place else f"curves_{place + 1}"] = curve.chart
+    return found
 
 
 def _deck_curves(scenario: OwnDeck, collected: Collected, verdict: Verdict) -> tuple[Curve, ...]:

@@ -114,10 +114,8 @@ def _value_sentences(known: Sequence[Setting], measure: str, study: Study) -> li
             f"{unit} ({high.label})."
         ]
     (one,) = known
-    said = [
-        f"The {what} is {with_margin(one.mean, one.ci_half_width)}{unit} (95 % interval of the "
-        f"mean of {one.n} runs)."
-    ]
+    rests = f"95 % interval of the mean of {one.n} runs" if one.n > 1 else "one run, no interval"
+    said = [f"The {what} is {with_margin(one.mean, one.ci_half_width)}{unit} ({rests})."]
     reported = study.objective.reported
     if reported is not None:
         apart = one.mean - reported.value

@@ -21,8 +21,9 @@ from sandmould.study.plan import STUDY_FILE, read_run
 from sandmould.study.report.agreement import agreement_pages
 from sandmould.study.report.animation import BUDGET_BYTES
 from sandmould.study.report.certificate import certificate_pages
-from sandmould.study.report.chart import NARROW, SMALL, WIDE, lay_out
+from sandmould.study.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.study.report.curves import objective_charts
+from sandmould.study.report.figure_files import FIGURES, write_figures
 from sandmould.study.report.kinds import drives_of, kind_pages, notes_of
 from sandmould.study.report.known import known_pages
 from sandmould.study.report.many import drawn_note, drawn_part, listed_settings
@@ -43,6 +44,8 @@ LIMIT_BYTES = 15_000_000
 def write_report(study_folder: Path, out: Path) -> None:
     """Write the report of a study, under 15 MB and without a single outside address.
 
+    Its main figures are written as files too, into ``figures`` of the study's folder.
+
     Parameters
     ----------
     study_folder : Path
@@ -57,13 +60,16 @@ def write_report(study_folder: Path, out: Path) -> None:
     """
     study = read_study(study_folder)
     collected = gather(study_folder, study.objective.at_vibration_s)
+    # made first: the page lists it
+    (study_folder / FIGURES).mkdir(exist_ok=True)
     page = _page(study_folder, out.absolute().parent, study, collected)
     for budget in (BUDGET_BYTES, BUDGET_BYTES // 4, BUDGET_BYTES // 20):
-        text = _render(page, budget)
+        text, figures = _render(page, budget)
         if len(text.encode("utf-8")) < LIMIT_BYTES:
             break
     partial = out.with_name(out.name + ".partial")
     partial.write_text(text, encoding="utf-8")
+    write_figures(study_folder / FIGURES, _environment(), figures)
     os.replace(partial, out)
 
 
@@ -115,7 +121,20 @@ def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
     return None
 
 
-def _render(page: _Page, film_budget_bytes: int) -> str:
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number
+    return environment
+
+
+def _render(page: _Page, film_budget_bytes: int) -> tuple[str, dict[str, Chart | bytes]]:
+    """The page, and its figures for files."""
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
     summary = page.collected.summary
     seeks_best = page.study.seeks_best
@@ -145,39 +164,39 @@ def _render(page: _Page, film_budget_bytes: int) -> str:
         *of_kind.method,
         statistics_method(page.study.objective, of_kind.ends),
     )
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
+    text = (
+        _environment()
+        .get_template(of_kind.template)
+        .render(
+            title=page.study.title or page.study_folder.name,
+            study_name=page.study_folder.name,
+            verdict=verdict,
+            measure_name=name_of(verdict.measure),
+            keys=keys,
+            seeks_best=seeks_best,
+            agreement=agreement,
+            known=known,
+            optimum=optimum,
+            certificate=certificate,
+            statement=optimum or (agreement if agreement and agreement.is_question else known),
+            key_numbers=key_numbers(
+                summary, verdict if seeks_best else replace(verdict, best=None)
+            ),
+            objective_charts=[_both_sizes(c) for c in charts],
+            drawn_note=drawn_note(of_sweep, verdict),
+            settings=settings_table(verdict, drives_of(page.by_setting)),
+            runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
+            method=method,
+            provenance=provenance_rows(provenance),
+            files=data_files(page.study_folder, page.href),
+            both_sizes=_both_sizes,
+            half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
+            advice=of_kind.advice,
+            **of_kind.context,
+        )
     )
-    environment.filters["number"] = number
-    return environment.get_template(of_kind.template).render(
-        title=page.study.title or page.study_folder.name,
-        study_name=page.study_folder.name,
-        verdict=verdict,
-        measure_name=name_of(verdict.measure),
-        keys=keys,
-        seeks_best=seeks_best,
-        agreement=agreement,
-        known=known,
-        optimum=optimum,
-        certificate=certificate,
-        statement=optimum or (agreement if agreement and agreement.is_question else known),
-        key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
-        objective_charts=[_both_sizes(c) for c in charts],
-        drawn_note=drawn_note(of_sweep, verdict),
-        settings=settings_table(verdict, drives_of(page.by_setting)),
-        runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
-        method=method,
-        provenance=provenance_rows(provenance),
-        files=data_files(page.study_folder, page.href),
-        both_sizes=_both_sizes,
-        half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
-        advice=of_kind.advice,
-        **of_kind.context,
-    )
+    objective = {f"objective_{n}" if n > 1 else "objective": c for n, c in enumerate(charts, 1)}
+    return text, objective | dict(of_kind.figures)
 
 
 def _both_sizes(chart: Any) -> tuple[Any, Any]:

@@ -14,6 +14,7 @@ import pandas as pd
 from sandmould.engines.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan import STUDY_FILE
+from sandmould.study.report.figure_files import FIGURES
 from sandmould.study.report.many import listed_note, listed_runs, listed_settings
 from sandmould.study.verdict import Verdict
 from sandmould.study.words import name_of, number, seconds, size, titled, with_margin
@@ -76,10 +77,12 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
         label = f"{name_of(verdict.measure)}, {best.label}"
         mean = f"mean of {best.n} runs" if best.n > 1 else "one run"
         found.append(KeyNumber(number(best.mean), label, mean))
-    finished = int((summary["outcome_code"] == int(Outcome.FINISHED)).sum())
-    found.append(KeyNumber(f"{finished} of {len(summary)}", "runs finished"))
+    finished = summary[summary["outcome_code"] == int(Outcome.FINISHED)]
+    found.append(KeyNumber(f"{len(finished)} of {len(summary)}", "runs finished"))
+    # a run that failed may have stopped before it had all its grains
+    typical = finished if len(finished) else summary
     for what in ("grains", "elements", "particles"):
-        count = _total(summary, what, "median")
+        count = _total(typical, what, "median")
         if count is not None:
             shown = f"{count:,.0f}".replace(",", "\u202f")
             found.append(KeyNumber(shown, f"{what} in a run"))
@@ -87,7 +90,7 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
     if wall_s is not None:
         note = "" if cpu_s is None else f"{seconds(cpu_s)} of processor time"
         found.append(KeyNumber(seconds(wall_s), "computing, all runs added up", note))
-    speed = _total(summary, "grain_steps_per_s", "median")
+    speed = _total(typical, "grain_steps_per_s", "median")
     if speed is not None:
         found.append(KeyNumber(f"{number(speed / 1e6)} M", "grain-steps a second, median run"))
     overlap = _total(summary, "largest_overlap_fraction", "max")
@@ -282,6 +285,7 @@ _FILES = (
     ("runs.tsv", "the plan: every run, its parameters, replicate and seed"),
     ("summary.tsv", "one row a run: parameters, outcome, final measures, cost"),
     ("curves.tsv", "one row a snapshot: all measures of all runs against time"),
+    (FIGURES, "main figures as files: charts as SVG, sand as PNG"),
     ("agreement.tsv", "one row a pair of settings and measure that the study compares"),
     ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "
      "snapshots; exports/ holds some of them for ParaView (.vtu) and OVITO (.dump)"),

@@ -1,0 +1,69 @@
+"""Figures of a report as files of their own, for slides, papers and committed records."""
+
+from __future__ import annotations
+
+import base64
+import io
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from jinja2 import Environment
+from matplotlib.figure import Figure
+from PIL import Image
+
+from sandmould.study.report.chart import WIDE, Chart, lay_out
+from sandmould.study.report.figures import png_bytes
+
+FIGURES = "figures"
+"""Folder of a study that they lie in."""
+_PICTURE_IN = 4.2
+
+
+def strip(pictures: Sequence[tuple[str, str]]) -> bytes:
+    """Pictures side by side under their headings, as one PNG.
+
+    Parameters
+    ----------
+    pictures : sequence of (str, str)
+        At least one heading and ``data:`` address, all of one size.
+    """
+    images = [
+        (heading, Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))))
+        for heading, address in pictures
+    ]
+    width, height = images[0][1].size
+    tall_in = _PICTURE_IN * height / width
+    figure = Figure(figsize=(_PICTURE_IN * len(images), tall_in + 0.3), dpi=100)
+    for place, (heading, image) in enumerate(images):
+        axes = figure.add_axes(
+            (place / len(images), 0.0, 1.0 / len(images), tall_in / (tall_in + 0.3))
+        )
+        axes.imshow(image.convert("RGB"), interpolation="antialiased")
+        axes.set_title(heading, fontsize=11)
+        axes.set_axis_off()
+    return png_bytes(figure)
+
+
+def write_figures(
+    folder: Path, environment: Environment, files: Mapping[str, Chart | bytes]
+) -> None:
+    """Write a folder of figures anew: charts as SVG in the page's colours, pictures as PNG.
+
+    Parameters
+    ----------
+    folder : Path
+    environment : Environment
+        Of the report's templates.
+    files : mapping of str to Chart or bytes
+        By name without its ending.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    template = environment.get_template("figure.svg")
+    for name, what in files.items():
+        if isinstance(what, bytes):
+            (folder / f"{name}.png").write_bytes(what)
+        else:
+            text = template.render(laid=lay_out(what, WIDE))
+            (folder / f"{name}.svg").write_text(text, encoding="utf-8")
