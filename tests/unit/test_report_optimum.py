@@ -65,6 +65,7 @@ def test_an_interval_at_the_end_of_the_sweep_is_not_resolved(tmp_path: Path) -> 
     assert not pages.sound
     assert pages.sentences[0].startswith("Not resolved: among what was swept")
     assert "reaches the highest frequency swept, so" in pages.sentences[0]
+    assert pages.sentences[-1].startswith("No round added any runs to the 21 of the sweep")
     assert "Rounds go on" in pages.sentences[-1]
 
 

@@ -142,7 +142,8 @@ def test_rounds_end_by_width_by_count_and_by_budget(tmp_path: Path) -> None:
         return why_enough(refine, optimum, done, spent_h, run_h=0.5)
 
     assert why() == ""
-    assert "as narrow as asked: frequency" in why(interval={FREQUENCY: 1.1 * (high - low)})
+    enough = f"as narrow as asked: frequency {low:.3g} to {high:.3g} Hz."
+    assert enough in why(interval={FREQUENCY: 1.1 * (high - low)})
     assert why(interval={FREQUENCY: 0.9 * (high - low)}) == ""
     assert why(done=3) == "All 3 rounds are done."
     assert why(spent_h=3.0, budget_core_h=6.0) == ""

@@ -157,9 +157,9 @@ def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
     added, swept = len(ledger.runs), study.sweep.number_of_points * study.replicates
     rounds = len(ledger.rounds)
     spent_h = float(summary["cpu_s"].sum()) / 3600 if "cpu_s" in summary else math.nan
-    many = "round" if rounds == 1 else "rounds"
+    many = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
     return (
-        f"{rounds} {many} added {added} runs to the {swept} of the sweep, "
+        f"{many} added {added or 'any'} runs to the {swept} of the sweep, "
         f"{number(spent_h, 2)} h of processor time in all. "
         f"{ledger.ended or 'Rounds go on: make study continues them.'}"
     )

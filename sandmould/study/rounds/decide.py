@@ -13,7 +13,7 @@ from sandmould.study.rounds.ledger import Ledger, Round
 from sandmould.study.rounds.optimum import Optimum, find_optimum
 from sandmould.study.rounds.propose import propose
 from sandmould.study.study import Study
-from sandmould.study.words import listed, name_of, number, unit_of, value_text
+from sandmould.study.words import listed, name_of, number, unit_of
 
 
 def next_runs(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
@@ -114,7 +114,7 @@ def _intervals(optimum: Optimum, keys: list[str]) -> str:
     said = []
     for key in keys:
         low, high = optimum.interval(key)
-        said.append(f"{name_of(key)} {number(low)} to {value_text(key, high)}")
+        said.append(f"{name_of(key)} {number(low)} to {number(high)} {unit_of(key)}".rstrip())
     return listed(said)
 
 
