@@ -152,7 +152,10 @@ def test_one_command_computes_a_sweep_and_its_rounds(checkout: Path) -> None:
 def test_point_of_a_sweep_on_two_engines(checkout: Path) -> None:
     study = checkout / "checked.yaml"
     study.write_text(
-        TINY.replace("scenario:", "scenario:\n  engine: {name: reference, ranks: 2}")
+        TINY.replace(
+            "scenario:",
+            "scenario:\n  engine: {name: reference, ranks: 2}\n  fill: {layers: [{height_m: 0.027}]}",
+        )
         + "sweep: {keys: {sand.disc_inertia: [sphere, disc]}}\nreplicates: 2\n"
         "cross_check: {engine: liggghts, at: {sand.disc_inertia: sphere}, replicates: 2}\n"
         "equivalence: {margins: {solid_fraction: 0.05}}\n"
