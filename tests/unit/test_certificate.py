@@ -231,6 +231,8 @@ def test_what_is_held_and_the_numerics_are_told_apart(tmp_path: Path) -> None:
     step = judged(tmp_path, {"hold velocity": 70.0, "time_step x0.5": 75.0})
     assert step.kind == "artefact of the numerics"
     assert "It moves up with velocity held and time step x0.5." in step.sentences[1]
+    both = judged(tmp_path, {"hold velocity": 30.0, "time_step x0.5": 75.0})
+    assert both.sentences[1] == "It moves up with time step x0.5 and down with velocity held."
 
 
 def test_noise_leaves_it_unresolved(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from sandmould.study.study import Study
 from sandmould.study.verdict import finished_values
 from sandmould.study.words import listed, number
 
-Moved = Literal["up", "down", "held", "unclear", "not run"]
+Moved = Literal["up", "down", "held", "unclear", "no result"]
 Kind = Literal[
     "rearrangement of grains", "column resonance of the springs",
     "artefact of what is held constant", "artefact of the numerics", "unresolved",
@@ -121,7 +121,7 @@ def certify(
 
 
 def _judged_without(shift: float) -> Moved:
-    return "not run" if math.isnan(shift) else "unclear"
+    return "no result" if math.isnan(shift) else "unclear"
 
 
 def _judged(ci: tuple[float, float], margin: float) -> Moved:
@@ -141,7 +141,7 @@ def _together(moves: Sequence[Movement], best_hz: float) -> tuple[Kind, tuple[st
     """The verdict, and the reasons for it."""
     at = f"The optimum at {number(best_hz)} Hz"
     moved = [m for m in moves if m.judged in ("up", "down")]
-    open_ = [m for m in moves if m.judged in ("unclear", "not run")]
+    open_ = [m for m in moves if m.judged in ("unclear", "no result")]
     said = [f"{_listed(moved)}."] if moved else []
     said += [f"Not told: {listed([m.name for m in open_])}."] if open_ else []
     numerics = [m for m in moved if m.control in ("time_step", "engine")]
@@ -186,10 +186,8 @@ def _names(moves: Sequence[Movement]) -> str:
 
 def _listed(moves: Sequence[Movement]) -> str:
     up, down = ([m for m in moves if m.judged == way] for way in ("up", "down"))
-    said = [
-        f"It moves {way} with {_names(some)}" for way, some in (("up", up), ("down", down)) if some
-    ]
-    return "; ".join(said)
+    said = [f"{way} with {_names(some)}" for way, some in (("up", up), ("down", down)) if some]
+    return f"It moves {' and '.join(said)}"
 
 
 def shaken_runs(summary: pd.DataFrame) -> list[str]:
