@@ -154,7 +154,8 @@ def test_point_of_a_sweep_on_two_engines(checkout: Path) -> None:
     study.write_text(
         TINY.replace(
             "scenario:",
-            "scenario:\n  engine: {name: reference, ranks: 2}\n  fill: {layers: [{height_m: 0.027}]}",
+            "scenario:\n  engine: {name: reference, ranks: 2}\n"
+            "  fill: {layers: [{height_m: 0.027}]}",
         )
         + "sweep: {keys: {sand.disc_inertia: [sphere, disc]}}\nreplicates: 2\n"
         "cross_check: {engine: liggghts, at: {sand.disc_inertia: sphere}, replicates: 2}\n"
