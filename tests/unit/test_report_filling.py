@@ -69,7 +69,14 @@ def test_the_chart_has_a_curve_a_time_and_what_others_found(tmp_path: Path) -> N
     reported = [{"value": 65.0, "by": "someone"}]
     chart = pages(tmp_path / "chart", 0.5, 0.002, reported_best=reported).chart
     assert chart is not None
-    assert [line.label for line in chart.lines] == ["0 s", "0.25 s", "0.50 s", "1 s", "2 s", ""]
+    assert [line.label for line in chart.lines] == [
+        "0 s",
+        "0.25 s",
+        "0.50 s",
+        "1 s",
+        "2 s",
+        "65 Hz",
+    ]
     assert chart.lines[-1].title == "best by someone"
     assert np.allclose(chart.lines[-1].xy[:, 0], 65.0)
     assert chart.lines[4].xy[:, 1].argmax() == 2

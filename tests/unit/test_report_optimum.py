@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from sandmould.study.collect import gather, read_study
-from sandmould.study.report.optimum import optimum_pages
+from sandmould.study.report.chart import Chart
+from sandmould.study.report.optimum import optimum_pages, with_surface
 from sandmould.study.report.page import write_report
 from sandmould.study.rounds.decide import next_round
 from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
@@ -55,6 +56,26 @@ def test_the_report_begins_with_the_optimum(tmp_path: Path) -> None:
     )
     assert "All 2 rounds are done." in said
     assert "The curve is the Gaussian process" in text
+
+
+def test_the_chart_shows_the_interval_and_what_others_found(tmp_path: Path) -> None:
+    folder = write_refined(tmp_path / "refined")
+    with (folder / "study.yaml").open("a") as file:
+        file.write("objective: {reported_best: [{value: 65.0, by: someone}]}\n")
+    study = read_study(folder)
+    pages = optimum_pages(folder, study, gather(folder).summary)
+    assert pages is not None
+    assert pages.optimum is not None
+    chart = with_surface(Chart("frequency", "fill", "Fill."), pages.optimum, study)
+    assert chart.band == pages.optimum.interval(KEY)
+    fitted, low, high, reported = chart.lines
+    assert (low.xy[:, 1] < fitted.xy[:, 1]).all()
+    assert (reported.label, reported.title) == ("65 Hz", "best by someone")
+    # upright, over all that is fitted
+    assert reported.xy[:, 0].tolist() == [65.0, 65.0]
+    assert sorted(reported.xy[:, 1]) == pytest.approx(
+        [min(low.xy[:, 1].min(), high.xy[:, 1].min()), max(low.xy[:, 1].max(), high.xy[:, 1].max())]
+    )
 
 
 def test_an_interval_at_the_end_of_the_sweep_is_not_resolved(tmp_path: Path) -> None:

@@ -15,8 +15,9 @@ from sandmould.engines.outcome import Outcome
 from sandmould.study.collect import Collected
 from sandmould.study.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
 from sandmould.study.settings import Setting
+from sandmould.study.study import Study
 from sandmould.study.verdict import Verdict, finished_values
-from sandmould.study.words import name_of, number, shown_scale, titled, with_margin
+from sandmould.study.words import name_of, number, shown_scale, titled, value_text, with_margin
 
 _POINTS = 12_000
 """Points of all curves of one chart; more would only make the page heavy."""
@@ -33,6 +34,17 @@ def setting_tints(verdict: Verdict, keys: Sequence[str]) -> dict[str, Tint]:
         return dict(zip((s.label for s in verdict.settings), tints(n, False), strict=True))
     best = verdict.best.label if verdict.best else ""
     return {s.label: tints(1, False)[0] if s.label == best else PLAIN for s in verdict.settings}
+
+
+def reported_lines(study: Study, key: str, low: float, high: float) -> list[Line]:
+    """Upright lines where others found the best value of the swept key."""
+    return [
+        Line(
+            np.array([[one.value, low], [one.value, high]]), PLAIN,
+            label=value_text(key, one.value), title=f"best by {one.by}",
+        )
+        for one in study.objective.reported_best
+    ]  # fmt: skip
 
 
 def _on_a_scale(verdict: Verdict, key: str) -> bool:

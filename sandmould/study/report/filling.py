@@ -15,8 +15,8 @@ from analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.engines.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected
-from sandmould.study.report.chart import PLAIN, Chart, Line, tints
-from sandmould.study.report.curves import runs_of
+from sandmould.study.report.chart import Chart, Line, tints
+from sandmould.study.report.curves import reported_lines, runs_of
 from sandmould.study.settings import CONFIDENCE, Setting, setting_of
 from sandmould.study.study import Study
 from sandmould.study.verdict import Verdict
@@ -175,10 +175,7 @@ def _chart(table: _AtTimes, study: Study, key: str, measure: str) -> Chart:
         for i, time_s in enumerate(table.time_s)
     ]
     low, high = float(np.nanmin(table.mean)), float(np.nanmax(table.mean))
-    lines += [
-        Line(np.array([[r.value, low], [r.value, high]]), PLAIN, title=f"best by {r.by}")
-        for r in study.objective.reported_best
-    ]
+    lines += reported_lines(study, key, low, high)
     alt = f"{name_of(measure)} against {titled(key)} at {len(table.time_s)} times of the vibration."
     ticks = tuple(table.x.tolist()) if len(table.x) <= 12 else ()
     return Chart(titled(key), name_of(measure), alt, tuple(lines), x_ticks=ticks)

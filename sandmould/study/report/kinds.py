@@ -154,7 +154,6 @@ def kind_pages(
             "dimension": scenario.dimension,
             "vibrates": bool(scenario.vibration),
             "filling": filling,
-            "reported_best": study.objective.reported_best,
         },
         _sand_figures(pages, filling),
     )

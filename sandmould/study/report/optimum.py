@@ -13,6 +13,7 @@ from scipy.stats import norm
 from sandmould.study.emulator import TooFewRunsError
 from sandmould.study.report.certificate import CertificatePages, opening_sentences
 from sandmould.study.report.chart import PLAIN, Chart, Line, tints
+from sandmould.study.report.curves import reported_lines
 from sandmould.study.rounds.ledger import Ledger, read_ledger
 from sandmould.study.rounds.optimum import Optimum, find_optimum
 from sandmould.study.settings import CONFIDENCE
@@ -165,16 +166,19 @@ def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
     )
 
 
-def with_surface(chart: Chart, optimum: Optimum, measure: str) -> Chart:
-    """The objective's chart over one key with the fitted curve, its error and the interval."""
+def with_surface(chart: Chart, optimum: Optimum, study: Study) -> Chart:
+    """The objective's chart over one key with fit, error, interval and what others found best."""
     mean, se = optimum.surface
-    factor = shown_scale(measure)[0]
+    factor = shown_scale(study.objective.measure)[0]
     x, tint = optimum.points[:, 0], tints(1, False)[0]
     lines = [Line(np.column_stack([x, factor * mean]), tint, True, title="fitted mean")]
     for sign in (-1.0, 1.0):
         edge = factor * (mean + sign * _TWO_SIDED * se)
         lines.append(Line(np.column_stack([x, edge]), PLAIN, title="95 % of the fitted mean"))
     key = optimum.keys[0]
+    reach = factor * _TWO_SIDED * se
+    foot, top = float((factor * mean - reach).min()), float((factor * mean + reach).max())
+    lines += reported_lines(study, key, foot, top)
     low, high = optimum.interval(key)
     alt = (
         f"{chart.alt} The fitted curve is best at {number(optimum.setting[key])} {unit_of(key)}, "

@@ -149,7 +149,7 @@ def _render(page: _Page, film_budget_bytes: int) -> tuple[str, dict[str, Chart |
     drawn, drawn_verdict = drawn_part(of_sweep, verdict)
     charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
-        charts = tuple(with_surface(c, optimum.optimum, verdict.measure) for c in charts)
+        charts = tuple(with_surface(c, optimum.optimum, page.study) for c in charts)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
     of_kind = kind_pages(
         page.study_folder,
@@ -164,36 +164,32 @@ def _render(page: _Page, film_budget_bytes: int) -> tuple[str, dict[str, Chart |
         *of_kind.method,
         statistics_method(page.study.objective, of_kind.ends),
     )
-    text = (
-        _environment()
-        .get_template(of_kind.template)
-        .render(
-            title=page.study.title or page.study_folder.name,
-            study_name=page.study_folder.name,
-            verdict=verdict,
-            measure_name=name_of(verdict.measure),
-            keys=keys,
-            seeks_best=seeks_best,
-            agreement=agreement,
-            known=known,
-            optimum=optimum,
-            certificate=certificate,
-            statement=optimum or (agreement if agreement and agreement.is_question else known),
-            key_numbers=key_numbers(
-                summary, verdict if seeks_best else replace(verdict, best=None)
-            ),
-            objective_charts=[_both_sizes(c) for c in charts],
-            drawn_note=drawn_note(of_sweep, verdict),
-            settings=settings_table(verdict, drives_of(page.by_setting)),
-            runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
-            method=method,
-            provenance=provenance_rows(provenance),
-            files=data_files(page.study_folder, page.href),
-            both_sizes=_both_sizes,
-            half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
-            advice=of_kind.advice,
-            **of_kind.context,
-        )
+    template = _environment().get_template(of_kind.template)
+    text = template.render(
+        title=page.study.title or page.study_folder.name,
+        study_name=page.study_folder.name,
+        verdict=verdict,
+        measure_name=name_of(verdict.measure),
+        keys=keys,
+        seeks_best=seeks_best,
+        agreement=agreement,
+        known=known,
+        optimum=optimum,
+        certificate=certificate,
+        statement=optimum or (agreement if agreement and agreement.is_question else known),
+        key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
+        objective_charts=[_both_sizes(c) for c in charts],
+        drawn_note=drawn_note(of_sweep, verdict),
+        settings=settings_table(verdict, drives_of(page.by_setting)),
+        runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
+        method=method,
+        provenance=provenance_rows(provenance),
+        files=data_files(page.study_folder, page.href),
+        both_sizes=_both_sizes,
+        half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
+        advice=of_kind.advice,
+        reported_best=page.study.objective.reported_best,
+        **of_kind.context,
     )
     objective = {f"objective_{n}" if n > 1 else "objective": c for n, c in enumerate(charts, 1)}
     return text, objective | dict(of_kind.figures)
