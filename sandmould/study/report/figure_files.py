@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from jinja2 import Environment
@@ -18,6 +18,8 @@ from sandmould.study.report.figures import png_bytes
 FIGURES = "figures"
 """Folder of a study that they lie in."""
 _PICTURE_IN = 4.2
+_HEADING_IN = 0.3
+"""Width of a picture in a strip, and room over it, inches."""
 
 
 def strip(pictures: Sequence[tuple[str, str]]) -> bytes:
@@ -33,16 +35,20 @@ def strip(pictures: Sequence[tuple[str, str]]) -> bytes:
         for heading, address in pictures
     ]
     width, height = images[0][1].size
-    tall_in = _PICTURE_IN * height / width
-    figure = Figure(figsize=(_PICTURE_IN * len(images), tall_in + 0.3), dpi=100)
+    picture_in = _PICTURE_IN * height / width
+    tall_in, share = picture_in + _HEADING_IN, 1.0 / len(images)
+    figure = Figure(figsize=(_PICTURE_IN * len(images), tall_in), dpi=100)
     for place, (heading, image) in enumerate(images):
-        axes = figure.add_axes(
-            (place / len(images), 0.0, 1.0 / len(images), tall_in / (tall_in + 0.3))
-        )
+        axes = figure.add_axes((place * share, 0.0, share, picture_in / tall_in))
         axes.imshow(image.convert("RGB"), interpolation="antialiased")
         axes.set_title(heading, fontsize=11)
         axes.set_axis_off()
     return png_bytes(figure)
+
+
+def numbered(name: str, charts: Iterable[Chart]) -> dict[str, Chart]:
+    """Charts by name: the first has it as it is, others their number too."""
+    return {f"{name}_{n}" if n > 1 else name: chart for n, chart in enumerate(charts, 1)}
 
 
 def write_figures(

@@ -16,7 +16,7 @@ from sandmould.scenario.solidification import Solidification
 from sandmould.study.collect import Collected
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.report.chart import Chart
-from sandmould.study.report.figure_files import strip
+from sandmould.study.report.figure_files import numbered, strip
 from sandmould.study.report.filling import FillingPages, filling_pages
 from sandmould.study.report.flow import flow_method, flow_pages
 from sandmould.study.report.measured import Curve, measure_curves, whole_conclusion
@@ -166,9 +166,7 @@ def _sand_figures(pages: SandPages, filling: FillingPages | None) -> dict[str, C
         found["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
     if filling and filling.chart:
         found["filling"] = filling.chart
-    for place, curve in enumerate(pages.tubes):
-        found["curves" if not place else f"curves_{place + 1}"] = curve.chart
-    return found
+    return found | numbered("curves", (curve.chart for curve in pages.tubes))
 
 
 def _deck_curves(scenario: OwnDeck, collected: Collected, verdict: Verdict) -> tuple[Curve, ...]:

@@ -23,7 +23,7 @@ from sandmould.study.report.animation import BUDGET_BYTES
 from sandmould.study.report.certificate import certificate_pages
 from sandmould.study.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.study.report.curves import objective_charts
-from sandmould.study.report.figure_files import FIGURES, write_figures
+from sandmould.study.report.figure_files import FIGURES, numbered, write_figures
 from sandmould.study.report.kinds import drives_of, kind_pages, notes_of
 from sandmould.study.report.known import known_pages
 from sandmould.study.report.many import drawn_note, drawn_part, listed_settings
@@ -63,13 +63,14 @@ def write_report(study_folder: Path, out: Path) -> None:
     # made first: the page lists it
     (study_folder / FIGURES).mkdir(exist_ok=True)
     page = _page(study_folder, out.absolute().parent, study, collected)
+    environment = _environment()
     for budget in (BUDGET_BYTES, BUDGET_BYTES // 4, BUDGET_BYTES // 20):
-        text, figures = _render(page, budget)
+        text, figures = _render(page, environment, budget)
         if len(text.encode("utf-8")) < LIMIT_BYTES:
             break
     partial = out.with_name(out.name + ".partial")
     partial.write_text(text, encoding="utf-8")
-    write_figures(study_folder / FIGURES, _environment(), figures)
+    write_figures(study_folder / FIGURES, environment, figures)
     os.replace(partial, out)
 
 
@@ -133,7 +134,9 @@ def _environment() -> Environment:
     return environment
 
 
-def _render(page: _Page, film_budget_bytes: int) -> tuple[str, dict[str, Chart | bytes]]:
+def _render(
+    page: _Page, environment: Environment, film_budget_bytes: int
+) -> tuple[str, dict[str, Chart | bytes]]:
     """The page, and its figures for files."""
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
     summary = page.collected.summary
@@ -164,8 +167,7 @@ def _render(page: _Page, film_budget_bytes: int) -> tuple[str, dict[str, Chart |
         *of_kind.method,
         statistics_method(page.study.objective, of_kind.ends),
     )
-    template = _environment().get_template(of_kind.template)
-    text = template.render(
+    text = environment.get_template(of_kind.template).render(
         title=page.study.title or page.study_folder.name,
         study_name=page.study_folder.name,
         verdict=verdict,
@@ -191,8 +193,7 @@ def _render(page: _Page, film_budget_bytes: int) -> tuple[str, dict[str, Chart |
         reported_best=page.study.objective.reported_best,
         **of_kind.context,
     )
-    objective = {f"objective_{n}" if n > 1 else "objective": c for n, c in enumerate(charts, 1)}
-    return text, objective | dict(of_kind.figures)
+    return text, {**numbered("objective", charts), **of_kind.figures}
 
 
 def _both_sizes(chart: Any) -> tuple[Any, Any]:
