@@ -101,7 +101,10 @@ def record(path: Path, results: Path) -> Path:
         shutil.copy(folder / name, target / name)
     shutil.rmtree(target / FIGURES, ignore_errors=True)
     if (folder / FIGURES).exists():
-        shutil.copytree(folder / FIGURES, target / FIGURES)
+        # without the mark that Snakemake leaves in folders
+        shutil.copytree(
+            folder / FIGURES, target / FIGURES, ignore=shutil.ignore_patterns(".snakemake*")
+        )
     (target / "record.json").write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     return target
 
