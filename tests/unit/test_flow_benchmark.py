@@ -65,7 +65,10 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
     assert peer["mean_speed_m_s"] == pytest.approx(0.2)
     write(
         {
-            "schemes": origin | {"rows": [row("MR5-0.5", 5, 4.0, 20.0), row("MR1", 1, 3.0, 50.0)]},
+            "schemes": origin | {
+                "rows": [row("MR10-0.5", 10, 4.0, 20.0), row("MR1", 1, 3.0, 50.0)],
+                "again": [row("MR10-0.5", 10, 5.0, 20.0), row("MR10-0.5", 10, 3.0, 20.0)],
+            },
             "solvers": origin | {"rows": [
                 {"solver": "SciPy cg, overrelaxed", "unknowns": 1000, "iterations": 18,
                  "residual_fraction": 2e-3, "cpu_s": 8e-4},
@@ -73,17 +76,18 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
                  "residual_fraction": 1e-15, "cpu_s": 0.01},
             ]},
             "large": origin | {"row": large},
-            "peers": origin | {"own": row("MR5-0.5", 5, 4.5, 21.0),
+            "peers": origin | {"own": row("MR10-0.5", 10, 4.5, 21.0),
                                "rows": [peer | {"scheme": "PySPH iisph"},
                                         {"scheme": "PySPH sisph", "stopped": "no compiler"}]},
         },
         tmp_path,
     )  # fmt: skip
     page = (tmp_path / "metal_flow.md").read_text()
+    assert "cost 0.9, 1.2, 1.5 s of processor time in 3 runs" in page
     assert "takes 40 % of a step and finding neighbours 30 %" in page
     assert "100 000 particles of metal and 70 000 of the mould" in page
     assert "| 1 000 | SciPy cg, overrelaxed | 18 | 0.002 | 0.8 |" in page
     assert "| SciPy spsolve | - |" in page
-    assert "| MR5-0.5 | this | 4.50 | 21.0 |" in page
+    assert "| MR10-0.5 | this | 4.50 | 21.0 |" in page
     assert "PySPH sisph gave no result: no compiler" in page
     assert (tmp_path / "metal_flow.png").stat().st_size > 5000
