@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -81,6 +82,17 @@ def test_each_control_changes_what_it_is_named_after(tmp_path: Path) -> None:
             was, now = (getattr(getattr(c, pair), name) for c in (old.contact, soft))
             assert now == pytest.approx(0.1 * was)
     assert soft.grain_grain.friction == old.contact.grain_grain.friction
+    allowed = {part: new(part).guard.largest_overlap_fraction
+               for part in ("stiffness x0.1", "stiffness x10", "bed_depth x2")}  # fmt: skip
+    root = math.sqrt(10.0)
+    assert allowed == pytest.approx(
+        {"stiffness x0.1": 0.5 * root, "stiffness x10": 0.5, "bed_depth x2": 0.5}
+    )
+    loose = old.model_copy(
+        update={"guard": old.guard.model_copy(update={"largest_overlap_fraction": 0.9})}
+    )
+    softest = by_part(study)["control: stiffness x0.1"].change(loose)
+    assert softest.guard.largest_overlap_fraction == 2.0
     deep = new("bed_depth x2")
     assert deep.fill.layers[0].height_m == 2 * old.fill.layers[0].height_m
     assert deep.box.height_m == 2 * old.box.height_m

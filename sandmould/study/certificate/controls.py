@@ -20,6 +20,8 @@ SHAKE_G = 0.05
 SHAKE_PERIODS = 8
 SHAKE_LEAST_S = 0.06
 WINDOWS_A_PERIOD = 8
+FULL_OVERLAP = 2.0
+"""Of the smaller radius: a grain lies wholly in another; no guard allows more."""
 Change = Callable[[Scenario], Scenario]
 
 
@@ -86,7 +88,12 @@ def _holding(hold: str, best_hz: float) -> Change:
 
 
 def _stiffer(factor: float) -> Change:
-    """All springs, so that k_n/b changes and nothing between them."""
+    """All springs, so that k_n/b changes and nothing between them.
+
+    A grain of the same speed presses a spring in by the root of one over its stiffness (half of
+    m v^2 is half of k x^2). The guard allows soft ones so much more, since what it stops are
+    scenes that run away.
+    """
 
     def change(scenario: Scenario) -> Scenario:
         tree = scenario.contact.model_dump()
@@ -94,7 +101,10 @@ def _stiffer(factor: float) -> Change:
             for key, value in pair.items() if isinstance(pair, dict) else ():
                 if key.endswith("_stiffness_n_m") and value is not None:
                     pair[key] = factor * value
-        return scenario.model_copy(update={"contact": Contact(**tree)})
+        allowed = scenario.guard.largest_overlap_fraction * max(1.0, factor**-0.5)
+        overlap = {"largest_overlap_fraction": min(allowed, FULL_OVERLAP)}
+        guard = scenario.guard.model_copy(update=overlap)
+        return scenario.model_copy(update={"contact": Contact(**tree), "guard": guard})
 
     return change
 
