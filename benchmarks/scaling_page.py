@@ -130,6 +130,7 @@ def _broke(found: dict[str, Any]) -> dict[str, str]:
         f"{before['report_bytes'] / 1e6:.0f} MB",
         "run_before": f"{before['run_cpu_s']:.1f} s",
         "commit_before": before["commit"],
+        "processor_before": before["processor"],
         "graph_now": told(most["graph_alone"]),
         "shared_now": told(most["graph_shared"]),
         "report_now": f"{told(most['report'])}, a page of {most['report_bytes'] / 1e6:.1f} MB",

@@ -64,8 +64,9 @@ def found() -> dict[str, Any]:
     return {
         "rows": {"10": row(10, True), "100": row(100, True), "10000": row(10_000, False)},
         "parts": dict.fromkeys((*names, *more), 0.5) | {"process of a run": 1.3},
-        "before": {"commit": "abc", "graph": graph, "graph_pattern_s": 200.0, "report": graph,
-                   "report_bytes": 31e6, "run_cpu_s": 4.1},
+        "before": {"commit": "abc", "processor": "a core", "graph": graph,
+                   "graph_pattern_s": 200.0, "report": graph, "report_bytes": 31e6,
+                   "run_cpu_s": 4.1},
         "peers": {"runs": 100, "cores": 2, "tools": {"sandmould": tool, "yade-batch": tool},
                   "job_cpu_s": {"plain": 0.02, "yade": 1.3}, "versions": {"Yade": "1"}},
         "took_s": 3600, "load_before": 0.1, "load_after": 2.0,
