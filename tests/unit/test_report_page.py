@@ -8,15 +8,19 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.engines.snapshot import Snapshot
 from sandmould.study.report import figures
 from sandmould.study.report.page import LIMIT_BYTES, write_report
+from sandmould.study.report.sand import _layer_conclusion
 from tests.unit.report_study import (
     ENGINES,
     FAILED,
     PLANTED,
+    scenario,
     write_cross_check,
     write_study,
     write_twins,
@@ -300,3 +304,17 @@ def test_cross_check_stands_beside_a_verdict_that_it_does_not_touch(tmp_path: Pa
 def test_study_that_compares_nothing_has_no_such_section(text: str) -> None:
     assert "Do the settings agree?" not in text
     assert 'href="#agreement"' not in text
+
+
+def test_the_layers_in_the_tube_are_told_from_the_largest_share_on() -> None:
+    of_layer = {1: 1, 2: 1, 3: 2, 4: 5, 5: 1}
+    layer = np.repeat(list(of_layer), list(of_layer.values()))
+    n = len(layer)
+    in_tube = np.stack([0.075 + 0.004 * np.arange(n), np.full(n, 0.035)], axis=1)
+    last = Snapshot(
+        time_s=2.0, vibration_time_s=1.0, stage="vibrate_1", id=np.arange(1, n + 1), layer=layer,
+        position_m=in_tube, velocity_m_s=np.zeros((n, 2)), spin_rad_s=np.zeros((n, 3)),
+        radius_m=np.full(n, 1e-3),
+    )  # fmt: skip
+    told = _layer_conclusion([last], scenario(50.0))
+    assert "comes from layer 4 (50 %), layer 3 (20 %), layer 5 (10 %) and 2 others." in told

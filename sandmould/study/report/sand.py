@@ -265,14 +265,14 @@ def _density_conclusion(median_kg_m3: Sequence[float]) -> str:
 
 
 def _layer_conclusion(snapshots: Sequence[Snapshot], scenario: Scenario) -> str:
-    """Which layers the sand in the first tube came from."""
+    """Which layers the sand in the first tube came from, the largest share first."""
     if not snapshots or not scenario.scene.bores:
         return ""
     bore, last = scenario.scene.bores[0], snapshots[-1]
     table = layer_table(last.position_m, last.radius_m, last.layer, bore)
     shares = [
         f"layer {layer} ({100 * share:.0f} %)"
-        for layer, share in zip(table.layer.tolist(), table.tube_share.tolist(), strict=True)
+        for share, layer in sorted(zip(table.tube_share, table.layer, strict=True), reverse=True)
         if share >= 0.05
     ]
     name = bore.name.replace("_", " ")
