@@ -29,21 +29,21 @@ KEPT_JSON = Path(__file__).with_name("scaling.json")
 BEFORE_JSON = Path(__file__).with_name("scaling_before.json")
 PAGE = ROOT / "docs" / "scaling.md"
 SCRATCH = ROOT / "results" / "benchmarks"
-EXECUTED, GRAFTED = (10, 100, 1_000), 10_000
+EXECUTED, LINKED = (10, 100, 1_000), (10_000,)
 ALONE_UP_TO = 100
 """Runs up to which three jobs a run are executed too."""
 CORES = 2
 
 
-def measure(sizes: tuple[int, ...], most: int, peer_runs: int) -> dict[str, Any]:
+def measure(sizes: tuple[int, ...], linked: tuple[int, ...], peer_runs: int) -> dict[str, Any]:
     """Measure all sizes.
 
     Parameters
     ----------
     sizes : tuple of int
         Numbers of runs that are executed.
-    most : int
-        Number of runs that are planned, collected and reported but not computed.
+    linked : tuple of int
+        Numbers of runs that are planned, collected and reported but not computed.
     peer_runs : int
         Runs of the comparison with other tools.
     """
@@ -66,15 +66,15 @@ def measure(sizes: tuple[int, ...], most: int, peer_runs: int) -> dict[str, Any]
             row["run_alone"] = executed(place, runs, study, False, CORES)
         row["run_shared"] = executed(place, runs, study, True, CORES)
         row |= {"files": files(place, runs), **finished(place, runs, study)}
-        row["append"] = appended(place, runs)
-        rows[str(runs)] = row
+        rows[str(runs)] = row | appended(place, runs)
     said("parts of a run")
     found_parts = parts(place, sizes[0])
-    said(f"{most} runs, with the products of {sizes[-1]}")
-    row = grafted(place, most, sizes[-1])
-    study = place.study(most)
-    row["job_start"] = job_start(place, study)
-    rows[str(most)] = row | finished(place, most, study) | {"append": appended(place, most)}
+    for runs in linked:
+        said(f"{runs} runs, with the products of {sizes[-1]}")
+        row = grafted(place, runs, sizes[-1])
+        study = place.study(runs)
+        row["job_start"] = job_start(place, study)
+        rows[str(runs)] = row | finished(place, runs, study) | appended(place, runs)
     said("peers")
     beside = peers(SCRATCH / "peers", peer_runs, CORES)
     return {
@@ -106,9 +106,9 @@ def main(arguments: list[str]) -> None:
     quick = "--quick" in arguments
     kept, shown = (SCRATCH / KEPT_JSON.name, SCRATCH / PAGE.name) if quick else (KEPT_JSON, PAGE)
     if "--page" not in arguments:
-        brief = EXECUTED[:2], GRAFTED, 40
-        few = (3, 10), 30, 10
-        whole = EXECUTED, GRAFTED, 100
+        brief = EXECUTED[:2], EXECUTED[2:] + LINKED, 40
+        few = (3, 10), (30,), 10
+        whole = EXECUTED, LINKED, 100
         found = measure(*(few if quick else brief if "--brief" in arguments else whole))
         kept.write_text(json.dumps(rounded(found), indent=1) + "\n", encoding="utf-8")
     found = json.loads(kept.read_text(encoding="utf-8"))

@@ -15,6 +15,7 @@ import pandas as pd
 
 from benchmarks.scaling_study import REPLICATES, SHARED, Cost, Place, graft
 from sandmould.study.planning import RESULTS, announce, open_plan
+from sandmould.study.sweep import MOST_RUNS
 
 _COLLECT = "from pathlib import Path; from sandmould.study.collect import collect; collect({0})"
 _REPORT = (
@@ -78,10 +79,15 @@ def finished(place: Place, runs: int, study: Path) -> Row:
 
 
 def appended(place: Place, runs: int) -> Row:
-    """One more point of the sweep, which is so many runs, and its new report."""
+    """One more point of the sweep, which is so many runs, and its new report.
+
+    Empty where a study may have no more runs.
+    """
+    if runs + REPLICATES > MOST_RUNS:
+        return {}
     cost: Cost = place.snakemake(place.study(runs, more_points=1), "--cores", "2", shared=True)
     place.study(runs)
-    return {**asdict(cost), "runs": min(runs, REPLICATES)}
+    return {"append": {**asdict(cost), "runs": min(runs, REPLICATES)}}
 
 
 def files(place: Place, runs: int) -> Row:

@@ -52,7 +52,8 @@ def _measured(found: dict[str, Any]) -> str:
         line("wall time of it on two cores, s", [_cpu(r, "run_shared", "wall_s") for r in rows]),
         line("the same command again: nothing to do", [_cpu(r, "nothing_to_do") for r in rows]),
         line("one more point, to its report", [
-            f"{_cpu(r, 'append')} ({r['append']['runs']} runs)" for r in rows
+            f"{_cpu(r, 'append')} ({r['append']['runs']} runs)" if "append" in r else "–"
+            for r in rows
         ]),
         line("`make status`", [_cpu(r, "status") for r in rows]),
         line("collection", [_cpu(r, "collect") for r in rows]),
