@@ -119,7 +119,12 @@ def _files(found: dict[str, Any]) -> str:
 
 
 def _broke(found: dict[str, Any]) -> dict[str, str]:
-    most, before = found["rows"][max(found["rows"], key=int)], found["before"]
+    fewest, runs = min(found["rows"], key=int), max(found["rows"], key=int)
+    most, before = found["rows"][runs], found["before"]
+    jobs = 3 * (int(runs) - int(fewest))
+
+    def of_a_job(of: str) -> float:
+        return (most["graph_alone"][of] - found["rows"][fewest]["graph_alone"][of]) / jobs
 
     def told(cost: dict[str, Any]) -> str:
         return f"{_s(cost['cpu_s'])} s, {_mb(cost['peak_memory_bytes'])} MB"
@@ -132,6 +137,8 @@ def _broke(found: dict[str, Any]) -> dict[str, str]:
         "run_before": f"{before['run_cpu_s']:.1f} s",
         "commit_before": before["commit"],
         "processor_before": before["processor"],
+        "job_kb": f"{of_a_job('peak_memory_bytes') / 1e3:.0f}",
+        "job_ms": f"{of_a_job('cpu_s') * 1e3:.1f}",
         "graph_now": told(most["graph_alone"]),
         "shared_now": told(most["graph_shared"]),
         "report_now": f"{told(most['report'])}, a page of {most['report_bytes'] / 1e6:.1f} MB",

@@ -23,7 +23,10 @@ FAMILIAR = {
         "with `--keep-going` the others end; no table; the reason is in what the job printed",
         "`--unlock`, then `--rerun-incomplete`",
     ),
-    "signac with signac-flow": ("see the columns", "the same command"),
+    "signac with signac-flow": (
+        "the first that fails ends all; the runs' folders tell what is done",
+        "the same command",
+    ),
     "yade-batch": (
         "the others end; a line with the exit status and a log a run; no table by itself",
         "it runs all again; lines can be chosen by hand",
