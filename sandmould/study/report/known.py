@@ -246,4 +246,5 @@ def _worth_table(calibrated: Calibrated) -> Table:
 
 def _cost(summary: pd.DataFrame) -> str:
     total_s = float(summary["cpu_s"].sum()) if "cpu_s" in summary else math.nan
-    return f"All {len(summary)} runs took {seconds(total_s)} of processor time."
+    runs = "The run" if len(summary) == 1 else f"All {len(summary)} runs"
+    return f"{runs} took {seconds(total_s)} of processor time."
