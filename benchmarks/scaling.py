@@ -2,8 +2,9 @@
 
 Writes scaling.json beside this file and docs/scaling.md with its picture. ``--quick`` shows with
 few runs that everything works and writes to ``results/benchmarks``; ``--page`` writes the page of
-scaling.json again. Takes an hour of two cores that have nothing else to do; ``--brief`` executes no
-more than a hundred runs and compares with peers on forty.
+scaling.json again. Takes an hour of two cores that have nothing else to do; the same command goes
+on from where it was stopped. ``--brief`` executes no more than a hundred runs and compares with
+peers on forty.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import json
 import os
 import sys
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +38,39 @@ ALONE_UP_TO = 100
 CORES = 2
 
 
+class Progress:
+    """What is measured, kept as soon as it is: a benchmark that was stopped goes on from there.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is kept.
+    origin : dict
+        Provenance. What another commit, machine or command measured is forgotten.
+    """
+
+    def __init__(self, path: Path, origin: dict[str, Any]) -> None:
+        self.path = path
+        self.kept: dict[str, Any] = {
+            "provenance": origin, "load_before": os.getloadavg()[0], "took_s": 0.0, "parts": {},
+        }  # fmt: skip
+        before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+        self.goes_on = before.get("provenance") == origin
+        if self.goes_on:
+            self.kept = before
+
+    def part(self, name: str, measure: Callable[[], Any]) -> Any:
+        """Measure a part, or take what is kept of it."""
+        parts = self.kept["parts"]
+        if name not in parts:
+            print(f"{time.strftime('%H:%M:%S')} {name}", file=sys.stderr, flush=True)
+            begun = time.time()
+            parts[name] = measure()
+            self.kept["took_s"] += time.time() - begun
+            self.path.write_text(json.dumps(self.kept), encoding="utf-8")
+        return parts[name]
+
+
 def measure(sizes: tuple[int, ...], linked: tuple[int, ...], peer_runs: int) -> dict[str, Any]:
     """Measure all sizes.
 
@@ -47,46 +83,49 @@ def measure(sizes: tuple[int, ...], linked: tuple[int, ...], peer_runs: int) -> 
     peer_runs : int
         Runs of the comparison with other tools.
     """
-    begun, load = time.time(), os.getloadavg()[0]
     place = Place(SCRATCH / "scaling")
-    scenario = open_plan(place.study(1)).runs[0].scenario
-    origin = provenance(scenario)
+    origin = provenance(open_plan(place.study(1)).runs[0].scenario)
+    progress = Progress(SCRATCH / "scaling_parts.json", origin)
+    if not progress.goes_on:
+        place.empty()
     # The machine is calibrated and kernels are compiled once, before anything counts.
     place.snakemake(place.study(1), "--cores", "1", shared=False)
-    rows: dict[str, Any] = {}
-    for runs in sizes:
-        said(f"{runs} runs")
-        study = place.study(runs)
-        row = {
-            **planned(place, study),
-            **graphs(place, study),
-            "job_start": job_start(place, study),
-        }
-        if runs <= ALONE_UP_TO:
-            row["run_alone"] = executed(place, runs, study, False, CORES)
-        row["run_shared"] = executed(place, runs, study, True, CORES)
-        row |= {"files": files(place, runs), **finished(place, runs, study)}
-        rows[str(runs)] = row | appended(place, runs)
-    said("parts of a run")
-    found_parts = parts(place, sizes[0])
-    for runs in linked:
-        said(f"{runs} runs, with the products of {sizes[-1]}")
-        row = grafted(place, runs, sizes[-1])
-        study = place.study(runs)
-        row["job_start"] = job_start(place, study)
-        rows[str(runs)] = row | finished(place, runs, study) | appended(place, runs)
-    said("peers")
-    beside = peers(SCRATCH / "peers", peer_runs, CORES)
+    rows = {str(n): progress.part(f"{n} runs", partial(_executed, place, n)) for n in sizes}
+    found_parts = progress.part("parts of a run", lambda: parts(place, sizes[0]))
+    for n in linked:
+        name = f"{n} runs, with the products of {sizes[-1]}"
+        rows[str(n)] = progress.part(name, partial(_linked, place, n, sizes[-1]))
+    beside = progress.part("peers", lambda: peers(SCRATCH / "peers", peer_runs, CORES))
+    progress.path.unlink()
     return {
         "rows": rows,
         "before": json.loads(BEFORE_JSON.read_text(encoding="utf-8")),
         "parts": found_parts,
         "peers": beside,
-        "took_s": round(time.time() - begun),
-        "load_before": load,
+        "took_s": round(progress.kept["took_s"]),
+        "load_before": progress.kept["load_before"],
         "load_after": os.getloadavg()[0],
         "provenance": origin,
     }
+
+
+def _executed(place: Place, runs: int) -> dict[str, Any]:
+    """All of a study whose runs are computed."""
+    study = place.study(runs)
+    row = {**planned(place, study), **graphs(place, study), "job_start": job_start(place, study)}
+    if runs <= ALONE_UP_TO:
+        row["run_alone"] = executed(place, runs, study, False, CORES)
+    row["run_shared"] = executed(place, runs, study, True, CORES)
+    row |= {"files": files(place, runs), **finished(place, runs, study)}
+    return row | appended(place, runs)
+
+
+def _linked(place: Place, runs: int, source: int) -> dict[str, Any]:
+    """All of a study whose runs have the products of another's."""
+    row = grafted(place, runs, source)
+    study = place.study(runs)
+    row["job_start"] = job_start(place, study)
+    return row | finished(place, runs, study) | appended(place, runs)
 
 
 def rounded(tree: Any) -> Any:
@@ -94,11 +133,6 @@ def rounded(tree: Any) -> Any:
     if isinstance(tree, dict):
         return {key: rounded(value) for key, value in tree.items()}
     return round(tree, 4) if isinstance(tree, float) else tree
-
-
-def said(what: str) -> None:
-    """Tell what is measured now."""
-    print(f"{time.strftime('%H:%M:%S')} {what}", file=sys.stderr, flush=True)
 
 
 def main(arguments: list[str]) -> None:

@@ -34,6 +34,7 @@ def cpu_s(work: Callable[[], Any]) -> float:
 
 def planned(place: Place, study: Path) -> Row:
     """Validate, expand and write a study in this process, then do it again."""
+    shutil.rmtree(place.folder / RESULTS / study.stem, ignore_errors=True)
     with chdir(place.folder):
         validate_s = cpu_s(lambda: open_plan(study))
         plan = open_plan(study)
@@ -113,7 +114,6 @@ def grafted(place: Place, runs: int, source: int) -> Row:
     Its collection, check and report are made by Snakemake; its runs are not computed.
     """
     study = place.study(runs)
-    shutil.rmtree(place.results(runs), ignore_errors=True)
     found = {**planned(place, study), **graphs(place, study)}
     found["linked_files"] = graft(place, study, place.results(source))
     found["tables_and_report"] = asdict(place.snakemake(study, "--cores", "2", shared=True))

@@ -60,9 +60,17 @@ def _measured(found: dict[str, Any]) -> str:
         line("its memory, MB", [_cpu(r, "collect", "peak_memory_bytes") for r in rows]),
         line("report", [_cpu(r, "report") for r in rows]),
         line("its memory, MB", [_cpu(r, "report", "peak_memory_bytes") for r in rows]),
+        line("files of its runs", [number(_files_of_runs(found, size)) for size in sizes]),
         line("size of the page, MB", [f"{r['report_bytes'] / 1e6:.1f}" for r in rows]),
     ]  # fmt: skip
     return table(["runs", *(number(int(size)) for size in sizes)], lines)
+
+
+def _files_of_runs(found: dict[str, Any], size: str) -> int:
+    row = found["rows"][size]
+    if "files" in row:
+        return round(int(size) * row["files"]["files"])
+    return int(row["linked_files"]) + int(size)  # The run's scenario is written and not linked.
 
 
 def _parts(found: dict[str, Any]) -> str:

@@ -53,10 +53,15 @@ class Place:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
+        folder.mkdir(parents=True, exist_ok=True)
         for name in LINKED:
-            (folder / name).symlink_to(ROOT / name)
+            if not (folder / name).is_symlink():
+                (folder / name).symlink_to(ROOT / name)
+
+    def empty(self) -> None:
+        """Remove what was measured here before."""
+        for name in ("results", ".snakemake"):
+            shutil.rmtree(self.folder / name, ignore_errors=True)
 
     def study(self, runs: int, more_points: int = 0) -> Path:
         """Write the study of so many runs, with some more points when it is extended."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.scaling import KEPT_JSON, PAGE
+from benchmarks.scaling import KEPT_JSON, PAGE, Progress
 from benchmarks.scaling_chart import draw
 from benchmarks.scaling_measure import executed, files
 from benchmarks.scaling_model import Assumed, Measured, drain
@@ -38,7 +38,9 @@ def row(runs: int, is_executed: bool) -> dict[str, Any]:
         "nothing_to_do": cost(2, 0.001), "status": cost(1, 1e-3), "collect": cost(1, 0.004),
         "report": cost(2, 0.004), "report_bytes": 1_500_000,
     }  # fmt: skip
-    if is_executed:
+    if not is_executed:
+        found["linked_files"] = 24 * runs
+    else:
         found["append"] = cost(9, 0.01) | {"runs": 5}
         found["run_alone"] = cost(4, 4.1)
         found["run_shared"] = cost(4, 1.9)
@@ -137,6 +139,19 @@ def test_the_stand_in_is_planned_in_any_number(tmp_path: Path) -> None:
         plan = open_plan(place.study(runs))
         assert len(plan.runs) == runs
     assert len(open_plan(place.study(200, more_points=1)).runs) == 200 + REPLICATES
+
+
+def test_a_stopped_benchmark_goes_on(tmp_path: Path) -> None:
+    origin = {"commit": "abc"}
+    first = Progress(tmp_path / "kept.json", origin)
+    assert first.part("10 runs", lambda: {"cpu_s": 1.0}) == {"cpu_s": 1.0}
+    again = Progress(tmp_path / "kept.json", origin)
+    assert again.goes_on
+    assert again.part("10 runs", lambda: {"cpu_s": 2.0}) == {"cpu_s": 1.0}
+    assert again.kept["took_s"] == first.kept["took_s"]
+    other = Progress(tmp_path / "kept.json", {"commit": "other"})
+    assert not other.goes_on
+    assert other.part("10 runs", lambda: {"cpu_s": 2.0}) == {"cpu_s": 2.0}
 
 
 @pytest.mark.slow
