@@ -19,8 +19,11 @@ from analysis.sections import convex_section, solid_sections
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.geometry import Array, Bore, Scene
 
-LAYER_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7")
-"""Okabe and Ito's colours, told apart with any colour vision; repeated from the eighth layer on."""
+LAYER_COLOURS = (
+    "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#999999",
+)  # fmt: skip
+"""Okabe and Ito's colours, told apart with any colour vision, and a grey; the ninth layer has the
+first again."""
 _SAND = "#D9B97C"
 _MANY = 3_000
 """Grains from which on outlines would blacken the picture and vectors bloat the file."""

@@ -74,11 +74,15 @@ class Record(Section):
     )
 
 
+FULL_OVERLAP = 2.0
+"""Of the smaller radius: a grain lies wholly in another."""
+
+
 class Guard(Section):
     """When a run is stopped because its numbers cannot be trusted."""
 
     largest_overlap_fraction: float = quantity(
-        0.5, "Largest overlap over the smaller radius.", source=ARGUED, gt=0, le=2
+        0.5, "Largest overlap over the smaller radius.", source=ARGUED, gt=0, le=FULL_OVERLAP
     )
     kinetic_energy_factor: float = quantity(
         5.0,

@@ -39,6 +39,9 @@ _OF_PROBE = {
     "_error_pa": "error of the mean pressure",
 }
 """Measures at a probe of a flow."""
+_PREFIXES = ((1e9, "G"), (1e6, "M"))
+_PREFIXED = ("Pa", "N/m")
+"""Units in which moduli and stiffnesses of millions are common."""
 
 
 def unit_of(key: str) -> str:
@@ -109,11 +112,13 @@ def shown_scale(key: str) -> tuple[float, str]:
 
 def value_text(key: str, value: Any) -> str:
     """A swept value with its unit."""
+    unit = unit_of(key)
     if isinstance(value, float | int) and not isinstance(value, bool):
-        text = f"{value:.6g}"
+        large = (p for p in _PREFIXES if unit in _PREFIXED and abs(value) >= p[0])
+        factor, prefix = next(large, (1.0, ""))
+        text, unit = f"{value / factor:.6g}", prefix + unit
     else:
         text = str(value).replace("_", " ")
-    unit = unit_of(key)
     return f"{text} {unit}" if unit else text
 
 

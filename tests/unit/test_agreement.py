@@ -92,7 +92,7 @@ def test_rows_of_a_chart_are_told_apart_where_their_names_are_cut() -> None:
     found = compare_keys(summary(**values), keys, Equivalence(keys=(FORM,), margins={FILL: 0.03}))
     rows = [row_name(c) for c in found]
     assert len(set(rows)) == len(found) == 4
-    assert rows[0].startswith("none − viscous, large, 6.4e+06 Pa: ")
+    assert rows[0].startswith("none − viscous, large, 6.4 MPa: ")
 
 
 def test_planted_difference_between_engines_is_found(tmp_path: Path) -> None:

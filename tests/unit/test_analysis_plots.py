@@ -138,7 +138,7 @@ def test_values_that_are_missing_are_grey(ax):
 
 def test_by_layer(ax):
     plots.draw_by_layer(THREE, ax)
-    expected = [to_rgba(plots.LAYER_COLOURS[k]) for k in (0, 1, 1)]  # the ninth repeats the second
+    expected = [to_rgba(plots.LAYER_COLOURS[k]) for k in (0, 1, 0)]  # the ninth repeats the first
     assert_allclose(grains(ax).get_facecolor(), expected)
     legend = ax.get_legend()
     assert [text.get_text() for text in legend.get_texts()] == ["9", "2", "1"]

@@ -122,6 +122,9 @@ def test_words() -> None:
     assert titled("vibration.0.frequency_hz") == "frequency, Hz"
     assert shown_scale("bed_height_m") == (1e3, "bed height, mm")
     assert value_text("vibration.0.hold", "velocity") == "velocity"
+    assert value_text("pattern.material.young_modulus_pa", 6.4e6) == "6.4 MPa"
+    assert value_text("contact.grain_grain.normal_stiffness_n_m", 1e6) == "1 MN/m"
+    assert value_text("probe_pa", 200.0) == "200 Pa"
     assert setting_text({"vibration.0.frequency_hz": 65.0}) == "65 Hz"
     assert setting_text({"contact.grain_grain.friction": 0.8}) == "friction 0.8"
     assert setting_text({}) == "the one setting"

@@ -1,8 +1,9 @@
 """SciPy's conjugate gradients with symmetric overrelaxation, for systems of a unit diagonal.
 
 Eisenstat's form (1981) of the preconditioner costs nothing: each iteration is one sweep down and
-one up, as many operations as one product with the matrix. Half the iterations that Jacobi's
-preconditioner needs are half the calls of SciPy, where a system of a thousand unknowns spends most.
+one up, as many operations as one product with the matrix. It needs fewer iterations than Jacobi's
+preconditioner (docs/metal_flow.md counts both), and so fewer calls of SciPy, where a system of a
+thousand unknowns spends most.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 
 from sandmould.scenario.box import Tube
 from sandmould.scenario.contact import Contact
-from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.certificate.asked import Certificate, Control
 
@@ -20,8 +20,6 @@ SHAKE_G = 0.05
 SHAKE_PERIODS = 8
 SHAKE_LEAST_S = 0.06
 WINDOWS_A_PERIOD = 8
-FULL_OVERLAP = 2.0
-"""Of the smaller radius: a grain lies wholly in another; no guard allows more."""
 Change = Callable[[Scenario], Scenario]
 
 

@@ -13,7 +13,7 @@ from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.study import Objective
-from sandmould.study.words import listed, name_of, number, seconds
+from sandmould.study.words import listed, name_of, number, seconds, value_text
 
 _NO_TENSION = {
     "total": "the total normal force, spring and dashpot together, is never allowed to pull",
@@ -123,8 +123,9 @@ def _model(scenario: Scenario) -> str:
 
 def _law(law: ContactLaw) -> str:
     return (
-        f"springs {law.normal_stiffness_n_m:g} N/m (normal) and {law.tangential_stiffness_n_m:g} "
-        f"N/m (tangential), friction {law.friction:g}, damping ratio {law.damping_ratio:g}, "
+        f"springs {value_text('normal_stiffness_n_m', law.normal_stiffness_n_m)} (normal) and "
+        f"{value_text('tangential_stiffness_n_m', law.tangential_stiffness_n_m)} (tangential), "
+        f"friction {law.friction:g}, damping ratio {law.damping_ratio:g}, "
         f"rolling arm {law.rolling_arm_fraction:g} of the smaller radius"
     )
 
