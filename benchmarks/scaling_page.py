@@ -89,16 +89,23 @@ def _parts(found: dict[str, Any]) -> str:
         ["measuring, pictures, exports", part["measuring"]],
     ]
     known = sum(value for _, value in lines)
-    lines.append(["Snakemake's own work, collection, report and what differs", alone - known])
     head = ["a run with three jobs", "s of a core", "share"]
-    body = [[name, f"{value:.2f}", f"{value / alone:.0%}"] for name, value in lines]
-    body.append(["all", f"{alone:.2f}", ""])
+    body = [[name, f"{value:.2f}", f"{value / known:.0%}"] for name, value in lines]
+    body.append(["sum of these", f"{known:.2f}", ""])
     imports = 2 * part["imports of a run"] + part["imports of measuring"]
+    rest = "Snakemake's own work, collection and report"
+    if alone > known:
+        whole = f"of which the other {alone - known:.2f} s are {rest}"
+    else:
+        whole = (
+            f"{known - alone:.2f} s less than the sum, although {rest} are in it: parts measured "
+            "by themselves, at another time, are no more exact than that"
+        )
     return (
-        table(head, body)
-        + f"\nImports are {imports / alone:.0%} of it. In shared jobs a run takes {shared:.2f} s: "
-        "the job imports once for all its runs, and each run keeps a process of its own, so that "
-        "one that crashes takes no other with it.\n"
+        f"{table(head, body)}\nImports are {imports / known:.0%} of it. A run of the whole study "
+        f"took {alone:.2f} s, {whole}. In shared jobs a run takes {shared:.2f} s: the job imports "
+        "once for all its runs, and each run keeps a process of its own, so that one that crashes "
+        "takes no other with it.\n"
     )
 
 
