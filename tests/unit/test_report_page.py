@@ -179,8 +179,14 @@ def test_all_failed_still_shows_the_sand(tmp_path: Path) -> None:
     every = [f"f{f:g}_r{r}" for f in PLANTED for r in (1, 2, 3)]
     text = report(write_study(tmp_path / "failed", failed=every))
     assert first_sentence(text).startswith("Not resolved: no run finished")
+    assert "</code>, which got farthest: none finished." in text
     assert 'id="film-canvas"' in text
     assert text.count('<tr class="marked">') == 9
+
+
+def test_a_run_alone_is_neither_best_nor_worst(tmp_path: Path) -> None:
+    text = report(write_study(tmp_path / "alone", {50.0: 0.55}, replicates=1, failed=()))
+    assert "</code>, the only one that finished." in text
 
 
 def test_nothing_but_a_plan(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from sandmould.study.report.measured import (
     whole_conclusion,
 )
 from sandmould.study.verdict import Verdict, rank_runs
-from sandmould.study.words import listed, number, setting_text
+from sandmould.study.words import listed, name_of, number, setting_text
 
 _SECONDARY = (
     "solid_fraction", "apparent_density_corrected_kg_m3", "coordination", "bed_height_m",
@@ -101,7 +101,7 @@ def sand_pages(
         scene=figures.draw_dimensions(scenario, bed_m),
         scene_alt=_scene_alt(scenario, bed_m),
         shown_run=run,
-        shown_as=next(iter(roles), ""),
+        shown_as=_shown_as(next(iter(roles), ""), verdict),
         panels=tuple(
             Panel(
                 f"{heading}, {_clock_s(moment):.2f} s",
@@ -141,15 +141,25 @@ def _clock_s(moment: Moment) -> float:
 def shown_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
     """Runs to be looked at, by role: best, median and worst, or what there is.
 
-    Where no run finished, that with most snapshots stands alone: to see how it failed.
+    Where one run finished it is the only one. Where none did, that with most snapshots stands
+    alone: to see how it failed.
     """
     ranks = rank_runs(summary, verdict.measure, verdict.better)
     seen = {r: run for r, run in ranks.items() if list_moments(study_folder / "runs" / run)}
     if seen:
-        return seen
+        return seen if len(ranks) > 1 else {"only": next(iter(seen.values()))}
     count = {str(r): len(list_moments(study_folder / "runs" / str(r))) for r in summary["run"]}
     longest = max(count, key=lambda r: count[r], default="")
     return {"longest": longest} if count.get(longest) else {}
+
+
+def _shown_as(role: str, verdict: Verdict) -> str:
+    """Why a run is the one to be looked at."""
+    if role == "only":
+        return "the only one that finished"
+    if role == "longest":
+        return "which got farthest: none finished"
+    return f"the {role} run by {name_of(verdict.measure)}"
 
 
 def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Moment]]:
