@@ -197,6 +197,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
     page = (folder / "report.html").read_text()
     assert "Recommended among the settings swept: <b>20" in page
     assert "speed from v_speed" in page
+    assert (folder / "figures" / "curves.svg").exists()
     assert "vibration" not in page.split("<style>")[0] + page.split("</style>")[1]
 
 

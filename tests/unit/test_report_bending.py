@@ -77,6 +77,8 @@ def test_the_page_tells_what_became_of_the_pattern(study: Path, text: str) -> No
     assert "The loop holds in all 3 runs." in page.text
     assert "vibration gave back a part of it, as the paper states" in page.text
     assert "with factor 1" in page.text
+    names = {path.name for path in (study / "figures").iterdir()}
+    assert {"pattern.png", "deflection.svg"} <= names
     links = {a["href"] for a in page.of("a") if "pattern_final" in a["href"]}
     assert links == {f"runs/{n}/exports/pattern_final.{s}" for n in SHARES for s in ("vtu", "stl")}
     assert all((study / link).is_file() for link in links)

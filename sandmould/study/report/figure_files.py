@@ -22,17 +22,16 @@ _HEADING_IN = 0.3
 """Width of a picture in a strip, and room over it, inches."""
 
 
-def strip(pictures: Sequence[tuple[str, str]]) -> bytes:
+def strip(panels: Sequence[tuple[str, str]]) -> bytes:
     """Pictures side by side under their headings, as one PNG.
 
     Parameters
     ----------
-    pictures : sequence of (str, str)
+    panels : sequence of (str, str)
         At least one heading and ``data:`` address, all of one size.
     """
     images = [
-        (heading, Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))))
-        for heading, address in pictures
+        (heading, Image.open(io.BytesIO(_image_bytes(address)))) for heading, address in panels
     ]
     width, height = images[0][1].size
     picture_in = _PICTURE_IN * height / width
@@ -44,6 +43,16 @@ def strip(pictures: Sequence[tuple[str, str]]) -> bytes:
         axes.set_title(heading, fontsize=11)
         axes.set_axis_off()
     return png_bytes(figure)
+
+
+def pictures(**addresses: str) -> dict[str, bytes]:
+    """Pictures by name from their ``data:`` addresses, without those that are empty."""
+    return {name: _image_bytes(address) for name, address in addresses.items() if address}
+
+
+def _image_bytes(address: str) -> bytes:
+    """The file that a ``data:`` address holds."""
+    return base64.b64decode(address.partition(",")[2])
 
 
 def numbered(name: str, charts: Iterable[Chart]) -> dict[str, Chart]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -16,7 +16,7 @@ from sandmould.scenario.solidification import Solidification
 from sandmould.study.collect import Collected
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.report.chart import Chart
-from sandmould.study.report.figure_files import numbered, strip
+from sandmould.study.report.figure_files import numbered, pictures, strip
 from sandmould.study.report.filling import FillingPages, filling_pages
 from sandmould.study.report.flow import flow_method, flow_pages
 from sandmould.study.report.measured import Curve, measure_curves, whole_conclusion
@@ -25,6 +25,9 @@ from sandmould.study.report.sand import SandPages, sand_pages
 from sandmould.study.report.solidification import shown_run, solid_method, solid_pages
 from sandmould.study.study import SolidificationStudy, Study
 from sandmould.study.verdict import Verdict, rank_runs, sand_notes
+
+if TYPE_CHECKING:
+    from sandmould.study.report.bending import BendingPages
 
 
 @dataclass(frozen=True)
@@ -114,28 +117,41 @@ def kind_pages(
     """
     of_sweep = collected.of_sweep
     if isinstance(scenario, OwnDeck):
+        curves = _deck_curves(scenario, of_sweep, verdict)
         return KindPages(
             "deck.html",
             deck_method(scenario, collected.keys, collected.summary),
             "the end of the deck's log",
             (),
-            {"curves": _deck_curves(scenario, of_sweep, verdict)},
+            {"curves": curves},
+            _curve_figures(curves),
         )
     if isinstance(scenario, Solidification):
         reference = study.reference if isinstance(study, SolidificationStudy) else {}
         best = _run_of(of_sweep.summary, verdict) if study.seeks_best else ""
         shown = shown_run(reference, of_sweep, best)
+        solid = solid_pages(study_folder, reference, scenario, of_sweep, verdict, shown)
         return KindPages(
             "solidification.html",
             solid_method(scenario, collected.keys),
             "the end of the run",
             (),
-            {"pages": solid_pages(study_folder, reference, scenario, of_sweep, verdict, shown)},
+            {"pages": solid},
+            {
+                **pictures(fields=solid.fields, error_cost=solid.error_cost),
+                **_curve_figures(solid.curves),
+            },
         )
     if isinstance(scenario, MetalFlow):
         flow = flow_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes)
-        method = flow_method(scenario, collected.keys)
-        return KindPages("flow.html", method, "the end of the run", (), {"pages": flow})
+        return KindPages(
+            "flow.html",
+            flow_method(scenario, collected.keys),
+            "the end of the run",
+            (),
+            {"pages": flow},
+            pictures(stability_map=flow.map, histories=flow.histories, fields=flow.fields),
+        )
     filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
     pages = sand_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes)
     bending = None
@@ -155,18 +171,29 @@ def kind_pages(
             "vibrates": bool(scenario.vibration),
             "filling": filling,
         },
-        _sand_figures(pages, filling),
+        _sand_figures(pages, filling, bending),
     )
 
 
-def _sand_figures(pages: SandPages, filling: FillingPages | None) -> dict[str, Chart | bytes]:
-    """The sand at its moments, filling over what is swept, and over time."""
+def _curve_figures(curves: Iterable[Curve]) -> dict[str, Chart]:
+    """Measures over time."""
+    return numbered("curves", (curve.chart for curve in curves))
+
+
+def _sand_figures(
+    pages: SandPages, filling: FillingPages | None, bending: BendingPages | None
+) -> dict[str, Chart | bytes]:
+    """The sand at its moments, the pattern, filling over what is swept, and over time."""
     found: dict[str, Chart | bytes] = {}
     if pages.panels:
         found["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
     if filling and filling.chart:
         found["filling"] = filling.chart
-    return found | numbered("curves", (curve.chart for curve in pages.tubes))
+    if bending:
+        found |= pictures(pattern=bending.outlines)
+    if bending and bending.deflection:
+        found["deflection"] = bending.deflection
+    return found | _curve_figures(pages.tubes)
 
 
 def _deck_curves(scenario: OwnDeck, collected: Collected, verdict: Verdict) -> tuple[Curve, ...]:
