@@ -137,6 +137,9 @@ def test_a_map_has_its_table_its_picture_and_its_sands(mapped: Path) -> None:
     assert "sand_26, measured heap angle 26 ± 0.5" in text
     assert "heap_angle_deg = 80 cannot be calibrated: valid is" in text
     assert "Posterior of sand_26" in text
+    names = {path.name for path in (mapped / "figures").iterdir()}
+    assert {"map.png", "heaps.png", "posterior_sand_26.png"} <= names
+    assert "posterior_sand_80.png" not in names
 
 
 def test_the_sands_that_are_found_become_materials(mapped: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from sandmould.study.collect import Collected
 from sandmould.study.emulator import TooFewRunsError, fit_emulator
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.moments import list_moments
+from sandmould.study.report.figure_files import pictures, strip
 from sandmould.study.report.repose_figures import draw_heap, draw_map, draw_posterior, shown
 from sandmould.study.report.tables import Cell, Column, Table
 from sandmould.study.settings import Setting
@@ -99,6 +100,16 @@ def known_pages(
         worths=_worth_table(calibrated) if calibrated and calibrated.worths else None,
         cost=_cost(summary),
     )
+
+
+def known_figures(known: KnownPages) -> dict[str, bytes]:
+    """Heaps side by side, the map, and what is known of each sand, as files."""
+    found = pictures(
+        map=known.map_picture, **{f"posterior_{one.name}": one.posterior for one in known.sands}
+    )
+    if known.heaps:
+        found["heaps"] = strip([(heap.heading, heap.picture) for heap in known.heaps])
+    return found
 
 
 def _value_sentences(known: Sequence[Setting], measure: str, study: Study) -> list[str]:

@@ -25,7 +25,7 @@ from sandmould.study.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.study.report.curves import objective_charts
 from sandmould.study.report.figure_files import FIGURES, numbered, write_figures
 from sandmould.study.report.kinds import drives_of, kind_pages, notes_of
-from sandmould.study.report.known import known_pages
+from sandmould.study.report.known import known_figures, known_pages
 from sandmould.study.report.many import drawn_note, drawn_part, listed_settings
 from sandmould.study.report.method import Row, provenance_rows, statistics_method
 from sandmould.study.report.optimum import optimum_pages, with_surface
@@ -193,7 +193,8 @@ def _render(
         reported_best=page.study.objective.reported_best,
         **of_kind.context,
     )
-    return text, {**numbered("objective", charts), **of_kind.figures}
+    of_known = known_figures(known) if known else {}
+    return text, {**numbered("objective", charts), **of_known, **of_kind.figures}
 
 
 def _both_sizes(chart: Any) -> tuple[Any, Any]:
