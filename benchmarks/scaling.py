@@ -46,7 +46,8 @@ class Progress:
     path : Path
         Where it is kept.
     origin : dict
-        Provenance. What another commit, machine or command measured is forgotten.
+        Provenance. What another commit, machine or command measured is forgotten, and what
+        was measured with changes that are in no commit.
     """
 
     def __init__(self, path: Path, origin: dict[str, Any]) -> None:
@@ -55,7 +56,8 @@ class Progress:
             "provenance": origin, "load_before": os.getloadavg()[0], "took_s": 0.0, "parts": {},
         }  # fmt: skip
         before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-        self.goes_on = before.get("provenance") == origin
+        same = before.get("provenance") == origin
+        self.goes_on = same and not origin["commit"].endswith("-dirty")
         if self.goes_on:
             self.kept = before
 
@@ -67,7 +69,9 @@ class Progress:
             begun = time.time()
             parts[name] = measure()
             self.kept["took_s"] += time.time() - begun
-            self.path.write_text(json.dumps(self.kept), encoding="utf-8")
+            partial_path = self.path.with_name(self.path.name + ".partial")
+            partial_path.write_text(json.dumps(self.kept), encoding="utf-8")
+            os.replace(partial_path, self.path)
         return parts[name]
 
 

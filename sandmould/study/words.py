@@ -112,14 +112,26 @@ def shown_scale(key: str) -> tuple[float, str]:
 
 def value_text(key: str, value: Any) -> str:
     """A swept value with its unit."""
-    unit = unit_of(key)
     if isinstance(value, float | int) and not isinstance(value, bool):
-        large = (p for p in _PREFIXES if unit in _PREFIXED and abs(value) >= p[0])
-        factor, prefix = next(large, (1.0, ""))
-        text, unit = f"{value / factor:.6g}", prefix + unit
+        factor, unit = _shown_unit(key, value)
+        text = f"{value / factor:.6g}"
     else:
-        text = str(value).replace("_", " ")
+        text, unit = str(value).replace("_", " "), unit_of(key)
     return f"{text} {unit}" if unit else text
+
+
+def range_text(key: str, low: float, high: float) -> str:
+    """Two swept values with one unit, that of the second: ``15 to 24.5 Hz``."""
+    factor, _ = _shown_unit(key, high)
+    return f"{number(low / factor)} to {value_text(key, high)}"
+
+
+def _shown_unit(key: str, value: float) -> tuple[float, str]:
+    """What a value is divided by where it is shown, and its unit then."""
+    unit = unit_of(key)
+    large = (p for p in _PREFIXES if unit in _PREFIXED and abs(value) >= p[0])
+    factor, prefix = next(large, (1.0, ""))
+    return factor, prefix + unit
 
 
 def setting_text(values: Mapping[str, Any]) -> str:

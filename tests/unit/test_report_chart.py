@@ -13,6 +13,7 @@ from sandmould.study.words import (
     listed,
     name_of,
     number,
+    range_text,
     seconds,
     setting_text,
     shown_scale,
@@ -125,6 +126,8 @@ def test_words() -> None:
     assert value_text("pattern.material.young_modulus_pa", 6.4e6) == "6.4 MPa"
     assert value_text("contact.grain_grain.normal_stiffness_n_m", 1e6) == "1 MN/m"
     assert value_text("probe_pa", 200.0) == "200 Pa"
+    assert range_text("pattern.material.young_modulus_pa", 8e5, 6.4e6) == "0.800 to 6.4 MPa"
+    assert range_text("vibration.0.frequency_hz", 15.0, 24.5) == "15 to 24.5 Hz"
     assert setting_text({"vibration.0.frequency_hz": 65.0}) == "65 Hz"
     assert setting_text({"contact.grain_grain.friction": 0.8}) == "friction 0.8"
     assert setting_text({}) == "the one setting"

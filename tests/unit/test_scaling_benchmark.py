@@ -149,6 +149,9 @@ def test_a_stopped_benchmark_goes_on(tmp_path: Path) -> None:
     assert again.goes_on
     assert again.part("10 runs", lambda: {"cpu_s": 2.0}) == {"cpu_s": 1.0}
     assert again.kept["took_s"] == first.kept["took_s"]
+    changed = {"commit": "abc-dirty"}
+    Progress(tmp_path / "changed.json", changed).part("10 runs", dict)
+    assert not Progress(tmp_path / "changed.json", changed).goes_on
     other = Progress(tmp_path / "kept.json", {"commit": "other"})
     assert not other.goes_on
     assert other.part("10 runs", lambda: {"cpu_s": 2.0}) == {"cpu_s": 2.0}

@@ -22,6 +22,7 @@ from sandmould.study.words import (
     listed,
     name_of,
     number,
+    range_text,
     shown_scale,
     unit_of,
     value_text,
@@ -98,7 +99,7 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
         low, high = optimum.interval(key)
         places.append(
             f"{name_of(key)} {value_text(key, _rounded(value))} "
-            f"(95 % interval {number(low)} to {value_text(key, _rounded(high))})"
+            f"(95 % interval {range_text(key, low, _rounded(high))})"
         )
     where = f"{listed(places)}: {with_margin(mean, _TWO_SIDED * se)}"
     if not ends:
@@ -122,7 +123,7 @@ def _flat(optimum: Optimum, study: Study, key: str) -> str:
     low, high = optimum.no_worse(key, margin)
     how = "the margin set beforehand" if set_margin else "5 % of it"
     said = (
-        f"From {number(low)} to {value_text(key, _rounded(high))} the mean loses less than "
+        f"From {range_text(key, low, _rounded(high))} the mean loses less than "
         f"{number(margin, 2)}, {how}"
     )
     off = WRONG.get(key.rsplit(".", 1)[-1])
