@@ -50,6 +50,9 @@ def _measured(found: dict[str, Any]) -> str:
         line("whole study, three jobs a run", [run(r, "run_alone") for r in rows]),
         line("whole study, shared jobs", [run(r, "run_shared") for r in rows]),
         line("wall time of it on two cores, s", [_cpu(r, "run_shared", "wall_s") for r in rows]),
+        line("graph, collection and report, a run", [
+            f"{_of_workflow(r) / int(size):.3f}" for size, r in zip(sizes, rows, strict=True)
+        ]),
         line("the same command again: nothing to do", [_cpu(r, "nothing_to_do") for r in rows]),
         line("one more point, to its report", [
             f"{_cpu(r, 'append')} ({r['append']['runs']} runs)" if "append" in r else "–"
@@ -64,6 +67,11 @@ def _measured(found: dict[str, Any]) -> str:
         line("size of the page, MB", [f"{r['report_bytes'] / 1e6:.1f}" for r in rows]),
     ]  # fmt: skip
     return table(["runs", *(number(int(size)) for size in sizes)], lines)
+
+
+def _of_workflow(row: dict[str, Any]) -> float:
+    """Seconds of a core that are no run's, of a study with shared jobs."""
+    return sum(float(row[name]["cpu_s"]) for name in ("graph_shared", "collect", "report"))
 
 
 def _files_of_runs(found: dict[str, Any], size: str) -> int:
