@@ -20,10 +20,10 @@ demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
 
 study: $(INSTALLED)
-	@$(BIN)/python -m sandmould.study.drive $(STUDY) --cores $(CORES) --quiet rules host
+	@$(BIN)/python -m sandmould.study.run_study $(STUDY) --cores $(CORES) --quiet rules host
 
 plan: $(INSTALLED)
-	@$(BIN)/python -m sandmould.study.planning $(STUDY)
+	@$(BIN)/python -m sandmould.study.build_plan $(STUDY)
 
 status: $(INSTALLED)
 	@$(BIN)/python -m sandmould.study.status $(STUDY)
@@ -31,9 +31,9 @@ status: $(INSTALLED)
 twins: $(INSTALLED)
 	@for name in $(TWINS); do \
 	  $(MAKE) --no-print-directory study STUDY=config/studies/$$name.yaml \
-	    && $(BIN)/python -m sandmould.study.evidence record config/studies/$$name.yaml || exit 1; \
+	    && $(BIN)/python -m sandmould.study.records record config/studies/$$name.yaml || exit 1; \
 	done
-	@$(BIN)/python -m sandmould.study.twins
+	@$(BIN)/python -m benchmarks.twins
 
 verification: $(INSTALLED)
 	$(BIN)/python -m tests.verification.table
@@ -91,7 +91,7 @@ lock:
 	  --output-file requirements.lock pyproject.toml
 
 results-check: $(INSTALLED)
-	$(BIN)/python -m sandmould.study.evidence check
+	$(BIN)/python -m sandmould.study.records check
 
 clean:
 	rm -rf results .snakemake

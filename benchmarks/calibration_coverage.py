@@ -13,14 +13,14 @@ from scipy.stats import binomtest, chi2
 from benchmarks.calibration_methods import Method, problem_of
 from benchmarks.calibration_oracle import ANGLE, Floats, Map, by_emulator
 from benchmarks.calibration_race import run_race
-from sandmould.study.calibration.asked import Target
-from sandmould.study.calibration.posterior import (
+from sandmould.statistics.calibration.config import Target
+from sandmould.statistics.calibration.posterior import (
     CREDIBLE,
     OffTheMapError,
     Posterior,
     posterior,
 )
-from sandmould.study.emulator import Emulator, fit_emulator
+from sandmould.statistics.emulator import Emulator, fit_emulator
 
 MEASURED_SD_DEG = 0.5
 """Of the planted measurement, as config/studies/calibrate_sand.yaml has it."""

@@ -20,9 +20,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from sandmould.study.calibration.asked import Target
-from sandmould.study.calibration.refine import best_guess, design, next_point
-from sandmould.study.emulator import TooFewRunsError, fit_emulator
+from sandmould.statistics.calibration.config import Target
+from sandmould.statistics.calibration.refine import best_guess, design, next_point
+from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
 
 Messages = Generator[dict[str, Any], float | None, None]
 START = 16
@@ -72,7 +72,7 @@ def problem_of(
 
 
 class Ours:
-    """``sandmould.study.calibration.refine``, one run after the other."""
+    """``sandmould.statistics.calibration.refine``, one run after the other."""
 
     name = "sandmould"
 

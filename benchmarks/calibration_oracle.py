@@ -16,15 +16,15 @@ from scipy.stats import chi2
 from benchmarks.kept_runs import KeptRuns, Measures, key_of
 from sandmould import ROOT
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
+from sandmould.statistics.verdict import finished_values
 from sandmould.study.collect import gather
-from sandmould.study.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.study.expand import replicate_seed
+from sandmould.study.load_study import open_study
 from sandmould.study.measure import write_measures
-from sandmould.study.opening import open_study
-from sandmould.study.plan import write_plan
+from sandmould.study.plan_files import write_plan
 from sandmould.study.run import Run
 from sandmould.study.simulate import render_run, simulate
-from sandmould.study.verdict import finished_values
 
 Floats = NDArray[np.float64]
 Simulate = Callable[[Sequence[float]], float]

@@ -19,9 +19,9 @@ _DRIVEN = """\
 All methods speak one line of asks and guesses; the peers run in an environment of their own. A
 start and the noise of its runs are shared by all methods, as far as a method takes them.
 
-- **sandmould**: `sandmould.study.calibration.refine`. Six points of a Sobol sequence, then one run
-  after the other where the chance is greatest that its mean lies within the tolerance. Its guess
-  has the least expected squared miss and changes with every run.
+- **sandmould**: `sandmould.statistics.calibration.refine`. Six points of a Sobol sequence, then one
+  run after the other where the chance is greatest that its mean lies within the tolerance. Its
+  guess has the least expected squared miss and changes with every run.
 - **GrainLearning**: `IterativeBayesianFilter` and `DynamicSystem`, called as
   `BayesianCalibration.run_one_iteration` calls them, less its percentage errors, which divide by
   the range of the observations and so by zero for a single angle. Ten runs a generation, target

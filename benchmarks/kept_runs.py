@@ -6,8 +6,8 @@ import hashlib
 import json
 from pathlib import Path
 
+from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import kind_of
 
 Measures = dict[str, float]

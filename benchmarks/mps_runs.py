@@ -9,7 +9,7 @@ from typing import Any
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.shoulder import open_shoulder
 from sandmould.casting.mps.stability import ideal_pa, run_still
-from sandmould.engines.products import peak_memory_bytes
+from sandmould.runs.products import peak_memory_bytes
 
 EXACT = 0.59
 """c_poi that undoes a long wave of compression at once: one over ``compression_gain``."""

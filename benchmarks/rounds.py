@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.tables import table
-from sandmould.study.rounds.optimum import Optimum, find_optimum
-from sandmould.study.rounds.propose import propose
+from sandmould.statistics.optimum import Optimum, find_optimum
+from sandmould.statistics.propose import propose
 
 KEY, MEASURE = "frequency_hz", "fill"
 LOW_HZ, HIGH_HZ = 20.0, 100.0

@@ -14,12 +14,12 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.scaling_study import REPLICATES, SHARED, Cost, Place, graft
-from sandmould.study.planning import RESULTS, announce, open_plan
+from sandmould.study.build_plan import RESULTS, announce, open_plan
 from sandmould.study.sweep import MOST_RUNS
 
 _COLLECT = "from pathlib import Path; from sandmould.study.collect import collect; collect({0})"
 _REPORT = (
-    "from pathlib import Path; from sandmould.study.report.page import write_report; "
+    "from pathlib import Path; from sandmould.report.page import write_report; "
     "write_report({0}, {0} / 'report.html')"
 )
 Row = dict[str, Any]

@@ -9,7 +9,7 @@ from statistics import median
 
 from benchmarks.scaling_measure import cpu_s
 from benchmarks.scaling_study import Place
-from sandmould.study.planning import open_plan
+from sandmould.study.build_plan import open_plan
 from sandmould.study.simulate import measure_run, render_run
 
 REPEATS = 5

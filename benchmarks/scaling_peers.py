@@ -21,7 +21,7 @@ from typing import Any
 
 from benchmarks.scaling_study import LINKED, timed
 from sandmould import ROOT
-from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.runs.outcome import Outcome, RunOutcome
 
 HERE = Path(__file__).parent / "peers" / "sweep"
 PYTHON = ROOT / ".venv-peers" / "bin" / "python"

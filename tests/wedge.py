@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.judge import JudgeSession
+from pattern_fe.coupling.monolithic_session import JudgeSession
 from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.material import Foam
 from pattern_fe.pattern import Pattern

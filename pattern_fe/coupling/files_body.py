@@ -17,8 +17,8 @@ from pattern_fe.coupling.exchange import (
     write_pattern,
 )
 from pattern_fe.pattern import Pattern
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, Session
+from sandmould.runs.outcome import Outcome
 
 Array = NDArray[np.float64]
 EXCHANGE = "exchange"

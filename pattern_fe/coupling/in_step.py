@@ -14,9 +14,9 @@ from pattern_fe.coupling.body import ElasticBody
 from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.coupling.ledger import LEDGER, Entry, Ledger, imbalance_n, rms_m
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.outcome import Outcome
 
 Array = NDArray[np.float64]
 CHECKPOINT = "pattern.npz"

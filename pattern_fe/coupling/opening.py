@@ -10,7 +10,7 @@ from pattern_fe.coupling.body import ElasticBody
 from pattern_fe.coupling.files_body import EXCHANGE, FilesBody
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.in_step import InStepSession
-from pattern_fe.coupling.judge import JudgeSession
+from pattern_fe.coupling.monolithic_session import JudgeSession
 from pattern_fe.coupling.schemes import explicit_foam, in_step_foam
 from pattern_fe.coupling.selective_mass import SelectiveMass
 from pattern_fe.coupling.session import CoupledSession

@@ -16,10 +16,10 @@ from pattern_fe.coupling.gain import measure_gain
 from pattern_fe.coupling.ledger import LEDGER, Entry, Ledger, imbalance_n, rms_m, work_of
 from pattern_fe.coupling.relaxation import Measured
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
 
 Array = NDArray[np.float64]

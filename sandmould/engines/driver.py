@@ -9,18 +9,18 @@ from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
-from sandmould.engines import checkpoint as checkpoints
 from sandmould.engines.blockage import what_blocks
-from sandmould.engines.checkpoint import Mark
 from sandmould.engines.choosing import engine_of
 from sandmould.engines.guard import Guard
-from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.engines.products import Cost, cpu_time_s, peak_memory_bytes
 from sandmould.engines.program import Program, Stage
-from sandmould.engines.progress import Progress
 from sandmould.engines.recording import Recorder
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.step_counts import StepCounts
+from sandmould.runs import checkpoint as checkpoints
+from sandmould.runs.checkpoint import Mark
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import Cost, cpu_time_s, peak_memory_bytes
+from sandmould.runs.progress import Progress
 
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 """What a disk says that takes no more; other errors of the system are errors of a program."""

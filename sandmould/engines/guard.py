@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sandmould.engines.neighbours import touching_pairs
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
 from sandmould.engines.snapshot import Snapshot, scene_at
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 
 

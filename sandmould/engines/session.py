@@ -10,10 +10,10 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.bad_input import Problem
 
 Array = NDArray[np.float64]

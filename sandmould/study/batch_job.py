@@ -13,15 +13,15 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from sandmould.runs.formatting import listed
+from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.batches import is_done
-from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import kind_of
-from sandmould.study.launch import die_with_parent, launch
 from sandmould.study.moments import LAST_MEASURED
-from sandmould.study.plan import read_run
+from sandmould.study.plan_files import read_run
+from sandmould.study.process import die_with_parent, launch
 from sandmould.study.simulate import measure_run, render_run
-from sandmould.study.words import listed
 
 
 def is_current(folder: Path) -> bool:

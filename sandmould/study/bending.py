@@ -19,8 +19,8 @@ from pattern_fe.large_displacement import LoadNotReachedError
 from pattern_fe.pattern import Pattern
 from pattern_fe.perimeter import Perimeter
 from pattern_fe.scene import pattern_of
-from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 
 Row = dict[str, Any]

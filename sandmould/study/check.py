@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from sandmould.engines.outcome import Outcome
+from sandmould.runs.outcome import Outcome
 
 
 def failed_runs(summary: Path) -> None:

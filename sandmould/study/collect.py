@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,10 +12,16 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.reading import Origin, read_planned, validated
-from sandmould.study.agreement import agreement_table, compare_study, sweep_part
-from sandmould.study.plan import STUDY_FILE
+from sandmould.statistics.agreement import (
+    Compared,
+    agreement_table,
+    compare_keys,
+    compare_pair,
+    sweep_part,
+)
+from sandmould.study.plan_files import STUDY_FILE
 from sandmould.study.study import Study, study_model
 
 NO_OUTCOME = "no outcome written"
@@ -69,6 +75,37 @@ def collect(study_folder: Path) -> None:
         partial = study_folder / f"{name}.tsv.partial"
         table.to_csv(partial, sep="\t", index=False, na_rep="nan")
         os.replace(partial, study_folder / f"{name}.tsv")
+
+
+def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> tuple[Compared, ...]:
+    """Compare all that a study wants compared.
+
+    Parameters
+    ----------
+    summary : DataFrame
+        One row a run; runs of the cross check have it in their column ``part``.
+    keys : sequence of str
+        Swept keys.
+    study : Study
+
+    Returns
+    -------
+    tuple of Compared
+        Empty where the study compares nothing.
+    """
+    equivalence = study.equivalence
+    swept = sweep_part(summary)
+    found = compare_keys(swept, keys, equivalence)
+    if study.cross_check is not None and "part" in summary:
+        checked = summary[summary["part"] == "cross_check"]
+        alike = swept
+        for key, value in study.cross_check.at.items():
+            alike = alike[alike[key] == value]
+        engines = (study.scenario.engine.name, study.cross_check.engine)
+        found += compare_pair(
+            "engine.name", engines, study.cross_check.at, (alike, checked), equivalence
+        )
+    return found
 
 
 def read_study(study_folder: Path) -> Study:

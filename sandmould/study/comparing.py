@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from sandmould.scenario.bad_input import Problem
-from sandmould.study.study import CrossCheck, Equivalence, Study
+from sandmould.statistics.config import Equivalence
+from sandmould.study.study import CrossCheck, Study
 from sandmould.study.sweep import Sweep, points
 
 ENGINE = "engine.name"

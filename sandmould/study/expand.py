@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.certificate.asked import frequency_key
-from sandmould.study.certificate.controls import Case, cases
 from sandmould.study.comparing import ENGINE
-from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import AnyScenario, kind_named
 from sandmould.study.labels import letters, run_label
-from sandmould.study.opening import OpenStudy
+from sandmould.study.load_study import OpenStudy
+from sandmould.study.robustness.config import frequency_key
+from sandmould.study.robustness.controls import Case, cases
 from sandmould.study.run import Part, Run
 from sandmould.study.sweep import Point, points, value_at
 

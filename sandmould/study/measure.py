@@ -26,7 +26,7 @@ from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.moments import LAST_MEASURED, MOMENTS, list_moments, nearest
 from sandmould.study.outflow import add_outflow, measure_outflow
-from sandmould.study.plan import read_run
+from sandmould.study.plan_files import read_run
 
 
 def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:

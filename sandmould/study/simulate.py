@@ -1,6 +1,6 @@
 """One run from its folder: ``python -m sandmould.study.simulate FOLDER``.
 
-``sandmould.study.launch`` starts and watches it as a process of its own.
+``sandmould.study.process`` starts and watches it as a process of its own.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
-from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.engines.products import Cost, finish
-from sandmould.study.hashes import scenario_hash
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import Cost, finish
 from sandmould.study.kinds.kind import AnyScenario, kind_of
-from sandmould.study.launch import RESTARTABLE_EXIT
-from sandmould.study.plan import read_run
+from sandmould.study.plan_files import read_run
+from sandmould.study.process import RESTARTABLE_EXIT
 
 
 def render_run(folder: Path) -> None:

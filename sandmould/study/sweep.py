@@ -104,11 +104,6 @@ class Sweep(Section):
         return math.prod(counts) if self.design == "grid" else min(counts, default=0)
 
 
-def fewest_points(keys: int) -> int:
-    """Different points that a surface over some keys needs."""
-    return 2 + 2 * keys
-
-
 def is_whole(key: str) -> bool:
     """Whether a key of the scenario takes whole numbers only."""
     kinds = [f.annotation for f in fields_at(Scenario, key)]

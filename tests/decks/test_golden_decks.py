@@ -14,7 +14,7 @@ from sandmould.engines.lammps.render import layer_data, render_deck
 from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.expand import expand
-from sandmould.study.opening import open_study
+from sandmould.study.load_study import open_study
 from tests.hopper import hopper_scene
 from tests.scenes import tube_scene
 

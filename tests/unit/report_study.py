@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.box import Box, Tube
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.plan import write_plan
+from sandmould.study.plan_files import write_plan
 from sandmould.study.run import Run
 
 KEY = "vibration.0.frequency_hz"

@@ -11,18 +11,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks import twins
 from sandmould import ROOT
-from sandmould.study import twins
-from sandmould.study.agreement import (
+from sandmould.report.agreement import row_name
+from sandmould.statistics.agreement import (
     COLUMNS,
     agreement_sentences,
     compare_keys,
-    compare_study,
     speeds,
     sweep_part,
 )
-from sandmould.study.collect import collect, gather, read_study
-from sandmould.study.report.agreement import row_name
+from sandmould.study.collect import collect, compare_study, gather, read_study
 from sandmould.study.study import Equivalence
 from tests.unit.report_study import ENGINES, KEY, write_cross_check, write_twins
 

@@ -12,15 +12,15 @@ import pytest
 import yaml
 
 from sandmould.engines.choosing import deck_hash
+from sandmould.runs.hashing import scenario_hash
 from sandmould.study import batch_job
 from sandmould.study.batch_job import compute_batch, is_current
 from sandmould.study.batches import START_S, alone, is_done, plan_batches, planned_wall_s
+from sandmould.study.build_plan import Plan
 from sandmould.study.expand import expand
-from sandmould.study.hashes import scenario_hash
+from sandmould.study.load_study import open_study
 from sandmould.study.moments import LAST_MEASURED
-from sandmould.study.opening import open_study
-from sandmould.study.plan import write_plan
-from sandmould.study.planning import Plan
+from sandmould.study.plan_files import write_plan
 from sandmould.study.run import Run
 
 FREQUENCY = "vibration.0.frequency_hz"

@@ -11,12 +11,12 @@ import pytest
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.scene import pattern_of, with_surface
 from sandmould.engines.snapshot import Snapshot
+from sandmould.report.animation import make_film
+from sandmould.report.bending_figure import _lines_m, draw_outlines
+from sandmould.report.sand import _bending_name
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.bending import BentPattern
 from sandmould.study.bent_files import write_bent
-from sandmould.study.report.animation import make_film
-from sandmould.study.report.bending_figure import _lines_m, draw_outlines
-from sandmould.study.report.sand import _bending_name
 from tests.patterns import _one_thread  # noqa: F401
 
 LOAD_N = -0.05

@@ -11,10 +11,11 @@ import pytest
 import yaml
 
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.calibration.asked import Calibration, Target, problems
-from sandmould.study.calibration.posterior import OffTheMapError, iso_line, posterior
-from sandmould.study.calibration.sands import calibrate, write_materials
-from sandmould.study.emulator import Emulator, TooFewRunsError, fit_emulator
+from sandmould.statistics.calibration.config import Calibration, Target
+from sandmould.statistics.calibration.posterior import OffTheMapError, iso_line, posterior
+from sandmould.statistics.calibration.sands import calibrate, write_materials
+from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
+from sandmould.study.calibration.problems import problems
 from sandmould.study.sweep import Sweep
 
 KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fraction")

@@ -17,14 +17,15 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.certificate.asked import Certificate, frequency_key
-from sandmould.study.certificate.controls import SHAKEN_HZ, Case, cases
-from sandmould.study.certificate.judge import Certified, certify
+from sandmould.statistics.robustness import Certified, certify
+from sandmould.study.build_plan import open_plan
 from sandmould.study.expand import expand
-from sandmould.study.opening import OpenStudy, open_study
-from sandmould.study.planning import open_plan
+from sandmould.study.load_study import OpenStudy, open_study
+from sandmould.study.robustness.config import Certificate, frequency_key
+from sandmould.study.robustness.controls import SHAKEN_HZ, Case, cases
 from sandmould.study.rounds.decide import choose_certified, next_round
 from sandmould.study.rounds.ledger import Ledger, basis_of, read_ledger, write_ledger
+from sandmould.study.study import Study
 
 FREQUENCY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"
@@ -207,10 +208,16 @@ PARTS = ["hold velocity", "hold displacement", "stiffness x0.1", "stiffness x10"
          "bed_depth x2", "time_step x0.5", "engine lammps"]  # fmt: skip
 
 
+def certify_study(table: pd.DataFrame, study: Study) -> Certified:
+    """Judge the controls of a study by its own objective and margin."""
+    margin = study.equivalence.margins.get(study.objective.measure)
+    return certify(table, FREQUENCY, CERTIFIED_HZ, study.objective, margin)
+
+
 def judged(tmp_path: Path, moved: dict[str, float], sd: float = 0.004) -> Certified:
     """Judge controls of which some move the optimum to another frequency."""
     table = planted(lambda part, f: hill(f, moved.get(part, BEST_HZ)), PARTS, sd)
-    return certify(table, FREQUENCY, CERTIFIED_HZ, opened(tmp_path).study)
+    return certify_study(table, opened(tmp_path).study)
 
 
 def test_an_optimum_that_nothing_moves_belongs_to_the_sand(tmp_path: Path) -> None:
@@ -257,7 +264,7 @@ def test_noise_leaves_it_unresolved(tmp_path: Path) -> None:
 def test_controls_that_were_not_asked_or_failed_keep_it_unresolved(tmp_path: Path) -> None:
     table = planted(lambda part, f: hill(f, BEST_HZ), PARTS[2:6], 0.004)
     table.loc[table["part"] == "control: stiffness x10", "outcome_code"] = 311
-    found = certify(table, FREQUENCY, CERTIFIED_HZ, opened(tmp_path).study)
+    found = certify_study(table, opened(tmp_path).study)
     assert found.kind == "unresolved"
     for words in ("stiffness x10 does not tell", "hold was not asked", "engine was not asked"):
         assert words in found.sentences[0]

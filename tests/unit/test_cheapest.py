@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.study import cheapest
-from sandmould.study.agreement import compare_study
-from sandmould.study.cheapest import Factor, factors_of
+from benchmarks import cheapest
+from benchmarks.cheapest import Factor, factors_of
+from benchmarks.twins import Recorded
+from sandmould.study.collect import compare_study
 from sandmould.study.study import Study
-from sandmould.study.twins import Recorded
 
 KEY = "time_step.fraction"
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from sandmould.engines.outcome import Outcome
+from sandmould.runs.outcome import Outcome
 from sandmould.study.check import failed_runs
 from sandmould.study.collect import (
     NO_OUTCOME,

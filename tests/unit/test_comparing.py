@@ -14,10 +14,10 @@ import yaml
 from sandmould import ROOT
 from sandmould.engines.program import build_program
 from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.build_plan import Plan, open_plan
 from sandmould.study.expand import expand
-from sandmould.study.opening import open_study
-from sandmould.study.plan import plan_table, read_run, write_plan
-from sandmould.study.planning import Plan, open_plan
+from sandmould.study.load_study import open_study
+from sandmould.study.plan_files import plan_table, read_run, write_plan
 from sandmould.study.run import Run
 
 FREQUENCY = "vibration.0.frequency_hz"

@@ -20,9 +20,9 @@ from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import engine
 from sandmould.engines.lammps.engine import open_session
 from sandmould.engines.lammps.render import write_deck
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop, engine_stop
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene
 

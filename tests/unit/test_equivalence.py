@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from sandmould.study.equivalence import MOST_REPLICATES, POWER, agree, judge_interval
+from sandmould.statistics.equivalence import MOST_REPLICATES, POWER, agree, judge_interval
 
 T_95_OF_2 = 2.919986
 """95 % point of Student's t with two degrees of freedom, as tables print it."""

@@ -11,8 +11,8 @@ import pytest
 from sandmould.casting import checkpoint
 from sandmould.casting.mps import computation, scene
 from sandmould.casting.mps.flow import Flow
-from sandmould.engines.outcome import Outcome
-from sandmould.engines.products import Computed
+from sandmould.runs.outcome import Outcome
+from sandmould.runs.products import Computed
 from sandmould.scenario.flow import MetalFlow
 
 SHOULDER = {"kind": "shoulder", "particle_m": 0.00625, "height_m": 0.05, "lower_m": 0.0375,

@@ -15,18 +15,18 @@ import yaml
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.measured import by_window, measure_flow
 from sandmould.casting.mps.stability import Verdict, table_2
-from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.report.animation import ABSENT
+from sandmould.report.flow import _hopping
+from sandmould.report.flow_film import make_flow_film
+from sandmould.report.flow_map import _parts, condition_text, said_of, stability_map
+from sandmould.report.page import write_report
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.flow import MetalFlow
 from sandmould.study.collect import collect
 from sandmould.study.expand import expand
-from sandmould.study.opening import open_study
-from sandmould.study.plan import plan_table, read_run, write_plan, write_study
-from sandmould.study.report.animation import ABSENT
-from sandmould.study.report.flow import _hopping
-from sandmould.study.report.flow_film import make_flow_film
-from sandmould.study.report.flow_map import _parts, condition_text, said_of, stability_map
-from sandmould.study.report.page import write_report
+from sandmould.study.load_study import open_study
+from sandmould.study.plan_files import plan_table, read_run, write_plan, write_study
 from sandmould.study.simulate import measure_run, render_run, simulate
 
 TANK = {"kind": "tank", "particle_m": 0.004, "width_m": 0.016, "depth_m": 0.032}

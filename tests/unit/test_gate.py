@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sandmould.engines.guard import Guard, measure_health
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.checks import problems
 from sandmould.scenario.placement import (
     NOMINAL_FRACTION,

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sandmould.engines.guard import Guard, grain_masses_kg, measure_health
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
 from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.outcome import Outcome
 from tests.scenes import tube_scene
 
 R = 0.002

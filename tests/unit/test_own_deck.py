@@ -11,14 +11,14 @@ import yaml
 
 from sandmould.engines.own_deck.deck import check_unchanged, render, with_hashes
 from sandmould.engines.own_deck.thermo import read_thermo
+from sandmould.report.page import write_report
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import collect
 from sandmould.study.expand import expand
 from sandmould.study.kinds import deck
-from sandmould.study.opening import open_study
-from sandmould.study.plan import plan_table, read_run, write_plan, write_study
-from sandmould.study.report.page import write_report
+from sandmould.study.load_study import open_study
+from sandmould.study.plan_files import plan_table, read_run, write_plan, write_study
 
 TEMPLATE = """\
 variable a equal {{ angle_deg }}

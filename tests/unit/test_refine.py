@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from sandmould.study.calibration.asked import Target
-from sandmould.study.calibration.refine import best_guess, chance, design, next_point
-from sandmould.study.emulator import fit_emulator
+from sandmould.statistics.calibration.config import Target
+from sandmould.statistics.calibration.refine import best_guess, chance, design, next_point
+from sandmould.statistics.emulator import fit_emulator
 
 LOW, HIGH = (0.1, 0.0), (0.8, 0.3)
 TARGET = Target(value=25.0, sd=0.3)

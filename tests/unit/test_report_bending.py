@@ -11,16 +11,16 @@ import pytest
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.ledger import LEDGER
 from pattern_fe.scene import pattern_of, with_surface
-from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.report import figures
+from sandmould.report.bending import TIP, bending_pages, deflection_chart
+from sandmould.report.page import write_report
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.verdict import Verdict, judge
 from sandmould.study.collect import Collected, gather
 from sandmould.study.measure import write_exports, write_measures
-from sandmould.study.plan import read_run, write_plan
-from sandmould.study.report import figures
-from sandmould.study.report.bending import TIP, bending_pages, deflection_chart
-from sandmould.study.report.page import write_report
+from sandmould.study.plan_files import read_run, write_plan
 from sandmould.study.run import Run
-from sandmould.study.verdict import Verdict, judge
 from tests.bent_run import SCENE, write_bent_run
 from tests.unit.test_report_page import Page
 

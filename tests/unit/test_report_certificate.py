@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.study.certificate.controls import SHAKE_G, SHAKEN_HZ, cases
+from sandmould.report.page import write_report
+from sandmould.report.robustness import certificate_pages
 from sandmould.study.collect import gather, read_study
-from sandmould.study.plan import write_plan
-from sandmould.study.report.certificate import certificate_pages
-from sandmould.study.report.page import write_report
+from sandmould.study.plan_files import write_plan
+from sandmould.study.robustness.controls import SHAKE_G, SHAKEN_HZ, cases
 from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
 from sandmould.study.run import Run
 from tests.unit.report_study import KEY, scenario, write_run

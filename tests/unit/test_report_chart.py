@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from sandmould.study.report.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
-from sandmould.study.words import (
+from sandmould.report.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
+from sandmould.runs.formatting import (
     listed,
     name_of,
     number,

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from pattern_fe.coupling.verdict import State
+from sandmould.report.coupling_map import FACTOR, LIMIT, MODULUS, SCHEME, coupling_map
 from sandmould.study.collect import Collected
-from sandmould.study.report.coupling_map import FACTOR, LIMIT, MODULUS, SCHEME, coupling_map
 
 WINDOW = "pattern.loop.window_s"
 STATES: dict[str, State] = {

@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from sandmould.report.filling import FillingPages, filling_pages
+from sandmould.report.page import write_report
+from sandmould.statistics.verdict import judge
 from sandmould.study.collect import gather, read_study
-from sandmould.study.report.filling import FillingPages, filling_pages
-from sandmould.study.report.page import write_report
 from sandmould.study.study import Study
-from sandmould.study.verdict import judge
 from tests.unit.report_study import DURATION_S, KEY, scenario, write_study
 
 BEST_HZ = 40.0

@@ -12,11 +12,11 @@ import pytest
 
 from sandmould import ROOT
 from sandmould.engines.snapshot import Snapshot
+from sandmould.report.animation import ABSENT, Film, make_film
+from sandmould.report.figures import cut_m, scene_outline
 from sandmould.study.expand import expand
+from sandmould.study.load_study import open_study
 from sandmould.study.moments import list_moments, nearest
-from sandmould.study.opening import open_study
-from sandmould.study.report.animation import ABSENT, Film, make_film
-from sandmould.study.report.figures import cut_m, scene_outline
 from tests.unit.report_study import write_study
 
 

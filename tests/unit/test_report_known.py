@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.engines.products import Cost
 from sandmould.engines.snapshot import Snapshot
+from sandmould.report.page import write_report
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import Cost
 from sandmould.scenario.box import Box, Plate
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.fill import Fill, Layer
@@ -20,8 +21,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
 from sandmould.study.measure import write_measures
-from sandmould.study.plan import write_plan
-from sandmould.study.report.page import write_report
+from sandmould.study.plan_files import write_plan
 from sandmould.study.run import Run
 
 FRICTION = "contact.grain_grain.friction"

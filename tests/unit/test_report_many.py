@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.report import figures, thinning
+from sandmould.report.page import write_report
+from sandmould.report.thinning import drawn_note, drawn_part, listed_runs, listed_settings
+from sandmould.statistics.verdict import Verdict, judge
 from sandmould.study.collect import Collected
-from sandmould.study.report import figures, many
-from sandmould.study.report.many import drawn_note, drawn_part, listed_runs, listed_settings
-from sandmould.study.report.page import write_report
-from sandmould.study.verdict import Verdict, judge
 from tests.unit.report_study import FAILED, write_study
 
 SETTINGS, REPLICATES = 2_000, 5
@@ -47,9 +47,9 @@ def test_settings_are_drawn_over_the_whole_sweep_with_the_best(
     drawn, part = drawn_part(collected, verdict)
     assert verdict.best in part.settings
     assert verdict.runner_up in part.settings
-    assert len(part.settings) <= many.MOST_SETTINGS
+    assert len(part.settings) <= thinning.MOST_SETTINGS
     assert (part.settings[0], part.settings[-1]) == (verdict.settings[0], verdict.settings[-1])
-    assert len(drawn.summary) == len(part.settings) * REPLICATES <= many.MOST_RUNS
+    assert len(drawn.summary) == len(part.settings) * REPLICATES <= thinning.MOST_RUNS
     assert set(drawn.curves["run"]) == set(drawn.summary["run"])
     # Means are those of all runs.
     assert all(setting in verdict.settings for setting in part.settings)
@@ -61,14 +61,14 @@ def test_settings_are_drawn_over_the_whole_sweep_with_the_best(
 def test_failed_runs_are_listed_before_the_best(found: tuple[Collected, Verdict]) -> None:
     collected, verdict = found
     rows = listed_runs(collected.summary, verdict)
-    assert len(rows) == many.MOST_RUNS
+    assert len(rows) == thinning.MOST_RUNS
     assert set(FAILED_ROWS) <= set(rows.index)
     assert rows.index.is_monotonic_increasing
     best = rows.drop(index=list(FAILED_ROWS))
     rest = collected.summary.drop(index=rows.index)
     assert best["fill"].min() > rest["fill"].max()
     settings = listed_settings(verdict)
-    assert len(settings) == many.MOST_SETTINGS
+    assert len(settings) == thinning.MOST_SETTINGS
     assert verdict.best in settings
     assert all(abs(s.values["frequency_hz"] - 80) < 3 for s in settings)
 
@@ -80,8 +80,8 @@ def test_page_says_what_it_leaves_out(tmp_path: Path, monkeypatch: pytest.Monkey
     whole = (tmp_path / "whole.html").read_text(encoding="utf-8")
     assert "Every run of the plan" in whole
     assert "Charts show" not in whole
-    monkeypatch.setattr(many, "MOST_RUNS", 4)
-    monkeypatch.setattr(many, "MOST_SETTINGS", 2)
+    monkeypatch.setattr(thinning, "MOST_RUNS", 4)
+    monkeypatch.setattr(thinning, "MOST_SETTINGS", 2)
     write_report(study, tmp_path / "part.html")
     part = (tmp_path / "part.html").read_text(encoding="utf-8")
     assert "Listed are 4 of 9 runs" in part

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sandmould.report.chart import Chart
+from sandmould.report.optimum import optimum_pages, with_surface
+from sandmould.report.page import write_report
 from sandmould.study.collect import gather, read_study
-from sandmould.study.report.chart import Chart
-from sandmould.study.report.optimum import optimum_pages, with_surface
-from sandmould.study.report.page import write_report
 from sandmould.study.rounds.decide import next_round
 from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
 from sandmould.study.study import Study

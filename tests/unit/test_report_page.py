@@ -13,9 +13,9 @@ import pandas as pd
 import pytest
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.study.report import figures
-from sandmould.study.report.page import LIMIT_BYTES, write_report
-from sandmould.study.report.sand import _layer_conclusion
+from sandmould.report import figures
+from sandmould.report.page import LIMIT_BYTES, write_report
+from sandmould.report.sand import _layer_conclusion
 from tests.unit.report_study import (
     ENGINES,
     FAILED,

@@ -13,16 +13,16 @@ import pytest
 import yaml
 
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study import drive as driving
+from sandmould.statistics.emulator import TooFewRunsError
+from sandmould.statistics.optimum import Optimum, find_optimum
+from sandmould.statistics.propose import NEAR, propose
+from sandmould.study import run_study as driving
+from sandmould.study.build_plan import announce, open_plan
 from sandmould.study.collect import collect
-from sandmould.study.emulator import TooFewRunsError
 from sandmould.study.expand import expand
-from sandmould.study.opening import open_study
-from sandmould.study.planning import announce, open_plan
+from sandmould.study.load_study import open_study
 from sandmould.study.rounds.decide import next_round, told, why_enough
 from sandmould.study.rounds.ledger import LEDGER, Ledger, basis_of, read_ledger, write_ledger
-from sandmould.study.rounds.optimum import Optimum, find_optimum
-from sandmould.study.rounds.propose import NEAR, propose
 
 FREQUENCY, GRAVITY = "vibration.0.frequency_hz", "vibration.0.acceleration_g"
 FILL = "tube_fill_fraction"

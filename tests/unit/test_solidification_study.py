@@ -16,14 +16,14 @@ from PIL import Image
 from analysis.freezing import freezing
 from sandmould.casting import checkpoint
 from sandmould.casting.arpm import computation
-from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.report.page import write_report
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.collect import collect
 from sandmould.study.expand import expand
-from sandmould.study.opening import open_study
-from sandmould.study.plan import plan_table, read_run, write_plan, write_study
-from sandmould.study.report.page import write_report
+from sandmould.study.load_study import open_study
+from sandmould.study.plan_files import plan_table, read_run, write_plan, write_study
 from sandmould.study.simulate import measure_run, render_run, simulate
 
 SMALL: dict[str, Any] = {

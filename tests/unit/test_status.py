@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.study.build_plan import Plan, open_plan
 from sandmould.study.kinds.sand import planned_work
-from sandmould.study.plan import write_plan
-from sandmould.study.planning import Plan, open_plan
+from sandmould.study.plan_files import write_plan
 from sandmould.study.status import main, run_status, status_text
 
 FREQUENCY = "vibration.0.frequency_hz"

@@ -11,11 +11,11 @@ import pytest
 import yaml
 
 from sandmould import ROOT
+from sandmould.runs.hashing import present, scenario_hash
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.expand import MOST_PROBLEMS, expand, replicate_seed
-from sandmould.study.hashes import present, scenario_hash
-from sandmould.study.opening import open_study
-from sandmould.study.plan import read_run, write_plan
+from sandmould.study.load_study import open_study
+from sandmould.study.plan_files import read_run, write_plan
 from sandmould.study.run import Run
 from tests.bracket import BRACKET
 

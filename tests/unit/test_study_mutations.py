@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.expand import expand
-from sandmould.study.opening import open_study
+from sandmould.study.load_study import open_study
 from sandmould.study.sweep import key_paths, value_at
 
 SCHEMA = json.loads((ROOT / "config" / "schema.json").read_text(encoding="utf-8"))

@@ -17,11 +17,11 @@ from sandmould.engines.program import REST_AFTER_FALL_S, build_program
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.build_plan import announce, open_plan
 from sandmould.study.expand import expand
 from sandmould.study.kinds.sand import planned_steps, planned_work
-from sandmould.study.opening import open_study
-from sandmould.study.plan import plan_table, read_run, write_plan
-from sandmould.study.planning import announce, open_plan
+from sandmould.study.load_study import open_study
+from sandmould.study.plan_files import plan_table, read_run, write_plan
 from sandmould.study.run import RUN_NAME, Run
 
 LAMMPS = ("lammps", 2)
@@ -181,7 +181,7 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
         # scikit-learn and scipy.stats take a second each.
         ("sandmould.study.simulate", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
         ("sandmould.study.batch_job", ("sklearn", "scipy.stats", "snakemake")),
-        ("sandmould.study.planning", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
+        ("sandmould.study.build_plan", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
     ],
 )
 def test_jobs_do_not_wait_for_libraries_of_the_report(module: str, heavy: tuple[str, ...]) -> None:

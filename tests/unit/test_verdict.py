@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.verdict import NOT_TESTED, judge, rank_runs, sand_notes
+from sandmould.statistics.verdict import NOT_TESTED, judge, rank_runs, sand_notes
 
 KEY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"

@@ -20,7 +20,7 @@ from pattern_fe.coupling.opening import open_coupled
 from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
 from pattern_fe.scene import pattern_of, with_surface
 from sandmould.engines.driver import Driver
-from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import _one_thread  # noqa: F401
 from tests.workflow.runs import drive

@@ -19,9 +19,9 @@ from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, mesh_of
 from pattern_fe.supports import Supports
 from sandmould.dem import pairs as pairs_module
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.instep import bed_scene, in_step
 from tests.patterns import _one_thread  # noqa: F401

@@ -15,9 +15,9 @@ from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
 from pattern_fe.coupling.opening import open_coupled
 from pattern_fe.scene import with_surface
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
+from sandmould.runs.outcome import Outcome
 from tests.patterns import _one_thread  # noqa: F401
 from tests.verification.one_grain import RADIUS_M, one_grain_scene
 from tests.wedge import (

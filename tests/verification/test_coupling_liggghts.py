@@ -16,7 +16,7 @@ from sandmould.engines.driver import Driver
 from sandmould.engines.liggghts.bending_mesh import BendingMesh
 from sandmould.engines.liggghts.mesh_files import outline_strips
 from sandmould.engines.liggghts.vtk_stress import TriangleLoads
-from sandmould.engines.outcome import Outcome
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import needs_liggghts
 from tests.patterns import _one_thread  # noqa: F401

@@ -13,9 +13,9 @@ import pytest
 from sandmould.engines.driver import Driver
 from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.lammps.session import LammpsSession, refuse
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.session import RefusedError
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_lammps
 from tests.verification.one_grain import (

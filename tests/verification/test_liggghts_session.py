@@ -10,9 +10,9 @@ import pytest
 from sandmould.engines.guard import grain_masses_kg
 from sandmould.engines.liggghts.grains_file import read_grains
 from sandmould.engines.liggghts.session import LiggghtsSession
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, RefusedError
 from sandmould.engines.step_mover import StepMover
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import (
     RADIUS_M,

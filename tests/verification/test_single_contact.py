@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from sandmould.engines.lammps.session import LammpsSession
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
+from sandmould.runs.outcome import Outcome
 from tests.scenes import open_lammps
 from tests.verification.one_grain import RADIUS_M, one_grain_scene
 

@@ -14,14 +14,14 @@ from pathlib import Path
 
 from sandmould.engines.choosing import engine_of
 from sandmould.engines.driver import Driver
-from sandmould.engines.outcome import RunOutcome
-from sandmould.engines.products import finish
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.outcome import RunOutcome
+from sandmould.runs.products import finish
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.sand import PRODUCTS, complete
-from sandmould.study.plan import write_plan
+from sandmould.study.plan_files import write_plan
 from sandmould.study.run import Run
 from sandmould.study.simulate import render_run
 

@@ -15,11 +15,11 @@ from pattern_fe.coupling.body import Answer
 from pattern_fe.coupling.ledger import LEDGER, read_ledger
 from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.step_counts import StepCounts
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_lammps, tube_scene

@@ -13,10 +13,10 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from sandmould.engines.outcome import Outcome, RunOutcome
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.expand import expand
-from sandmould.study.opening import open_study
-from sandmould.study.plan import write_plan
+from sandmould.study.load_study import open_study
+from sandmould.study.plan_files import write_plan
 from sandmould.study.simulate import measure_run, render_run
 
 FALLING = """\

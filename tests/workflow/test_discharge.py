@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.engines.checkpoint import newest_checkpoint
 from sandmould.engines.driver import Driver
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import Session
+from sandmould.runs.checkpoint import newest_checkpoint
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.placement import NOMINAL_FRACTION, filled_measure
 from sandmould.study.measure import write_measures
 from tests.hopper import (

@@ -10,9 +10,9 @@ import pytest
 
 from sandmould.engines.driver import Driver
 from sandmould.engines.liggghts.render import write_deck
-from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.program import build_program
-from sandmould.study.hashes import scenario_hash
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.outcome import Outcome, RunOutcome
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.workflow.runs import (
     computed,

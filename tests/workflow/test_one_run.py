@@ -13,12 +13,12 @@ import pandas as pd
 import pytest
 
 from sandmould.engines.guard import grain_masses_kg
-from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.launch import _only_one, launch
+from sandmould.study.process import _only_one, launch
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import computed, drive, last_snapshot, run_folder
 

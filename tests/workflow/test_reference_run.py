@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.launch import RESTARTABLE_EXIT
+from sandmould.study.process import RESTARTABLE_EXIT
 from tests.scenes import tube_scene
 from tests.workflow.runs import (
     computed,

@@ -12,7 +12,7 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
-from sandmould.study.report.page import write_report
+from sandmould.report.page import write_report
 from tests.unit.report_study import write_study
 
 pytestmark = pytest.mark.browser

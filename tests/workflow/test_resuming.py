@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 
 from sandmould import ROOT
-from sandmould.engines.checkpoint import newest_checkpoint
 from sandmould.engines.driver import Driver
-from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.program import build_program
+from sandmould.runs.checkpoint import newest_checkpoint
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.expand import expand
-from sandmould.study.hashes import scenario_hash
-from sandmould.study.launch import RESTARTABLE_EXIT
-from sandmould.study.opening import open_study
+from sandmould.study.load_study import open_study
+from sandmould.study.process import RESTARTABLE_EXIT
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import (
     computed,

@@ -81,7 +81,7 @@ def study_folder(folder: Path, study: str) -> Path:
 
 # Two or so runs share a job, and the queue of an empty node is asked more often.
 COMMAND = [
-    sys.executable, "-m", "sandmould.study.drive", "small.yaml",
+    sys.executable, "-m", "sandmould.study.run_study", "small.yaml",
     "--workflow-profile", "profiles/slurm", "--config", "batch_wall_s=8",
     "--slurm-init-seconds-before-status-checks", "1", "--latency-wait", "5",
     "--default-resources", "mem_mb=500", "runtime=5",

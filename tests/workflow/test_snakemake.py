@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from sandmould import ROOT
-from sandmould.engines.outcome import Outcome
+from sandmould.runs.outcome import Outcome
 from sandmould.study.expand import expand
 from sandmould.study.kinds.kind import kind_named, kind_of
-from sandmould.study.opening import open_study
+from sandmould.study.load_study import open_study
 from tests.workflow.runs import kill_at_a_checkpoint
 
 SNAKEMAKE = Path(sys.executable).parent / "snakemake"
@@ -135,7 +135,7 @@ def test_one_command_computes_a_sweep_and_its_rounds(checkout: Path) -> None:
         + "sweep: {keys: {vibration.0.frequency_hz: [25, 50, 100, 200]}}\n"
         "refine: {rounds: 1, runs: 2}\n"
     )
-    command = [sys.executable, "-m", "sandmould.study.drive", str(study), "--cores", "2"]
+    command = [sys.executable, "-m", "sandmould.study.run_study", str(study), "--cores", "2"]
     ran = subprocess.run(command, cwd=checkout, capture_output=True, text=True, timeout=300)
     assert ran.returncode == 0, ran.stderr
     assert "Round 1 of at most 1: best so far is frequency" in ran.stderr

@@ -5,7 +5,7 @@ import sys
 
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.batches import alone
-from sandmould.study.planning import RESULTS, announce, open_plan, study_path
+from sandmould.study.build_plan import RESULTS, announce, open_plan, study_path
 from sandmould.study.run import RUN_NAME
 
 OVERRIDES = dict(workflow.config_settings.config)

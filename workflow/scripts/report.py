@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from sandmould.report.page import write_report
 from sandmould.study.job_log import to_log
-from sandmould.study.report.page import write_report
 
 with to_log(snakemake.log[0]):
     write_report(Path(snakemake.input.summary).parent, Path(snakemake.output.html))

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sandmould.study.launch import launch
+from sandmould.study.process import launch
 
 launch(
     Path(snakemake.input.scenario).parent,

@@ -20,9 +20,9 @@ from sandmould.casting.arpm.solidification import Progress as Cooled
 from sandmould.casting.arpm.solidification import Solidification as Found
 from sandmould.casting.checkpoint import Checkpoint
 from sandmould.casting.hashing import hash_with
-from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.engines.products import Computed, Cost, peak_memory_bytes
-from sandmould.engines.progress import Progress
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import Computed, Cost, peak_memory_bytes
+from sandmould.runs.progress import Progress
 from sandmould.scenario.solidification import Solidification
 
 PRODUCTS = ("series.tsv", "fields.npz")

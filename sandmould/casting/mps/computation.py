@@ -19,9 +19,9 @@ from sandmould.casting.mps.flow import EscapedError, Flow
 from sandmould.casting.mps.flow import Progress as Flowed
 from sandmould.casting.mps.pressure import ClosedRegionError
 from sandmould.casting.mps.record import OF_FLUID, Record
-from sandmould.engines.outcome import Outcome, RunOutcome
-from sandmould.engines.products import Computed, Cost, peak_memory_bytes
-from sandmould.engines.progress import Progress
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import Computed, Cost, peak_memory_bytes
+from sandmould.runs.progress import Progress
 from sandmould.scenario.flow import MetalFlow, StillTank
 
 PRODUCTS = ("series.tsv", "fields.npz")

@@ -17,11 +17,11 @@ from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.render import needs_callback, surfaces
 from sandmould.engines.lammps.wall_loads import WallLoads
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program
 from sandmould.engines.session import Array, EngineStop, RefusedError, Shared, engine_stop
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 
 if TYPE_CHECKING:

@@ -23,10 +23,10 @@ from sandmould.engines.liggghts.process import (
 from sandmould.engines.liggghts.refusals import refuse
 from sandmould.engines.liggghts.render import atoms_data, surface_meshes
 from sandmould.engines.liggghts.vtk_stress import TriangleLoads, read_triangle_loads
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program
 from sandmould.engines.session import Array, EngineStop, RefusedError, engine_stop
 from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.outcome import Outcome
 
 _LOOP = re.compile(r"^label settling_\d+$.*^label settled_\d+$\n", re.M | re.S)
 _VALUE = re.compile(r"^value (\S+)$", re.M)

@@ -13,7 +13,6 @@ import pandas as pd
 
 from sandmould.engines.choosing import engine_module
 from sandmould.engines.lammps.session import load_library
-from sandmould.engines.outcome import Outcome, RunOutcome
 from sandmould.engines.own_deck.deck import (
     RESTART_FILES,
     check_unchanged,
@@ -22,9 +21,10 @@ from sandmould.engines.own_deck.deck import (
 )
 from sandmould.engines.own_deck.programs import RUN_ON
 from sandmould.engines.own_deck.thermo import STEP, read_thermo
-from sandmould.engines.products import Computed, Cost, cpu_time_s, peak_memory_bytes
-from sandmould.engines.progress import LINE_EVERY_S, Progress
 from sandmould.engines.session import EngineStop
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_bytes
+from sandmould.runs.progress import LINE_EVERY_S, Progress
 from sandmould.scenario.own_deck import CLOCK, OwnDeck
 
 OUTPUT = "output"

@@ -10,8 +10,8 @@ from typing import Any
 
 from sandmould.engines.lammps.session import load_library
 from sandmould.engines.liggghts.process import Conversation, LiggghtsDied, executable
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.session import EngineStop, engine_stop
+from sandmould.runs.outcome import Outcome
 
 
 def run_on_lammps(folder: Path, deck: str, log: Path) -> None:

@@ -12,13 +12,13 @@ import numpy as np
 from sandmould.dem import source_hash
 from sandmould.dem.solver import NotANumberError
 from sandmould.engines.box_motion import displacements
-from sandmould.engines.outcome import Outcome
 from sandmould.engines.program import Program
 from sandmould.engines.reference.model import grains_of, scene_of, solver_of
 from sandmould.engines.session import Array, EngineStop, RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.staged_session import StagedSession
 from sandmould.engines.step_mover import StepMover
+from sandmould.runs.outcome import Outcome
 
 
 class ReferenceSession(StagedSession):

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from sandmould.study.calibration.sands import Calibrated, calibrate, write_materials
+from sandmould.statistics.calibration.sands import Calibrated, calibrate, write_materials
 from sandmould.study.collect import gather, read_study
-from sandmould.study.plan import read_run
+from sandmould.study.plan_files import read_run
 from sandmould.study.study import Study
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 
 from sandmould.casting.mps import computation, scene
 from sandmould.casting.mps.measured import by_window, measure_flow
-from sandmould.engines.outcome import RunOutcome
+from sandmould.runs.outcome import RunOutcome
 from sandmould.scenario.flow import MetalFlow, StillTank
 from sandmould.study.kinds import own_solver
 from sandmould.study.kinds.kind import SpeedClass
@@ -92,7 +92,7 @@ def plan_cells(scenario: MetalFlow) -> Mapping[str, str]:
 
 def measure(run: Run, folder: Path) -> None:
     """Write the measures against time, those of the whole run in every row, and the picture."""
-    from sandmould.study.report.flow_figure import draw_last
+    from analysis.flow_plots import draw_last
 
     scenario: MetalFlow = run.scenario
     outcome = RunOutcome.read(folder / "outcome.json")

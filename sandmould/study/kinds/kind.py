@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from sandmould.engines.products import Computed, Cost
+from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.own_deck import OwnDeck

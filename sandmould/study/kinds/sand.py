@@ -15,15 +15,15 @@ from typing import Any
 import pattern_fe
 from sandmould.engines import choosing, recording
 from sandmould.engines.driver import Driver, Opening
-from sandmould.engines.products import SAND_PRODUCTS, Computed, Cost
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop, Session
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.products import SAND_PRODUCTS, Computed, Cost
 from sandmould.scenario import checks
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, with_hash
-from sandmould.study.hashes import scenario_hash
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.run import Run
 

@@ -92,7 +92,7 @@ def plan_cells(scenario: Solidification) -> Mapping[str, str]:
 
 def measure(run: Run, folder: Path) -> None:
     """Write the measures against time, those of the whole run in every row, and the picture."""
-    from sandmould.study.report.freezing_figure import draw_freezing
+    from analysis.freezing_plots import draw_freezing
 
     series = pd.read_csv(folder / "series.tsv", sep="\t")
     _, _, heat_column = scene.series_columns(run.scenario)

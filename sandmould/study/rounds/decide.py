@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import pandas as pd
 
-from sandmould.study.certificate.asked import round_best_hz
-from sandmould.study.emulator import TooFewRunsError
-from sandmould.study.rounds.asked import Refinement
+from sandmould.runs.formatting import listed, name_of, number, unit_of
+from sandmould.statistics.emulator import TooFewRunsError
+from sandmould.statistics.optimum import Optimum, find_optimum
+from sandmould.statistics.propose import propose
+from sandmould.study.robustness.config import round_best_hz
+from sandmould.study.rounds.config import Refinement
 from sandmould.study.rounds.ledger import Ledger, Round
-from sandmould.study.rounds.optimum import Optimum, find_optimum
-from sandmould.study.rounds.propose import propose
 from sandmould.study.study import Study
-from sandmould.study.words import listed, name_of, number, unit_of
+from sandmould.study.sweep import is_whole
 
 
 def next_runs(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
@@ -54,7 +55,7 @@ def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[s
     if ended:
         return replace(ledger, ended=ended)
     one = Round(
-        tuple(propose(optimum, summary, refine.runs, seed=done)),
+        tuple(propose(optimum, summary, refine.runs, done, [k for k in keys if is_whole(k)])),
         optimum.setting,
         {key: optimum.interval(key) for key in keys},
         spent_h,

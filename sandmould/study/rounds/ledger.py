@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sandmould.runs.hashing import present
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.hashes import present
 from sandmould.study.study import Study
 from sandmould.study.sweep import Point
 

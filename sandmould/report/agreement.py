@@ -1,0 +1,170 @@
+"""The report's section on settings that should agree: table, intervals against margins, speeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from sandmould.report.chart import PLAIN, Chart, Mark, Tint
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.runs.formatting import listed, name_of, number, seconds, titled
+from sandmould.statistics.agreement import (
+    Compared,
+    agreement_sentences,
+    interval_text,
+    speeds,
+)
+from sandmould.study.collect import Collected, compare_study
+from sandmould.study.study import Study
+
+_TINTS = {
+    "equivalent": Tint("#00694b", "#5fd0a5"),
+    "different": Tint("#b3261e", "#ff9d94"),
+    "not resolved": Tint("#9a5b00", "#f0b35a"),
+}
+_LONGEST = 40
+"""Characters of a row's name that a phone's width takes."""
+
+
+@dataclass(frozen=True)
+class AgreementPages:
+    """What the section shows."""
+
+    sentences: tuple[str, ...]
+    sound: bool
+    """Whether all settings agree within the margins."""
+    is_question: bool
+    """Whether the study was made to compare, so that its report begins with the answer."""
+    table: Table
+    charts: tuple[Chart, ...]
+    """One a measure."""
+    speeds: Table | None
+    """Only where several engines computed."""
+    percent: str
+    over: str
+    """Keys that comparisons are averaged over; empty where none is."""
+
+
+def agreement_pages(collected: Collected, study: Study) -> AgreementPages | None:
+    """Draw the comparisons of a study.
+
+    Parameters
+    ----------
+    collected : Collected
+    study : Study
+
+    Returns
+    -------
+    AgreementPages or None
+        None where the study compares nothing.
+    """
+    compared = compare_study(collected.summary, collected.keys, study)
+    if not compared:
+        return None
+    confidence = study.equivalence.confidence
+    percent = f"{100 * confidence:g} %"
+    return AgreementPages(
+        sentences=agreement_sentences(compared, confidence),
+        sound=all(c.agreement.judged == "equivalent" for c in compared),
+        is_question=bool(study.equivalence.keys),
+        table=_table(compared, percent),
+        charts=tuple(_chart([c for c in compared if c.measure == m])
+                     for m in dict.fromkeys(c.measure for c in compared)),
+        speeds=_speed_table(collected.summary),
+        percent=percent,
+        over=listed([name_of(key) for key in study.equivalence.over]),
+    )  # fmt: skip
+
+
+def _table(compared: Sequence[Compared], percent: str) -> Table:
+    columns = (
+        Column("measure", False),
+        Column("compared", False),
+        *map(Column, ("first", "second", "difference", f"{percent} interval", "margin", "n")),
+        Column("verdict", False),
+    )
+    rows, marked = [], []
+    for c in compared:
+        found = c.agreement
+        where = f"{c.pair}, {c.at}" if c.at else c.pair
+        cells = (*found.means, found.difference)
+        rows.append(
+            (
+                Cell(name_of(c.measure), c.measure),
+                Cell(where, where),
+                *(Cell(number(v, d), str(v)) for v, d in zip(cells, (4, 4, 2), strict=True)),
+                Cell(interval_text(found), str(found.ci[0])),
+                Cell(f"±{found.margin:g}", str(found.margin)),
+                Cell(f"{found.n}{' pairs' if found.paired else ''}", str(found.n)),
+                Cell(found.judged, found.judged, note=found.why),
+            )
+        )
+        marked.append(found.judged != "equivalent")
+    return Table(columns, tuple(rows), tuple(marked))
+
+
+def _chart(compared: Sequence[Compared]) -> Chart:
+    """Intervals of one measure in rows, with the margins shaded."""
+    margin = compared[0].agreement.margin
+    marks = [
+        Mark(
+            c.agreement.difference,
+            row,
+            "mean",
+            _TINTS.get(c.agreement.judged, PLAIN),
+            (c.agreement.ci[1] - c.agreement.ci[0]) / 2,
+            f"{c.pair}: {number(c.agreement.difference, 2)}, {c.agreement.judged}",
+        )
+        for row, c in enumerate(compared)
+        if math.isfinite(c.agreement.difference)
+    ]
+    said = [
+        f"{c.pair}{f' at {c.at}' if c.at else ''}: {number(c.agreement.difference, 2)}, "
+        f"{interval_text(c.agreement)}, {c.agreement.judged}"
+        for c in compared
+    ]
+    what = titled(compared[0].measure)
+    return Chart(
+        f"difference in {what}",
+        "",
+        f"Differences in {what} against a margin of {margin:g}. {'; '.join(said)}.",
+        marks=tuple(marks),
+        rows=tuple(row_name(c) for c in compared),
+        band=(-margin, margin),
+    )
+
+
+def row_name(compared: Compared) -> str:
+    """Name of a pair with its verdict, short enough for a phone."""
+    name = f"{compared.pair}, {compared.at}" if compared.at else compared.pair
+    if len(name) > _LONGEST and compared.at:
+        name = f"{compared.pair}, {compared.at_values}"
+    name = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
+    return f"{name}: {compared.agreement.judged}"
+
+
+def _speed_table(summary: pd.DataFrame) -> Table | None:
+    rows = speeds(summary)
+    if len(rows) < 2:
+        return None
+    columns = (
+        Column("engine", False),
+        *map(Column, ("version", "runs", "grain-steps/s, median", "wall time a run, median",
+                      "speed over the slowest")),
+    )  # fmt: skip
+    slowest = min(s.grain_steps_per_s for s in rows)
+    cells = tuple(
+        (
+            Cell(s.engine, s.engine),
+            Cell(s.version, s.version),
+            Cell(str(s.runs), str(s.runs)),
+            Cell(f"{number(s.grain_steps_per_s / 1e6)} M", str(s.grain_steps_per_s)),
+            Cell(seconds(s.wall_s), str(s.wall_s)),
+            Cell(number(s.grain_steps_per_s / slowest, 2), str(s.grain_steps_per_s)),
+        )
+        for s in rows
+    )
+    return Table(columns, cells, (False,) * len(cells))

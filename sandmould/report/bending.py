@@ -1,0 +1,263 @@
+"""What the report of runs that bend a pattern shows: deflection, loop, verdicts, shapes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pandas as pd
+
+from pattern_fe.coupling.verdict import LoopVerdict, study_sentence
+from sandmould.report.bending_figure import draw_outlines
+from sandmould.report.chart import Area, Chart
+from sandmould.report.coupling_map import CouplingMap, coupling_map
+from sandmould.report.curves import runs_of, setting_tints, time_chart
+from sandmould.report.ledger_charts import LedgerChart, ledger_charts
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.thinning import drawn_part, listed_runs
+from sandmould.runs.formatting import number, setting_text
+from sandmould.runs.outcome import Outcome
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.verdict import Verdict
+from sandmould.study.bending import ledger_of, verdict_of
+from sandmould.study.collect import Collected
+
+TIP = "pattern_tip_deflection_m"
+ROJEK = (
+    "Rojek et al. (2004, section 4.3) state of their L, in experiment and computation: filling "
+    "distorts it and leaves loose sand below its horizontal part; vibration lets sand flow in "
+    "there, and the distortion is then slightly reduced. They print no sizes and no numbers."
+)
+_RECOVERS = 0.02
+"""Share of the deflection that must come back before the page says so."""
+
+
+@dataclass(frozen=True)
+class BendingPages:
+    """What the section on the pattern shows."""
+
+    sentences: tuple[str, ...]
+    deflection: Chart | None
+    outlines: str
+    """Picture; empty where the shown run has no shape."""
+    outlines_note: str
+    map: CouplingMap | None
+    ledger: tuple[LedgerChart, ...]
+    shown_run: str
+    runs: Table
+    paper: str = ROJEK
+
+
+def bending_pages(
+    study_folder: Path,
+    href: str,
+    scenario: Scenario,
+    collected: Collected,
+    verdict: Verdict,
+    shown: str,
+) -> BendingPages:
+    """Draw what a study shows of its pattern.
+
+    Parameters
+    ----------
+    study_folder : Path
+    href : str
+        Address of that folder, seen from the report.
+    scenario : Scenario
+        Of the run that is shown.
+    collected : Collected
+    verdict : Verdict
+    shown : str
+        Name of that run.
+    """
+    found: dict[str, LoopVerdict] = {}
+    for run in collected.summary["run"]:
+        judged = verdict_of(study_folder / "runs" / str(run))
+        if judged is not None:
+            found[str(run)] = judged
+    curves = collected.curves
+    own = curves[curves["run"] == shown] if TIP in curves else curves.iloc[:0]
+    picture, note = draw_outlines(study_folder / "runs" / shown, scenario)
+    ledger = ledger_of(study_folder / "runs" / shown)
+    return BendingPages(
+        sentences=(study_sentence(list(found.values())), *_told(own, found.get(shown), scenario)),
+        deflection=deflection_chart(collected, verdict),
+        outlines=picture,
+        outlines_note=note,
+        map=coupling_map(collected, {run: v.state for run, v in found.items()}),
+        ledger=() if ledger is None else ledger_charts(ledger, _begins_s(own)),
+        shown_run=shown,
+        runs=_runs_table(study_folder, href, collected, verdict, found),
+    )
+
+
+def _begins_s(rows: pd.DataFrame) -> float:
+    """Time at which vibration begins; that of the end of a run without it."""
+    shaken = rows[rows["vibration_time_s"] >= 0.0]
+    times = (shaken if len(shaken) else rows.iloc[::-1])["time_s"]
+    return float(times.iloc[0]) if len(times) else 0.0
+
+
+def _told(rows: pd.DataFrame, verdict: LoopVerdict | None, scenario: Scenario) -> tuple[str, ...]:
+    """What became of the tip and of the sand under the pattern in the run that is shown."""
+    if rows.empty:
+        return ()
+    said = []
+    if verdict is not None:
+        said.append(f"The run shown: {verdict.sentence[0].lower()}{verdict.sentence[1:]}")
+    shaken = rows[rows["vibration_time_s"] >= 0.0]
+    first = shaken.iloc[0] if len(shaken) else rows.iloc[-1]
+    last = rows.iloc[-1]
+    said.append(f"Its tip had sunk by {_mm(first[TIP])} mm when the box was filled{_under(first)}.")
+    if scenario.vibration and len(shaken) > 1:
+        back = 1.0 - last[TIP] / first[TIP] if first[TIP] else 0.0
+        way = "hardly moved it"
+        if abs(back) > _RECOVERS:
+            way = "gave back a part of it" if back > 0.0 else "bent it farther"
+        like = "as the paper states" if back > _RECOVERS else "other than the paper states"
+        if verdict is None or verdict.state != "holds":
+            like = "by a loop that does not hold"
+        said.append(
+            f"{last['vibration_time_s']:.3g} s of vibration {way}, {like}: "
+            f"{_mm(last[TIP])} mm at the end{_under(last)}."
+        )
+    return tuple(said)
+
+
+def _under(row: pd.Series[Any]) -> str:
+    """How full the space under the pattern was."""
+    under, bed = row.get("pattern_under_fraction", math.nan), row["solid_fraction"]
+    if not math.isfinite(under):
+        return ""
+    return (
+        f"; {100 * under:.0f} % of the space under it was sand, of the whole bed {100 * bed:.0f} %"
+    )
+
+
+def _mm(length_m: float) -> str:
+    return number(1e3 * length_m)
+
+
+def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
+    """Deflection of the tip over the whole run, clocks set to the start of vibration.
+
+    Parameters
+    ----------
+    collected : Collected
+    verdict : Verdict
+
+    Returns
+    -------
+    Chart or None
+        Each run thin, the mean of each setting thick, between its least and greatest run an area.
+    """
+    drawn, part = drawn_part(collected, verdict)
+    if TIP not in drawn.curves:
+        return None
+    parts = []
+    for _, rows in drawn.curves.groupby("run"):
+        shift_s = _begins_s(rows) if (rows["vibration_time_s"] >= 0.0).any() else 0.0
+        parts.append(rows.assign(time_s=rows["time_s"] - shift_s, vibration_time_s=-1.0))
+    aligned = pd.concat(parts)
+    chart = time_chart(aligned, drawn.summary, part, collected.keys, TIP)
+    if chart is None:
+        return None
+    tint = setting_tints(part, collected.keys)
+    areas = []
+    for setting in part.settings:
+        rows = runs_of(drawn.summary, setting)
+        finished = rows.loc[rows["outcome_code"] == int(Outcome.FINISHED), "run"]
+        area = _area(aligned[aligned["run"].isin(finished)])
+        if area is not None:
+            said = f"{setting.label}: from the least to the greatest of {len(finished)} runs"
+            areas.append(replace(area, tint=tint[setting.label], title=said))
+    clock = (
+        "time since vibration began, s"
+        if (collected.curves["vibration_time_s"] >= 0).any()
+        else "time, s"
+    )
+    return replace(chart, x_title=clock, y_title="deflection of the tip, mm", areas=tuple(areas))
+
+
+def _area(curves: pd.DataFrame) -> Area | None:
+    """Least and greatest of some runs while all of them go on."""
+    runs = [rows[["time_s", TIP]].dropna().to_numpy() for _, rows in curves.groupby("run")]
+    runs = [xy for xy in runs if len(xy)]
+    if len(runs) < 2:
+        return None
+    start, end = max(xy[0, 0] for xy in runs), min(xy[-1, 0] for xy in runs)
+    x = runs[0][:, 0]
+    x = x[(x >= start) & (x <= end)]
+    if len(x) < 2:
+        return None
+    y = 1e3 * np.array([np.interp(x, xy[:, 0], xy[:, 1]) for xy in runs])
+    return Area(x, y.min(axis=0), y.max(axis=0))
+
+
+_COLUMNS = (
+    ("residual", "pattern_residual_fraction", 1e2, "%"),
+    ("tip filled", "pattern_tip_filled_m", 1e3, "mm"),
+    ("tip at end", TIP, 1e3, "mm"),
+    ("largest distance", "pattern_distance_largest_m", 1e3, "mm"),
+    ("its RMS", "pattern_distance_rms_m", 1e3, "mm"),
+    ("outside engine", "pattern_outside_fraction", 1e2, "%"),
+)
+
+
+def _runs_table(
+    study_folder: Path,
+    href: str,
+    collected: Collected,
+    verdict: Verdict,
+    found: Mapping[str, LoopVerdict],
+) -> Table:
+    """Verdict, numbers at the last snapshot and files of every run."""
+    columns = (
+        *(Column(title, False) for title in ("run", *(["setting"] if collected.keys else []))),
+        Column("loop", False),
+        *(Column(f"{title}, {unit}") for title, _, _, unit in _COLUMNS),
+        Column("surface", False),
+        Column("solid", False),
+    )
+    last = {str(run): rows.iloc[-1] for run, rows in collected.curves.groupby("run")}
+    rows, marked = [], []
+    for planned in listed_runs(collected.summary, verdict).to_dict("records"):
+        run = str(planned["run"])
+        judged, measures = found.get(run), last.get(run, pd.Series(dtype=np.float64))
+        setting = setting_text({key: planned[key] for key in collected.keys})
+        rows.append(
+            (
+                Cell(run, run),
+                *([Cell(setting, setting)] if collected.keys else []),
+                _loop_cell(judged),
+                *(_value_cell(measures.get(name), factor) for _, name, factor, _ in _COLUMNS),
+                *(_file_cell(study_folder, href, run, suffix) for suffix in ("vtu", "stl")),
+            )
+        )
+        marked.append(judged is None or judged.state != "holds")
+    return Table(columns, tuple(rows), tuple(marked))
+
+
+def _loop_cell(verdict: LoopVerdict | None) -> Cell:
+    if verdict is None:
+        return Cell("–", "")
+    told = verdict.sentence.split(": ", 1)[1]
+    return Cell(verdict.state, verdict.state, note=told[0].upper() + told[1:])
+
+
+def _value_cell(value: Any, factor: float) -> Cell:
+    x = math.nan if value is None else factor * float(value)
+    return Cell(number(x), str(x))
+
+
+def _file_cell(study_folder: Path, href: str, run: str, suffix: str) -> Cell:
+    """Link to the pattern's shape at the end of a run."""
+    name = f"pattern_final.{suffix}"
+    if not (study_folder / "runs" / run / "exports" / name).is_file():
+        return Cell("–", "")
+    return Cell(suffix.upper(), name, f"{href}runs/{quote(run)}/exports/{name}")

@@ -1,0 +1,121 @@
+"""The map of a coupled study: verdicts over modulus and relaxation, beside the predicted limit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pattern_fe.coupling.verdict import State
+from sandmould.report.figures import png
+from sandmould.runs.formatting import name_of, setting_text
+from sandmould.study.collect import Collected
+
+MODULUS, FACTOR = "pattern.young_modulus_pa", "pattern.loop.factor"
+SCHEME = "pattern.loop.scheme"
+LIMIT = "pattern_predicted_limit"
+SIGNS: dict[State, tuple[str, str]] = {
+    "holds": ("o", "#009E73"), "lags": ("s", "#56B4E9"), "cycles": ("^", "#E69F00"),
+    "diverged": ("X", "#D55E00"),
+}  # fmt: skip
+"""Markers, and colours that anyone can tell apart."""
+STABLE: tuple[State, ...] = ("holds", "lags")
+_COLUMNS = 4
+_LINE = "0.25"
+
+
+@dataclass(frozen=True)
+class CouplingMap:
+    """The picture, and how many verdicts the prediction gets right."""
+
+    picture: str
+    """A ``data:`` address."""
+    sentence: str
+
+
+def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingMap | None:
+    """Draw verdicts and predicted limits, a panel for each setting of the other swept keys.
+
+    Parameters
+    ----------
+    collected : Collected
+    states : mapping of run to state
+        Of the runs that can be judged.
+
+    Returns
+    -------
+    CouplingMap or None
+        None unless modulus and fixed share are swept and predictions are known.
+    """
+    keys, curves = collected.keys, collected.curves
+    if not {MODULUS, FACTOR} <= set(keys) or LIMIT not in curves:
+        return None
+    run = collected.summary["run"].astype(str)
+    # Of the snapshots: the summary has none of a run that was stopped.
+    limit = run.map(curves.groupby(curves["run"].astype(str))[LIMIT].last())
+    rows = collected.summary.assign(**{"state": run.map(states), LIMIT: limit})
+    rows = rows[rows["state"].isin(list(SIGNS)) & limit.notna()]
+    if SCHEME in keys:
+        rows = rows[rows[SCHEME] == "fixed"]
+    if rows.empty:
+        return None
+    others = [key for key in keys if key not in (MODULUS, FACTOR, SCHEME)]
+    panels = list(rows.groupby(others)) if others else [((), rows)]
+    columns = min(_COLUMNS, len(panels))
+    lines = math.ceil(len(panels) / columns)
+    figure = Figure(figsize=(2.6 * columns + 0.6, 2.6 * lines + 0.8), dpi=110, layout="constrained")
+    grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    for axes in grid.ravel()[len(panels) :]:
+        axes.set_axis_off()
+    for axes, (values, part) in zip(grid.ravel(), panels, strict=False):
+        _draw(axes, part)
+        named = zip(others, values, strict=True)
+        title = [f"{name_of(key)} {setting_text({key: value})}" for key, value in named]
+        axes.set_title("\n".join(title), fontsize=8)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("share of the residual")
+    for axes in grid[-1]:
+        axes.set_xlabel("Young's modulus, Pa")
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=5, frameon=False)
+    return CouplingMap(png(figure), _told(rows))
+
+
+def _draw(axes: Axes, part: pd.DataFrame) -> None:
+    """One panel."""
+    limit = part.groupby(MODULUS)[LIMIT].median()
+    axes.plot(limit.index, limit, color=_LINE, lw=1.4)
+    for state, (marker, colour) in SIGNS.items():
+        own = part[part["state"] == state]
+        axes.plot(own[MODULUS], own[FACTOR], marker, color=colour, ms=7, mec="white", mew=0.6)
+    axes.set(xscale="log", yscale="log")
+    axes.margins(0.12)
+    axes.grid(alpha=0.3)
+
+
+def _legend() -> list[Line2D]:
+    signs = [
+        Line2D([], [], ls="", marker=marker, color=colour, ms=7, label=state)
+        for state, (marker, colour) in SIGNS.items()
+    ]
+    return [*signs, Line2D([], [], color=_LINE, lw=1.4, label="predicted limit")]
+
+
+def _told(rows: pd.DataFrame) -> str:
+    """How good the prediction is: its verdicts, right and wrong either way."""
+    below, stable = rows[FACTOR] < rows[LIMIT], rows["state"].isin(STABLE)
+    wrong = [
+        f"{int(count.sum())} {what}"
+        for count, what in (
+            (below & ~stable, "called safe that cycle or diverge"),
+            (~below & stable, "called unsafe that hold or lag"),
+        )
+        if count.any()
+    ]
+    rest = f": {' and '.join(wrong)}" if wrong else ""
+    right = int((below == stable).sum())
+    return f"The limit predicted before the runs is right in {right} of {len(rows)}{rest}."

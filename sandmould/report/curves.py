@@ -1,0 +1,314 @@
+"""Charts of a study: a measure against time of every run, the objective against the settings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sandmould.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
+from sandmould.runs.formatting import name_of, number, shown_scale, titled, value_text, with_margin
+from sandmould.runs.outcome import Outcome
+from sandmould.statistics.settings import Setting
+from sandmould.statistics.verdict import Verdict, finished_values
+from sandmould.study.collect import Collected
+from sandmould.study.study import Study
+
+_POINTS = 12_000
+"""Points of all curves of one chart; more would only make the page heavy."""
+_MOST_LABELS = 18
+_MOST_ROWS = 30
+
+
+def setting_tints(verdict: Verdict, keys: Sequence[str]) -> dict[str, Tint]:
+    """Colour of each setting by label: a run of colours along a scale, else one for each."""
+    n = len(verdict.settings)
+    if len(keys) == 1 and _on_a_scale(verdict, keys[0]):
+        return dict(zip((s.label for s in verdict.settings), tints(n, True), strict=True))
+    if n <= 7:
+        return dict(zip((s.label for s in verdict.settings), tints(n, False), strict=True))
+    best = verdict.best.label if verdict.best else ""
+    return {s.label: tints(1, False)[0] if s.label == best else PLAIN for s in verdict.settings}
+
+
+def reported_lines(study: Study, key: str, low: float, high: float) -> list[Line]:
+    """Upright lines where others found the best value of the swept key."""
+    return [
+        Line(
+            np.array([[one.value, low], [one.value, high]]), PLAIN,
+            label=value_text(key, one.value), title=f"best by {one.by}",
+        )
+        for one in study.objective.reported_best
+    ]  # fmt: skip
+
+
+def _on_a_scale(verdict: Verdict, key: str) -> bool:
+    values = [s.values[key] for s in verdict.settings]
+    return all(_is_number(v) for v in values) and len(values) > 1
+
+
+def _is_number(value: Any) -> bool:
+    return (
+        isinstance(value, int | float | np.number)
+        and not isinstance(value, bool)
+        and math.isfinite(value)
+    )
+
+
+def runs_of(summary: pd.DataFrame, setting: Setting) -> pd.DataFrame:
+    """Rows of the summary at one setting."""
+    chosen = pd.Series(True, index=summary.index)
+    for key, value in setting.values.items():
+        chosen &= summary[key].isna() if pd.isna(value) else summary[key] == value
+    return summary[chosen]
+
+
+def time_chart(
+    curves: pd.DataFrame, summary: pd.DataFrame, verdict: Verdict, keys: Sequence[str], measure: str
+) -> Chart | None:
+    """A measure against the time of vibration: thin for each run, thick for a setting's mean.
+
+    Parameters
+    ----------
+    curves, summary : DataFrame
+        From :func:`sandmould.study.collect.collect`.
+    verdict : Verdict
+    keys : sequence of str
+    measure : str
+        A column of ``curves``.
+
+    Returns
+    -------
+    Chart or None
+        None where no run has the measure during vibration.
+    """
+    if measure not in curves or not curves[measure].notna().any():
+        return None
+    shaken = curves[curves["vibration_time_s"] >= 0]
+    clock = "vibration_time_s" if len(shaken) else "time_s"
+    shown = shaken if len(shaken) else curves
+    factor, what = shown_scale(measure)
+    by_run = {str(run): rows for run, rows in shown.groupby("run")}
+    stride = max(1, len(shown) // _POINTS)
+    colour = setting_tints(verdict, keys)
+    labelled = _labelled(verdict)
+    lines: list[Line] = []
+    means: list[Line] = []
+    for setting in verdict.settings:
+        rows = runs_of(summary, setting)
+        tint = colour[setting.label]
+        finished: list[NDArray[np.float64]] = []
+        for run, code, outcome in rows[["run", "outcome_code", "outcome"]].itertuples(index=False):
+            if str(run) not in by_run:
+                continue
+            xy = by_run[str(run)][[clock, measure]].to_numpy(dtype=np.float64)
+            xy = xy * [1.0, factor]
+            ended = "" if code == int(Outcome.FINISHED) else f", {outcome}"
+            lines.append(Line(_thinned(xy, stride), tint, title=f"{run}: {setting.label}{ended}"))
+            if not ended:
+                finished.append(xy[np.isfinite(xy).all(axis=1)])
+        mean = _mean_curve(finished)
+        if mean is not None:
+            label = setting.label if setting.label in labelled else ""
+            many = f"{setting.label}, mean of {len(finished)}"
+            means.append(Line(_thinned(mean, stride), tint, True, label, many))
+    when = "time of vibration, s" if clock == "vibration_time_s" else "time, s"
+    return Chart(when, what, _alt(what, when, means), tuple(lines + means))
+
+
+def _labelled(verdict: Verdict) -> set[str]:
+    """Settings named in the chart: all, or of too many the ends and the two best."""
+    if len(verdict.settings) <= _MOST_LABELS:
+        return {s.label for s in verdict.settings}
+    chosen = [verdict.settings[0], verdict.settings[-1], verdict.best, verdict.runner_up]
+    return {s.label for s in chosen if s is not None}
+
+
+def _thinned(xy: NDArray[np.float64], stride: int) -> NDArray[np.float64]:
+    """Every so many points, the last one kept."""
+    return np.concatenate([xy[:-1:stride], xy[-1:]])
+
+
+def _mean_curve(curves: Sequence[NDArray[np.float64]]) -> NDArray[np.float64] | None:
+    """Mean of curves at the times of the first, as far as all of them reach."""
+    curves = [c for c in curves if len(c)]
+    if not curves:
+        return None
+    start, end = max(c[0, 0] for c in curves), min(c[-1, 0] for c in curves)
+    time = curves[0][:, 0]
+    # times of replicates differ by a step of the engine, never by an interval
+    slack = 1e-3 * (end - start)
+    time = time[(time >= start - slack) & (time <= end + slack)]
+    values = np.mean([np.interp(time, c[:, 0], c[:, 1]) for c in curves], axis=0)
+    return np.column_stack([time, values])
+
+
+def _alt(what: str, when: str, means: Sequence[Line]) -> str:
+    ends = "; ".join(
+        f"{m.title} ends at {number(m.xy[-1, 1])}" for m in means[:_MOST_LABELS] if len(m.xy)
+    )
+    return f"Curves of {what} against {when}. {ends}."
+
+
+def objective_charts(
+    summary: pd.DataFrame, verdict: Verdict, keys: Sequence[str]
+) -> tuple[Chart, ...]:
+    """The objective of every run and the mean of each setting with its 95 % interval.
+
+    Over its axis for one numeric key, in rows for other settings, and for many settings of
+    several keys as one cloud of points a key.
+
+    Parameters
+    ----------
+    summary : DataFrame
+    verdict : Verdict
+    keys : sequence of str
+
+    Returns
+    -------
+    tuple of Chart
+        Empty where no run has a value or nothing is swept.
+    """
+    if not keys or verdict.best is None:
+        return ()
+    if len(keys) == 1 and _on_a_scale(verdict, keys[0]):
+        return (_scale_chart(summary, verdict, keys[0]),)
+    if len(verdict.settings) <= _MOST_ROWS:
+        return (_row_chart(summary, verdict),)
+    values = finished_values(summary, verdict.measure)
+    factor, what = shown_scale(verdict.measure)
+    numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
+    return tuple(
+        Chart(
+            titled(key),
+            what,
+            f"{name_of(verdict.measure)} of every run against {titled(key)}.",
+            marks=tuple(
+                Mark(
+                    float(x),
+                    factor * float(y),
+                    "run",
+                    tints(1, False)[0],
+                    title=f"{run}: {number(y)}",
+                )
+                for run, x, y in zip(summary["run"], summary[key], values, strict=True)
+                if math.isfinite(y)
+            ),
+        )
+        for key in numeric
+    )
+
+
+def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
+    """Points over a numeric key, means joined by a line."""
+    colour = setting_tints(verdict, [key])
+    places = [float(s.values[key]) for s in verdict.settings]
+    factor, what = shown_scale(verdict.measure)
+    marks: list[Mark] = []
+    for setting, x in zip(verdict.settings, places, strict=True):
+        tint = colour[setting.label]
+        for place, mark in enumerate(_run_marks(summary, verdict, setting, tint)):
+            # side by side to the left of the mean
+            shift_px = -9.0 - min(place * 3.5, 21.0)
+            marks.append(replace(mark, x=x, shift_px=shift_px))
+        if setting.n:
+            marks.append(_mean_mark(setting, x, factor * setting.mean, tint, factor))
+    joined = [(x, factor * s.mean) for s, x in zip(verdict.settings, places, strict=True) if s.n]
+    return Chart(
+        titled(key),
+        what,
+        _settings_alt(verdict),
+        (Line(np.array(joined), PLAIN, title="means"),),
+        tuple(marks),
+        x_ticks=tuple(places) if len(places) <= 12 else (),
+    )
+
+
+def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
+    """One row a setting, the highest mean on top."""
+    factor, what = shown_scale(verdict.measure)
+    ranked = sorted(verdict.settings, key=lambda s: -s.mean if s.n else math.inf)
+    marks: list[Mark] = []
+    for row, setting in enumerate(ranked):
+        tint = tints(1, False)[0] if setting is verdict.best else PLAIN
+        marks += [
+            replace(m, x=m.y, y=row)
+            for m in _run_marks(summary, verdict, setting, tint)
+            if m.kind == "run"
+        ]
+        if setting.n:
+            marks.append(_mean_mark(setting, factor * setting.mean, row, tint, factor))
+    return Chart(
+        what,
+        "",
+        _settings_alt(verdict),
+        marks=tuple(marks),
+        rows=tuple(s.label for s in ranked),
+    )
+
+
+def _run_marks(summary: pd.DataFrame, verdict: Verdict, setting: Setting, tint: Tint) -> list[Mark]:
+    """Marks of a setting's runs; x is left to the caller."""
+    rows = runs_of(summary, setting)
+    values = finished_values(rows, verdict.measure)
+    factor = shown_scale(verdict.measure)[0]
+    marks = []
+    for run, outcome, value in zip(rows["run"], rows["outcome"], values, strict=True):
+        if math.isfinite(value):
+            title = f"{run}: {number(value)}"
+            marks.append(Mark(math.nan, factor * value, "run", tint, title=title))
+        else:
+            marks.append(Mark(math.nan, math.nan, "failed", tint, title=f"{run}: {outcome}"))
+    return marks
+
+
+def _mean_mark(setting: Setting, x: float, y: float, tint: Tint, factor: float) -> Mark:
+    reach = setting.ci_half_width
+    mean = with_margin(setting.mean, reach)
+    title = f"{setting.label}: mean {mean}, {setting.n} runs"
+    return Mark(x, y, "mean", tint, factor * reach, title)
+
+
+def _settings_alt(verdict: Verdict) -> str:
+    parts = [f"{s.label}: {number(s.mean)}, {s.n} runs" for s in verdict.settings if s.n]
+    return f"Mean {name_of(verdict.measure)} by setting. {'; '.join(parts)}."
+
+
+def best_passage(
+    collected: Collected, verdict: Verdict, measure: str
+) -> tuple[float, float, float] | None:
+    """A measure of the best setting at the start, at 3/4 and at the end of the vibration.
+
+    Parameters
+    ----------
+    collected : Collected
+    verdict : Verdict
+    measure : str
+
+    Returns
+    -------
+    (float, float, float) or None
+        Means over its finished runs; None where no run tells.
+    """
+    if verdict.best is None:
+        return None
+    rows = runs_of(collected.summary, verdict.best)
+    finished = rows.loc[rows["outcome_code"] == int(Outcome.FINISHED), "run"]
+    curves = collected.curves
+    shaken = curves[curves["run"].isin(finished) & (curves["vibration_time_s"] >= 0)]
+    found = []
+    for _, run in shaken.groupby("run"):
+        time_s = run["vibration_time_s"].to_numpy(dtype=np.float64)
+        value = run[measure].to_numpy(dtype=np.float64)
+        if len(time_s) > 3 and np.isfinite(value).all():
+            late = float(np.interp(0.75 * time_s[-1], time_s, value))
+            found.append((float(value[0]), late, float(value[-1])))
+    if not found:
+        return None
+    first, late, last = np.mean(found, axis=0).tolist()
+    return first, late, last

@@ -1,0 +1,261 @@
+"""The report's section on a measure that is to be known: its map, heaps, calibrated sands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from sandmould.engines.snapshot import Snapshot
+from sandmould.report.figure_files import pictures, strip
+from sandmould.report.repose_figures import draw_heap, draw_map, draw_posterior, shown
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
+from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
+from sandmould.statistics.settings import Setting
+from sandmould.statistics.verdict import Verdict, finished_values
+from sandmould.study.calibration.run import read_calibrated
+from sandmould.study.collect import Collected
+from sandmould.study.kinds.kind import AnyScenario
+from sandmould.study.moments import list_moments
+from sandmould.study.study import Study
+
+SHOWN_HEAPS = 3
+
+
+@dataclass(frozen=True)
+class Heap:
+    """A picture of the sand at rest with the fitted lines."""
+
+    heading: str
+    picture: str
+    alt: str
+
+
+@dataclass(frozen=True)
+class SandFound:
+    """One calibrated sand."""
+
+    name: str
+    sentences: tuple[str, ...]
+    posterior: str
+    """Picture; empty where none was found."""
+
+
+@dataclass(frozen=True)
+class KnownPages:
+    """What the section shows."""
+
+    title: str
+    sentences: tuple[str, ...]
+    sound: bool
+    """Whether the study's question is answered."""
+    heaps: tuple[Heap, ...]
+    map: Table | None
+    map_picture: str
+    sands: tuple[SandFound, ...]
+    worths: Table | None
+    cost: str
+
+
+def known_pages(
+    study_folder: Path, study: Study, collected: Collected, verdict: Verdict, scenario: AnyScenario
+) -> KnownPages | None:
+    """Draw what a study found that asks for a value, not for the best; None for other studies.
+
+    Parameters
+    ----------
+    study_folder : Path
+    study : Study
+    collected : Collected
+    verdict : Verdict
+    scenario : Scenario
+        Of any run.
+    """
+    if study.objective.better != "neither":
+        return None
+    summary, keys = collected.of_sweep.summary, collected.keys
+    known = [s for s in verdict.settings if s.n]
+    calibrated = read_calibrated(study_folder, study, summary, keys)
+    sands = tuple(_sand(one, calibrated) for one in calibrated.sands) if calibrated else ()
+    sentences = [*_value_sentences(known, verdict.measure, study), *_touching(summary)]
+    sentences += [sentence for sand in sands for sentence in sand.sentences[:1]]
+    numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
+    is_map = len(keys) == 2 and len(numeric) == 2
+    what = name_of(verdict.measure)
+    return KnownPages(
+        title="Angle of repose" if verdict.measure == "heap_angle_deg" else what.capitalize(),
+        sentences=tuple(sentences) or (f"No run has a {what} that could be measured.",),
+        sound=bool(known) and all(sand.posterior for sand in sands),
+        heaps=_heaps(study_folder, summary, verdict, scenario),
+        map=_map_table(known, (keys[0], keys[1])) if is_map and known else None,
+        map_picture=_map_picture(summary, keys, verdict.measure, calibrated) if is_map else "",
+        sands=sands,
+        worths=_worth_table(calibrated) if calibrated and calibrated.worths else None,
+        cost=_cost(summary),
+    )
+
+
+def known_figures(known: KnownPages) -> dict[str, bytes]:
+    """Heaps side by side, the map, and what is known of each sand, as files."""
+    found = pictures(
+        map=known.map_picture, **{f"posterior_{one.name}": one.posterior for one in known.sands}
+    )
+    if known.heaps:
+        found["heaps"] = strip([(heap.heading, heap.picture) for heap in known.heaps])
+    return found
+
+
+def _value_sentences(known: Sequence[Setting], measure: str, study: Study) -> list[str]:
+    """The value at the one setting, or the range over a map; beside what was reported."""
+    if not known:
+        return []
+    what, unit = name_of(measure), unit_of(measure)
+    unit = unit if unit in ("", "°") else f" {unit}"
+    if len(known) > 1:
+        low, high = min(known, key=lambda s: s.mean), max(known, key=lambda s: s.mean)
+        return [
+            f"The {what} goes from {number(low.mean)}{unit} ({low.label}) to {number(high.mean)}"
+            f"{unit} ({high.label})."
+        ]
+    (one,) = known
+    rests = f"95 % interval of the mean of {one.n} runs" if one.n > 1 else "one run, no interval"
+    said = [f"The {what} is {with_margin(one.mean, one.ci_half_width)}{unit} ({rests})."]
+    reported = study.objective.reported
+    if reported is not None:
+        apart = one.mean - reported.value
+        reach = one.ci_half_width if one.n > 1 else math.nan
+        spread = "" if math.isnan(reach) else f" ± {number(reach, 2)}{unit}"
+        said.append(
+            f"{reported.by} reports {number(reported.value)}{unit}: the difference is "
+            f"{number(apart, 2)}{unit}{spread}."
+        )
+    return said
+
+
+def _touching(summary: pd.DataFrame) -> list[str]:
+    """Name runs whose heap leans on a wall: they have no angle of repose."""
+    if "heap_touches" not in summary:
+        return []
+    # An empty cell is read as NaN.
+    leaning = summary[[isinstance(walls, str) for walls in summary["heap_touches"]]]
+    if leaning.empty:
+        return []
+    walls = sorted({str(w) for w in leaning["heap_touches"]})
+    names = [str(run) for run in leaning["run"]]
+    return [
+        f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and "
+        f"so has no angle of repose: {listed(names)}. Widen the box or fill in less sand."
+    ]
+
+
+def _heaps(
+    study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: AnyScenario
+) -> tuple[Heap, ...]:
+    """Runs with the least, the middle and the steepest slope."""
+    if not isinstance(scenario, Scenario) or scenario.gate is None or not scenario.gate.is_level:
+        return ()
+    values = finished_values(summary, verdict.measure).dropna().sort_values()
+    places = np.unique(np.linspace(0, len(values) - 1, SHOWN_HEAPS).round().astype(int))
+    found = []
+    for index in [values.index[i] for i in places] if len(values) else []:
+        run = str(summary.loc[index, "run"])
+        moments = list_moments(study_folder / "runs" / run)
+        if not moments:
+            continue
+        sand = Snapshot.load(moments[-1].path)
+        heading = f"{number(values[index])}°: {run}"
+        picture = draw_heap(sand, scenario, 1.02 * scenario.scene.top_m)
+        found.append(Heap(heading, picture, f"Heap and hopper of run {run} with fitted lines"))
+    return tuple(found)
+
+
+def _map_table(known: Sequence[Setting], keys: tuple[str, str]) -> Table:
+    """The measure over both keys, the second across, as the paper's Figure 11."""
+    rows_of = sorted({s.values[keys[0]] for s in known})
+    columns_of = sorted({s.values[keys[1]] for s in known})
+    at = {(s.values[keys[0]], s.values[keys[1]]): s for s in known}
+
+    def head(key: str, value: float) -> str:
+        return number(float(shown(key, np.array(value))))
+
+    unit = "°" if keys[1].endswith("rolling_arm_fraction") else ""
+    columns = [Column(name_of(keys[0]))]
+    columns += [Column(f"{head(keys[1], c)}{unit}") for c in columns_of]
+    rows = []
+    for r in rows_of:
+        cells = [Cell(head(keys[0], r), repr(r))]
+        for c in columns_of:
+            setting = at.get((r, c))
+            text = "–" if setting is None else with_margin(setting.mean, setting.ci_half_width)
+            cells.append(Cell(text, repr(math.nan if setting is None else setting.mean)))
+        rows.append(tuple(cells))
+    return Table(tuple(columns), tuple(rows), (False,) * len(rows))
+
+
+def _map_picture(
+    summary: pd.DataFrame, keys: Sequence[str], measure: str, calibrated: Calibrated | None
+) -> str:
+    pair, points = (keys[0], keys[1]), summary[list(keys)].to_numpy(dtype=np.float64)
+    values = np.asarray(finished_values(summary, measure), dtype=np.float64)
+    emulator = calibrated.emulators.get(measure) if calibrated else None
+    try:
+        emulator = emulator or fit_emulator(measure, points, values)
+    except TooFewRunsError:
+        return ""
+    sands = calibrated.sands if calibrated else ()
+    return draw_map(emulator, pair, titled(measure), points[np.isfinite(values)], sands)
+
+
+def _sand(one: CalibratedSand, calibrated: Calibrated) -> SandFound:
+    """What is said of a calibrated sand."""
+    name = one.sand.name
+    if one.found is None or one.by_first is None:
+        return SandFound(name, (f"{name}: {one.problem}.",), "")
+    values = [
+        f"{name_of(key)} {with_margin(mode, sd)}"
+        for key, mode, sd in zip(calibrated.keys, one.found.mode, one.found.sd, strict=True)
+    ]
+    targets = listed([f"{name_of(m)} {t.value:g} ± {t.sd:g}" for m, t in one.sand.targets.items()])
+    taken = [f"{name_of(k)} {t.value:g} ± {t.sd:g}" for k, t in one.sand.assumed.items()]
+    granted = f", {listed(taken)} taken for granted" if taken else ""
+    said = [
+        f"{name}, measured {targets}{granted}: most probable are {listed(values)} (standard "
+        f"deviations), which are correlated by {one.found.correlation:.2f}."
+    ]
+    ridge = f"One measured value leaves a ridge, {one.by_first.bits:.1f} bits of the two"
+    more = len(one.sand.targets) + len(one.sand.assumed) > 1
+    all_told = f"; all that is known tells {one.found.bits:.1f}" if more else ""
+    said.append(f"{ridge}{all_told}.")
+    return SandFound(name, tuple(said), draw_posterior(one, calibrated.keys))
+
+
+def _worth_table(calibrated: Calibrated) -> Table:
+    columns = (
+        Column("measure", is_number=False), Column("bits alone"), Column("bits added"),
+        Column("extra processor time a run"), Column("bits added per processor hour"),
+    )  # fmt: skip
+    rows = []
+    for w in calibrated.worths:
+        rate = w.bits_added / w.cpu_s * 3600 if w.cpu_s > 0.0 else math.inf
+        cells = (
+            Cell(name_of(w.measure), w.measure),
+            Cell(number(w.bits_alone, 2), repr(w.bits_alone)),
+            Cell(number(w.bits_added, 2), repr(w.bits_added)),
+            Cell(seconds(w.cpu_s) if w.cpu_s else "none", repr(w.cpu_s)),
+            Cell(number(rate), repr(rate)),
+        )
+        rows.append(cells)
+    return Table(columns, tuple(rows), (False,) * len(rows))
+
+
+def _cost(summary: pd.DataFrame) -> str:
+    total_s = float(summary["cpu_s"].sum()) if "cpu_s" in summary else math.nan
+    runs = "The run" if len(summary) == 1 else f"All {len(summary)} runs"
+    return f"{runs} took {seconds(total_s)} of processor time."

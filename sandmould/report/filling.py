@@ -1,0 +1,207 @@
+"""How a cavity fills: over what is swept at several times, its two limbs, and how long it takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from analysis.filling import Limb, first_reach_s, fit_limbs
+from sandmould.report.chart import Chart, Line, tints
+from sandmould.report.curves import reported_lines, runs_of
+from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
+from sandmould.runs.outcome import Outcome
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
+from sandmould.statistics.verdict import Verdict
+from sandmould.study.collect import Collected
+from sandmould.study.study import Study
+
+FULL_SHARE = 0.95
+"""Of the sand that a cavity holds when it is packed as the bed is."""
+SHARES = (0.125, 0.25, 0.5, 1.0)
+"""Of the vibration: the times of the chart."""
+_EARLY = 1 + SHARES.index(0.25)
+"""Time that rates are taken over: before a cavity that fills fast is full."""
+
+
+@dataclass(frozen=True)
+class FillingPages:
+    """What the report says of the filling of a cavity."""
+
+    advice: tuple[str, ...]
+    """Drive of the best setting, and the time it takes."""
+    chart: Chart | None
+    """Fill over the swept key at several times, as figure 16 of the paper."""
+    limbs: str
+
+
+def filling_pages(
+    study: Study, collected: Collected, verdict: Verdict, scenario: Scenario
+) -> FillingPages | None:
+    """Say how a cavity fills; None for studies of something else.
+
+    Parameters
+    ----------
+    study : Study
+    collected : Collected
+        Of the sweep.
+    verdict : Verdict
+    scenario : Scenario
+        At the best setting.
+    """
+    best, measure = verdict.best, verdict.measure
+    if best is None or not scenario.vibration or not measure.endswith("_fill_fraction"):
+        return None
+    shaken = _shaken(collected)
+    if measure not in shaken or shaken.empty:
+        return None
+    curves = {str(run): rows for run, rows in shaken.groupby("run")}
+    keys = collected.keys
+    one_key = len(keys) == 1 and all(
+        isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
+    )
+    known = [s for s in verdict.settings if s.n]
+    advice = (_drive(scenario, best), _time_to_fill(collected.summary, curves, best, measure))
+    if not one_key or len(known) < 3:
+        return FillingPages(advice, None, "")
+    table = _fill_at_times(collected.summary, curves, known, keys[0], measure)
+    return FillingPages(
+        advice, _chart(table, study, keys[0], measure), _limbs(table, keys[0], measure)
+    )
+
+
+def _shaken(collected: Collected) -> pd.DataFrame:
+    """Curves of finished runs during vibration."""
+    summary, curves = collected.summary, collected.curves
+    finished = summary.loc[summary["outcome_code"] == int(Outcome.FINISHED), "run"]
+    return curves[curves["run"].isin(finished) & (curves["vibration_time_s"] >= 0)]
+
+
+def _drive(scenario: Scenario, best: Setting) -> str:
+    stage = scenario.vibration[0]
+    velocity_m_s = stage.amplitude_m * stage.angular_frequency_rad_s
+    return (
+        f"At {best.label} the box moves {number(1e3 * stage.amplitude_m)} mm to either side at "
+        f"{number(stage.frequency_hz)} Hz: {number(1e3 * velocity_m_s)} mm/s and "
+        f"{number(stage.peak_acceleration_g)} g at most."
+    )
+
+
+def _time_to_fill(
+    summary: pd.DataFrame, curves: Mapping[str, pd.DataFrame], best: Setting, measure: str
+) -> str:
+    """When the cavity holds nearly what it holds when it is packed as the bed is."""
+    times_s, lasts_s, ends = [], [], []
+    for run in runs_of(summary, best)["run"]:
+        rows = curves.get(str(run))
+        if rows is None or "solid_fraction" not in rows:
+            continue
+        full = float(rows["solid_fraction"].iloc[-1])
+        time_s = rows["vibration_time_s"].to_numpy(dtype=np.float64)
+        value = rows[measure].to_numpy(dtype=np.float64)
+        times_s.append(first_reach_s(time_s, value, FULL_SHARE * full))
+        lasts_s.append(time_s[-1])
+        ends.append(value[-1] / full)
+    what = "what the cavity holds when it is packed as densely as the bed"
+    reached = [t for t in times_s if math.isfinite(t)]
+    if not times_s:
+        return "How long the cavity takes to fill cannot be told."
+    if len(reached) < len(times_s):
+        return (
+            f"{len(reached)} of {len(times_s)} runs at {best.label} reach "
+            f"{100 * FULL_SHARE:.0f} % of {what}; after {number(max(lasts_s))} s it holds "
+            f"{100 * float(np.mean(ends)):.0f} % of it in the mean."
+        )
+    mean = setting_of({}, len(reached), pd.Series(reached))
+    reach = with_margin(mean.mean, mean.ci_half_width)
+    return f"{100 * FULL_SHARE:.0f} % of {what} are reached at {best.label} after {reach} s."
+
+
+@dataclass(frozen=True)
+class _AtTimes:
+    x: NDArray[np.float64]
+    """(s,) the swept values, ascending."""
+    time_s: NDArray[np.float64]
+    """(t,) from the start of vibration; the first is 0."""
+    mean: NDArray[np.float64]
+    """(s, t)."""
+    gained_se: NDArray[np.float64]
+    """(s, t) standard error of what was gained since the start; NaN for a single run."""
+
+
+def _fill_at_times(
+    summary: pd.DataFrame,
+    curves: Mapping[str, pd.DataFrame],
+    known: list[Setting],
+    key: str,
+    measure: str,
+) -> _AtTimes:
+    last_s = min(float(rows["vibration_time_s"].max()) for rows in curves.values())
+    time_s = last_s * np.array([0.0, *SHARES])
+    settings = sorted(known, key=lambda s: float(s.values[key]))
+    mean, error = [], []
+    for setting in settings:
+        runs = []
+        for run in runs_of(summary, setting)["run"]:
+            rows = curves.get(str(run))
+            if rows is not None:
+                runs.append(np.interp(time_s, rows["vibration_time_s"], rows[measure]))
+        values = np.array(runs)
+        gained = values - values[:, :1]
+        mean.append(values.mean(axis=0))
+        few = len(values) < 2
+        sd = np.full(len(time_s), math.nan) if few else gained.std(axis=0, ddof=1)
+        error.append(sd / math.sqrt(len(values)))
+    x = np.array([float(s.values[key]) for s in settings])
+    return _AtTimes(x, time_s, np.array(mean), np.array(error))
+
+
+def _chart(table: _AtTimes, study: Study, key: str, measure: str) -> Chart:
+    colours = tints(len(table.time_s), True)
+    lines = [
+        Line(
+            np.column_stack([table.x, table.mean[:, i]]),
+            colours[i],
+            True,
+            f"{number(time_s, 2)} s",
+            f"after {number(time_s, 2)} s of vibration",
+        )
+        for i, time_s in enumerate(table.time_s)
+    ]
+    low, high = float(np.nanmin(table.mean)), float(np.nanmax(table.mean))
+    lines += reported_lines(study, key, low, high)
+    alt = f"{name_of(measure)} against {titled(key)} at {len(table.time_s)} times of the vibration."
+    ticks = tuple(table.x.tolist()) if len(table.x) <= 12 else ()
+    return Chart(titled(key), name_of(measure), alt, tuple(lines), x_ticks=ticks)
+
+
+def _limbs(table: _AtTimes, key: str, measure: str) -> str:
+    """How the rate of filling rises and falls with the swept key, as power laws."""
+    gained = table.mean[:, _EARLY] - table.mean[:, 0]
+    early = f"over the first {number(table.time_s[_EARLY], 2)} s"
+    if not (gained > 0).any():
+        return f"The {name_of(measure)} grew at no setting {early}."
+    limbs = fit_limbs(table.x, gained, table.gained_se[:, _EARLY])
+    turn = value_text(key, limbs.turn)
+    said = [f"The {name_of(measure)} grows fastest {early} at {turn}."]
+    sides = (("Up to there", "rises", limbs.rise), ("From there", "falls", limbs.fall))
+    for where, way, limb in sides:
+        if limb is None:
+            said.append(f"{where} too few settings lie to say how the rate {way}.")
+        else:
+            said.append(
+                f"{where} the rate {way} as {name_of(key)} to the power of {_exponent(limb)}."
+            )
+    return " ".join(said)
+
+
+def _exponent(limb: Limb) -> str:
+    """An exponent with its 95 % interval, two degrees of freedom less than points."""
+    reach = float(student.ppf(0.5 + CONFIDENCE / 2, limb.points - 2)) * limb.se
+    return f"{with_margin(limb.exponent, reach)} ({limb.points} settings)"

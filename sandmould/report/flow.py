@@ -1,0 +1,304 @@
+"""What the report of a study of flow shows: stability map, noise, histories, fields and films."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from analysis.flow_plots import draw_frame, frame_of
+from sandmould.casting.mps import scene
+from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
+from sandmould.casting.mps.stability import Verdict as Stability
+from sandmould.report.figures import png
+from sandmould.report.flow_film import SHADES, FlowFilm, make_flow_film
+from sandmould.report.flow_map import condition_text, said_of, stability_map
+from sandmould.report.method import Row
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.time_series import Curve, measure_curves
+from sandmould.runs.formatting import listed, name_of, number
+from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
+from sandmould.statistics.verdict import Verdict
+from sandmould.study.collect import Collected
+
+SHOWN = 6
+"""Runs whose histories and fields are drawn."""
+FILMED = 2
+COLOURS = tuple(to_hex(colormaps["viridis"](shade / SHADES)) for shade in range(SHADES + 1))
+
+
+@dataclass(frozen=True)
+class FlowPages:
+    """What the sections show; empty where there is nothing to draw."""
+
+    map: str
+    sentences: tuple[str, ...]
+    noise: Table
+    histories: str
+    fields: str
+    shown: tuple[str, ...]
+    """Runs of histories and fields, the calmest first."""
+    films: tuple[FlowFilm, ...]
+    colours: tuple[str, ...]
+    curves: tuple[Curve, ...]
+    pours: bool
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """A run that is drawn."""
+
+    run: str
+    label: str
+    folder: Path
+    verdict: str
+
+
+def flow_pages(
+    study_folder: Path,
+    scenario: MetalFlow,
+    collected: Collected,
+    verdict: Verdict,
+    film_budget_bytes: int,
+) -> FlowPages:
+    """Draw everything that a study of flow shows.
+
+    Parameters
+    ----------
+    study_folder : Path
+    scenario : MetalFlow
+        Of one run; its probes and metal stand for all.
+    collected : Collected
+    verdict : Verdict
+    film_budget_bytes : int
+        Most that all films together may weigh.
+    """
+    ranked = _ranked(scenario, collected.summary)
+    shown = _shown(ranked, collected.keys, study_folder)
+    ideal_pa = scene.ideal_pa(scenario, scene.fluid_of(scenario))
+    filmed = [shown[0], shown[-1]][: min(FILMED, len(shown))] if shown else []
+    probes = [f"{name}_pa" for name in ideal_pa]
+    return FlowPages(
+        map=stability_map(ranked, collected.keys),
+        sentences=(
+            *_sentences(scenario, ranked, ideal_pa), *_hopping(scenario, ranked, collected.keys)
+        ),
+        noise=_noise(scenario, ranked, collected.keys),
+        histories=_histories(shown, ideal_pa),
+        fields=_fields(shown, max(ideal_pa.values())),
+        shown=tuple(one.run for one in shown),
+        films=tuple(
+            make_flow_film(
+                _load(one.folder), one.run, f"{one.label}: {one.verdict}", max(ideal_pa.values()),
+                film_budget_bytes // len(filmed),
+            )
+            for one in filmed
+        ),
+        colours=COLOURS,
+        curves=measure_curves(
+            collected, verdict, [*probes, "largest_speed_m_s"], lambda *_: ""
+        ),
+        pours=not isinstance(scenario.case, StillTank) and scenario.case.starts == "empty",
+    )  # fmt: skip
+
+
+def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
+    """Runs that ended: excellent, good and failed, the calmest of each first."""
+    order = {stability.value: place for place, stability in enumerate(Stability)}
+    table = summary.copy()
+    for column in ("classification", f"{scene.deepest(scenario)}_sd_pa"):
+        if column not in table:
+            table[column] = np.nan
+    # a run that a guard stopped while it poured has no row of measures
+    table["classification"] = table["classification"].fillna(Stability.FAILED.value)
+    table = table[table["outcome_code"].notna()]
+    return table.assign(rank=table["classification"].map(order)).sort_values(
+        ["rank", f"{scene.deepest(scenario)}_sd_pa"], kind="stable"
+    )
+
+
+def _shown(ranked: pd.DataFrame, keys: Sequence[str], study_folder: Path) -> list[_Shown]:
+    """Runs that left fields, evenly from the calmest to the worst."""
+    found = []
+    for _, row in ranked.iterrows():
+        folder = study_folder / "runs" / str(row["run"])
+        if (folder / "fields.npz").is_file():
+            label = condition_text({key: row[key] for key in keys})
+            found.append(_Shown(folder.name, label, folder, str(row["classification"])))
+    places = np.linspace(0, len(found) - 1, min(SHOWN, len(found))).round().astype(int)
+    return [found[place] for place in np.unique(places).tolist()]
+
+
+def _load(folder: Path) -> dict[str, NDArray[np.float64]]:
+    with np.load(folder / "fields.npz") as kept:
+        return dict(kept)
+
+
+def _sentences(
+    scenario: MetalFlow, ranked: pd.DataFrame, ideal_pa: dict[str, float]
+) -> tuple[str, ...]:
+    """How many settings hold, and how far their pressure is from rho g h."""
+    counts = ranked["classification"].value_counts()
+    parts = [f"{counts.get(s.value, 0)} {s.value}" for s in Stability]
+    said = [f"By the rule of figure 6 {listed(parts)}, of {len(ranked)}."]
+    name = scene.deepest(scenario)
+    errors = pd.to_numeric(ranked[f"{name}_error_pa"], errors="coerce").dropna() if (
+        f"{name}_error_pa" in ranked) else pd.Series(dtype=float)  # fmt: skip
+    if len(errors):
+        share = 100.0 / ideal_pa[name]
+        said.append(
+            f"The hydrostatic pressure at {name} is {number(ideal_pa[name], 4)} Pa; the means of "
+            f"runs that held are {number(share * errors.min(), 2)} to "
+            f"{number(share * errors.max(), 2)} % off it."
+        )
+        calm = (pd.to_numeric(ranked[f"{name}_window_sd_pa"]) < scenario.quiet_pa).sum()
+        said.append(
+            f"The verdicts take the deviation of single steps; of means over "
+            f"{1e3 * scenario.noise_window_s:g} ms it is below {scenario.quiet_pa:g} Pa in {calm} "
+            f"of {len(ranked)} runs. The paper does not say which it takes."
+        )
+    return tuple(said)
+
+
+def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> tuple[str, ...]:
+    """Where metal of a casting hops, and where it does not."""
+    if isinstance(scenario.case, StillTank) or "hops" not in ranked:
+        return ()
+    ended = ranked[ranked["classification"] != Stability.FAILED.value]
+    parts = []
+    for hops, verb in ((1, "hops"), (0, "does not hop")):
+        own = ended[ended["hops"] == hops]
+        where = [condition_text({key: row[key] for key in keys}) for _, row in own.iterrows()]
+        if where:
+            parts.append(f"it {verb} at {listed(where, most=6)}")
+    told = f"When the casting is full, metal that rises faster than {HOP_SPEED_M_S:g} m/s hops"
+    return (f"{told}: {'; '.join(parts)}.",) if parts else ()
+
+
+def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Table:
+    """Every run with its verdict, pressures and speeds, beside what the paper says."""
+    names = [probe.name for probe in scene.probes_of(scenario)]
+    deepest = scene.deepest(scenario)
+    is_papers = scenario.case == StillTank() and scenario.metal == PouredMetal()
+    said = [
+        said_of({key: row[key] for key in keys}) if is_papers else ""
+        for _, row in ranked.iterrows()
+    ]
+    columns = [Column("setting", False), Column("verdict", False)]
+    shown: list[tuple[str, int]] = []
+    for name in names:
+        columns += [Column(f"{name}: mean, Pa"), Column(f"{name}: deviation, Pa")]
+        shown += [(f"{name}_mean_pa", 4), (f"{name}_sd_pa", 3)]
+    window = f"{name_of(deepest)}: deviation of {1e3 * scenario.noise_window_s:g} ms means, Pa"
+    columns += [Column(window), Column("fastest, m/s"), Column("mean speed, m/s")]
+    shown += [(f"{deepest}_window_sd_pa", 3), ("peak_speed_m_s", 2), ("average_speed_m_s", 2)]
+    if any(said):
+        columns.append(Column("paper's text", False))
+    rows = []
+    for (_, row), text in zip(ranked.iterrows(), said, strict=True):
+        label = condition_text({key: row[key] for key in keys})
+        note = str(row["detail"]) if str(row["detail"]) != "nan" else ""
+        cells = [Cell(label, label), Cell(str(row["classification"]), str(row["rank"]), note=note)]
+        values = [float(row.get(column, np.nan)) for column, _ in shown]
+        cells += [
+            Cell(number(value, digits), str(value))
+            for value, (_, digits) in zip(values, shown, strict=True)
+        ]
+        rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
+    failed = tuple(c == Stability.FAILED.value for c in ranked["classification"])
+    return Table(tuple(columns), tuple(rows), failed)
+
+
+def _histories(shown: Sequence[_Shown], ideal_pa: dict[str, float]) -> str:
+    """Pressure at every step, as the paper's figure 5."""
+    if not shown:
+        return ""
+    figure, panels = _grid(len(shown), 2.3)
+    for axes, one in zip(panels, shown, strict=False):
+        table = pd.read_csv(one.folder / "series.tsv", sep="\t")
+        for place, (name, ideal) in enumerate(ideal_pa.items()):
+            colour = f"C{place}"
+            axes.plot(table["time_s"], table[f"{name}_pa"], lw=0.6, color=colour, label=name)
+            axes.axhline(ideal, color=colour, lw=0.8, ls="--")
+        axes.set_title(f"{one.label}\n{one.verdict}", fontsize=8)
+        highest = 3.0 * max(ideal_pa.values())
+        axes.set_ylim(0.0, min(highest, max(1.05 * axes.get_ylim()[1], 1.0)))
+        axes.tick_params(labelsize=8)
+        axes.set_xlabel("time, s", fontsize=8)
+    figure.supylabel("pressure, Pa", fontsize=9)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center",
+                  ncols=len(ideal_pa), fontsize=8)  # fmt: skip
+    return png(figure)
+
+
+def _fields(shown: Sequence[_Shown], highest_pa: float) -> str:
+    """Pressure over the particles at the end of each run, as the paper's figures 3 and 8."""
+    if not shown:
+        return ""
+    figure, panels = _grid(len(shown), 4.2)
+    for axes, one in zip(panels, shown, strict=False):
+        fields = _load(one.folder)
+        last = frame_of(fields, len(fields["count"]) - 1)
+        discs = draw_frame(fields, last, axes, highest_pa)
+        axes.set_title(f"{one.label}\n{one.verdict}, {last.time_s:.3g} s", fontsize=8)
+        axes.tick_params(labelsize=8)
+    figure.colorbar(discs, ax=panels, label="pressure, Pa", shrink=0.6, extend="max")
+    return png(figure)
+
+
+def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
+    """A figure of so many panels, three in a row."""
+    across = min(count, 3)
+    rows = -(-count // across)
+    figure = Figure(
+        figsize=(1.0 + 3.4 * across, height * rows + 0.6), dpi=100, layout="constrained"
+    )
+    panels = figure.subplots(rows, across, squeeze=False).ravel()
+    for axes in panels[count:]:
+        axes.set_axis_off()
+    return figure, list(panels[:count])
+
+
+def _collisions(scenario: MetalFlow, keys: Sequence[str]) -> str:
+    """Whether particles that come too near collide."""
+    if "collision_distance" in keys:
+        return "collisions as swept"
+    near = scenario.collision_distance
+    return f"particles nearer than {near:g} of their size collide" if near else "no collisions"
+
+
+def flow_method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Row, ...]:
+    """How the runs were computed; see ``sand_method``."""
+    case, metal = scenario.case, scenario.metal
+    size_mm = 1e3 * case.particle_m
+    if isinstance(case, StillTank):
+        where = (f"metal at rest in a tank, {1e3 * case.width_m:g} mm wide and "
+                 f"{1e3 * case.depth_m:g} mm deep, in two dimensions")  # fmt: skip
+    else:
+        begins = f"poured at {1e3 * case.rate_kg_s:g} g/s" if case.starts == "empty" else "full"
+        where = (f"a cylinder {1e3 * case.height_m:g} mm high, {1e3 * case.lower_m:g} mm wide "
+                 f"below and {1e3 * case.upper_m:g} mm above, {begins}")  # fmt: skip
+    return (
+        Row("Method", "moving particles, semi-implicit (MPS), with the improved multiple "
+            "relaxation of Hirata and Anzai (2017)"),
+        Row("Case", f"{where}; particles of {size_mm:g} mm"),
+        Row("Metal", f"{metal.name}: {metal.density_kg_m3:g} kg/m³, {metal.viscosity_m2_s:g} "
+            f"m²/s; gravity {metal.gravity_m_s2:g} m/s²"),
+        Row("Scheme", f"source {scenario.source.replace('_', ' ')}, gradient {scenario.gradient}, "
+            f"Laplacian {scenario.laplacian}, surface below {scenario.surface:g} of the full "
+            f"number density, Courant number {scenario.courant:g}; Poisson equation to "
+            f"{scenario.tolerance:g}; {_collisions(scenario, keys)}"),
+        Row("Measures", f"from {scenario.measured_from_s:g} to {scenario.duration_s:g} s, at the "
+            "particle nearest to each probe; excellent: deviation at the deepest probe below "
+            f"{scenario.quiet_pa:g} Pa and no hopping; good: the run ends; failed: a guard stops "
+            "it"),
+        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
+    )  # fmt: skip

@@ -1,0 +1,101 @@
+"""Charts of the ledger of one coupled run: residual, work and energy, factor and its limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from sandmould.report.chart import Chart, Line, tints
+
+_POINTS = 400
+"""Of a curve; windows between two of them are averaged."""
+
+
+@dataclass(frozen=True)
+class LedgerChart:
+    """A chart and what it shows."""
+
+    chart: Chart
+    caption: str
+
+
+@dataclass(frozen=True)
+class _Curve:
+    column: str
+    label: str
+    factor: float = 1.0
+    thick: bool = False
+
+
+def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, ...]:
+    """Draw the ledger of a run of any scheme.
+
+    Parameters
+    ----------
+    ledger : DataFrame
+    begins_s : float, s
+        When vibration begins: zero of the charts.
+    """
+    shown = _averaged(ledger)
+    shown["time_s"] -= begins_s
+    found = [
+        (
+            "displacement, mm",
+            (_Curve("displacement_m", "shown", 1e3, True), _Curve("residual_m", "residual", 1e3)),
+            "Root mean square over the surface's vertices of the displacement that the sand saw, "
+            "and of the one that its loads give less that.",
+        ),
+        (
+            "energy, J",
+            (
+                _Curve("work_j", "work of sand", thick=True),
+                _Curve("energy_j", "stored"),
+                _Curve("elastic_j", "stored"),
+                _Curve("kinetic_j", "kinetic"),
+                _Curve("damped_j", "damped"),
+            ),
+            "Work of the sand on the surface since the run began, and what became of it: stored "
+            "energy above the work came from the loop itself.",
+        ),
+    ]
+    if "factor" in shown:
+        shown["limit"] = 2.0 / (1.0 + shown["gain"])
+        found.append(
+            (
+                "share of the residual",
+                (_Curve("factor", "gone"), _Curve("limit", "limit")),
+                "Share of the residual that is gone next, and, where the gain was measured, the "
+                "limit 2 / (1 + gain) of a fixed share.",
+            )
+        )
+    return tuple(
+        LedgerChart(chart, caption)
+        for title, curves, caption in found
+        if (chart := _chart(shown, title, curves)) is not None
+    )
+
+
+def _averaged(ledger: pd.DataFrame) -> pd.DataFrame:
+    """Means over so many windows that few points are left."""
+    together = -(-len(ledger) // _POINTS)
+    return ledger.groupby(np.arange(len(ledger)) // together).mean()
+
+
+def _chart(shown: pd.DataFrame, title: str, curves: tuple[_Curve, ...]) -> Chart | None:
+    there = [c for c in curves if c.column in shown and shown[c.column].notna().any()]
+    if not there:
+        return None
+    lines = tuple(
+        Line(
+            np.column_stack([shown["time_s"], curve.factor * shown[curve.column]]),
+            tint,
+            curve.thick,
+            label=curve.label,
+            title=curve.label,
+        )
+        for curve, tint in zip(there, tints(len(there), False), strict=True)
+    )
+    alt = f"{title} against time since vibration began: {', '.join(c.label for c in there)}."
+    return Chart("time since vibration began, s", title, alt, lines)

@@ -1,0 +1,234 @@
+"""How a study of sand was computed, in terms and sentences for the end of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from sandmould.runs.formatting import listed, name_of, number, seconds, value_text
+from sandmould.scenario.contact import ContactLaw
+from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.vibration import VibrationStage
+from sandmould.study.study import Objective
+
+_NO_TENSION = {
+    "total": "the total normal force, spring and dashpot together, is never allowed to pull",
+    "elastic": "only the spring is kept from pulling; the dashpot may pull as grains part",
+}
+_DAMPING = {
+    "viscous": "viscous, eqs. (36) and (37)",
+    "nonviscous_isotropic": "non-viscous and isotropic, eqs. (38) and (39)",
+    "nonviscous_componentwise": "non-viscous, each component of force by itself; the paper's own "
+    "form, eq. (38), is isotropic",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A term and what holds for it."""
+
+    term: str
+    text: str
+
+
+def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) -> tuple[Row, ...]:
+    """How the runs were computed: model, laws, vibration, time step, seeds.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of one run; what the study sweeps is said apart.
+    keys : sequence of str
+    summary : DataFrame
+
+    Returns
+    -------
+    tuple of Row
+    """
+    sand, contact = scenario.sand, scenario.contact
+    sizes = sand.classes(scenario.dimension)
+    low, high = (1e3 * sizes[i].diameter_m for i in (0, -1))
+    return (
+        Row("Engine", _engines(summary)),
+        Row("Model", _model(scenario)),
+        Row(
+            "Sand",
+            f"grains of {number(low, 2)} to {number(high, 2)} mm in {len(sizes)} size classes, "
+            f"{number(sand.size_scale, 2)} times the size of the real sand; material density "
+            f"{number(sand.density_kg_m3, 4)} kg/m³",
+        ),
+        Row("Grain on grain", _law(contact.grain_grain)),
+        Row("Grain on wall", _law(contact.grain_wall)),
+        Row("No tension, eq. (18)", _NO_TENSION[contact.no_tension]),
+        Row("Background damping", _damping(scenario)),
+        Row("Filling", _filling(scenario)),
+        *(Row("Vibration", _vibration(s, scenario, keys)) for s in scenario.vibration),
+        Row("Time step", _time_step(scenario, summary)),
+        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
+        Row("Seeds", _seeds(summary)),
+    )
+
+
+def deck_method(scenario: OwnDeck, keys: Sequence[str], summary: pd.DataFrame) -> tuple[Row, ...]:
+    """What is known of the runs of a user's deck; see ``sand_method``."""
+    read = [f"{name_of(name)} from {column}" for name, column in scenario.measures.items()]
+    given = [f"{name} = {value}" for name, value in scenario.values.items() if
+             f"values.{name}" not in keys]  # fmt: skip
+    return (
+        Row("Engine", _engines(summary)),
+        Row("Deck", f"{scenario.template}, with {listed(given, most=20) or 'no fixed values'}"),
+        Row("Measures", listed(read, most=20) or "none"),
+        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
+        Row("Seeds", _seeds(summary)),
+    )
+
+
+def statistics_method(objective: Objective, ends: str) -> Row:
+    """How the verdict was reached; ``ends`` says when measures are taken without a time."""
+    at_s = objective.at_vibration_s
+    at = ends if at_s is None else f"{at_s:g} s of vibration"
+    return Row(
+        "Statistics",
+        f"{name_of(objective.measure)} at {at}, {objective.better} is better; a setting's ± is the "
+        "95 % interval of its mean (Student). Settings with the same finished replicates are "
+        "compared by paired differences, others by Welch's test; intervals and p values of the "
+        "best against the others carry Bonferroni's factor.",
+    )
+
+
+def _engines(summary: pd.DataFrame) -> str:
+    if "engine" not in summary or not summary["engine"].notna().any():
+        return "no run says which"
+    rows = summary[["engine", "version", "ranks"]].dropna().drop_duplicates()
+    return "; ".join(
+        f"{engine} {version}, {int(ranks)} rank{'s' if ranks > 1 else ''}"
+        for engine, version, ranks in rows.itertuples(index=False)
+    )
+
+
+def _model(scenario: Scenario) -> str:
+    gravity = f"gravity {number(scenario.gravity_m_s2, 4)} m/s²"
+    if scenario.dimension == 3:
+        return f"distinct elements in 3D: spheres; {gravity}"
+    return (
+        f"distinct elements in 2D: discs {1e3 * scenario.sand.disc_thickness_m:g} mm long across "
+        "the plane, a length the paper leaves open (only stiffness over thickness matters); "
+        f"{gravity}"
+    )
+
+
+def _law(law: ContactLaw) -> str:
+    return (
+        f"springs {value_text('normal_stiffness_n_m', law.normal_stiffness_n_m)} (normal) and "
+        f"{value_text('tangential_stiffness_n_m', law.tangential_stiffness_n_m)} (tangential), "
+        f"friction {law.friction:g}, damping ratio {law.damping_ratio:g}, "
+        f"rolling arm {law.rolling_arm_fraction:g} of the smaller radius"
+    )
+
+
+def _damping(scenario: Scenario) -> str:
+    damping = scenario.background_damping
+    if damping.form == "none":
+        return "none"
+    if damping.form == "viscous":
+        values = (damping.viscous_translation_per_s, damping.viscous_rotation_per_s)
+        unit = " 1/s"
+    else:
+        values, unit = (damping.nonviscous_translation, damping.nonviscous_rotation), ""
+    return (
+        f"{_DAMPING[damping.form]}: {values[0]:g}{unit} for translation, {values[1]:g}{unit} for "
+        "rotation"
+    )
+
+
+def _filling(scenario: Scenario) -> str:
+    fill = scenario.fill
+    layers = len(fill.each_layer())
+    between = ", vibrated in between" if fill.vibration_between_layers else ""
+    plural = "s" if layers > 1 else ""
+    return (
+        f"{layers} layer{plural} dropped {1e3 * fill.drop_height_m:g} mm{between}; the next "
+        f"comes when the grains' rms speed is below {fill.settling.rms_speed_m_s:g} m/s"
+    )
+
+
+def _vibration(stage: VibrationStage, scenario: Scenario, keys: Sequence[str]) -> str:
+    swept = any(k.startswith("vibration.") for k in keys)
+    where = stage.direction if isinstance(stage.direction, str) else f"along {stage.direction}"
+    frame = (
+        "the box's own frame: a body force on the grains"
+        if scenario.frame == "box"
+        else "the laboratory frame: moving walls"
+    )
+    what = (
+        f"{stage.hold} held constant while the frequency changes"
+        if swept
+        else f"{stage.frequency_hz:g} Hz, {stage.peak_acceleration_g:.3g} g"
+    )
+    ramp = f", ramp {seconds(stage.ramp_s)}" if stage.ramp_s else ""
+    return f"{where}, sinusoidal, {what}; {seconds(stage.whole_duration_s)}{ramp}; in {frame}"
+
+
+def _time_step(scenario: Scenario, summary: pd.DataFrame) -> str:
+    said = ""
+    if {"time_step_s", "time_step_fraction"} <= set(summary.columns):
+        steps, shares = summary["time_step_s"].dropna(), summary["time_step_fraction"].dropna()
+        if len(steps) and len(shares):
+            said = f"{_range(1e6 * steps)} µs, {_range(shares)} of the critical one; "
+    return f"{said}the critical step is set by the {scenario.critical_step.cause}"
+
+
+def _range(values: pd.Series[float]) -> str:
+    low, high = number(values.min()), number(values.max())
+    return low if low == high else f"{low} to {high}"
+
+
+def _seeds(summary: pd.DataFrame) -> str:
+    if not {"replicate", "seed"} <= set(summary.columns):
+        return "no seeds given"
+    if (summary.groupby("replicate")["seed"].nunique() == 1).all():
+        return (
+            "a replicate has the same seed at every setting, so that settings are compared on the "
+            "same sand; other replicates have other seeds"
+        )
+    return "every run has a seed of its own"
+
+
+def provenance_rows(all_runs: Sequence[Mapping[str, Any]]) -> tuple[Row, ...]:
+    """What the runs say of their origin, values that differ from run to run counted.
+
+    Parameters
+    ----------
+    all_runs : sequence of mapping
+        The ``provenance.json`` of each run.
+
+    Returns
+    -------
+    tuple of Row
+    """
+    flat = [dict(_flatten(p)) for p in all_runs if p]
+    rows = []
+    for key in dict.fromkeys(k for p in flat for k in p):
+        values = list(dict.fromkeys(p[key] for p in flat if key in p))
+        more = f" and {len(values) - 1} others" if len(values) > 1 else ""
+        each = len(values) == len(flat) > 1
+        text = "another one in every run" if each else f"{values[0]}{more}"
+        rows.append(Row(key.replace("_", " ").replace(".", ": "), text))
+    return tuple(rows)
+
+
+def _flatten(values: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
+    pairs = []
+    for name, value in values.items():
+        key = f"{above}.{name}" if above else str(name)
+        if isinstance(value, Mapping):
+            pairs += _flatten(value, key)
+        elif isinstance(value, list):
+            pairs.append((key, " ".join(map(str, value))))
+        else:
+            pairs.append((key, str(value)))
+    return pairs

@@ -1,0 +1,188 @@
+"""The report's answer of a study that looks for an optimum: where it lies, how flat it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.stats import norm
+
+from sandmould.report.chart import PLAIN, Chart, Line, tints
+from sandmould.report.curves import reported_lines
+from sandmould.report.robustness import CertificatePages, opening_sentences
+from sandmould.runs.formatting import (
+    listed,
+    name_of,
+    number,
+    range_text,
+    shown_scale,
+    unit_of,
+    value_text,
+    with_margin,
+)
+from sandmould.statistics.emulator import TooFewRunsError
+from sandmould.statistics.optimum import Optimum, find_optimum
+from sandmould.statistics.settings import CONFIDENCE
+from sandmould.study.rounds.ledger import Ledger, read_ledger
+from sandmould.study.study import Study
+
+WRONG = {"frequency_hz": 10.0}
+"""By how much a key may be set wrong in a foundry; others by a tenth of their range."""
+SHARE_LOST = 0.05
+"""Of the best value, what counts as no worse where the study sets no margin."""
+_TWO_SIDED = float(norm.ppf(0.5 + CONFIDENCE / 2))
+
+
+@dataclass(frozen=True)
+class OptimumPages:
+    """What the report says of the optimum."""
+
+    sentences: tuple[str, ...]
+    sound: bool
+    """Whether the optimum lies inside the sweep, as narrow as asked."""
+    optimum: Optimum | None
+
+
+def optimum_pages(
+    study_folder: Path,
+    study: Study,
+    summary: pd.DataFrame,
+    certificate: CertificatePages | None = None,
+) -> OptimumPages | None:
+    """Say where the optimum of a study with rounds or a certificate lies; None for others.
+
+    Parameters
+    ----------
+    study_folder : Path
+    study : Study
+    summary : DataFrame
+        One row a run of the sweep and its rounds.
+    certificate : CertificatePages, optional
+        Its verdict comes first where the optimum is an artefact.
+    """
+    if not (study.refine.rounds or study.certificate.controls):
+        return None
+    ledger, objective = read_ledger(study_folder, study), study.objective
+    keys = study.sweep.swept
+    try:
+        optimum = find_optimum(summary, keys, objective.measure, objective.better)
+    except TooFewRunsError as error:
+        return OptimumPages((f"No optimum can be told: {error}.",), False, None)
+    ends = [key for key in keys if optimum.at_end(key)]
+    wide = [
+        key
+        for key, width in study.refine.interval.items()
+        if optimum.interval(key)[1] - optimum.interval(key)[0] > width
+    ]
+    said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
+    said += _beside(optimum, study)
+    if study.refine.rounds:
+        said.append(_effort(ledger, study, summary))
+    sound = not ends and not wide
+    if certificate is not None:
+        opening = opening_sentences(certificate, objective.measure)
+        artefact = certificate.certified.is_artefact
+        said = [*opening, *said] if artefact else [said[0], *opening, *said[1:]]
+        sound = sound and certificate.certified.kind == "rearrangement of grains"
+    return OptimumPages(tuple(said), sound, optimum)
+
+
+def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
+    what = name_of(study.objective.measure)
+    most = "highest" if optimum.sign > 0 else "lowest"
+    mean, se = optimum.value
+    places = []
+    for key, value in optimum.setting.items():
+        low, high = optimum.interval(key)
+        places.append(
+            f"{name_of(key)} {value_text(key, _rounded(value))} "
+            f"(95 % interval {range_text(key, low, _rounded(high))})"
+        )
+    where = f"{listed(places)}: {with_margin(mean, _TWO_SIDED * se)}"
+    if not ends:
+        return f"The {what} is {most} at {where}."
+    reached = [
+        f"the {end.replace(' and ', ' and the ')} {name_of(key)} swept"
+        for key in ends
+        for end in [optimum.at_end(key)]
+    ]
+    return (
+        f"Not resolved: among what was swept the {what} is {most} at {where}, but the interval "
+        f"reaches {listed(reached)}, so the optimum may lie beyond."
+    )
+
+
+def _flat(optimum: Optimum, study: Study, key: str) -> str:
+    """How far a key may be off without harm, and what a usual error costs."""
+    measure, name = study.objective.measure, name_of(key)
+    set_margin = study.equivalence.margins.get(measure)
+    margin = set_margin or SHARE_LOST * abs(optimum.value[0])
+    low, high = optimum.no_worse(key, margin)
+    how = "the margin set beforehand" if set_margin else "5 % of it"
+    said = (
+        f"From {range_text(key, low, _rounded(high))} the mean loses less than "
+        f"{number(margin, 2)}, {how}"
+    )
+    off = WRONG.get(key.rsplit(".", 1)[-1])
+    if off is None:
+        values = optimum.points[:, optimum.keys.index(key)]
+        off = float(f"{0.1 * (values.max() - values.min()):.1g}")
+    costs = [
+        f"{value_text(key, off)} too {side} costs {number(loss, 2)}"
+        for side, loss in (("low", optimum.loss(key, -off)), ("high", optimum.loss(key, off)))
+        if not math.isnan(loss)
+    ]
+    return f"{said}; a {name} {listed(costs)}." if costs else f"{said}."
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
+def _beside(optimum: Optimum, study: Study) -> list[str]:
+    """What others have found best, beside the interval."""
+    if len(optimum.keys) > 1:
+        return []
+    (key,) = optimum.keys
+    low, high = optimum.interval(key)
+    return [
+        f"{value_text(key, one.value)} by {one.by} "
+        f"{'lies' if low <= one.value <= high else 'does not lie'} in the interval."
+        for one in study.objective.reported_best
+    ]
+
+
+def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
+    added, swept = len(ledger.runs), study.sweep.number_of_points * study.replicates
+    rounds = len(ledger.rounds)
+    spent_h = float(summary["cpu_s"].sum()) / 3600 if "cpu_s" in summary else math.nan
+    many = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
+    return (
+        f"{many} added {added or 'any'} runs to the {swept} of the sweep, "
+        f"{number(spent_h, 2)} h of processor time in all. "
+        f"{ledger.ended or 'Rounds go on: make study continues them.'}"
+    )
+
+
+def with_surface(chart: Chart, optimum: Optimum, study: Study) -> Chart:
+    """The objective's chart over one key with fit, error, interval and what others found best."""
+    mean, se = optimum.surface
+    factor = shown_scale(study.objective.measure)[0]
+    x, tint = optimum.points[:, 0], tints(1, False)[0]
+    lines = [Line(np.column_stack([x, factor * mean]), tint, True, title="fitted mean")]
+    for sign in (-1.0, 1.0):
+        edge = factor * (mean + sign * _TWO_SIDED * se)
+        lines.append(Line(np.column_stack([x, edge]), PLAIN, title="95 % of the fitted mean"))
+    key = optimum.keys[0]
+    reach = factor * _TWO_SIDED * se
+    foot, top = float((factor * mean - reach).min()), float((factor * mean + reach).max())
+    lines += reported_lines(study, key, foot, top)
+    low, high = optimum.interval(key)
+    alt = (
+        f"{chart.alt} The fitted curve is best at {number(optimum.setting[key])} {unit_of(key)}, "
+        f"95 % interval {number(low)} to {number(high)}."
+    )
+    return replace(chart, lines=tuple(lines), band=(low, high), alt=alt)

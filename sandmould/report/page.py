@@ -1,0 +1,202 @@
+"""The report of a study: one HTML file that opens offline."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from sandmould import ROOT
+from sandmould.report.agreement import agreement_pages
+from sandmould.report.animation import BUDGET_BYTES
+from sandmould.report.by_kind import drives_of, kind_pages, notes_of
+from sandmould.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
+from sandmould.report.curves import objective_charts
+from sandmould.report.estimate_section import known_figures, known_pages
+from sandmould.report.figure_files import numbered, write_figures
+from sandmould.report.method import Row, provenance_rows, statistics_method
+from sandmould.report.optimum import optimum_pages, with_surface
+from sandmould.report.robustness import certificate_pages
+from sandmould.report.sand import shown_runs
+from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
+from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
+from sandmould.runs.formatting import name_of, number, setting_text
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.settings import group_settings
+from sandmould.statistics.verdict import Verdict, judge
+from sandmould.study.collect import Collected, gather, read_provenance, read_study
+from sandmould.study.kinds.kind import AnyScenario
+from sandmould.study.plan_files import FIGURES, STUDY_FILE, read_run
+from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.study import Study
+
+TEMPLATES = ROOT / "templates" / "report"
+LIMIT_BYTES = 15_000_000
+
+
+def write_report(study_folder: Path, out: Path) -> None:
+    """Write the report of a study, under 15 MB and without a single outside address.
+
+    Its main figures are written as files too, into ``figures`` of the study's folder.
+
+    Parameters
+    ----------
+    study_folder : Path
+        ``results/<study>``; runs may be missing, unfinished or broken.
+    out : Path
+        The HTML file; links to the data lead from its folder.
+
+    Raises
+    ------
+    OSError, ValueError
+        When ``runs.tsv`` cannot be read, or no run has a readable scenario.
+    """
+    study = read_study(study_folder)
+    collected = gather(study_folder, study.objective.at_vibration_s)
+    # made first: the page lists it
+    (study_folder / FIGURES).mkdir(exist_ok=True)
+    page = _page(study_folder, out.absolute().parent, study, collected)
+    environment = _environment()
+    for budget in (BUDGET_BYTES, BUDGET_BYTES // 4, BUDGET_BYTES // 20):
+        text, figures = _render(page, environment, budget)
+        if len(text.encode("utf-8")) < LIMIT_BYTES:
+            break
+    partial = out.with_name(out.name + ".partial")
+    partial.write_text(text, encoding="utf-8")
+    write_figures(study_folder / FIGURES, environment, figures)
+    os.replace(partial, out)
+
+
+@dataclass(frozen=True)
+class _Page:
+    """What the report is made from."""
+
+    study_folder: Path
+    href: str
+    study: Study
+    collected: Collected
+    verdict: Verdict
+    scenario: AnyScenario
+    """Of the run that is shown."""
+    by_setting: dict[str, AnyScenario]
+
+
+def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
+    objective, keys, summary = study.objective, collected.keys, collected.of_sweep.summary
+    seeks_best = study.seeks_best
+    any_scenario = _scenario_of(study_folder, summary["run"])
+    if any_scenario is None:
+        raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
+    certified = bool(read_ledger(study_folder, study).certified_hz)
+    notes = notes_of(any_scenario, collected, seeks_best, certified)
+    if not (study_folder / STUDY_FILE).exists():
+        notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
+    verdict = judge(summary, keys, objective.measure, objective.better, notes, seeks_best)
+    shown = next(iter(shown_runs(study_folder, summary, verdict).values()), "")
+    listed = {setting.label for setting in listed_settings(verdict)}
+    by_setting = {}
+    for values, rows in group_settings(summary, keys):
+        if (label := setting_text(values)) in listed:
+            by_setting[label] = _scenario_of(study_folder, rows["run"])
+    relative = os.path.relpath(study_folder.absolute(), home)
+    href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
+    scenario = _scenario_of(study_folder, [shown] if shown else []) or any_scenario
+    return _Page(
+        study_folder, href, study, collected, verdict, scenario,
+        {label: found for label, found in by_setting.items() if found is not None},
+    )  # fmt: skip
+
+
+def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
+    """Scenario of the first run whose file can be read."""
+    for run in runs:
+        with contextlib.suppress(BadInputError, OSError):
+            return read_run(study_folder / "runs" / str(run) / "scenario.yaml").scenario
+    return None
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number
+    return environment
+
+
+def _render(
+    page: _Page, environment: Environment, film_budget_bytes: int
+) -> tuple[str, dict[str, Chart | bytes]]:
+    """The page, and its figures for files."""
+    of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
+    summary = page.collected.summary
+    seeks_best = page.study.seeks_best
+    agreement = agreement_pages(page.collected, page.study)
+    known = known_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
+    certificate = None
+    if isinstance(page.scenario, Scenario):
+        certificate = certificate_pages(
+            page.study_folder, page.study, page.collected, page.scenario
+        )
+    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, certificate)
+    drawn, drawn_verdict = drawn_part(of_sweep, verdict)
+    charts = objective_charts(drawn.summary, drawn_verdict, keys)
+    if optimum and optimum.optimum and len(keys) == 1:
+        charts = tuple(with_surface(c, optimum.optimum, page.study) for c in charts)
+    provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
+    of_kind = kind_pages(
+        page.study_folder,
+        page.study,
+        page.scenario,
+        page.collected,
+        verdict,
+        film_budget_bytes,
+        page.href,
+    )
+    method: tuple[Row, ...] = (
+        *of_kind.method,
+        statistics_method(page.study.objective, of_kind.ends),
+    )
+    text = environment.get_template(of_kind.template).render(
+        title=page.study.title or page.study_folder.name,
+        study_name=page.study_folder.name,
+        verdict=verdict,
+        measure_name=name_of(verdict.measure),
+        keys=keys,
+        seeks_best=seeks_best,
+        agreement=agreement,
+        known=known,
+        optimum=optimum,
+        certificate=certificate,
+        statement=optimum or (agreement if agreement and agreement.is_question else known),
+        key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
+        objective_charts=[_both_sizes(c) for c in charts],
+        drawn_note=drawn_note(of_sweep, verdict),
+        settings=settings_table(verdict, drives_of(page.by_setting)),
+        runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
+        method=method,
+        provenance=provenance_rows(provenance),
+        files=data_files(page.study_folder, page.href),
+        both_sizes=_both_sizes,
+        half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
+        advice=of_kind.advice,
+        reported_best=page.study.objective.reported_best,
+        **of_kind.context,
+    )
+    of_known = known_figures(known) if known else {}
+    return text, {**numbered("objective", charts), **of_known, **of_kind.figures}
+
+
+def _both_sizes(chart: Any) -> tuple[Any, Any]:
+    """A chart laid out for a wide page and for a phone."""
+    return lay_out(chart, WIDE), lay_out(chart, NARROW)

@@ -1,0 +1,186 @@
+"""The report's certificate: what the controls say, their table, and the bed's own spectrum."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.spectrum import column_frequency_hz, first_resonance_hz, transfer
+from sandmould.report.chart import PLAIN, Chart, Line, tints
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.runs.formatting import name_of, number
+from sandmould.scenario.scenario import FILLING, Scenario
+from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
+from sandmould.statistics.robustness import Certified, certify, shaken_runs
+from sandmould.study.collect import Collected
+from sandmould.study.plan_files import read_run
+from sandmould.study.robustness.config import frequency_key
+from sandmould.study.robustness.controls import SHAKE_G
+from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.study import Study
+
+
+@dataclass(frozen=True)
+class CertificatePages:
+    """What the section shows."""
+
+    certified: Certified
+    table: Table
+    spectrum: Chart | None
+    column: str
+    """What a column of springs would do, as a sentence."""
+
+
+def certificate_pages(
+    study_folder: Path, study: Study, collected: Collected, scenario: Scenario
+) -> CertificatePages | None:
+    """Judge and draw the controls of a study; None before they are chosen, or without any.
+
+    Parameters
+    ----------
+    study_folder : Path
+    study : Study
+    collected : Collected
+        Of all runs.
+    scenario : Scenario
+        Of any run of the sweep.
+    """
+    key = frequency_key(study.sweep)
+    certified_hz = read_ledger(study_folder, study).certified_hz
+    if not key or not certified_hz:
+        return None
+    certified = certify(
+        collected.summary,
+        key,
+        certified_hz,
+        study.objective,
+        study.equivalence.margins.get(study.objective.measure),
+    )
+    responses = _responses(study_folder, shaken_runs(collected.summary))
+    return CertificatePages(
+        certified,
+        _table(certified, certified_hz),
+        _chart(responses) if responses else None,
+        _column(scenario, collected.summary, responses),
+    )
+
+
+def _table(certified: Certified, certified_hz: Sequence[float]) -> Table:
+    columns = (
+        Column("control", False),
+        *(Column(f"{f:g} Hz") for f in certified_hz),
+        Column("shift"),
+        Column("95 % interval"),
+        Column("the optimum", False),
+    )
+    rows = [("the sweep itself", certified.sweep, math.nan, "–", "–")]
+    for move in certified.movements:
+        low, high = move.ci
+        interval = "–" if math.isnan(low) else f"{number(low, 2)} to {number(high, 2)}"
+        words = {"up": "moves up", "down": "moves down", "held": "stays"}
+        rows.append(
+            (move.name, move.means, move.shift, interval, words.get(move.judged, move.judged))
+        )
+    cells = tuple(
+        (
+            Cell(name, name),
+            *(Cell(number(v), repr(v)) for v in means),
+            Cell(number(shift, 2), repr(shift)),
+            Cell(interval, interval),
+            Cell(judged, judged),
+        )
+        for name, means, shift, interval, judged in rows
+    )
+    marked = tuple(judged.startswith("moves") for *_, judged in rows)
+    return Table(columns, cells, marked)
+
+
+Response = tuple[np.ndarray, np.ndarray]
+"""Frequencies, Hz, and the amplification at each."""
+
+
+def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
+    """Amplification of the small shake in each of its runs."""
+    found = []
+    for run in runs:
+        folder = study_folder / "runs" / run
+        scenario = read_run(folder / "scenario.yaml").scenario
+        loads = pd.read_csv(folder / "loads.tsv", sep="\t")
+        upward = [c for c in loads.columns if c.startswith("force_")][-1]
+        total = loads.groupby(["stage", "time_s"], sort=False)[upward].sum().reset_index()
+        filled = total[total["stage"].str.startswith(FILLING)]
+        # Sand presses down on the box; the mean of the last layer's rest is its weight.
+        weight_n = -float(filled[upward].iloc[-len(filled) // 20 :].mean())
+        rigid_n = weight_n / scenario.gravity_m_s2 * SHAKE_G * STANDARD_GRAVITY_M_S2
+        window_s = scenario.record.series_every_s
+        shaken, response = [], []
+        for place, stage in enumerate(scenario.vibration, start=1):
+            rows = total[total["stage"] == f"vibrate_{place}"]
+            if len(rows) < 4:
+                continue
+            shaken.append(stage.frequency_hz)
+            response.append(
+                transfer(
+                    rows["time_s"].to_numpy(dtype=np.float64),
+                    rows[upward].to_numpy(dtype=np.float64),
+                    stage.frequency_hz,
+                    window_s,
+                    rigid_n,
+                )
+            )
+        found.append((np.array(shaken), np.array(response)))
+    return found
+
+
+def _chart(responses: Sequence[Response]) -> Chart:
+    tint = tints(1, False)[0]
+    lines = [Line(np.column_stack([f, r]), PLAIN, title="one filling") for f, r in responses]
+    frequency = responses[0][0]
+    mean = np.mean([np.interp(frequency, f, r) for f, r in responses], axis=0)
+    lines.append(Line(np.column_stack([frequency, mean]), tint, True, title="mean"))
+    peak = int(np.nanargmax(mean))
+    return Chart(
+        "frequency, Hz",
+        "force over that of a rigid bed",
+        f"Response of the bed to a small shake against frequency; highest at "
+        f"{number(frequency[peak])} Hz with {number(mean[peak])}.",
+        tuple(lines),
+    )
+
+
+def _column(scenario: Scenario, summary: pd.DataFrame, responses: Sequence[Response]) -> str:
+    """Frequency of a column of springs as deep as the bed, beside the bed's own."""
+    classes = scenario.sand.classes(scenario.dimension)
+    shares = np.array([c.mass_fraction for c in classes])
+    mean_m = float(shares @ np.array([c.diameter_m for c in classes]))
+    mass_kg = scenario.sand.grain_mass_kg(mean_m, scenario.dimension)
+    height_m = float(pd.to_numeric(summary["bed_height_m"], errors="coerce").median())
+    estimate_hz = column_frequency_hz(
+        mean_m, mass_kg, scenario.contact.grain_grain.normal_stiffness_n_m, height_m
+    )
+    said = (
+        f"A column of the model's springs, {number(1e3 * height_m)} mm high, would resonate at "
+        f"about {number(estimate_hz, 2)} Hz, c/(4 H) with c = d sqrt(k/m), and at odd multiples"
+    )
+    own_hz = [first_resonance_hz(f, r) for f, r in responses]
+    if not own_hz:
+        return f"{said}."
+    known = [f for f in own_hz if math.isfinite(f)]
+    if not known:
+        return f"{said}; shaken weakly, the bed shows no resonance."
+    return (
+        f"{said}; shaken weakly, the bed's own first resonance is at {number(np.mean(known))} Hz."
+    )
+
+
+def opening_sentences(pages: CertificatePages, measure: str) -> tuple[str, ...]:
+    """What the head of the report says of the certificate."""
+    first = pages.certified.sentences[0]
+    if pages.certified.is_artefact:
+        return (f"{first} Do not take it for a property of the sand's {name_of(measure)}.",)
+    return (first,)

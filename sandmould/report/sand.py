@@ -1,0 +1,299 @@
+"""What the report of a sand study shows beside the verdict: scene, pictures, films, curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.layers import layer_table
+from analysis.plots import LAYER_COLOURS
+from sandmould.engines.snapshot import Snapshot
+from sandmould.report import figures
+from sandmould.report.animation import BENT_M, Film, make_film
+from sandmould.report.time_series import (
+    Curve,
+    late_conclusion,
+    measure_curves,
+    whole_conclusion,
+)
+from sandmould.runs.formatting import listed, name_of, number, setting_text
+from sandmould.scenario.geometry import Bore
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.verdict import Verdict, rank_runs
+from sandmould.study.collect import Collected
+from sandmould.study.moments import MOMENTS, Moment, list_moments, nearest
+
+_SECONDARY = (
+    "solid_fraction", "apparent_density_corrected_kg_m3", "coordination", "bed_height_m",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Panel:
+    """The sand at one moment: two pictures and what they are of."""
+
+    heading: str
+    by_layer: str
+    by_density: str
+    alt: str
+
+
+@dataclass(frozen=True)
+class SandPages:
+    """All that the sand sections of the report show."""
+
+    scene: str
+    scene_alt: str
+    shown_run: str
+    shown_as: str
+    panels: tuple[Panel, ...]
+    density_scale: figures.DensityScale
+    density_conclusion: str
+    layer_colours: tuple[tuple[int, str], ...]
+    layer_conclusion: str
+    films: tuple[Film, ...]
+    film_scene: Mapping[str, object]
+    tubes: tuple[Curve, ...]
+    others: tuple[Curve, ...]
+
+
+def sand_pages(
+    study_folder: Path,
+    scenario: Scenario,
+    collected: Collected,
+    verdict: Verdict,
+    film_budget_bytes: int,
+) -> SandPages:
+    """Draw everything that a study of sand shows.
+
+    Parameters
+    ----------
+    study_folder : Path
+    scenario : Scenario
+        Of the run that is shown: the best one.
+    collected : Collected
+    verdict : Verdict
+    film_budget_bytes : int
+        Most that the film of one run may weigh.
+
+    Returns
+    -------
+    SandPages
+        Parts without data are empty.
+    """
+    roles = shown_runs(study_folder, collected.summary, verdict)
+    run = next(iter(roles.values()), "")
+    moments = list_moments(study_folder / "runs" / run) if run else ()
+    chosen = _chosen(moments, scenario)
+    snapshots = [Snapshot.load(m.path) for _, m in chosen]
+    height_m = _shown_height_m(snapshots, scenario)
+    layers = figures.draw_layers(snapshots, scenario, height_m)
+    densities, scale, median_kg_m3 = figures.draw_densities(snapshots, scenario, height_m)
+    films = _films(study_folder, roles, collected, verdict, film_budget_bytes)
+    bed_m = _bed_height_m(collected.curves, run)
+    number_of_layers = max((int(s.layer.max(initial=1)) for s in snapshots), default=1)
+    return SandPages(
+        scene=figures.draw_dimensions(scenario, bed_m),
+        scene_alt=_scene_alt(scenario, bed_m),
+        shown_run=run,
+        shown_as=_shown_as(next(iter(roles), ""), verdict),
+        panels=tuple(
+            Panel(
+                f"{heading}, {_clock_s(moment):.2f} s",
+                by_layer,
+                by_density,
+                f"The sand of run {run} {heading}",
+            )
+            for (heading, moment), by_layer, by_density in zip(
+                chosen, layers, densities, strict=True
+            )
+        ),
+        density_scale=scale,
+        density_conclusion=_density_conclusion(median_kg_m3),
+        layer_colours=tuple(
+            (n, LAYER_COLOURS[(n - 1) % len(LAYER_COLOURS)]) for n in range(1, number_of_layers + 1)
+        ),
+        layer_conclusion=_layer_conclusion(snapshots, scenario),
+        films=films,
+        film_scene=_film_scene(scenario, height_m),
+        tubes=measure_curves(
+            collected,
+            verdict,
+            _tube_measures(collected.curves, scenario, verdict),
+            late_conclusion,
+        ),
+        others=measure_curves(
+            collected, verdict, _other_measures(scenario, verdict), whole_conclusion
+        ),
+    )
+
+
+def _clock_s(moment: Moment) -> float:
+    """Time of vibration, or of the run where nothing vibrates."""
+    return moment.vibration_time_s if moment.vibration_time_s >= 0.0 else moment.time_s
+
+
+def shown_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
+    """Runs to be looked at, by role: best, median and worst, or what there is.
+
+    Where one run finished it is the only one. Where none did, that with most snapshots stands
+    alone: to see how it failed.
+    """
+    ranks = rank_runs(summary, verdict.measure, verdict.better)
+    seen = {r: run for r, run in ranks.items() if list_moments(study_folder / "runs" / run)}
+    if seen:
+        return seen if len(ranks) > 1 else {"only": next(iter(seen.values()))}
+    count = {str(r): len(list_moments(study_folder / "runs" / str(r))) for r in summary["run"]}
+    longest = max(count, key=lambda r: count[r], default="")
+    return {"longest": longest} if count.get(longest) else {}
+
+
+def _shown_as(role: str, verdict: Verdict) -> str:
+    """Why a run is the one to be looked at."""
+    if role == "only":
+        return "the only one that finished"
+    if role == "longest":
+        return "which got farthest: none finished"
+    return f"the {role} run by {name_of(verdict.measure)}"
+
+
+def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Moment]]:
+    """Snapshots at 0, 1/8, 1/2 and 1 of the vibration, as far as the run has them."""
+    duration_s = sum(stage.whole_duration_s for stage in scenario.vibration)
+    if not moments:
+        return []
+    if not duration_s:
+        return [("at its end", moments[-1])]
+    chosen: dict[Path, tuple[str, Moment]] = {}
+    for heading, share in MOMENTS.items():
+        moment = nearest(moments, share * duration_s)
+        if abs(moment.vibration_time_s - share * duration_s) <= 0.1 * duration_s:
+            chosen.setdefault(moment.path, (heading, moment))
+    return list(chosen.values()) or [("at its last snapshot", moments[-1])]
+
+
+def _shown_height_m(snapshots: Sequence[Snapshot], scenario: Scenario) -> float:
+    """Height of the pictures: the sand and the tubes, not the empty space above."""
+    tops = [float((s.position_m[:, -1] + s.radius_m).max()) for s in snapshots if len(s.id)]
+    tops += [float(solid.corners()[:, -1].max()) for solid in scenario.scene.solids]
+    # sand heaped over the rim is shown too, grains still falling from high up are not
+    return min(1.12 * max(tops, default=scenario.box.height_m), 1.4 * scenario.box.height_m)
+
+
+def _bed_height_m(curves: pd.DataFrame, run: str) -> float | None:
+    """Height of the filled bed as vibration begins."""
+    if "bed_height_m" not in curves:
+        return None
+    rows = curves[(curves["run"] == run) & (curves["vibration_time_s"] >= 0)]
+    found = rows["bed_height_m"].dropna()
+    return float(found.iloc[0]) if len(found) else None
+
+
+def _films(
+    study_folder: Path,
+    roles: Mapping[str, str],
+    collected: Collected,
+    verdict: Verdict,
+    budget_bytes: int,
+) -> tuple[Film, ...]:
+    films = []
+    for role, run in roles.items():
+        row = collected.summary[collected.summary["run"] == run].iloc[0]
+        setting = setting_text({key: row[key] for key in collected.keys})
+        curve = collected.curves[collected.curves["run"] == run]
+        reading = None
+        if verdict.measure in curve:
+            known = curve[["time_s", verdict.measure]].dropna().to_numpy(dtype=np.float64)
+            reading = (known[:, 0], known[:, 1])
+        label = f"{role}: {setting}"
+        film = make_film(study_folder / "runs" / run, label, reading, budget_bytes)
+        if film is not None:
+            films.append(film)
+    return tuple(films)
+
+
+def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
+    """The scene for the page's canvas, in m; a pattern is drawn as it bends, with the film."""
+    obstacles = [o for o in scenario.obstacles if o.name != _bending_name(scenario)]
+    still = scenario.model_copy(update={"obstacles": tuple(obstacles), "pattern": None})
+    outline = figures.scene_outline(still, height_m)
+    return {
+        "width_m": scenario.box.width_m,
+        "height_m": height_m,
+        "cut_m": figures.cut_m(scenario),
+        "walls": [np.round(w, 6).tolist() for w in outline.walls],
+        "solids": [np.round(s, 6).tolist() for s in outline.solids],
+        "bores": [np.round(b, 6).tolist() for b in outline.bores],
+        "tubes": [_round(bore) for bore in scenario.scene.bores] if scenario.dimension == 3 else [],
+        "layer_colours": list(LAYER_COLOURS),
+        "bent_m": BENT_M,
+    }
+
+
+def _bending_name(scenario: Scenario) -> str:
+    """The pattern that the film shows as it bends; in 3D it stands as drawn."""
+    bends = scenario.pattern is not None and scenario.dimension == 2
+    return scenario.pattern.name if scenario.pattern is not None and bends else ""
+
+
+def _round(bore: Bore) -> dict[str, object]:
+    """A bore of a 3D scene as the cylinder round it, in m: what a cut shows grains inside of."""
+    end_m = bore.mouth_m + bore.length_m * bore.axis
+    return {
+        "x_m": sorted([float(bore.mouth_m[0]), float(end_m[0])]),
+        "axis_m": bore.mouth_m[1:].tolist(),
+        "radius_m": float(np.linalg.norm(bore.section_m, axis=1).max()),
+    }
+
+
+def _tube_measures(curves: pd.DataFrame, scenario: Scenario, verdict: Verdict) -> list[str]:
+    """The objective first, then the filling of every tube."""
+    fills = [f"{bore.name}_fill_fraction" for bore in scenario.scene.bores]
+    return list(dict.fromkeys([verdict.measure, *(f for f in fills if f in curves)]))
+
+
+def _other_measures(scenario: Scenario, verdict: Verdict) -> list[str]:
+    """How deep the sand has come into every tube, and what the bed does."""
+    fronts = [f"{bore.name}_front_depth_m" for bore in scenario.scene.bores]
+    return [m for m in (*fronts, *_SECONDARY) if m != verdict.measure]
+
+
+def _density_conclusion(median_kg_m3: Sequence[float]) -> str:
+    known = [d for d in median_kg_m3 if math.isfinite(d)]
+    if len(known) < 2:
+        return ""
+    way = "rose" if known[-1] > known[0] else "fell"
+    return (
+        f"The median over all grains {way} from {number(known[0], 4)} to {number(known[-1], 4)} "
+        "kg/m³ during the vibration."
+    )
+
+
+def _layer_conclusion(snapshots: Sequence[Snapshot], scenario: Scenario) -> str:
+    """Which layers the sand in the first tube came from, the largest share first."""
+    if not snapshots or not scenario.scene.bores:
+        return ""
+    bore, last = scenario.scene.bores[0], snapshots[-1]
+    table = layer_table(last.position_m, last.radius_m, last.layer, bore)
+    shares = [
+        f"layer {layer} ({100 * share:.0f} %)"
+        for share, layer in sorted(zip(table.tube_share, table.layer, strict=True), reverse=True)
+        if share >= 0.05
+    ]
+    name = bore.name.replace("_", " ")
+    return f"At the end the sand in the {name} comes from {listed(shares)}." if shares else ""
+
+
+def _scene_alt(scenario: Scenario, bed_m: float | None) -> str:
+    box = scenario.box
+    solid = listed(sorted({o.name.replace("_", " ") for o in scenario.obstacles})) or "nothing"
+    bed = "" if bed_m is None else f", filled with sand to {1e3 * bed_m:.0f} mm"
+    return (
+        f"Section of the box, {1e3 * box.width_m:g} mm wide and {1e3 * box.height_m:g} mm high, "
+        f"with {solid} in it{bed}"
+    )

@@ -1,0 +1,254 @@
+"""What the report of a study of solidification shows: fields, cooling curves, error and cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.freezing import freezing
+from analysis.freezing_plots import draw_freezing, draw_temperature
+from sandmould.report.figures import png
+from sandmould.report.method import Row
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.time_series import Curve, measure_curves
+from sandmould.runs.formatting import listed, name_of, number, seconds, setting_text
+from sandmould.scenario.solidification import MouldMaterial, Solidification
+from sandmould.statistics.verdict import Verdict
+from sandmould.study.collect import Collected
+from sandmould.study.plan_files import read_run
+from sandmould.study.sweep import Point
+
+MARKERS = "osD^vP*X<>"
+STAND_IN = "stand-in"
+"""How the source of a value begins that is not what it stands for."""
+
+
+@dataclass(frozen=True)
+class SolidPages:
+    """What the sections show."""
+
+    shown_run: str
+    fields: str
+    """Picture; empty where no run left fields."""
+    sentences: tuple[str, ...]
+    spots: Table | None
+    curves: tuple[Curve, ...]
+    reference: str
+    """Setting that the others are compared with; empty without one."""
+    error_cost: str
+    errors: Table | None
+
+
+@dataclass(frozen=True)
+class _Error:
+    """How far one run is from the reference."""
+
+    label: str
+    cpu_s: float
+    time_percent: float
+    curve_percent: float
+    """Error (7) of the worst probe, % of the initial difference; NaN without probes."""
+
+
+def solid_pages(
+    study_folder: Path,
+    reference: Point,
+    scenario: Solidification,
+    collected: Collected,
+    verdict: Verdict,
+    shown: str,
+) -> SolidPages:
+    """Draw everything that a study of solidification shows.
+
+    Parameters
+    ----------
+    study_folder : Path
+    reference : Point
+        Swept point that the others are compared with; empty for none.
+    scenario : Solidification
+        Of the run that is shown.
+    collected : Collected
+    verdict : Verdict
+    shown : str
+        Name of that run; the reference where the study names one.
+    """
+    probes = [f"{probe.name}_k" for probe in scenario.probes]
+    curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"], _silent)
+    fields, sentences, spots = _fields(study_folder / "runs" / shown, scenario)
+    errors = _errors(reference, scenario, collected) if reference else []
+    return SolidPages(
+        shown_run=shown, fields=fields,
+        sentences=(*sentences, *_stand_ins(study_folder / "runs" / shown / "scenario.yaml")),
+        spots=spots, curves=curves,
+        reference=setting_text(reference)
+        if reference
+        else "",
+        error_cost=_error_cost(errors) if errors else "",
+        errors=_error_table(errors) if errors else None,
+    )  # fmt: skip
+
+
+def _stand_ins(path: Path) -> tuple[str, ...]:
+    """Which values are not what they stand for, by their sources."""
+    sources = read_run(path).sources if path.is_file() else {}
+    keys = [key for key, source in sources.items() if source.startswith(STAND_IN)]
+    if not keys:
+        return ()
+    return (f"Stand-ins by their sources, so that times are those of no real casting: "
+            f"{listed(keys, most=20)}.",)  # fmt: skip
+
+
+def _silent(collected: Collected, verdict: Verdict, measure: str) -> str:
+    return ""
+
+
+def shown_run(reference: Point, collected: Collected, best: str) -> str:
+    """Run whose fields are shown: the best, else the reference, else the first that finished."""
+    done = collected.summary[collected.summary["outcome_code"] == 0]
+    runs = [best, *_of_point(done, reference)["run"].astype(str), *done["run"].astype(str)]
+    return next((run for run in runs if run), "")
+
+
+def _of_point(summary: pd.DataFrame, reference: Point) -> pd.DataFrame:
+    """Rows of the reference; swept values are as ``runs.tsv`` has them."""
+    chosen = np.ones(len(summary), dtype=bool)
+    for key, value in reference.items():
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        column = summary[key].astype(float if is_number else str)
+        chosen &= (column == (float(value) if is_number else str(value))).to_numpy()
+    return summary[chosen]
+
+
+def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...], Table | None]:
+    """Picture of a run's fields, what it says in words, and its hot spots."""
+    if not (folder / "fields.npz").is_file():
+        return "", ("No run has left fields.",), None
+    with np.load(folder / "fields.npz") as kept:
+        fields = dict(kept)
+    melts = fields["melts"]
+    found = freezing(
+        fields["position_m"][melts], fields["frozen_s"][melts], scenario.hot_spot_reach_m
+    )
+    figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
+    left, right = figure.subplots(1, 2)
+    draw_freezing(fields, found, left)
+    draw_temperature(fields, found, right)
+    said = "Some of the casting is still liquid at the end of the run."
+    if math.isfinite(found.solidification_time_s):
+        at = ", ".join(
+            f"{axis} = {number(1e3 * place_m)} mm"
+            for axis, place_m in zip("xyz", found.last_point_m, strict=False)
+        )
+        said = (
+            f"The casting is solid after {number(found.solidification_time_s, 4)} s; the last "
+            f"point to freeze lies at {at}."
+        )
+    axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
+    columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
+    rows = tuple(
+        tuple(Cell(number(v, 4), str(v)) for v in (*(1e3 * place), time_s))
+        for place, time_s in zip(found.hot_spots_m, found.hot_spot_s, strict=True)
+    )
+    return png(figure), (said,), Table(columns, rows, (False,) * len(rows))
+
+
+def _errors(point: Point, scenario: Solidification, collected: Collected) -> list[_Error]:
+    """Each finished run against the reference; nothing where that did not finish."""
+    done = collected.summary[collected.summary["outcome_code"] == 0]
+    reference = _of_point(done, point)
+    if reference.empty:
+        return []
+    base = reference.iloc[0]
+    own = dict(list(collected.curves.groupby("run")))
+    probes = [f"{probe.name}_k" for probe in scenario.probes]
+    range_k = scenario.initial_k.casting - scenario.initial_k.mould
+    found = []
+    for _, row in done.iterrows():
+        if row["run"] == base["run"]:
+            continue
+        time_s, base_s = float(row["solidification_time_s"]), float(base["solidification_time_s"])
+        curve = _curve_percent(own[row["run"]], own[base["run"]], probes, range_k)
+        label = setting_text({key: row[key] for key in collected.keys})
+        found.append(_Error(label, float(row["cpu_s"]), 100.0 * (time_s / base_s - 1.0), curve))
+    return found
+
+
+def _curve_percent(
+    table: pd.DataFrame, base: pd.DataFrame, probes: Sequence[str], range_k: float
+) -> float:
+    """Error (7) of the worst probe over the time that both runs have."""
+    end_s = min(table["time_s"].max(), base["time_s"].max())
+    time_s = base["time_s"].to_numpy()
+    time_s = time_s[time_s <= end_s]
+    off = [
+        np.abs(np.interp(time_s, table["time_s"], table[p]) - base[p].to_numpy()[: len(time_s)])
+        for p in probes
+    ]
+    return max((100.0 * float(np.trapezoid(o, time_s)) / (range_k * end_s) for o in off),
+               default=math.nan)  # fmt: skip
+
+
+def _error_cost(errors: Sequence[_Error]) -> str:
+    """Errors over the processor's time, both on logarithmic axes."""
+    figure = Figure(figsize=(11, 5.2), dpi=110, layout="constrained")
+    panels = figure.subplots(1, 2)
+    for place, one in enumerate(errors):
+        marker = MARKERS[place % len(MARKERS)]
+        for panel, value in zip(panels, (abs(one.time_percent), one.curve_percent), strict=True):
+            panel.loglog(one.cpu_s, value, marker, ms=8, label=one.label)
+    for panel, what in zip(
+        panels, ("error of the solidification time, %", "mean error of the worst cooling curve, %"),
+        strict=True,
+    ):  # fmt: skip
+        panel.set_xlabel("processor time, s")
+        panel.set_ylabel(what)
+        panel.grid(alpha=0.3, which="both")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3,
+                  fontsize=8)  # fmt: skip
+    return png(figure)
+
+
+def _error_table(errors: Sequence[_Error]) -> Table:
+    columns = (
+        Column("setting", False), Column("processor time"), Column("solidification time, %"),
+        Column("worst cooling curve, %"),
+    )  # fmt: skip
+    rows = tuple(
+        (
+            Cell(one.label, one.label),
+            Cell(seconds(one.cpu_s), str(one.cpu_s)),
+            *(Cell(number(v), str(v)) for v in (one.time_percent, one.curve_percent)),
+        )
+        for one in sorted(errors, key=lambda one: one.cpu_s)
+    )
+    return Table(columns, rows, (False,) * len(rows))
+
+
+def solid_method(scenario: Solidification, keys: Sequence[str]) -> tuple[Row, ...]:
+    """How the runs were computed; see ``sand_method``."""
+    metal, mould, initial = scenario.casting, scenario.mould, scenario.initial_k
+    transfer = scenario.heat_transfer_w_m2_k
+    return (
+        Row("Method", "adaptive resolution particles of Hirata and Anzai (2019) in "
+            f"{scenario.dimensions}D, and finite differences beside them; the box lets no heat "
+            "through"),
+        Row("Casting", f"{metal.name}: {_conducts(metal)}, latent heat "
+            f"{metal.latent_heat_j_kg / 1e3:g} kJ/kg from {metal.liquidus_k:g} to "
+            f"{metal.solidus_k:g} K; poured at {initial.casting:g} K"),
+        Row("Mould", f"{mould.name}: {_conducts(mould)}; at {initial.mould:g} K"),
+        Row("Interface", f"{transfer:g} W/m²/K" if transfer else "perfect contact"),
+        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
+    )  # fmt: skip
+
+
+def _conducts(it: MouldMaterial) -> str:
+    return (
+        f"{it.density_kg_m3:g} kg/m³, {it.heat_capacity_j_kg_k:g} J/kg/K, "
+        f"{it.conductivity_w_m_k:g} W/m/K"
+    )

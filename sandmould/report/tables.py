@@ -1,0 +1,300 @@
+"""Tables of the report: key numbers, settings against the best, and every run with its cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import pandas as pd
+
+from sandmould.report.thinning import listed_note, listed_runs, listed_settings
+from sandmould.runs.formatting import name_of, number, seconds, size, titled, with_margin
+from sandmould.runs.outcome import Outcome
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.verdict import Verdict
+from sandmould.study.plan_files import FIGURES, STUDY_FILE
+
+
+@dataclass(frozen=True)
+class KeyNumber:
+    """A number that a reader looks for first."""
+
+    value: str
+    label: str
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a cell shows and what it is sorted by."""
+
+    text: str
+    sort: str
+    href: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Head of a column."""
+
+    title: str
+    is_number: bool = True
+
+
+@dataclass(frozen=True)
+class Table:
+    """Heads and rows; a row is marked where something in it needs a look."""
+
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    marked: tuple[bool, ...]
+    note: str = ""
+    """What it leaves out."""
+
+
+def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...]:
+    """Objective of the best setting, runs that finished, size, cost and health of the runs.
+
+    Parameters
+    ----------
+    summary : DataFrame
+    verdict : Verdict
+
+    Returns
+    -------
+    tuple of KeyNumber
+        Without those whose data are missing.
+    """
+    found = []
+    if verdict.best is not None:
+        best = verdict.best
+        label = f"{name_of(verdict.measure)}, {best.label}"
+        mean = f"mean of {best.n} runs" if best.n > 1 else "one run"
+        found.append(KeyNumber(number(best.mean), label, mean))
+    finished = summary[summary["outcome_code"] == int(Outcome.FINISHED)]
+    found.append(KeyNumber(f"{len(finished)} of {len(summary)}", "runs finished"))
+    # a run that failed may have stopped before it had all its grains
+    typical = finished if len(finished) else summary
+    for what in ("grains", "elements", "particles"):
+        count = _total(typical, what, "median")
+        if count is not None:
+            shown = f"{count:,.0f}".replace(",", "\u202f")
+            found.append(KeyNumber(shown, f"{what} in a run"))
+    wall_s, cpu_s = _total(summary, "wall_s", "sum"), _total(summary, "cpu_s", "sum")
+    if wall_s is not None:
+        note = "" if cpu_s is None else f"{seconds(cpu_s)} of processor time"
+        found.append(KeyNumber(seconds(wall_s), "computing, all runs added up", note))
+    speed = _total(typical, "grain_steps_per_s", "median")
+    if speed is not None:
+        found.append(KeyNumber(f"{number(speed / 1e6)} M", "grain-steps a second, median run"))
+    overlap = _total(summary, "largest_overlap_fraction", "max")
+    if overlap is not None:
+        found.append(KeyNumber(f"{100 * overlap:.1f} %", "largest overlap, of a radius"))
+    return tuple(found)
+
+
+def _total(summary: pd.DataFrame, column: str, how: str) -> float | None:
+    if column not in summary:
+        return None
+    value = float(pd.to_numeric(summary[column], errors="coerce").dropna().agg(how))
+    return value if math.isfinite(value) and value else None
+
+
+def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table:
+    """Every setting with its mean, and the best against it.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    scenarios : mapping of str to Scenario
+        One scenario a setting, by label, for the drive of the vibrating table.
+    """
+    shaken = any(s.vibration for s in scenarios.values())
+    drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if shaken else ()
+    columns = (
+        Column("setting", False),
+        *map(Column, ("mean ± 95 %", "best minus this", "95 % interval", "p")),
+        Column("judged", False),
+        *map(Column, ("sd", "runs", *drive)),
+    )
+    rows, marked = [], []
+    for place, setting in enumerate(listed_settings(verdict)):
+        against = verdict.against(setting)
+        is_best = verdict.best is not None and setting.label == verdict.best.label
+        interval, p, difference = "–", math.nan, math.nan
+        judged = "best mean" if is_best else "no run"
+        if against is not None:
+            difference, p = against.difference, against.p
+            judged = "too few runs"
+            if against.tested:
+                interval = f"{number(against.ci[0], 2)} to {number(against.ci[1], 2)}"
+                judged = "worse" if against.separated else "undecided"
+        rows.append(
+            (
+                Cell(setting.label, str(place)),
+                Cell(with_margin(setting.mean, setting.ci_half_width), str(setting.mean)),
+                *_number_cells((difference, 2)),
+                Cell(interval, str(difference)),
+                Cell(_p_text(p), str(p)),
+                Cell(judged, judged),
+                *_number_cells((setting.sd, 2)),
+                Cell(f"{setting.n} of {setting.planned}", str(setting.n)),
+                *_drive_cells(scenarios.get(setting.label), bool(drive)),
+            )
+        )
+        marked.append(is_best)
+    nearest = "the best and those that come nearest to it"
+    note = listed_note(len(rows), len(verdict.settings), "settings", nearest)
+    return Table(columns, tuple(rows), tuple(marked), note)
+
+
+def _p_text(p: float) -> str:
+    if not math.isfinite(p):
+        return "–"
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+
+
+def _drive_cells(scenario: Scenario | None, shown: bool) -> tuple[Cell, ...]:
+    """Peak displacement, velocity and acceleration of the first stage of vibration."""
+    if not shown:
+        return ()
+    if scenario is None or not scenario.vibration:
+        return _number_cells(*[(math.nan, 3)] * 3)
+    stage = scenario.vibration[0]
+    velocity = stage.amplitude_m * stage.angular_frequency_rad_s
+    return _number_cells(
+        (1e3 * stage.amplitude_m, 3), (1e3 * velocity, 3), (stage.peak_acceleration_g, 3)
+    )
+
+
+def _number_cells(*values: tuple[float, int]) -> tuple[Cell, ...]:
+    return tuple(Cell(number(value, digits), str(value)) for value, digits in values)
+
+
+_COST = (
+    ("grains", "grains", lambda v: f"{v:.0f}"),
+    ("elements", "elements", lambda v: f"{v:.0f}"),
+    ("particles", "particles", lambda v: f"{v:.0f}"),
+    ("simulated_s", "simulated", seconds),
+    ("wall_s", "wall time", seconds),
+    ("cpu_s", "processor time", seconds),
+    ("grain_steps_per_s", "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
+    ("element_steps_per_s", "element-steps/s", lambda v: f"{number(v / 1e6)} M"),
+    ("particle_solves_per_s", "particle-solves/s", lambda v: f"{number(v / 1e6)} M"),
+    ("solver_fraction", "time in the solver", lambda v: f"{100 * v:.0f} %"),
+    ("peak_memory_bytes", "memory", size),
+    ("time_step_fraction", "step / critical", number),
+    ("largest_overlap_fraction", "largest overlap", lambda v: f"{100 * v:.1f} %"),
+)
+
+
+def runs_table(
+    summary: pd.DataFrame, keys: Sequence[str], verdict: Verdict, runs_href: str
+) -> Table:
+    """Every run with its parameters, outcome, objective and cost.
+
+    Parameters
+    ----------
+    summary : DataFrame
+    keys : sequence of str
+    verdict : Verdict
+    runs_href : str
+        Address of the folder of runs, seen from the report.
+
+    Returns
+    -------
+    Table
+        Runs that did not finish are marked and say why.
+    """
+    cost = [c for c in _COST if c[0] in summary]
+    blocks = [c for c in ("replicate", "seed") if c in summary]
+    has_value = verdict.measure in summary
+    columns = (
+        Column("run", False),
+        *(Column(titled(k)) for k in keys),
+        *(Column(b) for b in blocks),
+        Column("outcome", False),
+        *([Column(titled(verdict.measure))] if has_value else []),
+        *(Column(title) for _, title, _ in cost),
+    )
+    rows, marked = [], []
+    for row in listed_runs(summary, verdict).to_dict("records"):
+        failed = row["outcome_code"] != int(Outcome.FINISHED)
+        rows.append(
+            (
+                Cell(str(row["run"]), str(row["run"]), f"{runs_href}/{quote(str(row['run']))}/"),
+                *(_parameter_cell(row[k]) for k in keys),
+                *(_parameter_cell(row[b]) for b in blocks),
+                Cell(str(row["outcome"]), str(row["outcome"]), note=_why(row, failed)),
+                *([_number_cells((_float(row[verdict.measure]), 4))[0]] if has_value else []),
+                *(_cost_cell(row[name], show) for name, _, show in cost),
+            )
+        )
+        marked.append(failed)
+    failed_and_best = "those without a value and then the best; summary.tsv has all"
+    note = listed_note(len(rows), len(summary), "runs", failed_and_best)
+    return Table(columns, tuple(rows), tuple(marked), note)
+
+
+def _parameter_cell(value: Any) -> Cell:
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return Cell(text, str(value))
+
+
+def _cost_cell(value: Any, show: Any) -> Cell:
+    x = _float(value)
+    return Cell(show(x) if math.isfinite(x) else "–", str(x))
+
+
+def _float(value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan
+
+
+def _why(row: Mapping[Any, Any], failed: bool) -> str:
+    """Sentence of an outcome with what the engine or the collection said."""
+    detail = row["detail"] if isinstance(row["detail"], str) else ""
+    code = _float(row["outcome_code"])
+    meaning = ""
+    if failed and math.isfinite(code):
+        meaning = Outcome(int(code)).meaning
+    elif failed:
+        meaning = "The run was not started, or was killed before it could say how it ended."
+    return " ".join(s for s in (meaning, detail) if s)
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """A file of the study that the report links to."""
+
+    href: str
+    name: str
+    what: str
+
+
+_FILES = (
+    (STUDY_FILE, "the study as planned"),
+    ("runs.tsv", "the plan: every run, its parameters, replicate and seed"),
+    ("summary.tsv", "one row a run: parameters, outcome, final measures, cost"),
+    ("curves.tsv", "one row a snapshot: all measures of all runs against time"),
+    (FIGURES, "main figures as files: charts as SVG, sand as PNG"),
+    ("agreement.tsv", "one row a pair of settings and measure that the study compares"),
+    ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "
+     "snapshots; exports/ holds some of them for ParaView (.vtu) and OVITO (.dump)"),
+)  # fmt: skip
+
+
+def data_files(study_folder: Path, base_href: str) -> tuple[DataFile, ...]:
+    """Files of the study that are there, with addresses seen from the report."""
+    return tuple(
+        DataFile(f"{base_href}{name}", name, what)
+        for name, what in _FILES
+        if (study_folder / name).exists()
+    )

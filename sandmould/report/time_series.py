@@ -1,0 +1,74 @@
+"""Measures against time, each with the sentence that concludes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from sandmould.report.chart import Chart
+from sandmould.report.curves import best_passage, time_chart
+from sandmould.report.thinning import drawn_part
+from sandmould.runs.formatting import name_of, number, shown_scale
+from sandmould.statistics.verdict import Verdict
+from sandmould.study.collect import Collected
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A chart against time with the sentence that concludes it."""
+
+    chart: Chart
+    measure: str
+    conclusion: str
+
+
+def measure_curves(
+    collected: Collected,
+    verdict: Verdict,
+    measures: Sequence[str],
+    conclude: Callable[[Collected, Verdict, str], str],
+) -> tuple[Curve, ...]:
+    """Charts of measures against time, those that no run has left out.
+
+    Parameters
+    ----------
+    collected : Collected
+    verdict : Verdict
+    measures : sequence of str
+        Columns of the curves.
+    conclude : callable
+        Gives the sentence of a measure.
+    """
+    found = []
+    drawn, part = drawn_part(collected, verdict)
+    for measure in measures:
+        chart = time_chart(drawn.curves, drawn.summary, part, collected.keys, measure)
+        if chart is not None:
+            found.append(Curve(chart, measure, conclude(collected, verdict, measure)))
+    return tuple(found)
+
+
+def late_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:
+    """Whether the measure still changed at the end, at the best setting."""
+    passage = best_passage(collected, verdict, measure)
+    if verdict.best is None or passage is None or passage[1] == 0:
+        return ""
+    where, what = verdict.best.label, name_of(measure)
+    change = passage[2] / passage[1] - 1
+    if abs(change) < 0.02:
+        return f"At {where} it changed by less than 2 % in the last quarter of the vibration."
+    way = "rose" if change > 0 else "fell"
+    return (
+        f"At {where} the {what} still {way} by {100 * abs(change):.0f} % in the last quarter of "
+        "the vibration: a longer one may change the ranking."
+    )
+
+
+def whole_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:
+    """How the measure changed over the vibration, at the best setting."""
+    passage = best_passage(collected, verdict, measure)
+    if verdict.best is None or passage is None:
+        return ""
+    first, _, last = (shown_scale(measure)[0] * v for v in passage)
+    way = "rose" if last > first else "fell"
+    return f"At {verdict.best.label} it {way} from {number(first)} to {number(last)}."

@@ -1,0 +1,1 @@
+"""What every run has, whatever computes it: outcome, cost, progress, checkpoint, products."""

@@ -1,0 +1,130 @@
+"""What a run leaves behind, moved into place last; the outcome after all else."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import resource
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from sandmould.runs.outcome import RunOutcome
+from sandmould.scenario.scenario import Scenario
+
+
+@dataclass
+class Cost:
+    """The cost row of a run; continued runs add up."""
+
+    engine: str
+    ranks: int
+    time_step_s: float
+    time_step_fraction: float
+    version: str = ""
+    grains: int = 0
+    steps: int = 0
+    grain_steps: float = 0.0
+    wall_s: float = 0.0
+    engine_wall_s: float = 0.0
+    cpu_s: float = 0.0
+    """Of the first rank."""
+    peak_memory_bytes: int = 0
+    """Of the first rank."""
+    largest_overlap_fraction: float = 0.0
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Cost:
+        """Cost of a run that has not begun."""
+        fraction = scenario.step_s / scenario.critical_step.step_s
+        return cls(scenario.engine.name, scenario.engine.ranks, scenario.step_s, fraction)
+
+    def row(self) -> dict[str, Any]:
+        """Values by name, as a continued run takes them up."""
+        return asdict(self)
+
+    def columns(self) -> dict[str, Any]:
+        """Columns of ``cost.tsv`` and their values."""
+        rate = self.grain_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
+        return {**self.row(), "grain_steps_per_s": rate}
+
+
+@dataclass(frozen=True)
+class Computed:
+    """What the computation of a run came to."""
+
+    outcome: RunOutcome
+    cost: Cost
+    is_root: bool
+    """Whether this process writes the products."""
+
+
+def cpu_time_s() -> float:
+    """Processor time of this process and of the engines it has started and seen end."""
+    return sum(os.times()[:4])
+
+
+def peak_memory_bytes() -> int:
+    """Largest resident memory of this process and of the largest engine it has seen end."""
+    whose = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return sum(resource.getrusage(who).ru_maxrss for who in whose) * 1024
+
+
+LAST_WORK = "last_work"
+"""Folder of what a failed run leaves besides its products, its last checkpoint above all."""
+SAND_PRODUCTS = (
+    "series.tsv",
+    "loads.tsv",
+    "snapshots",
+    "engine.log",
+    "pattern.log",
+    "pattern.tsv",
+    "pattern_shapes.f8",
+)
+
+
+def finish(
+    folder: Path,
+    products: Sequence[str],
+    outcome: RunOutcome,
+    cost: Cost,
+    provenance: dict[str, Any],
+) -> None:
+    """Move a run's products from its work folder into place.
+
+    A finished run's work folder is removed, a failed one's renamed: asked for again, that run
+    begins anew, since its tables are no longer beside its checkpoint.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the run.
+    products : sequence of str
+        Files and folders of ``folder/work`` that are kept.
+    outcome : RunOutcome
+    cost : Cost
+    provenance : dict
+    """
+    work = folder / "work"
+    for name in products:
+        target = folder / name
+        if target.is_dir():
+            shutil.rmtree(target)
+        if (work / name).exists():
+            os.replace(work / name, target)
+    row = cost.columns()
+    with (folder / "cost.tsv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(row), delimiter="\t", lineterminator="\n")
+        writer.writeheader()
+        writer.writerow(row)
+    text = json.dumps(provenance, indent=1) + "\n"
+    (folder / "provenance.json").write_text(text, encoding="utf-8")
+    shutil.rmtree(folder / LAST_WORK, ignore_errors=True)
+    if outcome.outcome == 0:
+        shutil.rmtree(work)
+    else:
+        os.replace(work, folder / LAST_WORK)
+    outcome.write(folder / "outcome.json")

@@ -1,0 +1,191 @@
+"""Which settings of a study agree within its margins, and how that is said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import pandas as pd
+
+from sandmould.runs.formatting import listed, name_of, number, setting_text, value_text
+from sandmould.runs.outcome import Outcome
+from sandmould.statistics.config import Equivalence
+from sandmould.statistics.equivalence import Agreement, agree
+from sandmould.statistics.settings import by_block, group_settings
+from sandmould.statistics.verdict import finished_values
+
+COLUMNS = (
+    "at", "key", "first", "second", "measure", "mean_first", "mean_second", "difference",
+    "ci_low", "ci_high", "margin", "n", "paired", "verdict", "note",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Two settings that should agree, in one measure."""
+
+    measure: str
+    key: str
+    """The key in which they differ."""
+    first: str
+    second: str
+    at: str
+    """What else is swept, at the values both have; empty where nothing is."""
+    at_values: str
+    """These values alone."""
+    agreement: Agreement
+
+    @property
+    def pair(self) -> str:
+        """The two settings in the order of their difference."""
+        return f"{self.first} − {self.second}"
+
+    def row(self) -> dict[str, Any]:
+        """One row of ``agreement.tsv``."""
+        found = self.agreement
+        values = (
+            self.at, self.key, self.first, self.second, self.measure, *found.means,
+            found.difference, *found.ci, found.margin, found.n, found.paired, found.judged,
+            found.why,
+        )  # fmt: skip
+        return dict(zip(COLUMNS, values, strict=True))
+
+
+def sweep_part(summary: pd.DataFrame) -> pd.DataFrame:
+    """Runs of the sweep alone, without cross checks and controls."""
+    return summary[summary["part"] == "sweep"] if "part" in summary else summary
+
+
+def compare_keys(
+    summary: pd.DataFrame, keys: Sequence[str], equivalence: Equivalence
+) -> tuple[Compared, ...]:
+    """Compare all values of each key of the equivalence, at equal values of the others.
+
+    Keys that are averaged over do not make comparisons of their own: their values only pair runs.
+    """
+    found: tuple[Compared, ...] = ()
+    for key in equivalence.keys:
+        others = [k for k in keys if k != key]
+        over = [k for k in others if k in equivalence.over]
+        for rest, alike in group_settings(summary, [k for k in others if k not in over]):
+            for (a, rows), (b, other_rows) in combinations(group_settings(alike, [key]), 2):
+                pair = shown_value(key, a[key]), shown_value(key, b[key])
+                found += compare_pair(key, pair, rest, (rows, other_rows), equivalence, over)
+    return tuple(sorted(found, key=lambda c: list(equivalence.margins).index(c.measure)))
+
+
+def shown_value(key: str, value: Any) -> str:
+    """A value by itself where it is a word, with what it is a value of where it is a number."""
+    return value_text(key, value) if isinstance(value, str) else setting_text({key: value})
+
+
+def compare_pair(
+    key: str,
+    pair: tuple[str, str],
+    at: Mapping[str, Any],
+    rows: tuple[pd.DataFrame, pd.DataFrame],
+    equivalence: Equivalence,
+    over: Sequence[str] = (),
+) -> tuple[Compared, ...]:
+    """One pair of settings in every measure that has a margin."""
+    where = setting_text(at) if at else ""
+    at_values = ", ".join(value_text(k, v) for k, v in at.items())
+    found = []
+    for measure, margin in equivalence.margins.items():
+        values = [finished_values(r, measure).dropna() for r in rows]
+        first, second = (by_block(r, v, over) for r, v in zip(rows, values, strict=True))
+        judged = agree(first, second, margin, equivalence.confidence)
+        found.append(Compared(measure, key, *pair, where, at_values, judged))
+    return tuple(found)
+
+
+def agreement_table(compared: Sequence[Compared]) -> pd.DataFrame:
+    """``agreement.tsv``: one row a pair and measure."""
+    return pd.DataFrame([c.row() for c in compared], columns=list(COLUMNS))
+
+
+def agreement_sentences(compared: Sequence[Compared], confidence: float) -> tuple[str, ...]:
+    """Say first whether all agree, then what does not.
+
+    Parameters
+    ----------
+    compared : sequence of Compared
+        At least one.
+    confidence : float
+        Of the intervals.
+    """
+    by_verdict: Mapping[str, list[Compared]] = {
+        verdict: [c for c in compared if c.agreement.judged == verdict]
+        for verdict in ("equivalent", "different", "not resolved", "not tested")
+    }
+    different, open_ = by_verdict["different"], by_verdict["not resolved"]
+    untested, many = by_verdict["not tested"], len(compared)
+    percent = f"{100 * confidence:g} %"
+    if len(by_verdict["equivalent"]) == many:
+        what = "The pair agrees" if many == 1 else f"All {many} comparisons agree"
+        return (f"{what} within the margins set beforehand, at {percent}.",)
+    said = []
+    if different:
+        said.append(f"They differ by more than the margin in {_named(different)}, at {percent}.")
+    if open_:
+        first = "Not resolved" if not said else "Also not resolved"
+        said.append(f"{first}, since the interval reaches over the margin: {_named(open_)}.")
+    if untested:
+        said.append(f"Not tested: {_named(untested)}.")
+    agreeing = len(by_verdict["equivalent"])
+    said.append(f"{agreeing} of {many} comparisons agree within the margins set beforehand.")
+    return tuple(said)
+
+
+def _named(compared: Sequence[Compared]) -> str:
+    """Measures with the pairs they were compared for."""
+    measures = list(dict.fromkeys(c.measure for c in compared))
+    parts = []
+    for measure in measures:
+        pairs = [
+            f"{c.first} – {c.second}{f' at {c.at}' if c.at else ''}"
+            for c in compared
+            if c.measure == measure
+        ]
+        parts.append(f"{name_of(measure)} ({listed(pairs, most=3)})")
+    return listed(parts)
+
+
+def interval_text(found: Agreement) -> str:
+    """An interval as a table shows it."""
+    low, high = found.ci
+    return "–" if low != low else f"{number(low, 2)} to {number(high, 2)}"
+
+
+@dataclass(frozen=True)
+class Speed:
+    """What the finished runs of one engine cost."""
+
+    engine: str
+    version: str
+    runs: int
+    grain_steps_per_s: float
+    """Median over the runs."""
+    wall_s: float
+    """Median over the runs."""
+
+
+def speeds(summary: pd.DataFrame) -> tuple[Speed, ...]:
+    """Speed of each engine that computed runs, the fastest first."""
+    wanted = {"engine", "version", "grain_steps_per_s", "wall_s", "outcome_code"}
+    if not wanted <= set(summary.columns):
+        return ()
+    finished = summary[summary["outcome_code"] == int(Outcome.FINISHED)]
+    found = [
+        Speed(
+            str(engine),
+            listed([str(v) for v in dict.fromkeys(runs["version"])]),
+            len(runs),
+            float(runs["grain_steps_per_s"].median()),
+            float(runs["wall_s"].median()),
+        )
+        for engine, runs in finished.groupby("engine")
+    ]
+    return tuple(sorted(found, key=lambda s: -s.grain_steps_per_s))

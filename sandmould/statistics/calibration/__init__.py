@@ -1,0 +1,1 @@
+"""Calibration of sands: what measured values say of two parameters."""

@@ -1,0 +1,77 @@
+"""What a study compares its runs by: its objective, and its margins of equivalence."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from sandmould.scenario.quantity import NAME, Section, quantity
+from sandmould.scenario.sand import ARGUED
+
+
+class Reported(Section):
+    """A value that someone else has reported."""
+
+    value: float = quantity(..., "Reported value.", unit="of the column", source="user")
+    by: str = quantity(..., "Who reports it, and where.", source="user")
+
+
+class Objective(Section):
+    """What makes one setting better than another."""
+
+    measure: str = quantity(
+        "tube_fill_fraction",
+        "Column of measures.tsv that is compared.",
+        source=ARGUED,
+        pattern=NAME,
+    )
+    better: Literal["larger", "smaller", "neither"] = quantity(
+        "larger",
+        "Which values of the measure are better; neither where it is only to be known.",
+        source=ARGUED,
+    )
+    reported: Reported | None = Field(None, description="What the measure is compared with.")
+    reported_best: tuple[Reported, ...] = Field(
+        (), description="Values of the one swept key that others have found best."
+    )
+    at_vibration_s: float | None = quantity(
+        None,
+        "Time of vibration at which the measure is taken; its end unless given.",
+        unit="s",
+        source=ARGUED,
+        ge=0,
+    )
+
+
+class Equivalence(Section):
+    """Which settings should agree, and how closely: set before the runs, judged after them."""
+
+    keys: tuple[str, ...] = Field(
+        (),
+        description="Swept keys, such as engine.name, whose values should agree: settings that "
+        "differ in one of them alone are compared.",
+    )
+    over: tuple[str, ...] = Field(
+        (),
+        description="Swept keys that are averaged over: values of a key are compared over all of "
+        "theirs at once, as the main effect of a factorial design.",
+    )
+    margins: dict[Annotated[str, Field(pattern=NAME)], Annotated[float, Field(gt=0)]] = Field(
+        {},
+        description="Columns of measures.tsv and the largest difference of means, in the unit of "
+        "the column, that counts as none.",
+    )
+    confidence: float = quantity(
+        0.9,
+        "Confidence of the interval that must lie inside the margin: 0.9 makes two one-sided "
+        "tests at 5 %.",
+        source=ARGUED,
+        ge=0.5,
+        lt=1,
+    )
+
+
+def fewest_points(keys: int) -> int:
+    """Different points that a surface over some keys needs."""
+    return 2 + 2 * keys

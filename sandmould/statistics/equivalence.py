@@ -1,0 +1,144 @@
+"""Whether two settings agree: two one-sided t tests against a margin set before the runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from sandmould.statistics.settings import standard_error
+
+Judged = Literal["equivalent", "different", "not resolved", "not tested"]
+POWER = 0.8
+"""Chance of a verdict that the estimate of further replicates is made for."""
+MOST_REPLICATES = 1000
+"""More than this are not asked for: the difference then lies on the margin."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How far the means of two settings agree in one measure."""
+
+    means: tuple[float, float]
+    """Of the runs that are compared."""
+    ci: tuple[float, float]
+    """Interval of the difference, NaN where it cannot be tested."""
+    margin: float
+    n: int
+    """Pairs, or runs of the smaller group."""
+    paired: bool
+    judged: Judged
+    why: str
+    """What the verdict rests on, where that needs words."""
+    more: int | None = None
+    """Further replicates that would probably resolve it, where that is not too many."""
+
+    @property
+    def difference(self) -> float:
+        """Mean of the first minus that of the second."""
+        return self.means[0] - self.means[1]
+
+
+def agree(
+    first: pd.Series[float], second: pd.Series[float], margin: float, confidence: float = 0.9
+) -> Agreement:
+    """Test whether two means differ by less than a margin.
+
+    The interval of the difference inside the margin is the same as two one-sided t tests, each at
+    half of what is missing to full confidence: then they are equivalent. Wholly outside, they
+    differ by more than the margin. Anything else is not resolved, however small the difference
+    seems: a wide spread is no agreement.
+
+    Parameters
+    ----------
+    first, second : Series of float
+        Values by block: replicates that share their seeds have one label. Blocks that both have
+        are compared in pairs; without a common one the groups are compared by Welch's test.
+    margin : float
+    confidence : float
+        Of the interval.
+
+    Returns
+    -------
+    Agreement
+    """
+    shared = first.index.intersection(second.index)
+    if len(shared):
+        first, second = first.loc[shared], second.loc[shared]
+    n = min(len(first), len(second))
+    means = float(first.mean()), float(second.mean())
+    difference = means[0] - means[1]
+    nothing = (math.nan, math.nan)
+    if n < 2:
+        runs = "pair of finished runs" if len(shared) else "finished run on one side"
+        said = f"only one {runs}" if n else "no finished run on one side"
+        return Agreement(means, nothing, margin, n, bool(len(shared)), "not tested", said)
+    test = standard_error(first, second)
+    if test is None:
+        return _without_spread(first, means, margin, n)
+    error, freedom, paired = test
+    reach = float(stats.t.ppf(0.5 + confidence / 2, freedom)) * error
+    ci = (difference - reach, difference + reach)
+    judged = judge_interval(ci, margin)
+    if judged != "not resolved":
+        return Agreement(means, ci, margin, n, paired, judged, "")
+    more = _more(abs(difference), error * math.sqrt(n), margin, confidence, n, paired)
+    said = (
+        f"more than {MOST_REPLICATES} replicates would be needed: the difference lies about on "
+        "the margin"
+        if more is None
+        else f"about {more} more replicates would be needed at this spread"
+    )
+    return Agreement(means, ci, margin, n, paired, judged, said, more)
+
+
+def judge_interval(ci: tuple[float, float], margin: float) -> Judged:
+    """Verdict on an interval: inside the margin, wholly outside, or neither."""
+    low, high = ci
+    if -margin < low and high < margin:
+        return "equivalent"
+    return "different" if low > margin or high < -margin else "not resolved"
+
+
+def _without_spread(
+    first: pd.Series[float], means: tuple[float, float], margin: float, n: int
+) -> Agreement:
+    """Pairs that all differ by the same amount, most often by nothing."""
+    if float(first.std(ddof=1)) <= 1e-12 * float(first.abs().max()):
+        said = "the replicates do not differ: check that the seed reaches the sand"
+        return Agreement(means, (math.nan, math.nan), margin, n, True, "not tested", said)
+    difference = means[0] - means[1]
+    ci = (difference, difference)
+    said = "the same to round-off in every pair" if abs(difference) < 1e-9 * margin else ""
+    return Agreement(means, ci, margin, n, True, judge_interval(ci, margin), said)
+
+
+def _more(
+    size: float, spread: float, margin: float, confidence: float, n: int, paired: bool
+) -> int | None:
+    """Further replicates after which a verdict is likely, if size and spread stay as they are.
+
+    Parameters
+    ----------
+    size : float
+        Of the difference, without its sign.
+    spread : float
+        Standard error of the difference times the root of n.
+    margin, confidence : float
+    n : int
+    paired : bool
+    """
+    many = np.arange(n + 1, MOST_REPLICATES + 1)
+    freedom = (many - 1) * (1 if paired else 2)
+    error = spread / np.sqrt(many)
+    need = stats.t.ppf(0.5 + confidence / 2, freedom)
+    chance = stats.t.cdf((size - margin) / error - need, freedom)
+    if size < margin:
+        inside = stats.t.cdf((margin - size) / error - need, freedom)
+        chance = inside + stats.t.cdf((margin + size) / error - need, freedom) - 1
+    enough = np.flatnonzero(chance >= POWER)
+    return int(many[enough[0]]) - n if len(enough) else None

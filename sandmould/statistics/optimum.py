@@ -1,0 +1,160 @@
+"""Where the best setting lies between the runs, how sure that is, and how flat it is there."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from sandmould.statistics.emulator import Array, Emulator, fit_emulator
+from sandmould.statistics.settings import CONFIDENCE
+from sandmould.statistics.verdict import Better, finished_values
+
+DRAWS = 2000
+LOG_RATIO = 4.0
+"""A key whose values span more than this ratio is looked at by its logarithm."""
+_ACROSS = {1: 241, 2: 41}
+"""Points of the grid along each key; more keys get as many scattered ones as ``_SCATTERED``."""
+_SCATTERED = 2048
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """The best setting, by surfaces drawn from all that the runs leave possible."""
+
+    keys: tuple[str, ...]
+    emulator: Emulator
+    """Over the keys, those of ``logs`` by their logarithm."""
+    logs: NDArray[np.bool_]
+    """(d,) bool."""
+    sign: int
+    """1 where more is better, else -1."""
+    points: Array
+    """(g, d) float64, in the units of the keys."""
+    picks: NDArray[np.int64]
+    """(DRAWS,) int64: where each drawn surface is best."""
+
+    @cached_property
+    def surface(self) -> tuple[Array, Array]:
+        """Mean and standard error of the measure at ``points``, (g,) float64 each."""
+        return self.at(self.points)
+
+    @cached_property
+    def best(self) -> int:
+        """Which of ``points`` has the best mean."""
+        return int((self.sign * self.surface[0]).argmax())
+
+    @property
+    def setting(self) -> dict[str, float]:
+        """The best setting, by key."""
+        return dict(zip(self.keys, self.points[self.best].tolist(), strict=True))
+
+    @property
+    def value(self) -> tuple[float, float]:
+        """Mean of the measure at the best setting, and its standard error."""
+        mean, se = self.surface
+        return float(mean[self.best]), float(se[self.best])
+
+    def at(self, points: Array) -> tuple[Array, Array]:
+        """Mean and standard error of the measure at points in the units of the keys."""
+        return self.emulator.at(_scaled(points, self.logs))
+
+    def interval(self, key: str) -> tuple[float, float]:
+        """Where the optimum lies with 95 % probability, in one key."""
+        chosen = self.points[self.picks, self.keys.index(key)]
+        ends = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
+        low, high = np.quantile(chosen, ends, method="inverted_cdf")
+        return float(low), float(high)
+
+    def at_end(self, key: str) -> str:
+        """The end of the swept range that the interval reaches: lowest, highest, both or none."""
+        place = self.keys.index(key)
+        ends = self.points[:, place].min(), self.points[:, place].max()
+        low, high = self.interval(key)
+        reached = [n for n, at in (("lowest", low == ends[0]), ("highest", high == ends[1])) if at]
+        return " and ".join(reached)
+
+    def no_worse(self, key: str, margin: float) -> tuple[float, float]:
+        """Values of a key around the best, the others held, that lose less than a margin."""
+        place = self.keys.index(key)
+        along = np.linspace(self.points[:, place].min(), self.points[:, place].max(), 401)
+        line = np.tile(self.points[self.best], (len(along), 1))
+        line[:, place] = along
+        lost = self.value[0] - self.at(line)[0]
+        good = self.sign * lost < margin
+        here = int(np.abs(along - self.points[self.best, place]).argmin())
+        first = here - int(np.argmin(np.append(good[here::-1], False))) + 1
+        last = here + int(np.argmin(np.append(good[here:], False))) - 1
+        return float(along[min(first, here)]), float(along[max(last, here)])
+
+    def loss(self, key: str, by: float) -> float:
+        """What the measure loses where a key is off the best by some of its unit.
+
+        NaN beyond the swept range.
+        """
+        place = self.keys.index(key)
+        point = self.points[self.best].copy()
+        point[place] += by
+        if not self.points[:, place].min() <= point[place] <= self.points[:, place].max():
+            return float("nan")
+        return self.sign * (self.value[0] - float(self.at(point[None])[0][0]))
+
+
+def find_optimum(
+    summary: pd.DataFrame, keys: Sequence[str], measure: str, better: Better, seed: int = 0
+) -> Optimum:
+    """Fit a surface through the runs and see where it may be best.
+
+    Parameters
+    ----------
+    summary : DataFrame
+        One row a run of the sweep.
+    keys : sequence of str
+        Swept keys, all numbers.
+    measure : str
+    better : {"larger", "smaller"}
+    seed : int
+        Of the draws.
+
+    Raises
+    ------
+    TooFewRunsError
+    """
+    points = summary[list(keys)].to_numpy(dtype=np.float64)
+    values = np.asarray(finished_values(summary, measure), dtype=np.float64)
+    low, high = points.min(axis=0), points.max(axis=0)
+    logs = (low > 0.0) & (high > LOG_RATIO * low)
+    emulator = fit_emulator(measure, _scaled(points, logs), values)
+    grid = _unscaled(_grid(_scaled(low, logs), _scaled(high, logs)), logs)
+    # Rounding there and back must not leave the swept range.
+    grid = np.clip(grid, low, high)
+    sign = 1 if better == "larger" else -1
+    drawn = emulator.draws(_scaled(grid, logs), DRAWS, seed)
+    picks = (sign * drawn).argmax(axis=1)
+    return Optimum(tuple(keys), emulator, logs, sign, grid, picks)
+
+
+def _grid(low: Array, high: Array) -> Array:
+    across = _ACROSS.get(len(low))
+    if across is None:
+        unit = qmc.Sobol(len(low), rng=np.random.default_rng(0)).random(_SCATTERED)
+        scattered: Array = low + (high - low) * unit
+        return scattered
+    axes = [np.linspace(a, b, across) for a, b in zip(low, high, strict=True)]
+    return np.array(list(itertools.product(*axes)))
+
+
+def _scaled(points: Array, logs: NDArray[np.bool_]) -> Array:
+    scaled: Array = np.where(logs, np.log(np.where(logs, points, 1.0)), points)
+    return scaled
+
+
+def _unscaled(points: Array, logs: NDArray[np.bool_]) -> Array:
+    unscaled: Array = np.where(logs, np.exp(np.where(logs, points, 0.0)), points)
+    return unscaled

@@ -1,0 +1,314 @@
+"""Which setting of a study is best, how sure that is, and what the answer leaves open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+from sandmould.runs.formatting import listed, name_of, number, value_text, with_margin
+from sandmould.runs.outcome import Outcome
+from sandmould.scenario.vibration import VibrationStage
+from sandmould.statistics.settings import (
+    Comparison,
+    Setting,
+    by_block,
+    compare,
+    group_settings,
+    setting_of,
+)
+
+Better = Literal["larger", "smaller", "neither"]
+_FEW = 3
+_DEEP = 0.05
+"""Overlap over radius from which the reader is told of it."""
+NOT_TESTED = (
+    "Whether the optimum belongs to the sand or to the model's springs is not tested here: the "
+    "controls of the certificate (contact stiffness, bed depth, grain size, time step) have not "
+    "been run."
+)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The judgement of a study."""
+
+    measure: str
+    better: Better
+    settings: tuple[Setting, ...]
+    best: Setting | None
+    runner_up: Setting | None
+    difference: float
+    """Mean of the best minus that of the runner-up; NaN without two settings."""
+    ci: tuple[float, float]
+    p: float
+    resolved: bool
+    comparisons: tuple[Comparison, ...]
+    """The best against every other setting, nearest first."""
+    sentences: tuple[str, ...]
+    """Plain language; the first says at once when nothing is resolved."""
+    caveats: tuple[str, ...]
+
+    def against(self, setting: Setting) -> Comparison | None:
+        """Comparison of the best with a setting."""
+        return next((c for c in self.comparisons if c.other == setting.label), None)
+
+
+def judge(
+    summary: pd.DataFrame,
+    keys: Sequence[str],
+    measure: str,
+    better: Better = "larger",
+    notes: Sequence[str] = (),
+    seeks_best: bool = True,
+) -> Verdict:
+    """Compare the settings of a study by the mean of the objective.
+
+    Replicates share their seeds across settings, so two settings with the same finished
+    replicates are compared by paired differences, others by Welch's test. The best is picked
+    after seeing the data among all settings: intervals and p values carry Bonferroni's factor, the
+    number of other settings that can be tested.
+
+    Parameters
+    ----------
+    summary : DataFrame
+        One row a run, from :func:`sandmould.study.collect.collect`.
+    keys : sequence of str
+        Swept keys; a setting is a combination of their values.
+    measure : str
+        Column of the objective.
+    better : {"larger", "smaller", "neither"}
+        Which values are better.
+    notes : sequence of str
+        Caveats that the caller knows of, put after those found here.
+    seeks_best : bool
+        Whether the study looks for the best setting, so that its place in the sweep matters.
+
+    Returns
+    -------
+    Verdict
+    """
+    values = finished_values(summary, measure)
+    groups = group_settings(summary, keys)
+    settings = tuple(setting_of(v, len(rows), values[rows.index].dropna()) for v, rows in groups)
+    found = {
+        s.label: by_block(summary, values[rows.index].dropna())
+        for s, (_, rows) in zip(settings, groups, strict=True)
+    }
+    sign = -1 if better == "larger" else 1
+    ranked = sorted((s for s in settings if s.n), key=lambda s: sign * s.mean)
+    best = ranked[0] if ranked else None
+    comparisons = compare(best, ranked[1:], found) if best else ()
+    first = comparisons[0] if comparisons else None
+    resolved = first is not None and first.separated
+    resolved = resolved and all(c.separated for c in comparisons if c.tested)
+    caveats = [
+        *_run_caveats(settings, len(summary), int(values.notna().sum()), seeks_best),
+        *(_edge_caveats(best, settings, keys) if seeks_best else ()),
+        *_identical([c.other for c in comparisons if _is_identical(c, found, best)]),
+        *notes,
+    ]
+    return Verdict(
+        measure=measure,
+        better=better,
+        settings=settings,
+        best=best,
+        runner_up=ranked[1] if len(ranked) > 1 else None,
+        difference=first.difference if first else math.nan,
+        ci=first.ci if first else (math.nan, math.nan),
+        p=first.p if first else math.nan,
+        resolved=resolved,
+        comparisons=comparisons,
+        sentences=_sentences(measure, better, settings, ranked, comparisons, resolved),
+        caveats=tuple(caveats),
+    )
+
+
+def finished_values(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
+    """Objective of each run, NaN where the run did not finish or lacks the measure."""
+    if measure not in summary:
+        return pd.Series(np.nan, index=summary.index)
+    values = pd.to_numeric(summary[measure], errors="coerce")
+    return values.where(summary["outcome_code"] == int(Outcome.FINISHED))
+
+
+def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
+    """Best, median and worst finished run by the objective.
+
+    Parameters
+    ----------
+    summary : DataFrame
+    measure : str
+    better : {"larger", "smaller", "neither"}
+
+    Returns
+    -------
+    dict
+        ``best``, ``median`` and ``worst`` to the run's name, ``highest``, ``median`` and
+        ``lowest`` where neither is better; fewer where fewer runs finished. Of an even number of
+        runs the better of the two middle ones is the median.
+    """
+    first, last = ("highest", "lowest") if better == "neither" else ("best", "worst")
+    values = finished_values(summary, measure).dropna()
+    values = values.sort_values(ascending=better == "smaller", kind="stable")
+    runs = [str(r) for r in summary.loc[values.index, "run"]]
+    ranks: dict[str, str] = {}
+    for role, place in ((first, 0), (last, -1), ("median", (len(runs) - 1) // 2)):
+        if runs and runs[place] not in ranks.values():
+            ranks[role] = runs[place]
+    return {role: ranks[role] for role in (first, "median", last) if role in ranks}
+
+
+def sand_notes(
+    keys: Sequence[str],
+    stage: VibrationStage | None,
+    largest_overlap_fraction: float = 0.0,
+    seeks_best: bool = True,
+    is_certified: bool = False,
+) -> tuple[str, ...]:
+    """What a sweep over sand leaves open: what the vibration held constant, and the springs.
+
+    Parameters
+    ----------
+    keys : sequence of str
+        Swept keys.
+    stage : VibrationStage, optional
+    largest_overlap_fraction : float
+        Of all runs, over the smaller radius.
+    seeks_best : bool
+        Whether the study looks for the best setting.
+    is_certified : bool
+        Whether its controls have been run.
+
+    Returns
+    -------
+    tuple of str
+    """
+    notes = []
+    if largest_overlap_fraction > _DEEP:
+        notes.append(
+            f"Grains overlapped by up to {100 * largest_overlap_fraction:.0f} % of a radius, where "
+            "a few percent are usual: the springs are soft for these loads."
+        )
+    if stage is not None and any(k.endswith("frequency_hz") for k in keys):
+        others = [w for w in ("acceleration", "velocity", "displacement") if w != stage.hold]
+        notes.append(
+            f"The amplitude of {stage.hold} was held constant while the frequency changed; with "
+            f"{' or '.join(others)} held instead, another frequency may be best."
+        )
+    return (*notes, NOT_TESTED) if seeks_best and not is_certified else tuple(notes)
+
+
+def _is_identical(
+    comparison: Comparison, found: Mapping[str, pd.Series[float]], best: Setting | None
+) -> bool:
+    """Whether replicates are there but do not differ."""
+    enough = best is not None and min(best.n, len(found[comparison.other])) > 1
+    return enough and not comparison.tested
+
+
+def _identical(others: list[str]) -> list[str]:
+    if not others:
+        return []
+    return [
+        f"The replicates of the best setting and of {listed(others)} differ by no more than "
+        "round-off, so they say nothing about chance: check that the seed reaches the sand."
+    ]
+
+
+def _run_caveats(
+    settings: Sequence[Setting], planned: int, used: int, seeks_best: bool
+) -> list[str]:
+    caveats = []
+    if used < planned:
+        were = "was" if planned - used == 1 else "were"
+        caveats.append(
+            f"{planned - used} of {planned} runs did not finish or lack the measure and {were} "
+            "left out."
+        )
+    empty = [s.label for s in settings if s.n == 0]
+    if empty and used:
+        so = ": the best may lie there" if seeks_best else ""
+        caveats.append(f"No run finished at {listed(empty)}{so}.")
+    few = [s.label for s in settings if 0 < s.n < _FEW]
+    if few:
+        caveats.append(f"Fewer than {_FEW} finished replicates at {listed(few)}.")
+    return caveats
+
+
+def _edge_caveats(
+    best: Setting | None, settings: Sequence[Setting], keys: Sequence[str]
+) -> list[str]:
+    """Say where the best lies at the end of a swept range: the true best may lie beyond."""
+    caveats = []
+    for key in keys if best else ():
+        values = [s.values[key] for s in settings]
+        if not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
+            continue
+        mine = best.values[key] if best else None
+        if min(values) < max(values) and mine in (min(values), max(values)):
+            end = "lowest" if mine == min(values) else "highest"
+            caveats.append(
+                f"The best {name_of(key)}, {value_text(key, mine)}, is the {end} one swept: the "
+                "true best may lie beyond it."
+            )
+    return caveats
+
+
+def _sentences(
+    measure: str,
+    better: Better,
+    settings: Sequence[Setting],
+    ranked: Sequence[Setting],
+    comparisons: Sequence[Comparison],
+    resolved: bool,
+) -> tuple[str, ...]:
+    what = name_of(measure)
+    if not ranked:
+        return (f"Not resolved: no run finished with a value of the {what}.",)
+    best = ranked[0]
+    mean = with_margin(best.mean, best.ci_half_width)
+    if len(ranked) == 1:
+        only = "One setting was run" if len(settings) == 1 else "Runs of one setting only finished"
+        return (
+            f"Not resolved: nothing to compare with. {only}, {best.label}, with a {what} of "
+            f"{mean}.",
+        )
+    second, first = ranked[1], comparisons[0]
+    most = "highest" if better == "larger" else "lowest"
+    if resolved:
+        return (
+            f"{_capital(best.label)} is best: it gives the {most} {what}, {mean}, against "
+            f"{with_margin(second.mean, second.ci_half_width)} at {second.label}, the runner-up.",
+            _difference_sentence(first, best, len(comparisons)),
+        )
+    like = [c.other for c in comparisons if not c.separated]
+    again = (
+        _difference_sentence(first, best, len(comparisons))
+        if first.tested
+        else f"{_capital(best.label)} and {second.label} need two replicates or more, with "
+        "different values, before their difference can be told from chance."
+    )
+    return (
+        f"Not resolved: no setting can be recommended for its {what}. The {most} mean, "
+        f"{mean}, is that of {best.label}, but it cannot be told apart from "
+        f"{listed(like)} at 95 % confidence.",
+        again,
+    )
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _difference_sentence(first: Comparison, best: Setting, others: int) -> str:
+    how = f"{best.n} paired replicates" if first.paired else "independent replicates"
+    many = f", allowing for {others} comparisons" if others > 1 else ""
+    return (
+        f"The difference from {first.other} is {number(first.difference, 2)}, with a 95 % interval "
+        f"from {number(first.ci[0], 2)} to {number(first.ci[1], 2)} ({how}{many})."
+    )

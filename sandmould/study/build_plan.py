@@ -1,0 +1,197 @@
+"""From a study's file to the plan that Snakemake's graph is built of, and its price."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from sandmould import ROOT
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.study.batches import Batch, plan_batches
+from sandmould.study.comparing import ENGINE
+from sandmould.study.expand import expand, swept_key
+from sandmould.study.kinds.kind import Kind, kind_named
+from sandmould.study.load_study import OpenStudy, open_study
+from sandmould.study.plan_files import plan_table, write_plan, write_study
+from sandmould.study.robustness.config import provisional_hz
+from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.run import Run
+
+RESULTS = Path("results")
+DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study and its runs."""
+
+    study: OpenStudy
+    runs: tuple[Run, ...]
+
+    @property
+    def kind(self) -> Kind:
+        """What is simulated."""
+        return kind_named(self.study.study.kind)
+
+    @cached_property
+    def _by_name(self) -> dict[str, Run]:
+        return {run.run: run for run in self.runs}
+
+    def batches(self, wall_s: float, least: int = 1, cores: int = 1) -> list[Batch]:
+        """Runs that share a job of so many cores until it lasts so long; none for 0.
+
+        Batches of fewer than ``least`` runs are left out: those runs have jobs of their own.
+        """
+        found = plan_batches(self.runs, wall_s, cores) if wall_s > 0 else []
+        return [batch for batch in found if len(batch.runs) >= least]
+
+    def threads(self, name: str) -> int:
+        """Cores that a run keeps busy, as MPI ranks or as threads."""
+        return self.kind.threads(self._by_name[name].scenario)
+
+    def ranks(self, name: str) -> int:
+        """MPI ranks of a run."""
+        return self.kind.ranks(self._by_name[name].scenario)
+
+    def deck_sources(self, name: str) -> list[str]:
+        """Files of the repository that a run's deck is made from, and its solver if it is ours.
+
+        Decks name the state of the solver, so a changed kernel changes the decks of its runs and
+        they are computed again.
+        """
+        files = self.kind.sources(self._by_name[name].scenario)
+        # As seen from here: another place of the repository is no reason to compute again.
+        return [os.path.relpath(path) for path in files]
+
+    def memory_mb(self, name: str) -> int:
+        """Memory to ask for."""
+        return self.kind.memory_mb(self._by_name[name].scenario)
+
+    def runtime_min(self, *names: str, side_by_side: int = 1) -> int:
+        """Wall time to ask for some runs, so many at a time."""
+        each_s = [self.kind.allowed_s(self._by_name[name].scenario) for name in names]
+        # the last run may begin when all others have ended
+        seconds = sum(each_s) / side_by_side + (max(each_s) if side_by_side > 1 else 0.0)
+        return 10 + math.ceil(seconds / 60)
+
+    def labels(self, name: str) -> dict[str, str]:
+        """Labels of a run in Snakemake's own report."""
+        run = self._by_name[name]
+        labels = {key: str(value) for key, value in run.parameters.items()}
+        return labels | {"replicate": str(run.replicate)}
+
+
+def study_path(configfiles: Sequence[Path], overrides: Mapping[str, Any]) -> Path:
+    """Choose the study's file: the one given with ``--configfile``, else the demo.
+
+    Raises
+    ------
+    BadInputError
+        When several files are given, or single values with ``--config``: Snakemake would merge
+        them unseen, and no record would name them.
+    """
+    if len(configfiles) > 1:
+        names = [Path(p).name for p in configfiles]
+        raise BadInputError([Problem("--configfile", names, "one study at a time")])
+    if overrides:
+        valid = "no value: write a study based_on this one and give it with --configfile"
+        raise BadInputError([Problem("--config", dict(overrides), valid)])
+    return Path(configfiles[0]) if configfiles else DEFAULT_STUDY
+
+
+def open_plan(path: Path, results: Path = RESULTS) -> Plan:
+    """Open, validate and expand a study.
+
+    Parameters
+    ----------
+    path : Path
+    results : Path
+        Where finished studies lie that this one may rest on.
+
+    Raises
+    ------
+    BadInputError
+        With one sentence a problem; a missing engine is one of them.
+    """
+    study = open_study(path)
+    ledger = read_ledger(results / study.name, study.study)
+    runs = expand(study, ledger.runs, ledger.certified_hz)
+    found: dict[str, Problem] = {}
+    # Controls come hours later, at frequencies that are not known yet: they are tried at others.
+    asked = study.study.certificate
+    trial_hz = provisional_hz(asked, study.study.sweep, study.study.scenario.seed)
+    trial = expand(study, (), trial_hz) if trial_hz and not ledger.certified_hz else []
+    kind = kind_named(study.study.kind)
+    for run in (*runs, *trial):
+        problem = kind.engine_problem(run.scenario)
+        if problem is not None:
+            told = _told(study, run, problem)
+            found[str(told)] = told
+    for problem in _unfinished(study, results):
+        found[str(problem)] = problem
+    if found:
+        raise BadInputError(list(found.values()))
+    return Plan(study, tuple(runs))
+
+
+def _unfinished(study: OpenStudy, results: Path) -> Iterator[Problem]:
+    """Studies that help to calibrate and have not been run."""
+    for i, name in enumerate(study.study.calibration.also):
+        if not (results / name / "summary.tsv").is_file():
+            key = f"calibration.also.{i}"
+            valid = f"a study with results: make study STUDY=config/studies/{name}.yaml comes first"
+            yield Problem(key, name, valid, study.origin.file_of(key))
+
+
+def _told(study: OpenStudy, run: Run, problem: Problem) -> Problem:
+    """What an engine refuses, told at the key that gave the value."""
+    if problem.key in run.parameters:
+        key, file = swept_key(study, run.parameters, problem.key), study.file
+    elif problem.key == ENGINE and run.part == "cross_check":
+        key, file = "cross_check.engine", study.origin.file_of("cross_check.engine")
+    else:
+        key = f"scenario.{problem.key}"
+        file = study.origin.file_of(key)
+    return Problem(key, problem.value, problem.valid, file)
+
+
+def announce(plan: Plan, results: Path, cores: int) -> str:
+    """Write the plan to disk and say what it will take.
+
+    Raises
+    ------
+    BadInputError
+        When the results cannot be written.
+    """
+    folder = results / plan.study.name
+    try:
+        write_plan(plan.runs, folder)
+        write_study(plan.study.study, folder)
+    except OSError as error:
+        valid = f"a folder that takes files: {error.filename} does not ({error.strerror})"
+        raise BadInputError([Problem("results", str(folder), valid)]) from None
+    kind = plan.kind
+    one_each = {kind.speed_class(run.scenario): run.scenario for run in plan.runs}
+    rates = {each: kind.rate(one, results) for each, one in one_each.items()}
+    title = plan.study.study.title or plan.study.name
+    return f"\n{title}\n{plan_table(plan.runs, rates, cores)}"
+
+
+def main(path: Path) -> int:
+    """Check a study and print its plan; nothing starts."""
+    try:
+        print(announce(open_plan(path), RESULTS, os.cpu_count() or 1))
+    except BadInputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(Path(sys.argv[1])))

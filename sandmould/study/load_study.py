@@ -1,0 +1,252 @@
+"""Open a study: follow what it is based on, lay the files over each other, check the whole."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from sandmould import ROOT
+from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
+from sandmould.scenario.quantity import NAME, fields_at
+from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
+from sandmould.study import comparing, sweep
+from sandmould.study.calibration import problems as calibration
+from sandmould.study.kinds.kind import kind_named
+from sandmould.study.robustness import config as certificate
+from sandmould.study.rounds import config as rounds
+from sandmould.study.study import (
+    ONLY_SAND,
+    SolidificationStudy,
+    Study,
+    material_model,
+    study_model,
+)
+
+STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
+CALIBRATED = Path("results") / "materials"
+"""Where studies write the sands that they calibrate."""
+MATERIALS = (ROOT / "config" / "materials", CALIBRATED)
+_OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
+_FILE_KEY = (
+    r"(\b(obstacles|shapes)(\.\d+)+\.file|\b(scenario|sweep\.keys|sweep\.points\.\d+)\.template"
+    r"|\bscenario\.files\.\d+)(\.value)?$"
+)
+
+
+@dataclass(frozen=True)
+class OpenStudy:
+    """A study that was read whole and found sound."""
+
+    name: str
+    """Stem of its file; its results lie in ``results/<name>``."""
+    path: Path
+    study: Study
+    tree: Tree
+    """The merged files below the study, the scenario with all its defaults."""
+    origin: Origin
+    """File and source of each value, by key path from the study's root."""
+
+    @property
+    def file(self) -> str:
+        """Name of the study's file in messages."""
+        return shown_name(self.path)
+
+
+@dataclass(frozen=True)
+class _File:
+    path: Path
+    shown: str
+    tree: Tree
+
+
+def open_study(path: Path) -> OpenStudy:
+    """Read a study with all that it is based on, and check it.
+
+    Parameters
+    ----------
+    path : Path
+        Its stem is the study's name.
+
+    Returns
+    -------
+    OpenStudy
+
+    Raises
+    ------
+    BadInputError
+        With one line a problem, each naming the file that holds the bad value.
+    """
+    shown = shown_name(path)
+    if not re.fullmatch(NAME, path.stem):
+        valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
+        raise BadInputError([Problem("file name", path.name, valid, shown)])
+    files = _files(path)
+    kind = _kind(files)
+    model, material_of = study_model(kind), material_model(kind)
+    found = [p for f in files for p in _wrong_units(model, f)]
+    origin = Origin(file={"": shown})
+    tree: Tree = {"scenario": kind_named(kind).defaults()}
+    material = _material(files)
+    if material is not None and material_of is not None:
+        found += _wrong_units(material_of, material)
+        # By itself first, so that a message has the key as the material's file has it.
+        alone = Origin(file={"": material.shown})
+        validated(material_of, merge({}, material.tree, alone, material.shown), alone)
+        tree = merge(tree, {"scenario": material.tree}, origin, material.shown)
+    for file in files:
+        if "sweep" in file.tree:
+            for section in _OF_SWEEP:
+                tree.pop(section, None)
+        tree = merge(tree, file.tree, origin, file.shown)
+    found += [replace(p, file=origin.file_of(p.key)) for p in _not_of_its_kind(tree)]
+    if found:
+        raise BadInputError(found)
+    study = validated(model, tree, origin)
+    base = study.scenario.model_dump(mode="json")
+    found = sweep.problems(study.sweep, base, study.replicates) or [
+        *comparing.problems(study),
+        *_reported(study),
+        *_reference(study),
+        *calibration.problems(study.calibration, study.sweep),
+        *rounds.problems(study.refine, study.sweep, study.objective.better, study.scenario.seed),
+        *certificate.problems(
+            study.certificate, study.sweep, study.scenario, study.objective.better
+        ),
+    ]
+    if found:
+        raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found])
+    return OpenStudy(path.stem, path, study, tree, origin)
+
+
+def _kind(files: list[_File]) -> str:
+    """Kind of the study, by the last file that states it; the schema refuses what is none."""
+    stated = [f for f in files if "kind" in f.tree]
+    kind = str(stated[-1].tree["kind"]) if stated else "sand"
+    return kind if kind in ("deck", "solidification", "flow") else "sand"
+
+
+def _not_of_its_kind(tree: Tree) -> Iterator[Problem]:
+    """Sections that only studies of sand have."""
+    kind = tree.get("kind", "sand")
+    absent = [
+        *(ONLY_SAND if kind != "sand" else ()),
+        *(["material"] if kind in ("deck", "flow") else ()),
+    ]
+    for name in absent:
+        if tree.get(name):
+            yield Problem(name, tree[name], f"absent in a study of kind {kind}")
+    if kind in ("solidification", "flow") and tree.get("replicates", 1) != 1:
+        yield Problem("replicates", tree["replicates"], "1: nothing in a run is drawn by lot")
+
+
+def _reported(study: Study) -> Iterator[Problem]:
+    """Best values by others need the one key that they are values of."""
+    if study.objective.reported_best and len(study.sweep.swept) != 1:
+        shown = [one.value for one in study.objective.reported_best]
+        yield Problem("objective.reported_best", shown, "absent unless one key is swept")
+
+
+def _reference(study: Study) -> Iterator[Problem]:
+    """The point that others are compared with is one of the sweep."""
+    if not isinstance(study, SolidificationStudy) or not study.reference:
+        return
+    swept = sweep.points(study.sweep, study.scenario.seed)
+    if study.reference not in swept:
+        yield Problem("reference", study.reference, f"a point of the sweep, such as {swept[0]}")
+
+
+def _files(path: Path) -> list[_File]:
+    """The study's file and all it is based on, the deepest base first."""
+    files = [_read(path)]
+    while (name := files[0].tree.get("based_on")) is not None:
+        above = files[0]
+        folders = (above.path.parent, *STUDIES)
+        seen = [f.path.resolve() for f in files]
+        places = _places(name, folders)
+        new = [p for p in places if p.resolve() not in seen]
+        if not new:
+            if places:
+                chain = " on ".join(f.path.stem for f in reversed(files))
+                valid = f"a study that does not lead back here ({chain} on {name})"
+            else:
+                valid = f"the name of a study or scenario: {_candidates(folders)}"
+            raise BadInputError([Problem("based_on", name, valid, above.shown)])
+        files.insert(0, _read(new[0]))
+    return files
+
+
+def _material(files: list[_File]) -> _File | None:
+    """The material that the last file to name one names."""
+    stated = [f for f in files if "material" in f.tree]
+    if not stated or (name := stated[-1].tree["material"]) is None:
+        return None
+    folders = (stated[-1].path.parent, *MATERIALS)
+    places = _places(name, folders)
+    if not places:
+        valid = f"the name of a material: {_candidates(MATERIALS)}"
+        raise BadInputError([Problem("material", name, valid, stated[-1].shown)])
+    return _read(places[0])
+
+
+def _read(path: Path) -> _File:
+    shown = shown_name(path)
+    return _File(path, shown, _from_root(read_yaml(path, shown), path.parent))
+
+
+def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
+    """A file's tree with the files that it names as seen from itself named as seen from ROOT.
+
+    So a run finds them from any working directory, and no path of this machine enters its
+    scenario as long as the file lies in the repository.
+    """
+    if isinstance(tree, dict):
+        return {n: _from_root(v, folder, f"{key}.{n}") for n, v in tree.items()}
+    if isinstance(tree, list):
+        # the values of a swept key stand at the key, entries of other lists below it
+        swept = re.search(_FILE_KEY, key)
+        return [_from_root(v, folder, key if swept else f"{key}.{i}") for i, v in enumerate(tree)]
+    if isinstance(tree, str) and re.search(_FILE_KEY, key):
+        return Path(os.path.relpath(folder / tree, ROOT)).as_posix()
+    return tree
+
+
+def _places(name: Any, folders: tuple[Path, ...]) -> list[Path]:
+    """Files of a name; none when the name is no name at all."""
+    if not isinstance(name, str) or not re.fullmatch(NAME, name):
+        return []
+    return [p for folder in folders if (p := folder / f"{name}.yaml").is_file()]
+
+
+def _candidates(folders: tuple[Path, ...]) -> str:
+    return ", ".join(sorted({p.stem for folder in folders for p in folder.glob("*.yaml")}))
+
+
+def _wrong_units(model: type[BaseModel], file: _File) -> list[Problem]:
+    """Units that contradict the key's own."""
+    return [
+        Problem(f"{key}.unit", unit, f"the unit of the key, {' or '.join(declared)}", file.shown)
+        for key, unit in _units(file.tree)
+        if (declared := _declared_units(model, key)) and str(unit) not in declared
+    ]
+
+
+def _units(tree: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Every unit that a file states, with the key path it stands at."""
+    if isinstance(tree, dict) and {"value", "unit"} <= set(tree):
+        yield key, tree["unit"]
+    elif isinstance(tree, dict | list):
+        for name, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
+            yield from _units(value, f"{key}.{name}" if key else str(name))
+
+
+def _declared_units(model: type[BaseModel], key: str) -> list[str]:
+    # The values of a swept key have its unit.
+    path = re.sub(r"^sweep\.(keys|points\.\d+)\.", "scenario.", key)
+    extras = [f.json_schema_extra for f in fields_at(model, path)]
+    return sorted({str(e["unit"]) for e in extras if isinstance(e, dict) and "unit" in e})

@@ -1,0 +1,215 @@
+"""Committed results and whether they still stand for what the code would compute.
+
+``python -m sandmould.study.records record STUDY.yaml`` copies a finished study's tables and
+figures with what was run; ``check`` lists the records that are stale and computes the smallest one
+of each kind again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from sandmould import ROOT
+from sandmould.runs.formatting import listed
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.outcome import Outcome
+from sandmould.study.expand import expand
+from sandmould.study.kinds.kind import kind_of
+from sandmould.study.load_study import OpenStudy, open_study
+from sandmould.study.plan_files import FIGURES
+from sandmould.study.rounds.ledger import LEDGER, read_ledger
+from sandmould.study.run import Run
+from sandmould.study.study import Study
+
+RECORDS = ROOT / "docs" / "results"
+COPIED = ("runs.tsv", "summary.tsv")
+SAME = {
+    "tube_fill_fraction": 0.05,
+    "solid_fraction": 0.02,
+    "solidification_time_s": 0.01,
+    "h70_mean_pa": 50.0,
+}
+"""Largest difference of a study's mean when it is computed again on another machine: grains and
+particles part after a few collisions, so only means are compared, with margins of a few times
+their spread; heat is the same to round-off."""
+
+
+def study_hash(runs: list[Run]) -> str:
+    """Hash of all scenarios of a study and of what their decks command."""
+    digest = hashlib.sha256()
+    for text in sorted(scenario_hash(r.scenario) + _computed_hash(r) for r in runs):
+        digest.update(text.encode())
+    return digest.hexdigest()
+
+
+def _computed_hash(run: Run) -> str:
+    return kind_of(run.scenario).computed_hash(run.scenario)
+
+
+def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
+    """All runs of a study, with those of the rounds that a folder keeps."""
+    ledger = read_ledger(folder, study.study)
+    return expand(study, ledger.runs, ledger.certified_hz)
+
+
+def record(path: Path, results: Path) -> Path:
+    """Keep a study: its tables and figures, what was run, on what, and the hash of the study.
+
+    Runs that failed are named in the record.
+
+    Raises
+    ------
+    SystemExit
+        While runs have no outcome.
+    """
+    study = open_study(path)
+    folder = results / study.name
+    runs = runs_in(study, folder)
+    missing = [r for r in runs if not (folder / "runs" / r.run / "outcome.json").exists()]
+    if missing or not (folder / "report.html").exists():
+        raise SystemExit(f"{folder} is not whole, {len(missing)} runs are missing: run the study.")
+    summary = pd.read_csv(folder / "summary.tsv", sep="\t")
+    failed = summary[summary["outcome"] != Outcome.FINISHED.label]
+    names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
+    names += [LEDGER] if (folder / LEDGER).exists() else []
+    provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
+    kept: dict[str, Any] = {
+        "study": str(path),
+        "study_sha256": study_hash(runs),
+        "command": f"snakemake --configfile {path}",
+        "commit": provenance["commit"],
+        "versions": provenance["versions"],
+        "engines": _engines(summary),
+        "machine": provenance["machine"],
+        "margins": study.study.equivalence.margins,
+        "failed": dict(zip(failed["run"], failed["outcome"], strict=True)),
+        "wall_s_of_all_runs": round(float(summary.wall_s.sum()), 1),
+        **_work(kind_of(runs[0].scenario).WORK.replace("-", "_"), summary),
+    }
+    target = RECORDS / study.name
+    target.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        shutil.copy(folder / name, target / name)
+    shutil.rmtree(target / FIGURES, ignore_errors=True)
+    if (folder / FIGURES).exists():
+        # without the mark that Snakemake leaves in folders
+        shutil.copytree(
+            folder / FIGURES, target / FIGURES, ignore=shutil.ignore_patterns(".snakemake*")
+        )
+    (target / "record.json").write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    return target
+
+
+def _engines(summary: pd.DataFrame) -> dict[str, str]:
+    """Version of each engine that finished runs."""
+    finished = summary[summary["outcome_code"] == int(Outcome.FINISHED)]
+    return {
+        str(engine): listed([str(v) for v in dict.fromkeys(runs["version"])])
+        for engine, runs in finished.groupby("engine")
+    }
+
+
+def _work(column: str, summary: pd.DataFrame) -> dict[str, float]:
+    """What was computed in all; nothing where runs do not count it."""
+    return {column: float(summary[column].sum())} if column in summary else {}
+
+
+def _compares(study: Study) -> bool:
+    """Whether a study compares settings, so that it has a table of agreement."""
+    return bool(study.equivalence.keys) or study.cross_check is not None
+
+
+def stale_records() -> list[tuple[str, str]]:
+    """Name every record with what is wrong with it, or an empty text where it stands."""
+    found = []
+    for path in sorted(RECORDS.glob("*/record.json")):
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        study = ROOT / kept["study"]
+        if not study.exists():
+            found.append((path.parent.name, f"its study {kept['study']} is gone"))
+        else:
+            found.append((path.parent.name, _what_changed(open_study(study), kept, path.parent)))
+    return found
+
+
+def _what_changed(study: OpenStudy, kept: dict[str, Any], folder: Path) -> str:
+    """Say what parts a study from its record; margins count where the record has them."""
+    if study_hash(runs_in(study, folder)) != kept["study_sha256"]:
+        return "the study, its decks or our solver have changed since"
+    margins = study.study.equivalence.margins
+    return "its margins were set after the runs" if kept.get("margins", margins) != margins else ""
+
+
+def recompute_smallest(results: Path) -> list[str]:
+    """Run the cheapest recorded study of each kind again and compare its means with the record.
+
+    Studies with an engine that this machine lacks are passed over.
+
+    Returns
+    -------
+    list of str
+        One sentence a difference beyond its margin.
+    """
+    studies = {path.parent.name: json.loads(path.read_text())["study"]
+               for path in RECORDS.glob("*/record.json")}  # fmt: skip
+    cheapest: dict[str, tuple[float, str]] = {}
+    for name, study in studies.items():
+        runs = runs_in(open_study(ROOT / study), RECORDS / name)
+        kind = kind_of(runs[0].scenario)
+        if not any(kind.engine_problem(run.scenario) for run in runs):
+            cost = sum(kind.predicted_s(run.scenario) for run in runs)
+            cheapest[kind.WORK] = min(cheapest.get(kind.WORK, (math.inf, "")), (cost, name))
+    return [
+        sentence
+        for _, name in cheapest.values()
+        for sentence in _recompute(name, studies[name], results)
+    ]
+
+
+def _recompute(name: str, study: str, results: Path) -> list[str]:
+    """Run one study again; see ``recompute_smallest``."""
+    print(f"computing {name} again", flush=True)
+    shutil.rmtree(results / name, ignore_errors=True)
+    if (RECORDS / name / LEDGER).exists():
+        (results / name).mkdir(parents=True)
+        shutil.copy(RECORDS / name / LEDGER, results / name / LEDGER)
+    snakemake = Path(sys.executable).parent / "snakemake"
+    command = [str(snakemake), "--cores", "all", "--configfile", study, "--quiet", "rules"]
+    subprocess.run(command, cwd=ROOT, check=True)
+    old = pd.read_csv(RECORDS / name / "summary.tsv", sep="\t")
+    new = pd.read_csv(results / name / "summary.tsv", sep="\t")
+    return [
+        f"{name}: mean {column} is {new[column].mean():.4f}, recorded {old[column].mean():.4f}"
+        for column, margin in SAME.items()
+        if column in old and abs(new[column].mean() - old[column].mean()) > margin
+    ]
+
+
+def main(arguments: list[str]) -> int:
+    """Check all records, or keep one study."""
+    if arguments[:1] == ["record"] and len(arguments) == 2:
+        print(record(Path(arguments[1]), Path("results")))
+        return 0
+    if arguments != ["check"]:
+        print("usage: python -m sandmould.study.records check | record STUDY.yaml")
+        return 2
+    stale = stale_records()
+    for name, why in stale:
+        print(f"{name}: {'stale, ' + why if why else 'stands'}")
+    differences = recompute_smallest(Path("results"))
+    for sentence in differences:
+        print(sentence)
+    return 1 if differences or any(why for _, why in stale) else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,88 @@
+"""Which controls a study runs round its optimum, and what keeps it from running them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.box import Tube
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.sand import ARGUED
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.config import fewest_points
+from sandmould.study.sweep import Sweep, points
+
+Control = Literal[
+    "hold", "stiffness", "bed_depth", "grain_scale", "tube_length", "time_step", "engine",
+    "spectrum",
+]  # fmt: skip
+
+
+class Certificate(Section):
+    """Controls at three frequencies round the optimum, which tell the sand from the model."""
+
+    controls: tuple[Control, ...] = quantity(
+        (),
+        "hold: the other amplitudes held constant; stiffness: all springs x 0.1 and 10; bed_depth: "
+        "x 0.5 and 2; grain_scale: x 0.75 and 1.5; tube_length: x 0.6 and 1.5; time_step: x 0.5; "
+        "engine: another one; spectrum: the bed's own, from a small shake.",
+        source=ARGUED,
+    )
+    ratio: float = quantity(
+        1.4,
+        "The frequencies are the optimum's, and that over and times this.",
+        source=ARGUED,
+        gt=1,
+        le=4,
+    )
+    replicates: int = quantity(3, "Seeds of every control.", source=ARGUED, ge=2, le=100)
+    engine: Literal["lammps", "liggghts", "reference"] = quantity(
+        "lammps", "Engine of the control engine.", source=ARGUED
+    )
+
+
+def frequency_key(sweep: Sweep) -> str:
+    """The one swept key, a frequency; empty where a sweep is of anything else."""
+    (key,) = sweep.swept if len(sweep.swept) == 1 else ("",)
+    return key if key.endswith(".frequency_hz") else ""
+
+
+def round_best_hz(best_hz: float, ratio: float) -> tuple[float, ...]:
+    """Frequencies of a certificate: the best in the middle."""
+    return tuple(float(f"{best_hz * by:.3g}") for by in (1 / ratio, 1.0, ratio))
+
+
+def provisional_hz(certificate: Certificate, sweep: Sweep, seed: int) -> tuple[float, ...]:
+    """Frequencies for a trial of the controls before the best is known; none without controls."""
+    if not certificate.controls:
+        return ()
+    swept = sorted(float(p[frequency_key(sweep)]) for p in points(sweep, seed))
+    return round_best_hz(swept[len(swept) // 2], certificate.ratio)
+
+
+def problems(
+    certificate: Certificate, sweep: Sweep, scenario: Scenario, better: str
+) -> Iterator[Problem]:
+    """List what is wrong with the certificate of a study whose sweep has no problems."""
+    if not certificate.controls:
+        return
+    if not frequency_key(sweep):
+        valid = "one swept key, a frequency such as vibration.0.frequency_hz"
+        yield Problem("certificate.controls", sweep.swept, f"absent, or a study with {valid}")
+    elif sweep.number_of_points < fewest_points(1):
+        valid = f"at least {fewest_points(1)} frequencies to find the best among"
+        yield Problem("sweep", f"{sweep.number_of_points} points", valid)
+    if better == "neither":
+        yield Problem(
+            "certificate.controls", list(certificate.controls), "absent: nothing is to be best"
+        )
+    for i, control in enumerate(certificate.controls):
+        where = f"certificate.controls.{i}"
+        if control in certificate.controls[:i]:
+            yield Problem(where, control, "each control once")
+        if control == "engine" and certificate.engine == scenario.engine.name:
+            valid = f"another engine than the study's own, {scenario.engine.name}"
+            yield Problem("certificate.engine", certificate.engine, valid)
+        if control == "tube_length" and not any(isinstance(o, Tube) for o in scenario.obstacles):
+            yield Problem(where, control, "a control of what the scene has: there is no tube")

@@ -1,0 +1,202 @@
+"""What each control changes in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sandmould.scenario.box import Tube
+from sandmould.scenario.contact import Contact
+from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
+from sandmould.scenario.vibration import VibrationStage
+from sandmould.study.robustness.config import Certificate, Control
+
+SHAKEN_HZ = tuple(float(f"{f:.3g}") for f in np.geomspace(12.0, 400.0, 16))
+"""Frequencies of the small shake."""
+SHAKE_G = 0.05
+SHAKE_PERIODS = 8
+SHAKE_LEAST_S = 0.06
+WINDOWS_A_PERIOD = 8
+Change = Callable[[Scenario], Scenario]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One value of a control."""
+
+    control: Control
+    value: str
+    change: Change
+    places: tuple[int, ...] = (0, 1, 2)
+    """Which of the three frequencies are run."""
+
+    @property
+    def part(self) -> str:
+        """What it is called in ``runs.tsv``."""
+        return f"control: {self.control} {self.value}"
+
+
+def cases(certificate: Certificate, scenario: Scenario, best_hz: float) -> Iterator[Case]:
+    """Cases of all controls of a certificate.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    scenario : Scenario
+        Of the study.
+    best_hz : float, Hz
+        The middle frequency, where every amplitude that is held is that of the sweep.
+    """
+    for control in certificate.controls:
+        if control == "hold":
+            # At the middle frequency nothing differs from the sweep.
+            others = {"acceleration", "velocity", "displacement"} - {scenario.vibration[0].hold}
+            for hold in sorted(others):
+                yield Case(control, hold, _holding(hold, best_hz), (0, 2))
+        elif control in BY_FACTOR:
+            factors, changed = BY_FACTOR[control]
+            for factor in factors:
+                yield Case(control, f"x{factor:g}", changed(factor))
+        elif control == "engine":
+            yield Case(control, certificate.engine, _on(certificate.engine))
+        else:
+            yield Case(control, "small shake", _shaken, (1,))
+
+
+def _holding(hold: str, best_hz: float) -> Change:
+    def change(scenario: Scenario) -> Scenario:
+        stage = scenario.vibration[0]
+        at_best = stage.model_copy(update={"frequency_hz": best_hz})
+        # The same motion at the best frequency, whatever is held from there.
+        new = VibrationStage(
+            **stage.model_dump(
+                exclude={"hold", "acceleration_g", "velocity_m_s", "displacement_m",
+                         "reference_frequency_hz"}
+            ),
+            hold=hold,
+            displacement_m=at_best.amplitude_m,
+            reference_frequency_hz=best_hz,
+        )  # fmt: skip
+        return scenario.model_copy(update={"vibration": (new, *scenario.vibration[1:])})
+
+    return change
+
+
+def _stiffer(factor: float) -> Change:
+    """All springs, so that k_n/b changes and nothing between them.
+
+    A grain of the same speed presses a spring in by the root of one over its stiffness (half of
+    m v^2 is half of k x^2). The guard allows soft ones so much more, since what it stops are
+    scenes that run away.
+    """
+
+    def change(scenario: Scenario) -> Scenario:
+        tree = scenario.contact.model_dump()
+        for pair in tree.values():
+            for key, value in pair.items() if isinstance(pair, dict) else ():
+                if key.endswith("_stiffness_n_m") and value is not None:
+                    pair[key] = factor * value
+        allowed = scenario.guard.largest_overlap_fraction * max(1.0, factor**-0.5)
+        overlap = {"largest_overlap_fraction": min(allowed, FULL_OVERLAP)}
+        guard = scenario.guard.model_copy(update=overlap)
+        return scenario.model_copy(update={"contact": Contact(**tree), "guard": guard})
+
+    return change
+
+
+def _deeper(factor: float) -> Change:
+    def change(scenario: Scenario) -> Scenario:
+        layers = tuple(
+            layer.model_copy(
+                update={
+                    key: round(factor * value) if key == "count" else factor * value
+                    for key in ("height_m", "mass_kg", "count")
+                    for value in [getattr(layer, key)]
+                    if value is not None
+                }
+            )
+            for layer in scenario.fill.layers
+        )
+        fill = scenario.fill.model_copy(update={"layers": layers})
+        height_m = scenario.box.height_m * max(1.0, factor)
+        box = scenario.box.model_copy(update={"height_m": height_m})
+        return scenario.model_copy(update={"fill": fill, "box": box})
+
+    return change
+
+
+def _coarser(factor: float) -> Change:
+    def change(scenario: Scenario) -> Scenario:
+        size_scale = factor * scenario.sand.size_scale
+        sand = scenario.sand.model_copy(update={"size_scale": size_scale})
+        # As much sand, where it is given by the number of its grains.
+        fewer = factor**-scenario.dimension
+        layers = tuple(
+            layer.model_copy(update={"count": round(fewer * layer.count)}) if layer.count else layer
+            for layer in scenario.fill.layers
+        )
+        fill = scenario.fill.model_copy(update={"layers": layers})
+        return scenario.model_copy(update={"sand": sand, "fill": fill})
+
+    return change
+
+
+def _longer(factor: float) -> Change:
+    """All tubes, their closed ends where they are."""
+
+    def changed(obstacle: Any) -> Any:
+        if not isinstance(obstacle, Tube):
+            return obstacle
+        length_m = factor * obstacle.length_m
+        closed_right = obstacle.closed_end == "right"
+        left_m = obstacle.right_end_x_m - length_m if closed_right else obstacle.left_end_x_m
+        return obstacle.model_copy(update={"length_m": length_m, "left_end_x_m": left_m})
+
+    return lambda scenario: scenario.model_copy(
+        update={"obstacles": tuple(changed(o) for o in scenario.obstacles)}
+    )
+
+
+def _finer(factor: float) -> Change:
+    def change(scenario: Scenario) -> Scenario:
+        fraction = factor * scenario.time_step.fraction
+        step = scenario.time_step.model_copy(update={"fraction": fraction})
+        return scenario.model_copy(update={"time_step": step})
+
+    return change
+
+
+BY_FACTOR: dict[str, tuple[tuple[float, ...], Callable[[float], Change]]] = {
+    "stiffness": ((0.1, 10.0), _stiffer),
+    "bed_depth": ((0.5, 2.0), _deeper),
+    "grain_scale": ((0.75, 1.5), _coarser),
+    "tube_length": ((0.6, 1.5), _longer),
+    "time_step": ((0.5,), _finer),
+}
+"""Controls that multiply a property of the scene: by which factors, and how."""
+
+
+def _on(engine: str) -> Change:
+    return lambda scenario: scenario.model_copy(
+        update={"engine": scenario.engine.model_copy(update={"name": engine})}
+    )
+
+
+def _shaken(scenario: Scenario) -> Scenario:
+    """A shake too weak to move grains, one frequency after the other."""
+    direction = scenario.vibration[0].direction
+    stages = tuple(
+        VibrationStage(
+            direction=direction,
+            frequency_hz=f,
+            acceleration_g=SHAKE_G,
+            duration_s=max(SHAKE_PERIODS / f, SHAKE_LEAST_S),
+        )
+        for f in SHAKEN_HZ
+    )
+    window_s = float(f"{1.0 / (WINDOWS_A_PERIOD * SHAKEN_HZ[-1]):.2g}")
+    record = scenario.record.model_copy(update={"series_every_s": window_s})
+    return scenario.model_copy(update={"vibration": stages, "record": record})

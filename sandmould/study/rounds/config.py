@@ -1,0 +1,76 @@
+"""What a study asks of its rounds, and what keeps it from having any."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+from pydantic import Field
+
+from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.sand import ARGUED
+from sandmould.statistics.config import fewest_points
+from sandmould.study.sweep import Range, Sweep, points
+
+
+class Refinement(Section):
+    """Rounds of further runs where the optimum may lie, after those of the sweep."""
+
+    rounds: int = quantity(
+        0,
+        "Most rounds after the sweep; none computes the sweep alone.",
+        source=ARGUED,
+        ge=0,
+        le=100,
+    )
+    runs: int = quantity(
+        6,
+        "Runs of a round, shared among new points and further replicates as the spread asks.",
+        source=ARGUED,
+        ge=1,
+        le=1000,
+    )
+    interval: dict[str, Annotated[float, Field(gt=0)]] = Field(
+        {},
+        description="Swept keys and the width, in the unit of the key, of the optimum's 95 % "
+        "interval that is narrow enough: rounds end once all are.",
+    )
+    budget_core_h: float | None = quantity(
+        None,
+        "Processor time that all runs may take: rounds end before it is exceeded.",
+        unit="h",
+        source=ARGUED,
+        gt=0,
+    )
+
+
+def problems(refine: Refinement, sweep: Sweep, better: str, seed: int) -> Iterator[Problem]:
+    """List what is wrong with the rounds of a study whose sweep has no problems."""
+    if not refine.rounds:
+        if refine.interval or refine.budget_core_h is not None:
+            yield Problem("refine.rounds", 0, "at least 1 where refine says when rounds end")
+        return
+    if better == "neither":
+        yield Problem("refine.rounds", refine.rounds, "0 where objective.better is neither")
+    keys = sweep.swept
+    if not keys:
+        yield Problem("refine.rounds", refine.rounds, "0 in a study that sweeps nothing")
+        return
+    swept = points(sweep, seed)
+    for key in keys:
+        values = [p[key] for p in swept]
+        if isinstance(sweep.keys.get(key), Range) or all(
+            isinstance(v, int | float) and not isinstance(v, bool) for v in values
+        ):
+            if len(set(values)) == 1:
+                yield Problem(f"sweep.keys.{key}", values[0], "two values or more, with rounds")
+            continue
+        yield Problem(f"sweep.keys.{key}", values[0], "numbers, in a study with rounds")
+    for key in refine.interval:
+        if key not in keys:
+            yield Problem("refine.interval", key, f"a swept key, {' or '.join(keys)}")
+    fewest = fewest_points(len(keys))
+    if len(swept) < fewest:
+        valid = f"at least {fewest} points for rounds to begin with"
+        yield Problem("sweep", f"{len(swept)} points", valid)
