@@ -23,7 +23,7 @@ study: $(INSTALLED)
 	@$(BIN)/python -m sandmould.study.run_study $(STUDY) --cores $(CORES) --quiet rules host
 
 plan: $(INSTALLED)
-	@$(BIN)/python -m sandmould.study.build_plan $(STUDY)
+	@$(BIN)/python -m sandmould.study.plan.build_plan $(STUDY)
 
 status: $(INSTALLED)
 	@$(BIN)/python -m sandmould.study.status $(STUDY)

@@ -19,11 +19,11 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.statistics.verdict import finished_values
 from sandmould.study.collect import gather
-from sandmould.study.expand import replicate_seed
-from sandmould.study.load_study import open_study
-from sandmould.study.measure import write_measures
-from sandmould.study.plan_files import write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.sand.measure import write_measures
+from sandmould.study.plan.expand import replicate_seed
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.simulate import render_run, simulate
 
 Floats = NDArray[np.float64]

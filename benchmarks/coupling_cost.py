@@ -19,7 +19,7 @@ from pattern_fe.coupling.schemes import in_step_foam
 from pattern_fe.scene import pattern_of
 from sandmould import ROOT
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.load_study import open_study
+from sandmould.study.plan.load_study import open_study
 from sandmould.study.records import runs_in
 
 STEPS = 50_000

@@ -13,9 +13,9 @@ import numpy as np
 from analysis import repose
 from benchmarks.tables import table
 from sandmould.engines.snapshot import Snapshot
-from sandmould.study.moments import list_moments
-from sandmould.study.outflow import slopes
-from sandmould.study.plan_files import read_run
+from sandmould.study.kinds.sand.moments import list_moments
+from sandmould.study.kinds.sand.outflow import slopes
+from sandmould.study.plan.plan_files import read_run
 
 FEET = (0.2, 0.3, repose.HEAP_FOOT, 0.4, 0.5)
 

@@ -22,9 +22,9 @@ import pandas as pd
 from sandmould import ROOT
 from sandmould.engines.guard import Guard
 from sandmould.engines.snapshot import Snapshot
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.measure import measure_snapshot
+from sandmould.study.kinds.sand.measure import measure_snapshot
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 from sandmould.study.simulate import provenance
 
 OUT = Path(__file__).with_name("overhead.json")

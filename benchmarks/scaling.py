@@ -25,7 +25,7 @@ from benchmarks.scaling_parts import job_start, parts
 from benchmarks.scaling_peers import peers
 from benchmarks.scaling_study import Place
 from sandmould import ROOT
-from sandmould.study.build_plan import open_plan
+from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.simulate import provenance
 
 KEPT_JSON = Path(__file__).with_name("scaling.json")

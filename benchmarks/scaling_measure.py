@@ -14,8 +14,8 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.scaling_study import REPLICATES, SHARED, Cost, Place, graft
-from sandmould.study.build_plan import RESULTS, announce, open_plan
-from sandmould.study.sweep import MOST_RUNS
+from sandmould.study.definition.sweep import MOST_RUNS
+from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
 
 _COLLECT = "from pathlib import Path; from sandmould.study.collect import collect; collect({0})"
 _REPORT = (

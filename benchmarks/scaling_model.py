@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sandmould.study.batches import START_S
+from sandmould.study.plan.batches import START_S
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,14 @@ from statistics import median
 
 from benchmarks.scaling_measure import cpu_s
 from benchmarks.scaling_study import Place
-from sandmould.study.build_plan import open_plan
+from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.simulate import measure_run, render_run
 
 REPEATS = 5
 IMPORTED = {
     "preamble of a script": "snakemake.script",
     "imports of a run": "sandmould.study.simulate",
-    "imports of measuring": "sandmould.study.measure",
+    "imports of measuring": "sandmould.study.kinds.sand.measure",
     "imports of a shared job": "sandmould.study.batch_job",
 }
 

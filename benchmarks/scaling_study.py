@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sandmould import ROOT
-from sandmould.study.build_plan import open_plan
+from sandmould.study.plan.build_plan import open_plan
 
 REPLICATES = 5
 FIRST_HZ, STEP_HZ = 20.0, 0.04

@@ -24,7 +24,7 @@ from sandmould.statistics.agreement import (
     speeds,
 )
 from sandmould.study.collect import compare_study, swept_keys
-from sandmould.study.load_study import open_study
+from sandmould.study.plan.load_study import open_study
 from sandmould.study.records import RECORDS
 
 PAGE = ROOT / "docs" / "engine_twins.md"

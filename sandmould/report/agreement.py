@@ -18,7 +18,7 @@ from sandmould.statistics.agreement import (
     speeds,
 )
 from sandmould.study.collect import Collected, compare_study
-from sandmould.study.study import Study
+from sandmould.study.definition.study import Study
 
 _TINTS = {
     "equivalent": Tint("#00694b", "#5fd0a5"),

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.study.moments import Moment, list_moments
+from sandmould.study.kinds.sand.moments import Moment, list_moments
 
 BUDGET_BYTES = 2_500_000
 _MOST_FRAMES = 240

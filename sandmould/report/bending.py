@@ -24,8 +24,8 @@ from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
-from sandmould.study.bending import ledger_of, verdict_of
 from sandmould.study.collect import Collected
+from sandmould.study.kinds.sand.bending import ledger_of, verdict_of
 
 TIP = "pattern_tip_deflection_m"
 ROJEK = (

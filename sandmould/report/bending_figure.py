@@ -14,8 +14,8 @@ from sandmould.report.figures import png
 from sandmould.scenario.geometry import Array, Solid
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.bent_files import shape_moments
-from sandmould.study.moments import list_moments
+from sandmould.study.kinds.sand.bent_files import shape_moments
+from sandmould.study.kinds.sand.moments import list_moments
 
 _MM = 1e3
 _WIDTH_IN = 7.0

@@ -23,8 +23,8 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
 from sandmould.statistics.verdict import Verdict, rank_runs, sand_notes
 from sandmould.study.collect import Collected
+from sandmould.study.definition.study import SolidificationStudy, Study
 from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.study import SolidificationStudy, Study
 
 if TYPE_CHECKING:
     from sandmould.report.bending import BendingPages

@@ -17,7 +17,7 @@ from sandmould.runs.outcome import Outcome
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict, finished_values
 from sandmould.study.collect import Collected
-from sandmould.study.study import Study
+from sandmould.study.definition.study import Study
 
 _POINTS = 12_000
 """Points of all curves of one chart; more would only make the page heavy."""

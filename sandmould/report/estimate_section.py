@@ -22,9 +22,9 @@ from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict, finished_values
 from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.collect import Collected
+from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.moments import list_moments
-from sandmould.study.study import Study
+from sandmould.study.kinds.sand.moments import list_moments
 
 SHOWN_HEAPS = 3
 

@@ -20,7 +20,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.study import Study
+from sandmould.study.definition.study import Study
 
 FULL_SHARE = 0.95
 """Of the sand that a cavity holds when it is packed as the bed is."""

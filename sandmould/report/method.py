@@ -13,7 +13,7 @@ from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.study import Objective
+from sandmould.study.definition.study import Objective
 
 _NO_TENSION = {
     "total": "the total normal force, spring and dashpot together, is never allowed to pull",

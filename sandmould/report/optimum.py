@@ -26,8 +26,8 @@ from sandmould.runs.formatting import (
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.settings import CONFIDENCE
+from sandmould.study.definition.study import Study
 from sandmould.study.rounds.ledger import Ledger, read_ledger
-from sandmould.study.study import Study
 
 WRONG = {"frequency_hz": 10.0}
 """By how much a key may be set wrong in a foundry; others by a tenth of their range."""

@@ -32,10 +32,10 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import group_settings
 from sandmould.statistics.verdict import Verdict, judge
 from sandmould.study.collect import Collected, gather, read_provenance, read_study
+from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.plan_files import FIGURES, STUDY_FILE, read_run
+from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, read_run
 from sandmould.study.rounds.ledger import read_ledger
-from sandmould.study.study import Study
 
 TEMPLATES = ROOT / "templates" / "report"
 LIMIT_BYTES = 15_000_000

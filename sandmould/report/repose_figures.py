@@ -18,7 +18,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.posterior import axes_of, surface
 from sandmould.statistics.calibration.sands import CalibratedSand
 from sandmould.statistics.emulator import Emulator
-from sandmould.study.outflow import slopes
+from sandmould.study.kinds.sand.outflow import slopes
 
 _LINE = "#C00000"
 _BANDS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

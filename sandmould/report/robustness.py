@@ -18,11 +18,11 @@ from sandmould.scenario.scenario import FILLING, Scenario
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.robustness import Certified, certify, shaken_runs
 from sandmould.study.collect import Collected
-from sandmould.study.plan_files import read_run
-from sandmould.study.robustness.config import frequency_key
+from sandmould.study.definition.certificate import frequency_key
+from sandmould.study.definition.study import Study
+from sandmould.study.plan.plan_files import read_run
 from sandmould.study.robustness.controls import SHAKE_G
 from sandmould.study.rounds.ledger import read_ledger
-from sandmould.study.study import Study
 
 
 @dataclass(frozen=True)

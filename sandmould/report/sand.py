@@ -26,7 +26,7 @@ from sandmould.scenario.geometry import Bore
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict, rank_runs
 from sandmould.study.collect import Collected
-from sandmould.study.moments import MOMENTS, Moment, list_moments, nearest
+from sandmould.study.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 
 _SECONDARY = (
     "solid_fraction", "apparent_density_corrected_kg_m3", "coordination", "bed_height_m",

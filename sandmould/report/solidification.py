@@ -21,8 +21,8 @@ from sandmould.runs.formatting import listed, name_of, number, seconds, setting_
 from sandmould.scenario.solidification import MouldMaterial, Solidification
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.plan_files import read_run
-from sandmould.study.sweep import Point
+from sandmould.study.definition.sweep import Point
+from sandmould.study.plan.plan_files import read_run
 
 MARKERS = "osD^vP*X<>"
 STAND_IN = "stand-in"

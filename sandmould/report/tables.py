@@ -16,7 +16,7 @@ from sandmould.runs.formatting import name_of, number, seconds, size, titled, wi
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
-from sandmould.study.plan_files import FIGURES, STUDY_FILE
+from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE
 
 
 @dataclass(frozen=True)

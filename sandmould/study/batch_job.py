@@ -16,10 +16,10 @@ from typing import Any
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.batches import is_done
 from sandmould.study.kinds.kind import kind_of
-from sandmould.study.moments import LAST_MEASURED
-from sandmould.study.plan_files import read_run
+from sandmould.study.kinds.sand.moments import LAST_MEASURED
+from sandmould.study.plan.batches import is_done
+from sandmould.study.plan.plan_files import read_run
 from sandmould.study.process import die_with_parent, launch
 from sandmould.study.simulate import measure_run, render_run
 

@@ -21,8 +21,8 @@ from sandmould.statistics.agreement import (
     compare_pair,
     sweep_part,
 )
-from sandmould.study.plan_files import STUDY_FILE
-from sandmould.study.study import Study, study_model
+from sandmould.study.definition.study import Study, study_model
+from sandmould.study.plan.plan_files import STUDY_FILE
 
 NO_OUTCOME = "no outcome written"
 _OUTCOME_COLUMNS = ("outcome_code", "outcome", "detail", "simulated_s", "planned_s")

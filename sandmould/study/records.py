@@ -22,13 +22,13 @@ from sandmould import ROOT
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
-from sandmould.study.expand import expand
+from sandmould.study.definition.run import Run
+from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import kind_of
-from sandmould.study.load_study import OpenStudy, open_study
-from sandmould.study.plan_files import FIGURES
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import OpenStudy, open_study
+from sandmould.study.plan.plan_files import FIGURES
 from sandmould.study.rounds.ledger import LEDGER, read_ledger
-from sandmould.study.run import Run
-from sandmould.study.study import Study
 
 RECORDS = ROOT / "docs" / "results"
 COPIED = ("runs.tsv", "summary.tsv")

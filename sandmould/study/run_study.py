@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.build_plan import RESULTS, open_plan
 from sandmould.study.collect import gather
+from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.rounds.decide import next_runs, told
 from sandmould.study.rounds.ledger import read_ledger, write_ledger
 

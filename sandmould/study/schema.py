@@ -19,7 +19,7 @@ from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section, models_in
 from sandmould.scenario.solidification import Solidification
-from sandmould.study.study import DeckStudy, FlowStudy, SolidificationStudy, Study
+from sandmould.study.definition.study import DeckStudy, FlowStudy, SolidificationStudy, Study
 
 SCHEMA = ROOT / "config" / "schema.json"
 DEFAULT = ROOT / "config" / "default.yaml"

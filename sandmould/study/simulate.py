@@ -19,7 +19,7 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Cost, finish
 from sandmould.study.kinds.kind import AnyScenario, kind_of
-from sandmould.study.plan_files import read_run
+from sandmould.study.plan.plan_files import read_run
 from sandmould.study.process import RESTARTABLE_EXIT
 
 

@@ -20,8 +20,8 @@ import pandas as pd
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.build_plan import DEFAULT_STUDY, RESULTS, Plan, open_plan
 from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.plan.build_plan import DEFAULT_STUDY, RESULTS, Plan, open_plan
 from sandmould.study.rounds.ledger import read_ledger
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]

@@ -13,8 +13,8 @@ from sandmould.engines.deck import Block, Deck, environment, exact
 from sandmould.engines.lammps.render import layer_data, render_deck
 from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 from tests.hopper import hopper_scene
 from tests.scenes import tube_scene
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 
 
 def refused(folder: Path, text: str | bytes, monkeypatch: pytest.MonkeyPatch) -> str:

@@ -15,8 +15,8 @@ from sandmould.scenario.box import Box, Tube
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.plan_files import write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.plan.plan_files import write_plan
 
 KEY = "vibration.0.frequency_hz"
 DURATION_S = 2.0

@@ -22,7 +22,7 @@ from sandmould.statistics.agreement import (
     sweep_part,
 )
 from sandmould.study.collect import collect, compare_study, gather, read_study
-from sandmould.study.study import Equivalence
+from sandmould.study.definition.study import Equivalence
 from tests.unit.report_study import ENGINES, KEY, write_cross_check, write_twins
 
 FILL = "tube_fill_fraction"

@@ -8,7 +8,7 @@ import pytest
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.load_study import open_study
+from sandmould.study.plan.load_study import open_study
 from tests.unit.refusing import refused
 
 SHIPPED = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")

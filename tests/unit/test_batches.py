@@ -15,13 +15,13 @@ from sandmould.engines.choosing import deck_hash
 from sandmould.runs.hashing import scenario_hash
 from sandmould.study import batch_job
 from sandmould.study.batch_job import compute_batch, is_current
-from sandmould.study.batches import START_S, alone, is_done, plan_batches, planned_wall_s
-from sandmould.study.build_plan import Plan
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.moments import LAST_MEASURED
-from sandmould.study.plan_files import write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.sand.moments import LAST_MEASURED
+from sandmould.study.plan.batches import START_S, alone, is_done, plan_batches, planned_wall_s
+from sandmould.study.plan.build_plan import Plan
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import write_plan
 
 FREQUENCY = "vibration.0.frequency_hz"
 STUDY: dict[str, Any] = {

@@ -14,10 +14,10 @@ from pattern_fe.coupling.ledger import LEDGER
 from pattern_fe.scene import pattern_of, with_surface
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.bending import verdict_of
-from sandmould.study.measure import write_exports, write_measures
-from sandmould.study.plan_files import write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.sand.bending import verdict_of
+from sandmould.study.kinds.sand.measure import write_exports, write_measures
+from sandmould.study.plan.plan_files import write_plan
 from tests.bent_run import SCENE, tip_load, write_bent_run
 
 

@@ -15,8 +15,8 @@ from sandmould.report.animation import make_film
 from sandmould.report.bending_figure import _lines_m, draw_outlines
 from sandmould.report.sand import _bending_name
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.bending import BentPattern
-from sandmould.study.bent_files import write_bent
+from sandmould.study.kinds.sand.bending import BentPattern
+from sandmould.study.kinds.sand.bent_files import write_bent
 from tests.patterns import _one_thread  # noqa: F401
 
 LOAD_N = -0.05

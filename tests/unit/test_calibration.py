@@ -15,8 +15,8 @@ from sandmould.statistics.calibration.config import Calibration, Target
 from sandmould.statistics.calibration.posterior import OffTheMapError, iso_line, posterior
 from sandmould.statistics.calibration.sands import calibrate, write_materials
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
-from sandmould.study.calibration.problems import problems
-from sandmould.study.sweep import Sweep
+from sandmould.study.definition.calibration import problems
+from sandmould.study.definition.sweep import Sweep
 
 KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fraction")
 NOISE_DEG = 0.5

@@ -44,7 +44,7 @@ from benchmarks.calibration_oracle import (
 from benchmarks.calibration_page import page
 from benchmarks.calibration_race import HELD_AFTER, Race, quartiles, run_race, summarised
 from sandmould import ROOT
-from sandmould.study.plan_files import read_run
+from sandmould.study.plan.plan_files import read_run
 
 NOISE_DEG = 0.8
 FAKE = """\

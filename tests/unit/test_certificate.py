@@ -18,14 +18,14 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.robustness import Certified, certify
-from sandmould.study.build_plan import open_plan
-from sandmould.study.expand import expand
-from sandmould.study.load_study import OpenStudy, open_study
-from sandmould.study.robustness.config import Certificate, frequency_key
+from sandmould.study.definition.certificate import Certificate, frequency_key
+from sandmould.study.definition.study import Study
+from sandmould.study.plan.build_plan import open_plan
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.robustness.controls import SHAKEN_HZ, Case, cases
 from sandmould.study.rounds.decide import choose_certified, next_round
 from sandmould.study.rounds.ledger import Ledger, basis_of, read_ledger, write_ledger
-from sandmould.study.study import Study
 
 FREQUENCY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"

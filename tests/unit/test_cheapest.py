@@ -10,7 +10,7 @@ from benchmarks import cheapest
 from benchmarks.cheapest import Factor, factors_of
 from benchmarks.twins import Recorded
 from sandmould.study.collect import compare_study
-from sandmould.study.study import Study
+from sandmould.study.definition.study import Study
 
 KEY = "time_step.fraction"
 

@@ -18,7 +18,7 @@ from sandmould.study.collect import (
     read_provenance,
     read_study,
 )
-from sandmould.study.study import Objective, Study
+from sandmould.study.definition.study import Objective, Study
 from tests.unit.report_study import (
     DURATION_S,
     FAILED,

@@ -14,11 +14,11 @@ import yaml
 from sandmould import ROOT
 from sandmould.engines.program import build_program
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.build_plan import Plan, open_plan
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.plan_files import plan_table, read_run, write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.plan.build_plan import Plan, open_plan
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
 
 FREQUENCY = "vibration.0.frequency_hz"
 MARGINS = {"margins": {"tube_fill_fraction": 0.03}}

@@ -24,9 +24,9 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.flow import MetalFlow
 from sandmould.study.collect import collect
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
 from sandmould.study.simulate import measure_run, render_run, simulate
 
 TANK = {"kind": "tank", "particle_m": 0.004, "width_m": 0.016, "depth_m": 0.032}

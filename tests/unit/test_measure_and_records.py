@@ -13,12 +13,17 @@ import pytest
 from sandmould import ROOT
 from sandmould.engines.snapshot import Snapshot
 from sandmould.study import records
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.measure import write_exports, write_measures, write_picture, write_profile
-from sandmould.study.plan_files import write_plan
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.sand.measure import (
+    write_exports,
+    write_measures,
+    write_picture,
+    write_profile,
+)
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.rounds.ledger import LEDGER, Ledger, Round, basis_of, write_ledger
-from sandmould.study.run import Run
 from tests.scenes import tube_scene
 
 R = 0.002

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.study.outflow import (
+from sandmould.study.kinds.sand.outflow import (
     add_outflow,
     measure_outflow,
     outflow_time_s,

@@ -15,10 +15,10 @@ from sandmould.report.page import write_report
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import collect
-from sandmould.study.expand import expand
-from sandmould.study.kinds import deck
-from sandmould.study.load_study import open_study
-from sandmould.study.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.kinds.deck import planning as deck
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
 
 TEMPLATE = """\
 variable a equal {{ angle_deg }}

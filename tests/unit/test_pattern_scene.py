@@ -23,7 +23,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds import sand
+from sandmould.study.kinds.sand import planning as sand
 
 L_SCENE: dict[str, Any] = {
     "box": {"width_m": 0.2, "height_m": 0.2},

@@ -18,9 +18,9 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict, judge
 from sandmould.study.collect import Collected, gather
-from sandmould.study.measure import write_exports, write_measures
-from sandmould.study.plan_files import read_run, write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.sand.measure import write_exports, write_measures
+from sandmould.study.plan.plan_files import read_run, write_plan
 from tests.bent_run import SCENE, write_bent_run
 from tests.unit.test_report_page import Page
 

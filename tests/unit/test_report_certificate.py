@@ -13,10 +13,10 @@ import pytest
 from sandmould.report.page import write_report
 from sandmould.report.robustness import certificate_pages
 from sandmould.study.collect import gather, read_study
-from sandmould.study.plan_files import write_plan
+from sandmould.study.definition.run import Run
+from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKE_G, SHAKEN_HZ, cases
 from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
-from sandmould.study.run import Run
 from tests.unit.report_study import KEY, scenario, write_run
 
 CERTIFIED_HZ = (35.7, 50.0, 70.0)

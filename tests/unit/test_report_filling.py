@@ -14,7 +14,7 @@ from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.page import write_report
 from sandmould.statistics.verdict import judge
 from sandmould.study.collect import gather, read_study
-from sandmould.study.study import Study
+from sandmould.study.definition.study import Study
 from tests.unit.report_study import DURATION_S, KEY, scenario, write_study
 
 BEST_HZ = 40.0

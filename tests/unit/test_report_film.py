@@ -14,9 +14,9 @@ from sandmould import ROOT
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.animation import ABSENT, Film, make_film
 from sandmould.report.figures import cut_m, scene_outline
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.moments import list_moments, nearest
+from sandmould.study.kinds.sand.moments import list_moments, nearest
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 from tests.unit.report_study import write_study
 
 

@@ -20,9 +20,9 @@ from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
-from sandmould.study.measure import write_measures
-from sandmould.study.plan_files import write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.sand.measure import write_measures
+from sandmould.study.plan.plan_files import write_plan
 
 FRICTION = "contact.grain_grain.friction"
 ARM = "contact.grain_grain.rolling_arm_fraction"

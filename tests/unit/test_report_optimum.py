@@ -13,9 +13,9 @@ from sandmould.report.chart import Chart
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.page import write_report
 from sandmould.study.collect import gather, read_study
+from sandmould.study.definition.study import Study
 from sandmould.study.rounds.decide import next_round
 from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
-from sandmould.study.study import Study
 from tests.unit.report_study import KEY, write_study
 
 BEST_HZ = 48.0

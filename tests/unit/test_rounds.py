@@ -17,10 +17,10 @@ from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import NEAR, propose
 from sandmould.study import run_study as driving
-from sandmould.study.build_plan import announce, open_plan
 from sandmould.study.collect import collect
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
+from sandmould.study.plan.build_plan import announce, open_plan
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 from sandmould.study.rounds.decide import next_round, told, why_enough
 from sandmould.study.rounds.ledger import LEDGER, Ledger, basis_of, read_ledger, write_ledger
 
@@ -247,7 +247,7 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
         return 0
 
     monkeypatch.setattr(driving, "_snakemake", snakemake)
-    monkeypatch.setattr("sandmould.study.kinds.sand.rate", lambda *_: 1e7)
+    monkeypatch.setattr("sandmould.study.kinds.sand.planning.rate", lambda *_: 1e7)
     assert driving.main(["trial.yaml"]) == 0
     # Three rounds of four runs after the ten of the sweep, then the controls, each computed once.
     assert calls == [["results/trial/summary.tsv"]] * 4 + [[]]

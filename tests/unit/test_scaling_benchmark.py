@@ -16,7 +16,7 @@ from benchmarks.scaling_model import Assumed, Measured, drain
 from benchmarks.scaling_page import page
 from benchmarks.scaling_peers import HERE, Tool, written_lines
 from benchmarks.scaling_study import REPLICATES, Place
-from sandmould.study.build_plan import open_plan
+from sandmould.study.plan.build_plan import open_plan
 
 COSTS = Measured(
     plan_s=0.001, graph_s=0.005, snakemake_s=2.0, job_start_s=1.5, job_start_s_per_run=0.0,

@@ -21,9 +21,9 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.collect import collect
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
 from sandmould.study.simulate import measure_run, render_run, simulate
 
 SMALL: dict[str, Any] = {

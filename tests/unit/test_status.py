@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.build_plan import Plan, open_plan
-from sandmould.study.kinds.sand import planned_work
-from sandmould.study.plan_files import write_plan
+from sandmould.study.kinds.sand.planning import planned_work
+from sandmould.study.plan.build_plan import Plan, open_plan
+from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.status import main, run_status, status_text
 
 FREQUENCY = "vibration.0.frequency_hz"

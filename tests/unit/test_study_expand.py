@@ -13,10 +13,10 @@ import yaml
 from sandmould import ROOT
 from sandmould.runs.hashing import present, scenario_hash
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.expand import MOST_PROBLEMS, expand, replicate_seed
-from sandmould.study.load_study import open_study
-from sandmould.study.plan_files import read_run, write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.plan.expand import MOST_PROBLEMS, expand, replicate_seed
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import read_run, write_plan
 from tests.bracket import BRACKET
 
 FREQUENCY = "vibration.0.frequency_hz"

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.sweep import key_paths, value_at
+from sandmould.study.definition.sweep import key_paths, value_at
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 
 SCHEMA = json.loads((ROOT / "config" / "schema.json").read_text(encoding="utf-8"))
 STUDIES = sorted((ROOT / "config").glob("*/tube*.yaml"))

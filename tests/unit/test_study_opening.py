@@ -11,8 +11,8 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.contact import WALL_LAW
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.expand import expand
-from sandmould.study.load_study import OpenStudy, open_study, shown_name
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import OpenStudy, open_study, shown_name
 
 Opened = Callable[..., OpenStudy]
 SHIPPED = sorted((ROOT / "config" / "studies").glob("*.yaml"))

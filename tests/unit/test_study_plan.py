@@ -17,12 +17,12 @@ from sandmould.engines.program import REST_AFTER_FALL_S, build_program
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.build_plan import announce, open_plan
-from sandmould.study.expand import expand
-from sandmould.study.kinds.sand import planned_steps, planned_work
-from sandmould.study.load_study import open_study
-from sandmould.study.plan_files import plan_table, read_run, write_plan
-from sandmould.study.run import RUN_NAME, Run
+from sandmould.study.definition.run import RUN_NAME, Run
+from sandmould.study.kinds.sand.planning import planned_steps, planned_work
+from sandmould.study.plan.build_plan import announce, open_plan
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
 
 LAMMPS = ("lammps", 2)
 THREE = """\
@@ -181,7 +181,7 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
         # scikit-learn and scipy.stats take a second each.
         ("sandmould.study.simulate", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
         ("sandmould.study.batch_job", ("sklearn", "scipy.stats", "snakemake")),
-        ("sandmould.study.build_plan", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
+        ("sandmould.study.plan.build_plan", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
     ],
 )
 def test_jobs_do_not_wait_for_libraries_of_the_report(module: str, heavy: tuple[str, ...]) -> None:

@@ -11,8 +11,8 @@ import yaml
 
 from sandmould import ROOT
 from sandmould.scenario.reading import Origin, read_yaml, validated
+from sandmould.study.definition.study import Study
 from sandmould.study.schema import DEFAULT, SCHEMA, default_text, schema_text
-from sandmould.study.study import Study
 
 REFRESH = "the types have changed: run `python -m sandmould.study.schema` and commit both files"
 STUDIES = sorted((ROOT / "config").glob("s*/*.yaml"))

@@ -9,7 +9,15 @@ import pytest
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.sweep import MOST_RUNS, Range, Sweep, is_whole, points, problems, value_at
+from sandmould.study.definition.sweep import (
+    MOST_RUNS,
+    Range,
+    Sweep,
+    is_whole,
+    points,
+    problems,
+    value_at,
+)
 
 BASE = Scenario().model_dump(mode="json")
 SCALE, CLASSES, FRICTION = "sand.size_scale", "sand.size_classes", "contact.grain_grain.friction"

@@ -20,9 +20,9 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import RunOutcome
 from sandmould.runs.products import finish
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand import PRODUCTS, complete
-from sandmould.study.plan_files import write_plan
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.sand.planning import PRODUCTS, complete
+from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.simulate import render_run
 
 

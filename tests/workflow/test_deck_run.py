@@ -14,9 +14,9 @@ import pandas as pd
 import yaml
 
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
-from sandmould.study.plan_files import write_plan
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.simulate import measure_run, render_run
 
 FALLING = """\

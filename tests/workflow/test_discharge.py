@@ -17,7 +17,7 @@ from sandmould.engines.session import Session
 from sandmould.runs.checkpoint import newest_checkpoint
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.placement import NOMINAL_FRACTION, filled_measure
-from sandmould.study.measure import write_measures
+from sandmould.study.kinds.sand.measure import write_measures
 from tests.hopper import (
     BOX_WIDTH_M,
     DEEP,

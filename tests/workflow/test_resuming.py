@@ -15,8 +15,8 @@ from sandmould.engines.program import build_program
 from sandmould.runs.checkpoint import newest_checkpoint
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.expand import expand
-from sandmould.study.load_study import open_study
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 from sandmould.study.process import RESTARTABLE_EXIT
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import (

@@ -12,9 +12,9 @@ import pytest
 
 from sandmould import ROOT
 from sandmould.runs.outcome import Outcome
-from sandmould.study.expand import expand
 from sandmould.study.kinds.kind import kind_named, kind_of
-from sandmould.study.load_study import open_study
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 from tests.workflow.runs import kill_at_a_checkpoint
 
 SNAKEMAKE = Path(sys.executable).parent / "snakemake"

@@ -4,9 +4,9 @@ import os
 import sys
 
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.batches import alone
-from sandmould.study.build_plan import RESULTS, announce, open_plan, study_path
-from sandmould.study.run import RUN_NAME
+from sandmould.study.plan.batches import alone
+from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, study_path
+from sandmould.study.definition.run import RUN_NAME
 
 OVERRIDES = dict(workflow.config_settings.config)
 # Set by a profile: how long a job should last at least, where jobs cost more than short runs, how

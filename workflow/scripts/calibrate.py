@@ -4,7 +4,7 @@ from pathlib import Path
 
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.job_log import to_log
-from sandmould.study.load_study import CALIBRATED
+from sandmould.study.plan.load_study import CALIBRATED
 
 with to_log(snakemake.log[0]):
     not_found = write_calibration(Path(snakemake.input.table).parent, CALIBRATED)

@@ -9,8 +9,8 @@ import pandas as pd
 
 from sandmould.statistics.calibration.sands import Calibrated, calibrate, write_materials
 from sandmould.study.collect import gather, read_study
-from sandmould.study.plan_files import read_run
-from sandmould.study.study import Study
+from sandmould.study.definition.study import Study
+from sandmould.study.plan.plan_files import read_run
 
 
 def read_calibrated(

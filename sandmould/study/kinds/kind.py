@@ -14,7 +14,7 @@ from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
 
 AnyScenario = Scenario | OwnDeck | Solidification | MetalFlow
 SpeedClass = tuple[str, int]
@@ -131,7 +131,7 @@ _MODULE_OF = {
 
 def kind_named(name: str) -> Kind:
     """The kind of a study by its name in the study's file."""
-    return cast(Kind, importlib.import_module(f"sandmould.study.kinds.{name}"))
+    return cast(Kind, importlib.import_module(f"sandmould.study.kinds.{name}.planning"))
 
 
 def kind_of(scenario: AnyScenario) -> Kind:

@@ -10,11 +10,11 @@ from sandmould.runs.formatting import listed, name_of, number, unit_of
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
-from sandmould.study.robustness.config import round_best_hz
-from sandmould.study.rounds.config import Refinement
+from sandmould.study.definition.certificate import round_best_hz
+from sandmould.study.definition.refinement import Refinement
+from sandmould.study.definition.study import Study
+from sandmould.study.definition.sweep import is_whole
 from sandmould.study.rounds.ledger import Ledger, Round
-from sandmould.study.study import Study
-from sandmould.study.sweep import is_whole
 
 
 def next_runs(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:

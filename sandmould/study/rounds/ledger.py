@@ -11,8 +11,8 @@ from typing import Any
 
 from sandmould.runs.hashing import present
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.study import Study
-from sandmould.study.sweep import Point
+from sandmould.study.definition.study import Study
+from sandmould.study.definition.sweep import Point
 
 LEDGER = "rounds.json"
 

@@ -11,7 +11,7 @@ from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.config import fewest_points
-from sandmould.study.sweep import Sweep, points
+from sandmould.study.definition.sweep import Sweep, points
 
 Control = Literal[
     "hold", "stiffness", "bed_depth", "grain_scale", "tube_length", "time_step", "engine",

@@ -24,8 +24,8 @@ from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, with_hash
+from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.run import Run
 
 MODEL = Scenario
 WORK = "grain-steps"
@@ -179,7 +179,7 @@ def complete(scenario: Scenario, work: Path) -> None:
 
 def measure(run: Run, folder: Path) -> None:
     """Measure every snapshot."""
-    from sandmould.study.measure import measure_sand  # draws: not every job needs that
+    from sandmould.study.kinds.sand.measure import measure_sand  # draws: not every job needs that
 
     measure_sand(folder)
 

@@ -13,14 +13,14 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.comparing import ENGINE
+from sandmould.study.definition.certificate import frequency_key
+from sandmould.study.definition.comparing import ENGINE
+from sandmould.study.definition.run import Part, Run
+from sandmould.study.definition.sweep import Point, points, value_at
 from sandmould.study.kinds.kind import AnyScenario, kind_named
-from sandmould.study.labels import letters, run_label
-from sandmould.study.load_study import OpenStudy
-from sandmould.study.robustness.config import frequency_key
+from sandmould.study.plan.labels import letters, run_label
+from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.robustness.controls import Case, cases
-from sandmould.study.run import Part, Run
-from sandmould.study.sweep import Point, points, value_at
 
 MOST_PROBLEMS = 10
 """Problems told at once; the first few are those that teach."""

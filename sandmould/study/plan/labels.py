@@ -6,8 +6,8 @@ import re
 
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.comparing import ENGINE
-from sandmould.study.sweep import Point
+from sandmould.study.definition.comparing import ENGINE
+from sandmould.study.definition.sweep import Point
 
 
 def run_label(parameters: Point) -> str:

@@ -14,9 +14,9 @@ from analysis.freezing import freezing
 from sandmould.casting.arpm import computation, scene
 from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
-from sandmould.study.kinds import own_solver
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds import casting as own_solver
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.run import Run
 
 MODEL = Solidification
 WORK = "element-steps"

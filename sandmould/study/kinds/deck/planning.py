@@ -17,9 +17,9 @@ from sandmould.engines.own_deck import deck as own_deck
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
+from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.moments import LAST_MEASURED
-from sandmould.study.run import Run
+from sandmould.study.kinds.sand.moments import LAST_MEASURED
 
 MODEL = OwnDeck
 WORK = "core-seconds"

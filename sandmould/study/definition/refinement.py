@@ -11,7 +11,7 @@ from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.config import fewest_points
-from sandmould.study.sweep import Range, Sweep, points
+from sandmould.study.definition.sweep import Range, Sweep, points
 
 
 class Refinement(Section):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from sandmould.scenario.bad_input import Problem
 from sandmould.statistics.calibration.config import Calibration
-from sandmould.study.sweep import Range, Sweep
+from sandmould.study.definition.sweep import Range, Sweep
 
 OF_MATERIAL = ("sand.", "contact.", "background_damping.")
 """Beginnings of the keys that a material states."""

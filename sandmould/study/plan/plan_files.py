@@ -18,9 +18,9 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
+from sandmould.study.definition.run import Part, Run
+from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import SpeedClass, kind_of
-from sandmould.study.run import Part, Run
-from sandmould.study.study import Study
 
 STUDY_FILE = "study.yaml"
 """The study as planned, with all that it rests on."""

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from sandmould.scenario.bad_input import Problem
 from sandmould.statistics.config import Equivalence
-from sandmould.study.study import CrossCheck, Study
-from sandmould.study.sweep import Sweep, points
+from sandmould.study.definition.study import CrossCheck, Study
+from sandmould.study.definition.sweep import Sweep, points
 
 ENGINE = "engine.name"
 

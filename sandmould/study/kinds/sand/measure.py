@@ -24,9 +24,9 @@ from analysis.solid_fraction import (
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.moments import LAST_MEASURED, MOMENTS, list_moments, nearest
-from sandmould.study.outflow import add_outflow, measure_outflow
-from sandmould.study.plan_files import read_run
+from sandmould.study.kinds.sand.moments import LAST_MEASURED, MOMENTS, list_moments, nearest
+from sandmould.study.kinds.sand.outflow import add_outflow, measure_outflow
+from sandmould.study.plan.plan_files import read_run
 
 
 def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
@@ -101,7 +101,9 @@ def write_exports(folder: Path, out: Path) -> None:
     out.mkdir(exist_ok=True)
     moments = list_moments(folder)
     if scenario.pattern is not None:
-        from sandmould.study.bent_files import write_bent  # scikit-fem: few studies need it
+        from sandmould.study.kinds.sand.bent_files import (
+            write_bent,  # scikit-fem: few studies need it
+        )
 
         write_bent(scenario, folder, out)
     if wanted == "none" or not moments:
@@ -149,7 +151,10 @@ def write_measures(folder: Path, out: Path) -> None:
     scenario = read_run(folder / "scenario.yaml").scenario
     bent = None
     if scenario.pattern is not None:
-        from sandmould.study.bending import BentPattern, add_loop  # scikit-fem: few studies need it
+        from sandmould.study.kinds.sand.bending import (  # scikit-fem: few studies need it
+            BentPattern,
+            add_loop,
+        )
 
         bent = BentPattern(scenario)
     rows = []

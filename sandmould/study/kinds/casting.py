@@ -14,8 +14,8 @@ import pandas as pd
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section
-from sandmould.study.moments import LAST_MEASURED
-from sandmould.study.run import Run
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.sand.moments import LAST_MEASURED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

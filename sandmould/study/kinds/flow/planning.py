@@ -13,9 +13,9 @@ from sandmould.casting.mps import computation, scene
 from sandmould.casting.mps.measured import by_window, measure_flow
 from sandmould.runs.outcome import RunOutcome
 from sandmould.scenario.flow import MetalFlow, StillTank
-from sandmould.study.kinds import own_solver
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds import casting as own_solver
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.run import Run
 
 MODEL = MetalFlow
 WORK = computation.WORK

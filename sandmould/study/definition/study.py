@@ -15,9 +15,9 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import MetalAndMould, Solidification
 from sandmould.statistics.calibration.config import Calibration
 from sandmould.statistics.config import Equivalence, Objective
-from sandmould.study.robustness.config import Certificate
-from sandmould.study.rounds.config import Refinement
-from sandmould.study.sweep import Sweep
+from sandmould.study.definition.certificate import Certificate
+from sandmould.study.definition.refinement import Refinement
+from sandmould.study.definition.sweep import Sweep
 
 
 class CrossCheck(Section):

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import kind_of
-from sandmould.study.moments import LAST_MEASURED
-from sandmould.study.run import Run
+from sandmould.study.kinds.sand.moments import LAST_MEASURED
 
 START_S = 2.0
 """What a run takes beside its steps: its process and its measures (docs/scaling.md)."""

@@ -7,8 +7,8 @@ from pathlib import Path
 from pattern_fe.export import write_stl, write_surface
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.bending import BentPattern
-from sandmould.study.moments import Moment, list_moments
+from sandmould.study.kinds.sand.bending import BentPattern
+from sandmould.study.kinds.sand.moments import Moment, list_moments
 
 
 def shape_moments(moments: tuple[Moment, ...]) -> dict[str, Moment]:

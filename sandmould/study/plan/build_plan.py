@@ -13,15 +13,15 @@ from typing import Any
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.batches import Batch, plan_batches
-from sandmould.study.comparing import ENGINE
-from sandmould.study.expand import expand, swept_key
+from sandmould.study.definition.certificate import provisional_hz
+from sandmould.study.definition.comparing import ENGINE
+from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import Kind, kind_named
-from sandmould.study.load_study import OpenStudy, open_study
-from sandmould.study.plan_files import plan_table, write_plan, write_study
-from sandmould.study.robustness.config import provisional_hz
+from sandmould.study.plan.batches import Batch, plan_batches
+from sandmould.study.plan.expand import expand, swept_key
+from sandmould.study.plan.load_study import OpenStudy, open_study
+from sandmould.study.plan.plan_files import plan_table, write_plan, write_study
 from sandmould.study.rounds.ledger import read_ledger
-from sandmould.study.run import Run
 
 RESULTS = Path("results")
 DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"

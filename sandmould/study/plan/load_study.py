@@ -15,18 +15,16 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
 from sandmould.scenario.quantity import NAME, fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
-from sandmould.study import comparing, sweep
-from sandmould.study.calibration import problems as calibration
-from sandmould.study.kinds.kind import kind_named
-from sandmould.study.robustness import config as certificate
-from sandmould.study.rounds import config as rounds
-from sandmould.study.study import (
+from sandmould.study.definition import calibration, certificate, comparing, sweep
+from sandmould.study.definition import refinement as rounds
+from sandmould.study.definition.study import (
     ONLY_SAND,
     SolidificationStudy,
     Study,
     material_model,
     study_model,
 )
+from sandmould.study.kinds.kind import kind_named
 
 STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"

@@ -1,0 +1,1 @@
+"""A study as it is written: its typed sections, its sweep, and what is wrong with them."""

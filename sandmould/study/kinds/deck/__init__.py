@@ -1,0 +1,1 @@
+"""Studies of a deck of the user's own."""

@@ -1,0 +1,1 @@
+"""Studies of sand: grains on one of the engines."""

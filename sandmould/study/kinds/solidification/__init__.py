@@ -1,0 +1,1 @@
+"""Studies of a casting that solidifies in its mould."""
