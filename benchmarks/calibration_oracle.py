@@ -166,6 +166,7 @@ def _measured(one: Run) -> Measures:
         write_plan([one], folder)
         render_run(folder / "runs" / one.run)
         simulate(folder / "runs" / one.run)
-        write_measures(folder / "runs" / one.run, folder / "runs" / one.run / "measures.tsv")
+        run_folder = folder / "runs" / one.run
+        write_measures(one.scenario, run_folder, run_folder / "measures.tsv")
         summary = gather(folder).summary
     return {m: float(finished_values(summary, m).iloc[0]) for m in (ANGLE, SECOND)}

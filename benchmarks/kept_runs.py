@@ -8,14 +8,14 @@ from pathlib import Path
 
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.kind import kind_of
+from sandmould.study.kinds.registry import kind_of
 
 Measures = dict[str, float]
 
 
 def key_of(scenario: Scenario) -> str:
     """Name of a run: what its scenario says and what its engine is told to compute."""
-    told = scenario_hash(scenario) + kind_of(scenario).computed_hash(scenario)
+    told = scenario_hash(scenario) + kind_of(scenario).planning.computed_hash(scenario)
     return hashlib.sha256(told.encode()).hexdigest()
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic
 
 import pandas as pd
 
@@ -23,8 +23,9 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
 from sandmould.statistics.verdict import Verdict, rank_runs, sand_notes
 from sandmould.study.collect import Collected
-from sandmould.study.definition.study import SolidificationStudy, Study
-from sandmould.study.kinds.kind import AnyScenario
+from sandmould.study.definition.study import Study
+from sandmould.study.kinds.kind import AnyScenario, ScenarioT
+from sandmould.study.kinds.registry import kind_of
 
 if TYPE_CHECKING:
     from sandmould.report.bending import BendingPages
@@ -47,6 +48,34 @@ class KindPages:
     """What is written as files too, by name."""
 
 
+@dataclass(frozen=True)
+class Findings(Generic[ScenarioT]):
+    """What the pages of a kind are drawn from."""
+
+    study_folder: Path
+    study: Study
+    scenario: ScenarioT
+    """Of the run that is shown."""
+    collected: Collected
+    verdict: Verdict
+    film_budget_bytes: int
+    """Most that the film of one run may weigh."""
+    href: str
+    """Address of the study's folder, seen from the report."""
+
+
+@dataclass(frozen=True)
+class KindReport(Generic[ScenarioT]):
+    """What reports of one kind of study say and show of their own."""
+
+    notes: Callable[[ScenarioT, Collected, bool, bool], tuple[str, ...]]
+    """What the simulation leaves open; arguments are those of ``notes_of``."""
+    pages: Callable[[Findings[ScenarioT]], KindPages]
+    """What it draws."""
+    shows_drives: bool = False
+    """Whether settings are listed with the drive of a vibrating table."""
+
+
 def notes_of(
     scenario: AnyScenario, collected: Collected, seeks_best: bool, is_certified: bool
 ) -> tuple[str, ...]:
@@ -59,19 +88,48 @@ def notes_of(
     seeks_best, is_certified : bool
         Whether the study looks for the best setting; whether its controls have been run.
     """
-    if isinstance(scenario, OwnDeck):
-        return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
-    if isinstance(scenario, Solidification):
-        flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
-        return (flat,) if scenario.dimensions == 2 else ()
-    if isinstance(scenario, MetalFlow):
-        return _flow_notes(scenario)
-    stage = scenario.vibration[0] if scenario.vibration else None
-    deepest = _deepest_overlap_fraction(collected.summary)
-    return sand_notes(collected.keys, stage, deepest, seeks_best, is_certified)
+    return _report_of(scenario).notes(scenario, collected, seeks_best, is_certified)
 
 
-def _flow_notes(scenario: MetalFlow) -> tuple[str, ...]:
+def kind_pages(
+    study_folder: Path,
+    study: Study,
+    scenario: AnyScenario,
+    collected: Collected,
+    verdict: Verdict,
+    film_budget_bytes: int,
+    href: str,
+) -> KindPages:
+    """Draw what the kind of study shows; parameters are the fields of ``Findings``."""
+    findings = Findings(study_folder, study, scenario, collected, verdict, film_budget_bytes, href)
+    return _report_of(scenario).pages(findings)
+
+
+def drives_of(by_setting: Mapping[str, AnyScenario]) -> dict[str, Any]:
+    """Scenarios among those of the settings that have a vibrating table, for its drive."""
+    return {label: s for label, s in by_setting.items() if _report_of(s).shows_drives}
+
+
+def _report_of(scenario: ScenarioT) -> KindReport[ScenarioT]:
+    return REPORTS[kind_of(scenario).name]
+
+
+def _deck_notes(
+    scenario: OwnDeck, collected: Collected, seeks_best: bool, is_certified: bool
+) -> tuple[str, ...]:
+    return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
+
+
+def _solidification_notes(
+    scenario: Solidification, collected: Collected, seeks_best: bool, is_certified: bool
+) -> tuple[str, ...]:
+    flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
+    return (flat,) if scenario.dimensions == 2 else ()
+
+
+def _flow_notes(
+    scenario: MetalFlow, collected: Collected, seeks_best: bool, is_certified: bool
+) -> tuple[str, ...]:
     """What the paper leaves open."""
     gradient = (
         "The gradient as printed, eq. (3), points the wrong way and makes every run fail; the "
@@ -85,80 +143,79 @@ def _flow_notes(scenario: MetalFlow) -> tuple[str, ...]:
     )
 
 
+def _sand_notes(
+    scenario: Scenario, collected: Collected, seeks_best: bool, is_certified: bool
+) -> tuple[str, ...]:
+    stage = scenario.vibration[0] if scenario.vibration else None
+    deepest = _deepest_overlap_fraction(collected.summary)
+    return sand_notes(collected.keys, stage, deepest, seeks_best, is_certified)
+
+
 def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
     column = "largest_overlap_fraction"
     found = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
     return float(found) if found > 0 else 0.0
 
 
-def kind_pages(
-    study_folder: Path,
-    study: Study,
-    scenario: AnyScenario,
-    collected: Collected,
-    verdict: Verdict,
-    film_budget_bytes: int,
-    href: str,
-) -> KindPages:
-    """Draw what the kind of study shows.
+def _deck_pages(findings: Findings[OwnDeck]) -> KindPages:
+    scenario, collected = findings.scenario, findings.collected
+    curves = _deck_curves(scenario, collected.of_sweep, findings.verdict)
+    return KindPages(
+        "deck.html",
+        deck_method(scenario, collected.keys, collected.summary),
+        "the end of the deck's log",
+        (),
+        {"curves": curves},
+        _curve_figures(curves),
+    )
 
-    Parameters
-    ----------
-    study_folder : Path
-    study : Study
-    scenario : scenario of any kind
-        Of the run that is shown.
-    collected : Collected
-    verdict : Verdict
-    film_budget_bytes : int
-        Most that the film of one run may weigh.
-    href : str
-        Address of the study's folder, seen from the report.
-    """
+
+def _solidification_pages(findings: Findings[Solidification]) -> KindPages:
+    study, scenario, verdict = findings.study, findings.scenario, findings.verdict
+    of_sweep, keys = findings.collected.of_sweep, findings.collected.keys
+    reference = getattr(study, "reference", {})
+    best = _run_of(of_sweep.summary, verdict) if study.seeks_best else ""
+    shown = shown_run(reference, of_sweep, best)
+    pages = solid_pages(findings.study_folder, reference, scenario, of_sweep, verdict, shown)
+    return KindPages(
+        "solidification.html",
+        solid_method(scenario, keys),
+        "the end of the run",
+        (),
+        {"pages": pages},
+        {
+            **pictures(fields=pages.fields, error_cost=pages.error_cost),
+            **_curve_figures(pages.curves),
+        },
+    )
+
+
+def _flow_pages(findings: Findings[MetalFlow]) -> KindPages:
+    scenario, of_sweep = findings.scenario, findings.collected.of_sweep
+    pages = flow_pages(
+        findings.study_folder, scenario, of_sweep, findings.verdict, findings.film_budget_bytes
+    )
+    return KindPages(
+        "flow.html",
+        flow_method(scenario, findings.collected.keys),
+        "the end of the run",
+        (),
+        {"pages": pages},
+        pictures(stability_map=pages.map, histories=pages.histories, fields=pages.fields),
+    )
+
+
+def _sand_pages(findings: Findings[Scenario]) -> KindPages:
+    folder, study, scenario = findings.study_folder, findings.study, findings.scenario
+    collected, verdict = findings.collected, findings.verdict
     of_sweep = collected.of_sweep
-    if isinstance(scenario, OwnDeck):
-        curves = _deck_curves(scenario, of_sweep, verdict)
-        return KindPages(
-            "deck.html",
-            deck_method(scenario, collected.keys, collected.summary),
-            "the end of the deck's log",
-            (),
-            {"curves": curves},
-            _curve_figures(curves),
-        )
-    if isinstance(scenario, Solidification):
-        reference = study.reference if isinstance(study, SolidificationStudy) else {}
-        best = _run_of(of_sweep.summary, verdict) if study.seeks_best else ""
-        shown = shown_run(reference, of_sweep, best)
-        solid = solid_pages(study_folder, reference, scenario, of_sweep, verdict, shown)
-        return KindPages(
-            "solidification.html",
-            solid_method(scenario, collected.keys),
-            "the end of the run",
-            (),
-            {"pages": solid},
-            {
-                **pictures(fields=solid.fields, error_cost=solid.error_cost),
-                **_curve_figures(solid.curves),
-            },
-        )
-    if isinstance(scenario, MetalFlow):
-        flow = flow_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes)
-        return KindPages(
-            "flow.html",
-            flow_method(scenario, collected.keys),
-            "the end of the run",
-            (),
-            {"pages": flow},
-            pictures(stability_map=flow.map, histories=flow.histories, fields=flow.fields),
-        )
     filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
-    pages = sand_pages(study_folder, scenario, of_sweep, verdict, film_budget_bytes)
+    pages = sand_pages(folder, scenario, of_sweep, verdict, findings.film_budget_bytes)
     bending = None
     if scenario.pattern is not None:
         from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
 
-        bending = bending_pages(study_folder, href, scenario, of_sweep, verdict, pages.shown_run)
+        bending = bending_pages(folder, findings.href, scenario, of_sweep, verdict, pages.shown_run)
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),
@@ -207,6 +264,10 @@ def _run_of(summary: pd.DataFrame, verdict: Verdict) -> str:
     return rank_runs(summary, verdict.measure, verdict.better).get("best", "")
 
 
-def drives_of(by_setting: Mapping[str, AnyScenario]) -> dict[str, Scenario]:
-    """Scenarios of sand among those of the settings, for the drive of the vibrating table."""
-    return {label: s for label, s in by_setting.items() if isinstance(s, Scenario)}
+REPORTS: dict[str, KindReport[Any]] = {
+    "sand": KindReport(_sand_notes, _sand_pages, shows_drives=True),
+    "deck": KindReport(_deck_notes, _deck_pages),
+    "solidification": KindReport(_solidification_notes, _solidification_pages),
+    "flow": KindReport(_flow_notes, _flow_pages),
+}
+"""The part of a report by the name of its kind."""

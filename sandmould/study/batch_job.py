@@ -15,24 +15,23 @@ from typing import Any
 
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
-from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.kinds.kind import kind_of
-from sandmould.study.kinds.sand.moments import LAST_MEASURED
+from sandmould.study.definition.run import LAST_MEASURED, Run
+from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.batches import is_done
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.process import die_with_parent, launch
-from sandmould.study.simulate import measure_run, render_run
+from sandmould.study.simulate import measure, render
 
 
-def is_current(folder: Path) -> bool:
+def is_current(run: Run, folder: Path) -> bool:
     """Whether a run's folder holds an outcome, of its scenario and deck as they are now."""
     try:
         origin: dict[str, Any] = json.loads((folder / "provenance.json").read_text("utf-8"))
-        scenario = read_run(folder / "scenario.yaml").scenario
         there = (folder / "outcome.json").exists()
-    except (OSError, ValueError, BadInputError):
+    except (OSError, ValueError):
         return False
-    wanted = scenario_hash(scenario), kind_of(scenario).template_hash(scenario)
+    template_hash = kind_of(run.scenario).planning.template_hash
+    wanted = scenario_hash(run.scenario), template_hash(run.scenario)
     return there and (origin.get("scenario_sha256"), origin.get("template_sha256")) == wanted
 
 
@@ -116,12 +115,13 @@ class _Stop:
 
 def _compute(folder: Path, log: Path, ranks: int, mpi: str) -> None:
     """Do what is missing of one run."""
-    if is_current(folder):
+    run = read_run(folder / "scenario.yaml")
+    if is_current(run, folder):
         print(f"{folder.name}: computed already", file=sys.stderr)
     else:
         for old in ("outcome.json", LAST_MEASURED):
             (folder / old).unlink(missing_ok=True)  # of another scenario or deck
-        render_run(folder)
+        render(run, folder)
         launch(folder, log, ranks, mpi)
     if not (folder / LAST_MEASURED).exists():
-        measure_run(folder)
+        measure(run, folder)

@@ -21,7 +21,8 @@ from sandmould.statistics.agreement import (
     compare_pair,
     sweep_part,
 )
-from sandmould.study.definition.study import Study, study_model
+from sandmould.study.definition.study import Study
+from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
 from sandmould.study.plan.plan_files import STUDY_FILE
 
 NO_OUTCOME = "no outcome written"
@@ -112,9 +113,10 @@ def read_study(study_folder: Path) -> Study:
     """The study as planned, from its folder; one with the defaults where none was written."""
     path = study_folder / STUDY_FILE
     if not path.exists():
-        return Study(title=study_folder.name.replace("_", " "))
+        return DEFAULT_KIND.study.model_validate({"title": study_folder.name.replace("_", " ")})
     tree = read_planned(path, str(path))
-    return validated(study_model(tree.get("kind", "sand")), tree, Origin({"": str(path)}))
+    kind = kind_named(tree["kind"], str(path)) if "kind" in tree else DEFAULT_KIND
+    return validated(kind.study, tree, Origin({"": str(path)}))
 
 
 def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected:

@@ -24,7 +24,7 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
 from sandmould.study.definition.run import Run
 from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import kind_of
+from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.plan_files import FIGURES
@@ -52,7 +52,7 @@ def study_hash(runs: list[Run]) -> str:
 
 
 def _computed_hash(run: Run) -> str:
-    return kind_of(run.scenario).computed_hash(run.scenario)
+    return kind_of(run.scenario).planning.computed_hash(run.scenario)
 
 
 def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
@@ -93,7 +93,7 @@ def record(path: Path, results: Path) -> Path:
         "margins": study.study.equivalence.margins,
         "failed": dict(zip(failed["run"], failed["outcome"], strict=True)),
         "wall_s_of_all_runs": round(float(summary.wall_s.sum()), 1),
-        **_work(kind_of(runs[0].scenario).WORK.replace("-", "_"), summary),
+        **_work(kind_of(runs[0].scenario).planning.work_unit.replace("-", "_"), summary),
     }
     target = RECORDS / study.name
     target.mkdir(parents=True, exist_ok=True)
@@ -165,9 +165,9 @@ def recompute_smallest(results: Path) -> list[str]:
     for name, study in studies.items():
         runs = runs_in(open_study(ROOT / study), RECORDS / name)
         kind = kind_of(runs[0].scenario)
-        if not any(kind.engine_problem(run.scenario) for run in runs):
-            cost = sum(kind.predicted_s(run.scenario) for run in runs)
-            cheapest[kind.WORK] = min(cheapest.get(kind.WORK, (math.inf, "")), (cost, name))
+        if not any(kind.planning.engine_problem(run.scenario) for run in runs):
+            cost = sum(kind.planning.predicted_s(run.scenario) for run in runs)
+            cheapest[kind.name] = min(cheapest.get(kind.name, (math.inf, "")), (cost, name))
     return [
         sentence
         for _, name in cheapest.values()

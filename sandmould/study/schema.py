@@ -15,11 +15,10 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from sandmould import ROOT
-from sandmould.scenario.flow import MetalFlow
-from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.pattern import Pattern
 from sandmould.scenario.quantity import Section, models_in
-from sandmould.scenario.solidification import Solidification
-from sandmould.study.definition.study import DeckStudy, FlowStudy, SolidificationStudy, Study
+from sandmould.study.definition.study import Study
+from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS
 
 SCHEMA = ROOT / "config" / "schema.json"
 DEFAULT = ROOT / "config" / "default.yaml"
@@ -28,8 +27,7 @@ Tree = dict[str, Any]
 
 def schema_text() -> str:
     """JSON schema of a study's file; every leaf may also state its source."""
-    schema = Study.model_json_schema()
-    others = [model.model_json_schema() for model in (DeckStudy, SolidificationStudy, FlowStudy)]
+    schema, *others = (kind.study.model_json_schema() for kind in KINDS.values())
     definitions = schema.pop("$defs")
     scenarios = [part["properties"]["scenario"] for part in (schema, *others)]
     for other in others:
@@ -37,9 +35,13 @@ def schema_text() -> str:
         definitions = other["$defs"] | definitions
         schema["properties"] = other["properties"] | schema["properties"]
     # The material states a part of it, and what the study is based on another.
-    for name in ("Solidification", "MetalFlow", "Pattern"):
-        definitions[name].pop("required")
+    for name in (*(kind.scenario.__name__ for kind in KINDS.values()), Pattern.__name__):
+        definitions[name].pop("required", None)
     # The kind may be that of the study which this one is based on.
+    kind_key = schema["properties"]["kind"]
+    about = {name: kind_key[name] for name in kind_key if name not in ("const", "type")}
+    schema["properties"]["kind"] = {**about, "enum": list(KINDS), "type": "string"}
+    schema["description"] = Study.model_json_schema()["description"].splitlines()[0]
     schema["properties"]["scenario"] = {
         "description": "What is simulated, by kind.",
         "anyOf": [{"$ref": scenario["$ref"]} for scenario in scenarios],
@@ -82,11 +84,11 @@ def default_text() -> str:
     lines = [
         "# All keys of a study and their defaults. Written by python -m sandmould.study.schema;",
         "# a study states only what differs.",
-        *_lines(Study()),
-        *_entry_keys(OwnDeck, "", "the scenario of a study of kind deck"),
-        *_entry_keys(Solidification, "", "the scenario of a study of kind solidification"),
-        *_entry_keys(MetalFlow, "", "the scenario of a study of kind flow"),
+        *_lines(DEFAULT_KIND.study.model_validate({})),
     ]
+    for kind in KINDS.values():
+        if kind is not DEFAULT_KIND:
+            lines += _entry_keys(kind.scenario, "", f"the scenario of a study of kind {kind.name}")
     return "\n".join(lines) + "\n"
 
 

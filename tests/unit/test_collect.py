@@ -18,7 +18,8 @@ from sandmould.study.collect import (
     read_provenance,
     read_study,
 )
-from sandmould.study.definition.study import Objective, Study
+from sandmould.study.definition.study import Objective
+from sandmould.study.kinds.sand.kind import SandStudy
 from tests.unit.report_study import (
     DURATION_S,
     FAILED,
@@ -145,7 +146,7 @@ def test_study_without_any_run_started(tmp_path: Path) -> None:
 
 
 def test_study_reads_back_whole(study: Path) -> None:
-    planned = Study(
+    planned = SandStudy(
         title="Pack",
         scenario=scenario(50.0),
         objective=Objective(measure="solid_fraction", better="smaller", at_vibration_s=1.0),

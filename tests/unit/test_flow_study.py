@@ -92,6 +92,18 @@ def test_what_a_study_cannot_ask_is_told(tmp_path: Path, top: dict[str, Any], to
         open_study(opened(tmp_path, top))
 
 
+def test_a_range_of_a_whole_number_is_swept_in_whole_numbers(tmp_path: Path) -> None:
+    sweep = {"keys": {"relaxations": {"low": 1, "high": 5, "number": 3}}}
+    runs = expand(open_study(opened(tmp_path, {"sweep": sweep})))
+    values = [run.parameters["relaxations"] for run in runs]
+    assert values == [1, 3, 5]
+    assert all(type(value) is int for value in values)
+    assert [run.run.rsplit("_r", 1)[0] for run in runs] == [f"relaxations_{n}" for n in values]
+    sweep["keys"]["relaxations"]["high"] = 4.5
+    with pytest.raises(BadInputError, match=r"relaxations.high = 4.5 .* a whole number"):
+        open_study(opened(tmp_path, {"sweep": sweep}))
+
+
 def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     points = [{"gradient": gradient} for gradient in ("least", "printed")]
     top = {"sweep": {"design": "list", "points": points}}
@@ -105,6 +117,10 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
         back = read_run(of_run / "scenario.yaml")
         assert isinstance(back.scenario, MetalFlow)
         assert back == run
+        planned = (of_run / "scenario.yaml").read_text()
+        older = of_run / "older.yaml"
+        older.write_text(planned.replace("kind: flow\n", ""))
+        assert read_run(older) == run
         render_run(of_run)
         deck = (of_run / "deck.in").read_text()
         assert "metal.density_kg_m3 = 2500.0" in deck

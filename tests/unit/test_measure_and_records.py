@@ -22,7 +22,7 @@ from sandmould.study.kinds.sand.measure import (
 )
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import write_plan
+from sandmould.study.plan.plan_files import read_run, write_plan
 from sandmould.study.rounds.ledger import LEDGER, Ledger, Round, basis_of, write_ledger
 from tests.scenes import tube_scene
 
@@ -46,7 +46,7 @@ def folder(tmp_path: Path) -> Path:
 def test_measures_have_a_row_a_snapshot_and_gaps_for_broken_ones(folder: Path) -> None:
     broken = folder / "snapshots" / "000003.npz"
     broken.write_bytes((folder / "snapshots" / "000000.npz").read_bytes()[:200])
-    write_measures(folder, folder / "measures.tsv")
+    write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")
     table = pd.read_csv(folder / "measures.tsv", sep="\t")
     bore = 0.02 * 0.03
     grain = np.pi * R**2
@@ -57,7 +57,7 @@ def test_measures_have_a_row_a_snapshot_and_gaps_for_broken_ones(folder: Path) -
 
 
 def test_exports_are_read_back_by_meshio_and_hold_the_moments(folder: Path) -> None:
-    write_exports(folder, folder / "exports")
+    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
     names = sorted(p.name for p in (folder / "exports").iterdir())
     assert names == ["000000.dump", "000000.vtu", "000001.dump", "000001.vtu", "000002.dump",
                      "000002.vtu", "solids.vtu"]  # fmt: skip
@@ -66,7 +66,7 @@ def test_exports_are_read_back_by_meshio_and_hold_the_moments(folder: Path) -> N
 
 
 def test_profile_sums_to_the_sand_in_the_box(folder: Path) -> None:
-    write_profile(folder, folder / "profile.tsv")
+    write_profile(read_run(folder / "scenario.yaml").scenario, folder, folder / "profile.tsv")
     table = pd.read_csv(folder / "profile.tsv", sep="\t")
     assert list(dict.fromkeys(table.moment)) == [
         "at its start", "after 1/8", "after 1/2", "at its end"
@@ -81,9 +81,9 @@ def test_profile_sums_to_the_sand_in_the_box(folder: Path) -> None:
 def test_picture_of_a_run_without_snapshots_shows_the_scene(folder: Path) -> None:
     for path in (folder / "snapshots").iterdir():
         path.unlink()
-    write_picture(folder, folder / "final.png")
-    write_exports(folder, folder / "exports")
-    write_measures(folder, folder / "measures.tsv")
+    write_picture(read_run(folder / "scenario.yaml").scenario, folder, folder / "final.png")
+    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
+    write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")
     assert (folder / "final.png").stat().st_size > 1000
     assert list(pd.read_csv(folder / "measures.tsv", sep="\t").columns)
 

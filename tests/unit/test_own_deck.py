@@ -15,6 +15,7 @@ from sandmould.report.page import write_report
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import collect
+from sandmould.study.kinds.deck import execution as deck_execution
 from sandmould.study.kinds.deck import planning as deck
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -188,7 +189,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
             '{"code": 0, "detail": "", "simulated_s": 1.0, "planned_s": 0.0}'
         )
         (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
-        deck.measure(run, of_run)
+        deck_execution.measure(run, of_run)
         assert (of_run / "final.png").stat().st_size > 5000
     collect(folder)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")

@@ -41,8 +41,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         run = folder / "runs" / name
         write_bent_run(run, body, share)
         RunOutcome(Outcome.FINISHED, "", 0.06, 0.06).write(run / "outcome.json")
-        write_measures(run, run / "measures.tsv")
-        write_exports(run, run / "exports")
+        write_measures(read_run(run / "scenario.yaml").scenario, run, run / "measures.tsv")
+        write_exports(read_run(run / "scenario.yaml").scenario, run, run / "exports")
     return folder
 
 

@@ -22,7 +22,7 @@ from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.sand.measure import write_measures
-from sandmould.study.plan.plan_files import write_plan
+from sandmould.study.plan.plan_files import read_run, write_plan
 
 FRICTION = "contact.grain_grain.friction"
 ARM = "contact.grain_grain.rolling_arm_fraction"
@@ -78,7 +78,7 @@ def write_planted(folder: Path, points: dict[tuple[float, float], float], extra:
         header = "time_s\tvibration_time_s\tstage\tsurface\tforce_x_n\tforce_y_n\n"
         rows = "0.5\t-1\tsettle_1\tgate\t0\t-2.0\n0.5\t-1\tsettle_1\tleft\t-0.5\t0\n"
         (place / "loads.tsv").write_text(header + rows)
-        write_measures(place, place / "measures.tsv")
+        write_measures(read_run(place / "scenario.yaml").scenario, place, place / "measures.tsv")
         RunOutcome(Outcome.FINISHED, "", 2.0, 2.0).write(place / "outcome.json")
         cost = {**Cost.of(run.scenario).row(), "cpu_s": 3.5, "grain_steps_per_s": 1e6}
         pd.DataFrame([cost]).to_csv(place / "cost.tsv", sep="\t", index=False)

@@ -247,7 +247,6 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
         return 0
 
     monkeypatch.setattr(driving, "_snakemake", snakemake)
-    monkeypatch.setattr("sandmould.study.kinds.sand.planning.rate", lambda *_: 1e7)
     assert driving.main(["trial.yaml"]) == 0
     # Three rounds of four runs after the ten of the sweep, then the controls, each computed once.
     assert calls == [["results/trial/summary.tsv"]] * 4 + [[]]

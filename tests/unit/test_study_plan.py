@@ -14,17 +14,20 @@ import pytest
 
 from sandmould import ROOT
 from sandmould.engines.program import REST_AFTER_FALL_S, build_program
+from sandmould.runs.progress import duration_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import RUN_NAME, Run
-from sandmould.study.kinds.sand.planning import planned_steps, planned_work
-from sandmould.study.plan.build_plan import announce, open_plan
+from sandmould.study.kinds.sand import speed
+from sandmould.study.kinds.sand.planning import planned_steps, planned_work, predicted_s
+from sandmould.study.plan.build_plan import announce, measure_speeds, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
 
 LAMMPS = ("lammps", 2)
+MEASURED = "at the speed measured on this machine"
 THREE = """\
 based_on: tube
 scenario: {sand: {size_scale: 6}}
@@ -93,6 +96,30 @@ def test_run_reads_back_as_it_was(demo: list[Run], tmp_path: Path) -> None:
         assert read_run(tmp_path / "runs" / run.run / "scenario.yaml") == run
 
 
+def test_run_of_an_older_plan_reads_back_and_is_left_alone(demo: list[Run], tmp_path: Path) -> None:
+    # Plans did not write the kind; results of weeks must not be computed again for that.
+    write_plan(demo[:1], tmp_path)
+    path = tmp_path / "runs" / demo[0].run / "scenario.yaml"
+    older = path.read_text(encoding="utf-8").replace("kind: sand\n", "")
+    path.write_text(older, encoding="utf-8")
+    assert read_run(path) == demo[0]
+    write_plan(demo[:1], tmp_path)
+    assert path.read_text(encoding="utf-8") == older
+
+
+def test_plan_is_announced_without_an_engine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(speed, "_measure_rate", lambda scenario: pytest.fail("an engine started"))
+    plan = open_plan(ROOT / "config" / "studies" / "tube_demo.yaml")
+    assert announce(plan, tmp_path, 1).endswith(", an estimate\n")
+    assert not (tmp_path / speed.STORED).exists()
+    monkeypatch.setattr(speed, "_measure_rate", lambda scenario: 1e7)
+    assert measure_speeds(plan, tmp_path)
+    assert not measure_speeds(plan, tmp_path)
+    assert announce(plan, tmp_path, 1).endswith(f", {MEASURED}\n")
+
+
 def test_results_that_cannot_be_written_are_told(tmp_path: Path) -> None:
     plan = open_plan(ROOT / "config" / "studies" / "tube_demo.yaml")
     (tmp_path / "results").write_text("a file where a folder should be")
@@ -143,10 +170,11 @@ def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
     assert build_program(weightless).expected_s == 0.2
 
 
-def test_price_before_calibration_is_unknown(demo: list[Run]) -> None:
-    text = plan_table(demo, {}, 2)
-    assert text.count("unknown until calibrated") == 4
-    assert "9 runs" in text
+def test_price_of_an_unknown_machine_is_an_estimate(demo: list[Run]) -> None:
+    *_, last = plan_table(demo, {}, 1).splitlines()
+    seconds = sum(predicted_s(r.scenario) for r in demo)
+    assert last.startswith("9 runs")
+    assert last.endswith(f"wall time on 1 cores: {duration_text(seconds)}, an estimate")
 
 
 def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
@@ -156,11 +184,13 @@ def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
     grains = sum(plan_counts(demo[0].scenario))
     assert lines[1].split()[:3] == ["frequency_25", "3", f"{grains:,}"]
     assert lines[-1].startswith("9 runs, ")
-    assert lines[-1].endswith("wall time on 1 cores: 2.5 h")
-    assert plan_table(demo, {LAMMPS: total / 9000}, 2).endswith("on 2 cores: 75.0 min\n")
+    assert lines[-1].endswith(f"wall time on 1 cores: 2.5 h, {MEASURED}")
+    halved = plan_table(demo, {LAMMPS: total / 9000}, 2)
+    assert halved.endswith(f"on 2 cores: 75.0 min, {MEASURED}\n")
     # On more cores than runs the longest run decides.
     longest = max(planned_work(r.scenario) for r in demo)
-    assert plan_table(demo, {LAMMPS: longest / 30}, 99).endswith("on 99 cores: 30 s\n")
+    shortest = plan_table(demo, {LAMMPS: longest / 30}, 99)
+    assert shortest.endswith(f"on 99 cores: 30 s, {MEASURED}\n")
 
 
 def test_long_table_is_cut(tmp_path: Path) -> None:

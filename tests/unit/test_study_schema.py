@@ -11,7 +11,7 @@ import yaml
 
 from sandmould import ROOT
 from sandmould.scenario.reading import Origin, read_yaml, validated
-from sandmould.study.definition.study import Study
+from sandmould.study.kinds.sand.kind import SandStudy
 from sandmould.study.schema import DEFAULT, SCHEMA, default_text, schema_text
 
 REFRESH = "the types have changed: run `python -m sandmould.study.schema` and commit both files"
@@ -25,7 +25,7 @@ def test_generated_files_are_in_step_with_the_types() -> None:
 
 def test_defaults_load_back_as_the_types_defaults() -> None:
     tree = read_yaml(DEFAULT, "config/default.yaml")
-    assert validated(Study, tree, Origin()) == Study()
+    assert validated(SandStudy, tree, Origin()) == SandStudy()
 
 
 def test_every_default_stands_below_its_meaning() -> None:

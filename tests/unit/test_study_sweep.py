@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 
 from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solidification import Solidification
 from sandmould.study.definition.sweep import (
     MOST_RUNS,
     Range,
@@ -19,7 +21,8 @@ from sandmould.study.definition.sweep import (
     value_at,
 )
 
-BASE = Scenario().model_dump(mode="json")
+SCENE = Scenario(seed=1)
+BASE = SCENE.model_dump(mode="json")
 SCALE, CLASSES, FRICTION = "sand.size_scale", "sand.size_classes", "contact.grain_grain.friction"
 
 
@@ -28,12 +31,12 @@ def sweep_of(**tree: Any) -> Sweep:
 
 
 def told(sweep: Sweep, replicates: int = 1) -> list[Problem]:
-    return problems(sweep, BASE, replicates)
+    return problems(sweep, SCENE, replicates)
 
 
 def test_grid_takes_all_combinations_last_key_fastest() -> None:
     sweep = sweep_of(keys={SCALE: [4, 6, 8], FRICTION: [0.2, 0.8]})
-    found = points(sweep, seed=1)
+    found = points(sweep, SCENE)
     assert sweep.number_of_points == len(found) == 6
     assert found[:3] == [
         {SCALE: 4, FRICTION: 0.2},
@@ -43,13 +46,13 @@ def test_grid_takes_all_combinations_last_key_fastest() -> None:
 
 
 def test_nothing_swept_is_one_point() -> None:
-    assert points(Sweep(), seed=1) == [{}]
+    assert points(Sweep(), SCENE) == [{}]
     assert Sweep().number_of_points == 1
 
 
 def test_zipped_takes_values_together() -> None:
     sweep = sweep_of(design="zipped", keys={SCALE: [4, 6], FRICTION: [0.2, 0.8]})
-    assert points(sweep, 1) == [{SCALE: 4, FRICTION: 0.2}, {SCALE: 6, FRICTION: 0.8}]
+    assert points(sweep, SCENE) == [{SCALE: 4, FRICTION: 0.2}, {SCALE: 6, FRICTION: 0.8}]
     assert sweep.number_of_points == 2
 
 
@@ -64,20 +67,20 @@ def test_list_takes_the_points_as_given() -> None:
     given = [{SCALE: 4, FRICTION: 0.2}, {FRICTION: 0.8, SCALE: 5}]
     sweep = sweep_of(design="list", points=given)
     assert told(sweep) == []
-    assert points(sweep, 1) == given
+    assert points(sweep, SCENE) == given
     assert sweep.number_of_points == 2
 
 
 def test_range_steps_evenly_or_by_ratios() -> None:
     even = Range(low=1, high=4, number=4)
-    assert points(sweep_of(keys={SCALE: even.model_dump()}), 1) == [
+    assert points(sweep_of(keys={SCALE: even.model_dump()}), SCENE) == [
         {SCALE: 1.0},
         {SCALE: 2.0},
         {SCALE: 3.0},
         {SCALE: 4.0},
     ]
     ratios = {"low": 1, "high": 100, "number": 3, "spacing": "log"}
-    assert [p[SCALE] for p in points(sweep_of(keys={SCALE: ratios}), 1)] == [1.0, 10.0, 100.0]
+    assert [p[SCALE] for p in points(sweep_of(keys={SCALE: ratios}), SCENE)] == [1.0, 10.0, 100.0]
 
 
 @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
@@ -90,7 +93,7 @@ def test_drawn_points_lie_within_bounds_and_repeat(design: str) -> None:
     }
     sweep = sweep_of(design=design, keys=keys, samples=32)
     assert told(sweep) == []
-    found = points(sweep, seed=3)
+    found = points(sweep, Scenario(seed=3))
     assert sweep.number_of_points == len(found) == 32
     assert all(4 <= p[SCALE] <= 8 and 0.01 <= p[FRICTION] <= 1 for p in found)
     # Half of a log range lies below its geometric mean.
@@ -98,13 +101,13 @@ def test_drawn_points_lie_within_bounds_and_repeat(design: str) -> None:
     assert {p[CLASSES] for p in found} == {2, 3, 4, 5, 6}
     assert all(type(p[CLASSES]) is int for p in found)
     assert sum(p["contact.no_tension"] == "total" for p in found) == 16
-    assert points(sweep, seed=3) == found
-    assert points(sweep, seed=4) != found
+    assert points(sweep, Scenario(seed=3)) == found
+    assert points(sweep, Scenario(seed=4)) != found
 
 
 def test_latin_hypercube_has_one_point_in_each_stratum() -> None:
     sweep = sweep_of(design="latin_hypercube", keys={SCALE: {"low": 0.1, "high": 10.1}}, samples=10)
-    assert sorted(int(p[SCALE] - 0.1) for p in points(sweep, 1)) == list(range(10))
+    assert sorted(int(p[SCALE] - 0.1) for p in points(sweep, SCENE)) == list(range(10))
 
 
 def test_sobol_wants_a_power_of_two() -> None:
@@ -149,12 +152,15 @@ def test_too_many_runs_are_refused_before_they_are_made() -> None:
 
 
 def test_whole_numbers_are_known_by_their_type() -> None:
-    assert is_whole("sand.size_classes")
-    assert is_whole("fill.layers.0.count")
-    assert is_whole("obstacles.0.facets")
-    assert not is_whole("sand.size_scale")
-    assert not is_whole("contact.no_tension")
-    assert not is_whole("no.such.key")
+    assert is_whole(Scenario, "sand.size_classes")
+    assert is_whole(Scenario, "fill.layers.0.count")
+    assert is_whole(Scenario, "obstacles.0.facets")
+    assert not is_whole(Scenario, "sand.size_scale")
+    assert not is_whole(Scenario, "contact.no_tension")
+    assert not is_whole(Scenario, "no.such.key")
+    assert is_whole(MetalFlow, "relaxations")
+    assert not is_whole(MetalFlow, "dt_max_s")
+    assert is_whole(Solidification, "threads")
 
 
 def test_value_at_follows_lists_and_refuses_what_is_not_there() -> None:

@@ -21,7 +21,7 @@ from sandmould.runs.outcome import RunOutcome
 from sandmould.runs.products import finish
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import Run
-from sandmould.study.kinds.sand.planning import PRODUCTS, complete
+from sandmould.study.kinds.sand.execution import EXECUTION
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.simulate import render_run
 
@@ -103,8 +103,8 @@ def drive(
     driver = driver_of(program, folder, "test", scenario_hash(scenario))
     outcome = driver.run()
     if not outcome.outcome.restartable:
-        complete(scenario, folder / "work")
-        finish(folder, PRODUCTS, outcome, driver.cost, {})
+        EXECUTION.complete(scenario, folder / "work")
+        finish(folder, EXECUTION.products, outcome, driver.cost, {})
     return outcome
 
 

@@ -18,6 +18,7 @@ from sandmould.runs.checkpoint import newest_checkpoint
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.placement import NOMINAL_FRACTION, filled_measure
 from sandmould.study.kinds.sand.measure import write_measures
+from sandmould.study.plan.plan_files import read_run
 from tests.hopper import (
     BOX_WIDTH_M,
     DEEP,
@@ -66,7 +67,7 @@ def emptied(tmp_path_factory: pytest.TempPathFactory) -> Emptied:
         outcome = drive(scene, folder)
         assert outcome.outcome is Outcome.FINISHED, outcome.detail
         assert outcome.detail == ""
-        write_measures(folder, folder / "measures.tsv")
+        write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")
         return folder
 
     return compute
@@ -174,7 +175,7 @@ def test_a_column_behind_an_upright_gate_runs_out(tmp_path: Path) -> None:
     )
     folder = run_folder(scene, tmp_path)
     assert drive(scene, folder).outcome is Outcome.FINISHED
-    write_measures(folder, folder / "measures.tsv")
+    write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")
     rows = discharge_of(folder)
     assert rows.outflow_fraction.iloc[0] == rows.run_out_m.iloc[0] == 0.0
     # It falls over: a good part of it passes the gate, further than a few grains, not to the wall.

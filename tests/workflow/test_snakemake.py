@@ -12,7 +12,7 @@ import pytest
 
 from sandmould import ROOT
 from sandmould.runs.outcome import Outcome
-from sandmould.study.kinds.kind import kind_named, kind_of
+from sandmould.study.kinds.registry import kind_named, kind_of
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from tests.workflow.runs import kill_at_a_checkpoint
@@ -40,9 +40,10 @@ def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Measure the engines' speeds once for all tests."""
     results = tmp_path_factory.mktemp("results")
     runs = [run for path in STUDIES for run in expand(open_study(path))]
-    each = {kind_of(run.scenario).speed_class(run.scenario): run for run in runs}
+    each = {kind_of(run.scenario).planning.speed_class(run.scenario): run for run in runs}
     for run in each.values():
-        kind_of(run.scenario).rate(run.scenario, results)
+        if speed := kind_of(run.scenario).planning.speed:
+            speed.measured(run.scenario, results)
     return results / "calibration.json"
 
 
@@ -64,9 +65,18 @@ def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
         (checkout / "results" / other / "summary.tsv").touch()
     ran = snakemake("-n", "--configfile", str(study), folder=checkout)
     assert ran.returncode == 0, ran.stderr
-    assert kind_named(opened.kind).WORK in ran.stderr
+    assert kind_named(opened.kind).planning.work_unit in ran.stderr
     assert "wall time on 2 cores" in ran.stderr
     assert (checkout / "results" / study.stem / "runs.tsv").exists()
+
+
+def test_a_dry_run_starts_no_engine(checkout: Path) -> None:
+    stored = checkout / "results" / "calibration.json"
+    stored.unlink()
+    ran = snakemake("-n", folder=checkout)
+    assert ran.returncode == 0, ran.stderr
+    assert ", an estimate" in ran.stderr
+    assert not stored.exists()
 
 
 def test_a_study_that_rests_on_another_says_what_comes_first(checkout: Path) -> None:

@@ -5,7 +5,14 @@ import sys
 
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.plan.batches import alone
-from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, study_path
+from sandmould.study.plan.build_plan import (
+    RESULTS,
+    announce,
+    measure_speeds,
+    open_plan,
+    price,
+    study_path,
+)
 from sandmould.study.definition.run import RUN_NAME
 
 OVERRIDES = dict(workflow.config_settings.config)
@@ -16,14 +23,12 @@ BATCH_WALL_S = float(OVERRIDES.pop("batch_wall_s", 0))
 BATCH_LEAST = int(OVERRIDES.pop("batch_least", 1))
 BATCH_CORES = int(OVERRIDES.pop("batch_cores", 1))
 MPI = OVERRIDES.pop("mpi", "mpiexec")
+CORES = workflow._cores or os.cpu_count()
 try:
     PLAN = open_plan(study_path(workflow.configfiles, OVERRIDES))
     BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
     if workflow.is_main_process and "--lint" not in sys.argv:
-        print(
-            announce(PLAN, RESULTS, workflow._cores or os.cpu_count()),
-            file=sys.stderr,
-        )
+        print(announce(PLAN, RESULTS, CORES), file=sys.stderr)
 except BadInputError as error:
     sys.exit(str(error))
 

@@ -53,11 +53,11 @@ def round_best_hz(best_hz: float, ratio: float) -> tuple[float, ...]:
     return tuple(float(f"{best_hz * by:.3g}") for by in (1 / ratio, 1.0, ratio))
 
 
-def provisional_hz(certificate: Certificate, sweep: Sweep, seed: int) -> tuple[float, ...]:
+def provisional_hz(certificate: Certificate, sweep: Sweep, scenario: Section) -> tuple[float, ...]:
     """Frequencies for a trial of the controls before the best is known; none without controls."""
     if not certificate.controls:
         return ()
-    swept = sorted(float(p[frequency_key(sweep)]) for p in points(sweep, seed))
+    swept = sorted(float(p[frequency_key(sweep)]) for p in points(sweep, scenario))
     return round_best_hz(swept[len(swept) // 2], certificate.ratio)
 
 

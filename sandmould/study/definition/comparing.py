@@ -46,6 +46,6 @@ def _cross_check(check: CrossCheck, study: Study) -> Iterator[Problem]:
     if check.replicates is not None and check.replicates > study.replicates:
         valid = f"at most {study.replicates}, the study's own: runs are compared in pairs"
         yield Problem("cross_check.replicates", check.replicates, valid)
-    swept = points(study.sweep, study.scenario.seed)
+    swept = points(study.sweep, study.scenario)
     if check.at not in swept:
         yield Problem("cross_check.at", check.at, f"a point of the sweep, such as {swept[0]}")

@@ -45,7 +45,7 @@ class Refinement(Section):
     )
 
 
-def problems(refine: Refinement, sweep: Sweep, better: str, seed: int) -> Iterator[Problem]:
+def problems(refine: Refinement, sweep: Sweep, scenario: Section, better: str) -> Iterator[Problem]:
     """List what is wrong with the rounds of a study whose sweep has no problems."""
     if not refine.rounds:
         if refine.interval or refine.budget_core_h is not None:
@@ -57,7 +57,7 @@ def problems(refine: Refinement, sweep: Sweep, better: str, seed: int) -> Iterat
     if not keys:
         yield Problem("refine.rounds", refine.rounds, "0 in a study that sweeps nothing")
         return
-    swept = points(sweep, seed)
+    swept = points(sweep, scenario)
     for key in keys:
         values = [p[key] for p in swept]
         if isinstance(sweep.keys.get(key), Range) or all(

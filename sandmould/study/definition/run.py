@@ -9,6 +9,8 @@ Part = str
 """``sweep``, ``cross_check``, or a case of the certificate's controls."""
 RUN_NAME = "[a-z0-9_]+_r[0-9]+_[0-9a-f]{6}"
 """Pattern of the name of any run."""
+LAST_MEASURED = "final.png"
+"""File of a run's folder that is written after all else that is measured."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Run:
     replicate: int
     """Number of the replicate, from 1; a block, see ``replicate_seed``."""
     scenario: Any
-    """Of the study's kind, see ``sandmould.study.kinds``."""
+    """Of the type of the study's kind, see ``sandmould.study.kinds``."""
     sources: dict[str, str]
     """Where each leaf of the scenario came from, by key path."""
     part: Part = "sweep"

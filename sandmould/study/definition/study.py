@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 from pydantic import Field
 
-from sandmould.scenario.contact import BackgroundDamping, Contact
-from sandmould.scenario.flow import MetalFlow
-from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import NAME, Section, quantity
-from sandmould.scenario.sand import ARGUED, Sand
-from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solidification import MetalAndMould, Solidification
+from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.calibration.config import Calibration
 from sandmould.statistics.config import Equivalence, Objective
 from sandmould.study.definition.certificate import Certificate
@@ -37,22 +34,18 @@ class CrossCheck(Section):
     )
 
 
-class Material(Section):
-    """A named sand: the part of a scenario that a material file may state."""
-
-    sand: Sand = Field(Sand(), description="The sand.")
-    contact: Contact = Field(Contact(), description="Contact laws.")
-    background_damping: BackgroundDamping = Field(
-        BackgroundDamping(), description="Damping of free grains."
-    )
+def kind_key(name: str) -> Any:
+    """The key that says what is simulated, for the studies of one kind."""
+    return quantity(name, "What is simulated; deck is a template of the user's own.", source=ARGUED)
 
 
 class Study(Section):
-    """One study: all of it can stand in one file, or rest on the file that based_on names."""
+    """One study: all of it can stand in one file, or rest on the file that based_on names.
 
-    kind: Literal["sand", "deck", "solidification", "flow"] = quantity(
-        "sand", "What is simulated; deck is a template of the user's own.", source=ARGUED
-    )
+    Each kind of study states its own ``kind`` and the type of its ``scenario``.
+    """
+
+    kind: str
     title: str = quantity("", "The question in one line, head of the report.", source="user")
     based_on: str | None = quantity(
         None, "Study or shipped scenario that this one changes.", source="user", pattern=NAME
@@ -63,7 +56,7 @@ class Study(Section):
         source="user",
         pattern=NAME,
     )
-    scenario: Scenario = Field(Scenario(), description="The scene of sand.")
+    scenario: Any
     sweep: Sweep = Field(
         Sweep(),
         description="What is varied; replaces the sweep of based_on, its equivalence, its rounds, "
@@ -100,49 +93,6 @@ class Study(Section):
         """Whether the study looks for the best setting, not for agreement or for a value."""
         return not self.equivalence.keys and self.objective.better != "neither"
 
-
-class DeckStudy(Study):
-    """A study of a deck of the user's own."""
-
-    scenario: OwnDeck = Field(  # type: ignore[assignment]
-        ..., description="What the template is given, and what is read from its log."
-    )
-
-
-class SolidificationStudy(Study):
-    """A study of a casting in its mould."""
-
-    scenario: Solidification = Field(  # type: ignore[assignment]
-        ..., description="The casting, its mould, and how they are computed."
-    )
-    reference: dict[str, Any] = Field(
-        {},
-        description="The swept point that the others are compared with in error and cost: a value "
-        "of every swept key, as the sweep has it.",
-    )
-
-
-class FlowStudy(Study):
-    """A study of metal that flows."""
-
-    scenario: MetalFlow = Field(  # type: ignore[assignment]
-        ..., description="The metal, where it flows, and how that is computed."
-    )
-
-
-ONLY_SAND = ("cross_check", "calibration", "certificate")
-"""Sections that other kinds of studies do not have."""
-_MODELS: dict[str, type[Study]] = {
-    "deck": DeckStudy, "solidification": SolidificationStudy, "flow": FlowStudy
-}  # fmt: skip
-_MATERIALS: dict[str, type[Section]] = {"sand": Material, "solidification": MetalAndMould}
-
-
-def study_model(kind: str) -> type[Study]:
-    """Type of the studies of a kind."""
-    return _MODELS.get(kind, Study)
-
-
-def material_model(kind: str) -> type[Section] | None:
-    """What a material file holds for a kind of studies; None where they have none."""
-    return _MATERIALS.get(kind)
+    def problems(self) -> Iterable[Problem]:
+        """What is wrong with the sections that only its kind has, where the sweep is sound."""
+        return ()

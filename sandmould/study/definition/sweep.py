@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
@@ -15,7 +15,6 @@ from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section, fields_at, quantity
 from sandmould.scenario.reading import Tree
 from sandmould.scenario.sand import ARGUED
-from sandmould.scenario.scenario import Scenario
 
 Design = Literal["grid", "zipped", "list", "latin_hypercube", "sobol"]
 Point = dict[str, Any]
@@ -104,28 +103,28 @@ class Sweep(Section):
         return math.prod(counts) if self.design == "grid" else min(counts, default=0)
 
 
-def is_whole(key: str) -> bool:
-    """Whether a key of the scenario takes whole numbers only."""
-    kinds = [f.annotation for f in fields_at(Scenario, key)]
-    return any(k is int or int in get_args(k) for k in kinds)
+def is_whole(scenario: type[Section], key: str) -> bool:
+    """Whether a key takes whole numbers only, in scenarios of a type."""
+    types = [f.annotation for f in fields_at(scenario, key)]
+    return any(t is int or int in get_args(t) for t in types)
 
 
-def _between(values: tuple[Any, ...] | Range, key: str, share: float) -> Any:
+def _between(values: tuple[Any, ...] | Range, whole: bool, share: float) -> Any:
     """Value of a key at a share (0 to 1) of its range, or of its list (0 to below 1)."""
     if not isinstance(values, Range):
         return values[int(share * len(values))]
     value = values.at(share)
-    return round(value) if is_whole(key) else value
+    return round(value) if whole else value
 
 
-def _each(values: tuple[Any, ...] | Range, key: str) -> list[Any]:
+def _each(values: tuple[Any, ...] | Range, whole: bool) -> list[Any]:
     if not isinstance(values, Range):
         return list(values)
     number = values.number or 0
-    return [_between(values, key, i / (number - 1)) for i in range(number)]
+    return [_between(values, whole, i / (number - 1)) for i in range(number)]
 
 
-def _drawn(sweep: Sweep, seed: int) -> Iterator[Point]:
+def _drawn(sweep: Sweep, whole: Mapping[str, bool], seed: int) -> Iterator[Point]:
     # scipy.stats takes a second to import, and most sweeps are grids.
     from scipy.stats import qmc
 
@@ -133,19 +132,20 @@ def _drawn(sweep: Sweep, seed: int) -> Iterator[Point]:
     sampler = qmc.LatinHypercube if sweep.design == "latin_hypercube" else qmc.Sobol
     for row in sampler(dimension, rng=seed).random(samples):
         yield {
-            key: _between(values, key, float(share))
+            key: _between(values, whole[key], float(share))
             for (key, values), share in zip(sweep.keys.items(), row, strict=True)
         }
 
 
-def points(sweep: Sweep, seed: int) -> list[Point]:
+def points(sweep: Sweep, scenario: Any) -> list[Point]:
     """All points of a sweep that has no problems.
 
     Parameters
     ----------
     sweep : Sweep
-    seed : int
-        Fixes the points of a drawn design; the scenario's own seed.
+    scenario : scenario of any kind
+        What is varied: its type says which keys take whole numbers only, its seed fixes the
+        points of a drawn design.
 
     Returns
     -------
@@ -154,9 +154,10 @@ def points(sweep: Sweep, seed: int) -> list[Point]:
     """
     if sweep.design == "list":
         return [dict(p) for p in sweep.points]
+    whole = {key: is_whole(type(scenario), key) for key in sweep.keys}
     if sweep.is_drawn:
-        return list(_drawn(sweep, seed))
-    columns = [_each(values, key) for key, values in sweep.keys.items()]
+        return list(_drawn(sweep, whole, scenario.seed))
+    columns = [_each(values, whole[key]) for key, values in sweep.keys.items()]
     rows = itertools.product(*columns) if sweep.design == "grid" else zip(*columns, strict=True)
     return [dict(zip(sweep.keys, row, strict=True)) for row in rows]
 
@@ -188,17 +189,16 @@ def key_paths(tree: Tree | list[Any], above: str = "") -> Iterator[str]:
             yield from key_paths(value, key)
 
 
-def problems(sweep: Sweep, base: Tree, replicates: int) -> list[Problem]:
+def problems(sweep: Sweep, scenario: Section, replicates: int) -> list[Problem]:
     """List what keeps a well-typed sweep from being laid over a scenario.
 
     Parameters
     ----------
     sweep : Sweep
-    base : dict
-        The resolved scenario.
+    scenario : scenario of any kind
     replicates : int
     """
-    found = [*_design(sweep), *_paths(sweep, base)]
+    found = [*_design(sweep), *_paths(sweep, scenario)]
     if not found and (runs := sweep.number_of_points * replicates) > MOST_RUNS:
         found = [Problem("sweep", f"{runs} runs", f"at most {MOST_RUNS} runs")]
     return found
@@ -251,8 +251,9 @@ def _samples(sweep: Sweep) -> Iterator[Problem]:
         )
 
 
-def _paths(sweep: Sweep, base: Tree) -> Iterator[Problem]:
+def _paths(sweep: Sweep, scenario: Section) -> Iterator[Problem]:
     """Swept keys that the scenario lacks, or that cannot be swept."""
+    base = scenario.model_dump(mode="json")
     above = "sweep.points.0" if sweep.design == "list" else "sweep.keys"
     for key in sweep.swept:
         values = sweep.keys.get(key)
@@ -270,7 +271,7 @@ def _paths(sweep: Sweep, base: Tree) -> Iterator[Problem]:
         inside = [k for k in sweep.swept if k.startswith(key + ".")]
         if inside:
             yield Problem(where, shown, f"a key that does not hold another swept one, {inside[0]}")
-        if isinstance(values, Range) and is_whole(key):
+        if isinstance(values, Range) and is_whole(type(scenario), key):
             for name, bound in (("low", values.low), ("high", values.high)):
                 if bound != round(bound):
                     yield Problem(f"{where}.{name}", bound, "a whole number, as the key itself")

@@ -1,23 +1,21 @@
-"""What studies of casting have in common: our own solvers, which are given a whole scenario."""
+"""What kinds of casting have in common: solvers of our own, which take a whole scenario."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import pandas as pd
 
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
-from sandmould.scenario.quantity import Section
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.sand.moments import LAST_MEASURED
+from sandmould.study.definition.run import LAST_MEASURED, Run
+from sandmould.study.kinds.kind import Execution, Planning, ScenarioT, SpeedClass
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
 
 SLOWER = 10.0
@@ -46,61 +44,58 @@ class Solver(Protocol):
         """Make the products that a broken run never wrote."""
 
 
-@dataclass(frozen=True)
-class Given:
-    """Entries of a kind whose solver takes a whole scenario."""
+def casting_planning(
+    solver: Solver,
+    *,
+    work_unit: str,
+    resolved: Callable[[ScenarioT], ScenarioT],
+    problems: Callable[[ScenarioT], list[Problem]],
+    threads: Callable[[ScenarioT], int],
+    memory_mb: Callable[[ScenarioT], int],
+    planned_work: Callable[[ScenarioT], float],
+    predicted_s: Callable[[ScenarioT], float],
+    planned_s: Callable[[ScenarioT], float],
+    speed_class: Callable[[ScenarioT], SpeedClass],
+    plan_cells: Callable[[ScenarioT], Mapping[str, str]],
+) -> Planning[ScenarioT]:
+    """Plan runs whose solver is our own: no engine can be missing, nothing runs under MPI.
 
-    solver: Solver
-    problems: Callable[[Any], list[Problem]]
-    predicted_s: Callable[[Any], float]
+    Measures are those of the end, and a slow machine is given ``SLOWER`` times the predicted time.
+    Parameters are those of ``Planning``.
+    """
+    return Planning(
+        work_unit=work_unit,
+        resolved=resolved,
+        problems=problems,
+        engine_problem=lambda scenario: None,
+        vibration_s=lambda scenario: 0.0,
+        sources=lambda scenario: solver.source_files(),
+        template_hash=lambda scenario: solver.source_hash(),
+        computed_hash=solver.computed_hash,
+        threads=threads,
+        ranks=lambda scenario: 1,
+        memory_mb=memory_mb,
+        allowed_s=lambda scenario: SLOWER * predicted_s(scenario),
+        planned_work=planned_work,
+        predicted_s=predicted_s,
+        planned_s=planned_s,
+        speed_class=speed_class,
+        plan_cells=plan_cells,
+    )
 
-    def defaults(self) -> dict[str, Any]:
-        """Nothing: what is cast is the user's."""
-        return {}
 
-    def lasts_s(self, scenario: Section) -> float:
-        """Measures are those of the end."""
-        return 0.0
-
-    def engine_problem(self, scenario: Section) -> Problem | None:
-        """None: the solver is our own."""
-        return None
-
-    def ranks(self, scenario: Section) -> int:
-        """No MPI."""
-        return 1
-
-    def sources(self, scenario: Section) -> list[Path]:
-        """Our solver."""
-        return self.solver.source_files()
-
-    def template_hash(self, scenario: Section) -> str:
-        """Hash of our solver."""
-        return self.solver.source_hash()
-
-    def computed_hash(self, scenario: Section) -> str:
-        """Hash of scenario and solver."""
-        return self.solver.computed_hash(scenario)
-
-    def no_cost(self, scenario: Section) -> Cost:
-        """Cost of a run that has not begun."""
-        return self.solver.no_cost(scenario)
-
-    def allowed_s(self, scenario: Section) -> float:
-        """Wall time on a slow machine."""
-        return SLOWER * self.predicted_s(scenario)
-
-    def render(self, run: Run, folder: Path) -> None:
-        """Write down all that the solver is given, each value with its source."""
-        _write_given(run, folder, self.solver.source_hash())
-
-    def compute(self, run: Run, folder: Path) -> Computed:
-        """Compute a run from its newest checkpoint, or from its beginning."""
-        return self.solver.compute(run.scenario, folder, run.run)
-
-    def complete(self, scenario: Section, work: Path) -> None:
-        """Make the products that a broken run never wrote."""
-        self.solver.complete(scenario, work)
+def casting_execution(
+    solver: Solver, products: tuple[str, ...], measure: Callable[[Run, Path], None]
+) -> Execution[Any]:
+    """Compute runs with a solver of our own; its deck lists all values with their sources."""
+    return Execution(
+        products=products,
+        render=lambda run, folder: _write_values(run, folder, solver.source_hash()),
+        compute=lambda run, folder: solver.compute(run.scenario, folder, run.run),
+        complete=solver.complete,
+        no_cost=solver.no_cost,
+        measure=measure,
+    )
 
 
 def read_fields(folder: Path) -> dict[str, Any] | None:
@@ -108,8 +103,8 @@ def read_fields(folder: Path) -> dict[str, Any] | None:
     path = folder / "fields.npz"
     if not path.exists():
         return None
-    with np.load(path) as kept:
-        return dict(kept)
+    with np.load(path) as arrays:
+        return dict(arrays)
 
 
 def write_measures(folder: Path, table: pd.DataFrame) -> None:
@@ -133,7 +128,7 @@ def write_picture(
     figure.savefig(folder / LAST_MEASURED)
 
 
-def _write_given(run: Run, folder: Path, solver: str) -> None:
+def _write_values(run: Run, folder: Path, solver: str) -> None:
     """Write every value of a run's scenario with its source to ``deck.in``."""
     lines = [
         f"# Study {run.study}, run {run.run}: what the solver {solver} is given",

@@ -1,139 +1,136 @@
-"""What a study asks of the kind of thing that it simulates."""
+"""What makes a kind of study: its types, how its runs are planned, how they are computed."""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Generic, TypeVar
 
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
-from sandmould.scenario.flow import MetalFlow
-from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
-from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solidification import Solidification
 from sandmould.study.definition.run import Run
+from sandmould.study.definition.study import Study
 
-AnyScenario = Scenario | OwnDeck | Solidification | MetalFlow
+AnyScenario = Section
+"""A scenario of any kind."""
+ScenarioT = TypeVar("ScenarioT", bound=Section)
 SpeedClass = tuple[str, int]
 """Engine and dimension: what the speed of a core depends on most."""
+OF_SAND = ("cross_check", "calibration", "certificate")
+"""Sections of a study that speak of sand."""
 
 
-class Kind(Protocol):
-    """What ``sandmould.study.kinds.<kind>`` offers, for each kind."""
+@dataclass(frozen=True)
+class Speed(Generic[ScenarioT]):
+    """How fast a core of this machine is; of kinds whose engines differ from machine to machine.
 
-    MODEL: type[Section]
-    """Type of its scenario."""
-    WORK: str
+    Both functions take a scenario and the folder of all results, and give work a second.
+    """
+
+    stored: Callable[[ScenarioT, Path], float | None]
+    """As measured before; None where it was not. Starts nothing."""
+    measured: Callable[[ScenarioT, Path], float | None]
+    """As measured before, or measured now and stored; None where the engine cannot run."""
+
+
+@dataclass(frozen=True)
+class Planning(Generic[ScenarioT]):
+    """What a kind says of a run before it starts. Functions take its scenario."""
+
+    work_unit: str
     """Unit of ``planned_work``."""
-    PRODUCTS: tuple[str, ...]
+    resolved: Callable[[ScenarioT], ScenarioT]
+    """The scenario with the hashes of the files that it names."""
+    problems: Callable[[ScenarioT], list[Problem]]
+    """What keeps a well-typed scenario from being run."""
+    engine_problem: Callable[[ScenarioT], Problem | None]
+    """Why this machine cannot compute it."""
+    vibration_s: Callable[[ScenarioT], float]
+    """Time of vibration, over which measures are taken."""
+    sources: Callable[[ScenarioT], list[Path]]
+    """Files that its runs are computed again for when they change."""
+    template_hash: Callable[[ScenarioT], str]
+    """Hash of all that turns a scenario into a deck, and of our solver where it takes part."""
+    computed_hash: Callable[[ScenarioT], str]
+    """Hash of what is computed, whatever it is called."""
+    threads: Callable[[ScenarioT], int]
+    """Cores that a run keeps busy, as MPI ranks or as threads."""
+    ranks: Callable[[ScenarioT], int]
+    """MPI ranks of a run."""
+    memory_mb: Callable[[ScenarioT], int]
+    """Memory to ask for."""
+    allowed_s: Callable[[ScenarioT], float]
+    """Wall time to ask for, less what any job takes."""
+    planned_work: Callable[[ScenarioT], float]
+    """What a run costs, before it starts."""
+    predicted_s: Callable[[ScenarioT], float]
+    """Wall time of a run at speeds that are the same on every machine."""
+    planned_s: Callable[[ScenarioT], float]
+    """Simulated time of a whole run."""
+    speed_class: Callable[[ScenarioT], SpeedClass]
+    """Scenarios of one class are computed at one speed."""
+    plan_cells: Callable[[ScenarioT], Mapping[str, str]]
+    """What the plan says of a run, by heading."""
+    speed: Speed[ScenarioT] | None = None
+    """None where ``predicted_s`` is all that is known."""
+
+
+@dataclass(frozen=True)
+class Execution(Generic[ScenarioT]):
+    """How a kind computes a run. Functions of a run take its folder too."""
+
+    products: tuple[str, ...]
     """What a run leaves beside outcome, cost and provenance."""
-
-    @staticmethod
-    def defaults() -> dict[str, Any]:
-        """Scenario of a study that states nothing."""
-
-    @staticmethod
-    def resolved(scenario: Any) -> Any:
-        """The scenario with the hashes of the files that it names."""
-
-    @staticmethod
-    def problems(scenario: Any) -> list[Problem]:
-        """What keeps a well-typed scenario from being run."""
-
-    @staticmethod
-    def lasts_s(scenario: Any) -> float:
-        """Time of vibration, over which measures are taken."""
-
-    @staticmethod
-    def engine_problem(scenario: Any) -> Problem | None:
-        """Why this machine cannot compute it."""
-
-    @staticmethod
-    def sources(scenario: Any) -> list[Path]:
-        """Files that its runs are computed again for when they change."""
-
-    @staticmethod
-    def template_hash(scenario: Any) -> str:
-        """Hash of all that turns a scenario into a deck, and of our solver where it takes part."""
-
-    @staticmethod
-    def computed_hash(scenario: Any) -> str:
-        """Hash of what is computed, whatever it is called."""
-
-    @staticmethod
-    def threads(scenario: Any) -> int:
-        """Cores that a run keeps busy, as MPI ranks or as threads."""
-
-    @staticmethod
-    def ranks(scenario: Any) -> int:
-        """MPI ranks of a run."""
-
-    @staticmethod
-    def memory_mb(scenario: Any) -> int:
-        """Memory to ask for."""
-
-    @staticmethod
-    def allowed_s(scenario: Any) -> float:
-        """Wall time to ask for, less what any job takes."""
-
-    @staticmethod
-    def planned_work(scenario: Any) -> float:
-        """What a run costs, before it starts."""
-
-    @staticmethod
-    def predicted_s(scenario: Any) -> float:
-        """Wall time of a run at speeds that are the same on every machine."""
-
-    @staticmethod
-    def planned_s(scenario: Any) -> float:
-        """Simulated time of a whole run."""
-
-    @staticmethod
-    def speed_class(scenario: Any) -> SpeedClass:
-        """Scenarios of one class are computed at one speed."""
-
-    @staticmethod
-    def rate(scenario: Any, results: Path) -> float | None:
-        """Work a second of one core of this machine; None where it cannot be known."""
-
-    @staticmethod
-    def plan_cells(scenario: Any) -> Mapping[str, str]:
-        """What the plan tells of a run, by heading."""
-
-    @staticmethod
-    def render(run: Run, folder: Path) -> None:
-        """Write the deck of a run into its folder."""
-
-    @staticmethod
-    def compute(run: Run, folder: Path) -> Computed:
-        """Compute a run from its newest checkpoint, or from its beginning."""
-
-    @staticmethod
-    def complete(scenario: Any, work: Path) -> None:
-        """Make the products in a work folder that a broken run never wrote."""
-
-    @staticmethod
-    def no_cost(scenario: Any) -> Cost:
-        """Cost of a run that has not begun."""
-
-    @staticmethod
-    def measure(run: Run, folder: Path) -> None:
-        """Measure what a run left behind; the picture last."""
+    render: Callable[[Run, Path], None]
+    """Write the deck of a run into its folder."""
+    compute: Callable[[Run, Path], Computed]
+    """Compute a run from its newest checkpoint, or from its beginning."""
+    complete: Callable[[ScenarioT, Path], None]
+    """Make the products in a work folder that a broken run never wrote."""
+    no_cost: Callable[[ScenarioT], Cost]
+    """Cost of a run that has not begun."""
+    measure: Callable[[Run, Path], None]
+    """Measure what a run left behind; the picture last."""
 
 
-_MODULE_OF = {
-    Scenario: "sand", OwnDeck: "deck", Solidification: "solidification", MetalFlow: "flow"
-}  # fmt: skip
+def _nothing() -> dict[str, Any]:
+    return {}
 
 
-def kind_named(name: str) -> Kind:
-    """The kind of a study by its name in the study's file."""
-    return cast(Kind, importlib.import_module(f"sandmould.study.kinds.{name}.planning"))
+@dataclass(frozen=True)
+class Kind(Generic[ScenarioT]):
+    """One kind of study.
 
+    Planning and execution are imported when they are first asked for: opening a study of sand
+    must not wait for the solvers of casting, and no plan for what draws pictures.
+    """
 
-def kind_of(scenario: AnyScenario) -> Kind:
-    """The kind that a scenario belongs to."""
-    return kind_named(_MODULE_OF[type(scenario)])
+    name: str
+    """As ``kind`` in a study's file."""
+    scenario: type[ScenarioT]
+    study: type[Study]
+    open_planning: Callable[[], Planning[ScenarioT]]
+    open_execution: Callable[[], Execution[ScenarioT]]
+    material: type[Section] | None = None
+    """What a material file holds for it; None where it has none."""
+    absent: tuple[str, ...] = OF_SAND
+    """Sections that a study of this kind does not have."""
+    draws_by_lot: bool = False
+    """Whether runs of other seeds differ, so that replicates tell something."""
+    labels_have_units: bool = True
+    """Whether the unit in a swept key's name stands in names of runs: those of sand have none."""
+    defaults: Callable[[], dict[str, Any]] = _nothing
+    """Scenario of a study that states nothing."""
+
+    @cached_property
+    def planning(self) -> Planning[ScenarioT]:
+        """What it says of a run before it starts."""
+        return self.open_planning()
+
+    @cached_property
+    def execution(self) -> Execution[ScenarioT]:
+        """How it computes a run."""
+        return self.open_execution()

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import kind_of
-from sandmould.study.kinds.sand.moments import LAST_MEASURED
+from sandmould.study.definition.run import LAST_MEASURED, Run
+from sandmould.study.kinds.registry import kind_of
 
 START_S = 2.0
 """What a run takes beside its steps: its process and its measures (docs/scaling.md)."""
@@ -39,7 +38,7 @@ class _Alike(NamedTuple):
 
 def planned_wall_s(run: Run) -> float:
     """Wall time that batches count on for a run, in a job that is there already."""
-    return START_S + kind_of(run.scenario).predicted_s(run.scenario)
+    return START_S + kind_of(run.scenario).planning.predicted_s(run.scenario)
 
 
 def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Batch]:
@@ -69,8 +68,9 @@ def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Bat
         batches.append(Batch(chosen[0].run, tuple(chosen), min(beside(alike), len(chosen))))
 
     for run in runs:
-        kind, scenario = kind_of(run.scenario), run.scenario
-        alike = _Alike(kind.speed_class(scenario)[0], kind.threads(scenario), kind.ranks(scenario))
+        planning, scenario = kind_of(run.scenario).planning, run.scenario
+        engine, _ = planning.speed_class(scenario)
+        alike = _Alike(engine, planning.threads(scenario), planning.ranks(scenario))
         kept.setdefault(alike, []).append(run)
         filled[alike] = filled.get(alike, 0.0) + planned_wall_s(run)
         if filled[alike] >= wall_s * beside(alike):

@@ -16,7 +16,8 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.definition.certificate import provisional_hz
 from sandmould.study.definition.comparing import ENGINE
 from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import Kind, kind_named
+from sandmould.study.kinds.kind import AnyScenario, Kind, SpeedClass
+from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.batches import Batch, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.load_study import OpenStudy, open_study
@@ -35,9 +36,14 @@ class Plan:
     runs: tuple[Run, ...]
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> Kind[Any]:
         """What is simulated."""
         return kind_named(self.study.study.kind)
+
+    @cached_property
+    def classes(self) -> dict[SpeedClass, AnyScenario]:
+        """A scenario of each class that is computed at one speed."""
+        return {self.kind.planning.speed_class(run.scenario): run.scenario for run in self.runs}
 
     @cached_property
     def _by_name(self) -> dict[str, Run]:
@@ -53,11 +59,11 @@ class Plan:
 
     def threads(self, name: str) -> int:
         """Cores that a run keeps busy, as MPI ranks or as threads."""
-        return self.kind.threads(self._by_name[name].scenario)
+        return self.kind.planning.threads(self._by_name[name].scenario)
 
     def ranks(self, name: str) -> int:
         """MPI ranks of a run."""
-        return self.kind.ranks(self._by_name[name].scenario)
+        return self.kind.planning.ranks(self._by_name[name].scenario)
 
     def deck_sources(self, name: str) -> list[str]:
         """Files of the repository that a run's deck is made from, and its solver if it is ours.
@@ -65,17 +71,17 @@ class Plan:
         Decks name the state of the solver, so a changed kernel changes the decks of its runs and
         they are computed again.
         """
-        files = self.kind.sources(self._by_name[name].scenario)
+        files = self.kind.planning.sources(self._by_name[name].scenario)
         # As seen from here: another place of the repository is no reason to compute again.
         return [os.path.relpath(path) for path in files]
 
     def memory_mb(self, name: str) -> int:
         """Memory to ask for."""
-        return self.kind.memory_mb(self._by_name[name].scenario)
+        return self.kind.planning.memory_mb(self._by_name[name].scenario)
 
     def runtime_min(self, *names: str, side_by_side: int = 1) -> int:
         """Wall time to ask for some runs, so many at a time."""
-        each_s = [self.kind.allowed_s(self._by_name[name].scenario) for name in names]
+        each_s = [self.kind.planning.allowed_s(self._by_name[name].scenario) for name in names]
         # the last run may begin when all others have ended
         seconds = sum(each_s) / side_by_side + (max(each_s) if side_by_side > 1 else 0.0)
         return 10 + math.ceil(seconds / 60)
@@ -124,15 +130,15 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
     runs = expand(study, ledger.runs, ledger.certified_hz)
     found: dict[str, Problem] = {}
     # Controls come hours later, at frequencies that are not known yet: they are tried at others.
-    asked = study.study.certificate
-    trial_hz = provisional_hz(asked, study.study.sweep, study.study.scenario.seed)
+    certificate = study.study.certificate
+    trial_hz = provisional_hz(certificate, study.study.sweep, study.study.scenario)
     trial = expand(study, (), trial_hz) if trial_hz and not ledger.certified_hz else []
-    kind = kind_named(study.study.kind)
+    planning = kind_named(study.study.kind).planning
     for run in (*runs, *trial):
-        problem = kind.engine_problem(run.scenario)
+        problem = planning.engine_problem(run.scenario)
         if problem is not None:
-            told = _told(study, run, problem)
-            found[str(told)] = told
+            problem = _at_stated_key(study, run, problem)
+            found[str(problem)] = problem
     for problem in _unfinished(study, results):
         found[str(problem)] = problem
     if found:
@@ -149,8 +155,8 @@ def _unfinished(study: OpenStudy, results: Path) -> Iterator[Problem]:
             yield Problem(key, name, valid, study.origin.file_of(key))
 
 
-def _told(study: OpenStudy, run: Run, problem: Problem) -> Problem:
-    """What an engine refuses, told at the key that gave the value."""
+def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:
+    """What an engine refuses, at the key that gave the value."""
     if problem.key in run.parameters:
         key, file = swept_key(study, run.parameters, problem.key), study.file
     elif problem.key == ENGINE and run.part == "cross_check":
@@ -162,7 +168,7 @@ def _told(study: OpenStudy, run: Run, problem: Problem) -> Problem:
 
 
 def announce(plan: Plan, results: Path, cores: int) -> str:
-    """Write the plan to disk and say what it will take.
+    """Write the plan to disk and say what it will take; no engine starts.
 
     Raises
     ------
@@ -176,17 +182,47 @@ def announce(plan: Plan, results: Path, cores: int) -> str:
     except OSError as error:
         valid = f"a folder that takes files: {error.filename} does not ({error.strerror})"
         raise BadInputError([Problem("results", str(folder), valid)]) from None
-    kind = plan.kind
-    one_each = {kind.speed_class(run.scenario): run.scenario for run in plan.runs}
-    rates = {each: kind.rate(one, results) for each, one in one_each.items()}
     title = plan.study.study.title or plan.study.name
-    return f"\n{title}\n{plan_table(plan.runs, rates, cores)}"
+    return f"\n{title}\n{price(plan, results, cores)}"
+
+
+def price(plan: Plan, results: Path, cores: int) -> str:
+    """Say what the runs will take, as far as the machine's speed is known at what was measured."""
+    return plan_table(plan.runs, stored_speeds(plan, results), cores)
+
+
+def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
+    """Work a second of a core of this machine by class, as far as it was measured before."""
+    speed = plan.kind.planning.speed
+    if speed is None:
+        return {}
+    stored = {each: speed.stored(scenario, results) for each, scenario in plan.classes.items()}
+    return {each: rate for each, rate in stored.items() if rate is not None}
+
+
+def measure_speeds(plan: Plan, results: Path) -> bool:
+    """Measure and store how fast this machine is where that is not known: seconds an engine.
+
+    Returns
+    -------
+    bool
+        Whether anything was measured, so that the plan has another price.
+    """
+    speed = plan.kind.planning.speed
+    if speed is None:
+        return False
+    before = stored_speeds(plan, results)
+    missing = [scenario for each, scenario in plan.classes.items() if each not in before]
+    measured = [speed.measured(scenario, results) for scenario in missing]
+    return any(rate is not None for rate in measured)
 
 
 def main(path: Path) -> int:
-    """Check a study and print its plan; nothing starts."""
+    """Check a study, measure the machine where it is not known, and print the plan."""
     try:
-        print(announce(open_plan(path), RESULTS, os.cpu_count() or 1))
+        plan, cores = open_plan(path), os.cpu_count() or 1
+        text = announce(plan, RESULTS, cores)
+        print(announce(plan, RESULTS, cores) if measure_speeds(plan, RESULTS) else text)
     except BadInputError as error:
         print(error, file=sys.stderr)
         return 1

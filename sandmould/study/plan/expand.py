@@ -17,7 +17,8 @@ from sandmould.study.definition.certificate import frequency_key
 from sandmould.study.definition.comparing import ENGINE
 from sandmould.study.definition.run import Part, Run
 from sandmould.study.definition.sweep import Point, points, value_at
-from sandmould.study.kinds.kind import AnyScenario, kind_named
+from sandmould.study.kinds.kind import AnyScenario
+from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.labels import letters, run_label
 from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.robustness.controls import Case, cases
@@ -67,7 +68,7 @@ def expand(
     found: dict[str, Problem] = {}
     runs: dict[str, Run] = {}
     every = range(1, study.study.replicates + 1)
-    swept = [(point, every) for point in points(study.study.sweep, study.study.scenario.seed)]
+    swept = [(point, every) for point in points(study.study.sweep, study.study.scenario)]
     added = [(point, range(replicate, replicate + 1)) for point, replicate in more]
     certificate = study.study.certificate
     key = frequency_key(study.study.sweep)
@@ -122,20 +123,20 @@ class _AtPoint:
         tree = self.base
         for key, value in point.items():
             tree = _put(tree, key.split("."), value, origin, f"sweep of {self.study.file}")
-        scenario = validated(self.kind.MODEL, tree, origin, ROOT_KEY)
+        scenario = validated(self.kind.scenario, tree, origin, ROOT_KEY)
         try:
-            return self.kind.resolved(scenario)
+            return self.kind.planning.resolved(scenario)
         except BadInputError as error:
             found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in error.problems]
             raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found]) from error
 
     def _misfits(self, scenario: AnyScenario) -> list[Problem]:
         """What is wrong with a well-typed scenario of this study, keys from the study's root."""
-        found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in self.kind.problems(scenario)]
-        at = self.study.study.objective.at_vibration_s
-        lasts = self.kind.lasts_s(scenario)
-        if at is not None and at > lasts:
-            valid = f"at most {lasts:g} s, the end of the vibration"
+        planning = self.kind.planning
+        found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in planning.problems(scenario)]
+        at, vibration_s = self.study.study.objective.at_vibration_s, planning.vibration_s(scenario)
+        if at is not None and at > vibration_s:
+            valid = f"at most {vibration_s:g} s, the end of the vibration"
             found.append(Problem("objective.at_vibration_s", at, valid))
         return found
 
@@ -210,15 +211,14 @@ class _AtPoint:
         yield from self._replicates(scenario, replicates, source, case.part)
 
     def _replicates(
-        self, base: AnyScenario, replicates: Iterable[int], source: dict[str, str], part: Part
+        self, base: Any, replicates: Iterable[int], source: dict[str, str], part: Part
     ) -> Iterator[Run]:
         dump = base.model_dump(mode="json")
         parameters = {key: value_at(dump, key) for key in self.point}
-        label = run_label(
-            {ENGINE: self.kind.speed_class(base)[0], **parameters} if source else parameters
-        )
+        engine = {ENGINE: self.kind.planning.speed_class(base)[0]} if source else {}
+        label = self._label({**engine, **parameters})
         if part.startswith("control"):
-            label = f"{letters(part)}_{run_label(parameters)}"
+            label = f"{letters(part)}_{self._label(parameters)}"
         sources = {**dict(_sources(base, self.origin)), **source}
         own = base.seed
         for replicate in replicates:
@@ -232,6 +232,9 @@ class _AtPoint:
                 {**sources, "seed": f"replicate {replicate} of seed {own} ({sources['seed']})"},
                 part,
             )
+
+    def _label(self, parameters: Point) -> str:
+        return run_label(parameters, self.kind.scenario, self.kind.labels_have_units)
 
 
 def swept_key(study: OpenStudy, point: Point, key: str) -> str:

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import re
 
-from sandmould.scenario.quantity import fields_at
-from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.quantity import Section, fields_at
 from sandmould.study.definition.comparing import ENGINE
 from sandmould.study.definition.sweep import Point
 
 
-def run_label(parameters: Point) -> str:
-    """Names and values of at most three swept keys, in letters that any file system takes."""
+def run_label(parameters: Point, scenario: type[Section], has_units: bool) -> str:
+    """Names and values of at most three swept keys, in letters that any file system takes.
+
+    Parameters
+    ----------
+    parameters : Point
+    scenario : type of Section
+        That of the scenario, which says what unit a key ends with.
+    has_units : bool
+        Whether the unit stands in the label.
+    """
     keys = sorted(parameters)
     last = [key.rsplit(".", 1)[-1] for key in keys]
     words = []
@@ -20,7 +28,8 @@ def run_label(parameters: Point) -> str:
         if key == ENGINE:
             parent, name = "", "engine"
         value = parameters[key]
-        words.append(letters(parent + name.removesuffix(_unit_suffix(key)))[:16])
+        unit = "" if has_units else _unit_suffix(scenario, key)
+        words.append(letters(parent + name.removesuffix(unit))[:16])
         if isinstance(value, list) and all(isinstance(v, int | float) for v in value):
             words += [_digits(v) for v in value]
         elif isinstance(value, int | float):
@@ -39,9 +48,9 @@ def letters(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
 
 
-def _unit_suffix(key: str) -> str:
+def _unit_suffix(scenario: type[Section], key: str) -> str:
     """Unit of a key as its name ends with it, such as ``_kg_m3``."""
-    for field in fields_at(Scenario, key):
+    for field in fields_at(scenario, key):
         extra = field.json_schema_extra
         if isinstance(extra, dict):
             unit = str(extra["unit"]).lower()

@@ -15,16 +15,10 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
 from sandmould.scenario.quantity import NAME, fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
-from sandmould.study.definition import calibration, certificate, comparing, sweep
-from sandmould.study.definition import refinement as rounds
-from sandmould.study.definition.study import (
-    ONLY_SAND,
-    SolidificationStudy,
-    Study,
-    material_model,
-    study_model,
-)
-from sandmould.study.kinds.kind import kind_named
+from sandmould.study.definition import calibration, certificate, comparing, refinement, sweep
+from sandmould.study.definition.study import Study
+from sandmould.study.kinds.kind import Kind
+from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
 
 STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
@@ -86,33 +80,31 @@ def open_study(path: Path) -> OpenStudy:
         raise BadInputError([Problem("file name", path.name, valid, shown)])
     files = _files(path)
     kind = _kind(files)
-    model, material_of = study_model(kind), material_model(kind)
-    found = [p for f in files for p in _wrong_units(model, f)]
+    found = [p for f in files for p in _wrong_units(kind.study, f)]
     origin = Origin(file={"": shown})
-    tree: Tree = {"scenario": kind_named(kind).defaults()}
+    tree: Tree = {"scenario": kind.defaults()}
     material = _material(files)
-    if material is not None and material_of is not None:
-        found += _wrong_units(material_of, material)
+    if material is not None and kind.material is not None:
+        found += _wrong_units(kind.material, material)
         # By itself first, so that a message has the key as the material's file has it.
         alone = Origin(file={"": material.shown})
-        validated(material_of, merge({}, material.tree, alone, material.shown), alone)
+        validated(kind.material, merge({}, material.tree, alone, material.shown), alone)
         tree = merge(tree, {"scenario": material.tree}, origin, material.shown)
     for file in files:
         if "sweep" in file.tree:
             for section in _OF_SWEEP:
                 tree.pop(section, None)
         tree = merge(tree, file.tree, origin, file.shown)
-    found += [replace(p, file=origin.file_of(p.key)) for p in _not_of_its_kind(tree)]
+    found += [replace(p, file=origin.file_of(p.key)) for p in _not_of_its_kind(kind, tree)]
     if found:
         raise BadInputError(found)
-    study = validated(model, tree, origin)
-    base = study.scenario.model_dump(mode="json")
-    found = sweep.problems(study.sweep, base, study.replicates) or [
+    study = validated(kind.study, tree, origin)
+    found = sweep.problems(study.sweep, study.scenario, study.replicates) or [
         *comparing.problems(study),
         *_reported(study),
-        *_reference(study),
+        *study.problems(),
         *calibration.problems(study.calibration, study.sweep),
-        *rounds.problems(study.refine, study.sweep, study.objective.better, study.scenario.seed),
+        *refinement.problems(study.refine, study.sweep, study.scenario, study.objective.better),
         *certificate.problems(
             study.certificate, study.sweep, study.scenario, study.objective.better
         ),
@@ -122,24 +114,18 @@ def open_study(path: Path) -> OpenStudy:
     return OpenStudy(path.stem, path, study, tree, origin)
 
 
-def _kind(files: list[_File]) -> str:
-    """Kind of the study, by the last file that states it; the schema refuses what is none."""
+def _kind(files: list[_File]) -> Kind[Any]:
+    """Kind of the study, by the last file that states it."""
     stated = [f for f in files if "kind" in f.tree]
-    kind = str(stated[-1].tree["kind"]) if stated else "sand"
-    return kind if kind in ("deck", "solidification", "flow") else "sand"
+    return kind_named(stated[-1].tree["kind"], stated[-1].shown) if stated else DEFAULT_KIND
 
 
-def _not_of_its_kind(tree: Tree) -> Iterator[Problem]:
-    """Sections that only studies of sand have."""
-    kind = tree.get("kind", "sand")
-    absent = [
-        *(ONLY_SAND if kind != "sand" else ()),
-        *(["material"] if kind in ("deck", "flow") else ()),
-    ]
-    for name in absent:
+def _not_of_its_kind(kind: Kind[Any], tree: Tree) -> Iterator[Problem]:
+    """Sections that studies of a kind do not have."""
+    for name in (*kind.absent, *(() if kind.material else ("material",))):
         if tree.get(name):
-            yield Problem(name, tree[name], f"absent in a study of kind {kind}")
-    if kind in ("solidification", "flow") and tree.get("replicates", 1) != 1:
+            yield Problem(name, tree[name], f"absent in a study of kind {kind.name}")
+    if not kind.draws_by_lot and tree.get("replicates", 1) != 1:
         yield Problem("replicates", tree["replicates"], "1: nothing in a run is drawn by lot")
 
 
@@ -148,15 +134,6 @@ def _reported(study: Study) -> Iterator[Problem]:
     if study.objective.reported_best and len(study.sweep.swept) != 1:
         shown = [one.value for one in study.objective.reported_best]
         yield Problem("objective.reported_best", shown, "absent unless one key is swept")
-
-
-def _reference(study: Study) -> Iterator[Problem]:
-    """The point that others are compared with is one of the sweep."""
-    if not isinstance(study, SolidificationStudy) or not study.reference:
-        return
-    swept = sweep.points(study.sweep, study.scenario.seed)
-    if study.reference not in swept:
-        yield Problem("reference", study.reference, f"a point of the sweep, such as {swept[0]}")
 
 
 def _files(path: Path) -> list[_File]:

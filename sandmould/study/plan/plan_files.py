@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import yaml
+from pydantic import create_model
 
 from sandmould.runs.progress import duration_text
-from sandmould.scenario.flow import MetalFlow
-from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
-from sandmould.scenario.reading import Origin, read_planned, validated
-from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.reading import Origin, Tree, read_planned, validated
 from sandmould.study.definition.run import Part, Run
 from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import SpeedClass, kind_of
+from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
 
 STUDY_FILE = "study.yaml"
 """The study as planned, with all that it rests on."""
@@ -31,41 +29,30 @@ SHOWN_POINTS = 20
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
-class _RunFile(Section):
-    """What ``scenario.yaml`` holds."""
+_HEAD = "# Written by the plan of the study; change the study instead.\n"
 
+
+class _RunFile(Section):
+    """What ``scenario.yaml`` holds; the type of its scenario is that of its kind."""
+
+    kind: str
     study: str
     run: str
     parameters: dict[str, Any]
     replicate: int
-    scenario: Scenario
+    scenario: Any
     sources: dict[str, str]
     part: Part = "sweep"
 
 
-class _DeckRunFile(_RunFile):
-    """The same of a deck of the user's own."""
-
-    scenario: OwnDeck  # type: ignore[assignment]
+_OF_RUN = tuple(name for name in _RunFile.model_fields if name != "kind")
 
 
-class _SolidificationRunFile(_RunFile):
-    """The same of a casting in its mould."""
-
-    scenario: Solidification  # type: ignore[assignment]
-
-
-class _FlowRunFile(_RunFile):
-    """The same of metal that flows."""
-
-    scenario: MetalFlow  # type: ignore[assignment]
-
-
-_FILE_OF: dict[type, type[_RunFile]] = {
-    OwnDeck: _DeckRunFile, Solidification: _SolidificationRunFile, MetalFlow: _FlowRunFile
-}  # fmt: skip
-_SIGN = {"template": _DeckRunFile, "shapes": _SolidificationRunFile, "case": _FlowRunFile}
-"""Keys that only a scenario of one kind has."""
+@cache
+def _file_model(kind: str) -> type[_RunFile]:
+    """Type of the run files of a kind."""
+    scenario: Any = kind_named(kind).scenario
+    return create_model("RunFile", __base__=_RunFile, scenario=(scenario, ...))
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
@@ -82,7 +69,8 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
         ``results/<study>``.
     """
     for run in runs:
-        _write(folder / "runs" / run.run / "scenario.yaml", _scenario_text(run))
+        text, without_kind = _scenario_texts(run)
+        _write(folder / "runs" / run.run / "scenario.yaml", text, without_kind)
     table = folder / "runs.tsv"
     earlier = table.read_text(encoding="utf-8").splitlines()[1:] if table.is_file() else []
     place = {line.split("\t", 1)[0]: n for n, line in enumerate(earlier)}
@@ -99,9 +87,12 @@ def write_study(study: Study, folder: Path) -> None:
     )
 
 
-def _write(path: Path, text: str) -> None:
-    """Write a file unless it says so already: Snakemake reruns what depends on newer files."""
-    if path.is_file() and path.read_text(encoding="utf-8") == text:
+def _write(path: Path, text: str, older: str = "") -> None:
+    """Write a file unless it says so already: Snakemake reruns what depends on newer files.
+
+    A file that says the same in the form of an older plan is left, too.
+    """
+    if path.is_file() and path.read_text(encoding="utf-8") in (text, older or text):
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(path.name + ".partial")
@@ -109,12 +100,13 @@ def _write(path: Path, text: str) -> None:
     os.replace(partial, path)
 
 
-def _scenario_text(run: Run) -> str:
-    model = _FILE_OF.get(type(run.scenario), _RunFile)
-    file = model(**{name: getattr(run, name) for name in _RunFile.model_fields})
-    tree = file.model_dump(mode="json")
+def _scenario_texts(run: Run) -> tuple[str, str]:
+    """A run's file, and the same as plans wrote it before it stated its kind."""
+    kind = kind_of(run.scenario).name
+    file = _file_model(kind)(kind=kind, **{name: getattr(run, name) for name in _OF_RUN})
+    tree = file.model_dump(mode="json", exclude={"kind"})
     text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
-    return f"# Written by the plan of the study; change the study instead.\n{text}"
+    return f"{_HEAD}kind: {kind}\n{text}", f"{_HEAD}{text}"
 
 
 def _table_text(runs: Sequence[Run]) -> str:
@@ -146,48 +138,55 @@ def read_run(path: Path) -> Run:
     """
     shown = str(path)
     tree = read_planned(path, shown)
-    keys = tree.get("scenario") or ()
-    model = next((model for key, model in _SIGN.items() if key in keys), _RunFile)
-    file = validated(model, tree, Origin({"": shown}))
-    return Run(**{name: getattr(file, name) for name in _RunFile.model_fields})
+    kind = kind_named(tree["kind"], shown).name if "kind" in tree else _kind_of_older(tree)
+    file = validated(_file_model(kind), {"kind": kind, **tree}, Origin({"": shown}))
+    return Run(**{name: getattr(file, name) for name in _OF_RUN})
 
 
-def plan_table(
-    runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float | None], cores: int
-) -> str:
+def _kind_of_older(tree: Tree) -> str:
+    """Kind of a run whose file does not state it: the one whose scenario has all its keys."""
+    keys = set(tree.get("scenario") or ())
+    fits = (kind.name for kind in KINDS.values() if keys <= set(kind.scenario.model_fields))
+    return next(fits, DEFAULT_KIND.name)
+
+
+def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], cores: int) -> str:
     """What the runs of a study will take, as text.
 
     Parameters
     ----------
     runs : sequence of Run
-    rate_per_s : mapping of SpeedClass to float or None
-        Work a second of one core, from the calibration; None or missing before it.
+    rate_per_s : mapping of SpeedClass to float
+        Work a second of one core, as measured on this machine; where it is missing the wall time
+        is an estimate at a speed that is the same everywhere.
     cores : int
         Cores that share the runs.
     """
     points: dict[str, list[Run]] = {}
     for run in runs:
         points.setdefault(f"{run.part} {json.dumps(run.parameters)}", []).append(run)
-    kind = kind_of(runs[0].scenario)
-    heads = [*kind.plan_cells(runs[0].scenario), kind.WORK]
+    planning = kind_of(runs[0].scenario).planning
+    heads = [*planning.plan_cells(runs[0].scenario), planning.work_unit]
     rows = [["point", "runs", *heads, "wall time a run"]]
     work = core_s = longest_s = 0.0
+    measured = True
     for alike in points.values():
         scenario = alike[0].scenario
-        one, threads = kind.planned_work(scenario), kind.threads(scenario)
-        rate = rate_per_s.get(kind.speed_class(scenario))
-        one_s = one / rate if rate else math.nan
-        work += one * len(alike)
-        core_s += one_s * len(alike)
-        longest_s = max(longest_s, one_s / threads)
+        work_a_run, threads = planning.planned_work(scenario), planning.threads(scenario)
+        rate = rate_per_s.get(planning.speed_class(scenario))
+        wall_s = work_a_run / rate / threads if rate else planning.predicted_s(scenario)
+        measured = measured and rate is not None
+        work += work_a_run * len(alike)
+        core_s += wall_s * threads * len(alike)
+        longest_s = max(longest_s, wall_s)
         if len(rows) <= SHOWN_POINTS:
             rows.append(
                 [
                     alike[0].run.rsplit("_r", 1)[0],
                     str(len(alike)),
-                    *kind.plan_cells(scenario).values(),
-                    f"{one:.3g}",
-                    _wall_text(one_s / threads),
+                    *planning.plan_cells(scenario).values(),
+                    f"{work_a_run:.3g}",
+                    duration_text(wall_s),
                 ]
             )
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
@@ -195,10 +194,10 @@ def plan_table(
     if len(points) > SHOWN_POINTS:
         lines.append(f"... and {len(points) - SHOWN_POINTS} more points")
     # No schedule is shorter than its longest run.
-    whole = _wall_text(max(core_s / cores, longest_s))
-    lines.append(f"{len(runs)} runs, {work:.3g} {kind.WORK}, wall time on {cores} cores: {whole}")
+    whole = duration_text(max(core_s / cores, longest_s))
+    basis = "at the speed measured on this machine" if measured else "an estimate"
+    lines.append(
+        f"{len(runs)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} cores: {whole}, "
+        f"{basis}"
+    )
     return "\n".join(line.rstrip() for line in lines) + "\n"
-
-
-def _wall_text(seconds: float) -> str:
-    return "unknown until calibrated" if math.isnan(seconds) else duration_text(seconds)

@@ -54,8 +54,9 @@ def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[s
     ended = why_enough(refine, optimum, done, spent_h, spent_h / max(len(summary), 1))
     if ended:
         return replace(ledger, ended=ended)
+    whole = [key for key in keys if is_whole(type(study.scenario), key)]
     one = Round(
-        tuple(propose(optimum, summary, refine.runs, done, [k for k in keys if is_whole(k)])),
+        tuple(propose(optimum, summary, refine.runs, done, whole)),
         optimum.setting,
         {key: optimum.interval(key) for key in keys},
         spent_h,

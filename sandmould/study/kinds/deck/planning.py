@@ -1,43 +1,22 @@
-"""Studies of a deck of the user's own."""
+"""How a deck of the user's own is planned."""
 
 from __future__ import annotations
 
 import hashlib
-import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
 
 from sandmould.engines.choosing import engine_module
-from sandmould.engines.own_deck import computation
 from sandmould.engines.own_deck import deck as own_deck
-from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.kinds.sand.moments import LAST_MEASURED
+from sandmould.study.kinds.kind import Planning, SpeedClass
 
-MODEL = OwnDeck
-WORK = "core-seconds"
-PRODUCTS = ("series.tsv", computation.OUTPUT)
 _ALLOWED = 3.0
 """Wall time to ask for over what the user expects."""
 
-resolved = own_deck.with_hashes
-problems = own_deck.problems
-complete = computation.write_series
 
-
-def defaults() -> dict[str, Any]:
-    """Nothing: template and measures are the user's."""
-    return {}
-
-
-def lasts_s(scenario: OwnDeck) -> float:
+def vibration_s(scenario: OwnDeck) -> float:
     """Measures are those of the last row of the log."""
     return 0.0
 
@@ -105,58 +84,28 @@ def speed_class(scenario: OwnDeck) -> SpeedClass:
     return scenario.engine.name, 0
 
 
-def rate(scenario: OwnDeck, results: Path) -> float:
-    """Work is time here."""
-    return 1.0
-
-
 def plan_cells(scenario: OwnDeck) -> Mapping[str, str]:
     """Its template, and its steps where the user states them."""
     steps = f"{scenario.steps:,}" if scenario.steps else "unknown"
     return {"template": Path(scenario.template).name, "steps": steps}
 
 
-def render(run: Run, folder: Path) -> None:
-    """Write the deck as the engine reads it at the beginning."""
-    own_deck.check_unchanged(run.scenario)
-    text = own_deck.render(run.scenario, run.run, run.study)
-    partial = folder / "deck.in.partial"
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
-
-
-def compute(run: Run, folder: Path) -> Computed:
-    """Have the engine read the deck."""
-    return computation.compute(run.scenario, folder, run.run, run.study)
-
-
-def no_cost(scenario: OwnDeck) -> Cost:
-    """Cost before the engine has started."""
-    return Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
-
-
-def measure(run: Run, folder: Path) -> None:
-    """Write the measures against time, and draw them."""
-    series = pd.read_csv(folder / "series.tsv", sep="\t")
-    names = [name for name in run.scenario.measures if name in series]
-    time_s = series["time_s"] if "time_s" in series else pd.Series(dtype=float)
-    clock = {"time_s": time_s, "vibration_time_s": -1.0, "stage": "deck"}
-    table = pd.DataFrame({**clock, **{name: series[name] for name in names}})
-    partial = folder / "measures.tsv.partial"
-    table.to_csv(partial, sep="\t", index=False)
-    os.replace(partial, folder / "measures.tsv")
-    _draw(table, names, folder / LAST_MEASURED)
-
-
-def _draw(table: pd.DataFrame, names: list[str], out: Path) -> None:
-    """One panel a measure, over time."""
-    from matplotlib.figure import Figure
-
-    rows = max(len(names), 1)
-    figure = Figure(figsize=(6, 1 + 1.8 * rows), dpi=150, layout="constrained")
-    panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-    for panel, name in zip(panels, names, strict=False):
-        panel.plot(table["time_s"], table[name], lw=1)
-        panel.set_ylabel(name)
-    panels[-1].set_xlabel("time, s")
-    figure.savefig(out)
+PLANNING = Planning[OwnDeck](
+    work_unit="core-seconds",
+    resolved=own_deck.with_hashes,
+    problems=own_deck.problems,
+    engine_problem=engine_problem,
+    vibration_s=vibration_s,
+    sources=sources,
+    template_hash=template_hash,
+    computed_hash=computed_hash,
+    threads=threads,
+    ranks=ranks,
+    memory_mb=memory_mb,
+    allowed_s=allowed_s,
+    planned_work=planned_work,
+    predicted_s=predicted_s,
+    planned_s=planned_s,
+    speed_class=speed_class,
+    plan_cells=plan_cells,
+)

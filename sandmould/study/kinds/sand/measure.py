@@ -24,9 +24,9 @@ from analysis.solid_fraction import (
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand.moments import LAST_MEASURED, MOMENTS, list_moments, nearest
+from sandmould.study.definition.run import LAST_MEASURED
+from sandmould.study.kinds.sand.moments import MOMENTS, list_moments, nearest
 from sandmould.study.kinds.sand.outflow import add_outflow, measure_outflow
-from sandmould.study.plan.plan_files import read_run
 
 
 def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
@@ -69,17 +69,16 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
     return row | measure_outflow(scenario, snapshot)
 
 
-def measure_sand(folder: Path) -> None:
-    """Write all that is measured on a run's snapshots."""
-    write_measures(folder, folder / "measures.tsv")
-    write_exports(folder, folder / "exports")
-    write_profile(folder, folder / "profile.tsv")
-    write_picture(folder, folder / LAST_MEASURED)
+def measure_sand(scenario: Scenario, folder: Path) -> None:
+    """Write all that is measured on the snapshots of a run's folder."""
+    write_measures(scenario, folder, folder / "measures.tsv")
+    write_exports(scenario, folder, folder / "exports")
+    write_profile(scenario, folder, folder / "profile.tsv")
+    write_picture(scenario, folder, folder / LAST_MEASURED)
 
 
-def write_picture(folder: Path, out: Path) -> None:
+def write_picture(scenario: Scenario, folder: Path, out: Path) -> None:
     """Draw the last snapshot of a run by layer; the empty scene where there is none."""
-    scenario = read_run(folder / "scenario.yaml").scenario
     figure = Figure(figsize=(6, 4.5), dpi=150, layout="constrained")
     ax = figure.add_subplot()
     moments = list_moments(folder)
@@ -91,12 +90,11 @@ def write_picture(folder: Path, out: Path) -> None:
     figure.savefig(out)
 
 
-def write_exports(folder: Path, out: Path) -> None:
+def write_exports(scenario: Scenario, folder: Path, out: Path) -> None:
     """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks.
 
     A pattern's bent surface is always written: it is what the run was made for.
     """
-    scenario = read_run(folder / "scenario.yaml").scenario
     wanted = scenario.record.export
     out.mkdir(exist_ok=True)
     moments = list_moments(folder)
@@ -120,12 +118,11 @@ def write_exports(folder: Path, out: Path) -> None:
         to_ovito(snapshot, out / f"{moment.path.stem}.dump")
 
 
-def write_profile(folder: Path, out: Path) -> None:
+def write_profile(scenario: Scenario, folder: Path, out: Path) -> None:
     """Write the solid fraction against height at the moments of the vibration.
 
     Slabs are as high as the largest grain; where a slab lies above the bed it holds little.
     """
-    scenario = read_run(folder / "scenario.yaml").scenario
     slab_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
     edges_m = np.arange(0.0, scenario.box.height_m + slab_m / 2, slab_m)
     moments = list_moments(folder)
@@ -142,13 +139,12 @@ def write_profile(folder: Path, out: Path) -> None:
     pd.DataFrame(rows, columns=columns).to_csv(out, sep="\t", index=False, float_format="%.6g")
 
 
-def write_measures(folder: Path, out: Path) -> None:
+def write_measures(scenario: Scenario, folder: Path, out: Path) -> None:
     """Measure all snapshots of a run into a table.
 
     A snapshot that cannot be read leaves a row of gaps that names it, not an error: the run's
     other rows stay good.
     """
-    scenario = read_run(folder / "scenario.yaml").scenario
     bent = None
     if scenario.pattern is not None:
         from sandmould.study.kinds.sand.bending import (  # scikit-fem: few studies need it

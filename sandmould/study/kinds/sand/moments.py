@@ -11,9 +11,6 @@ import numpy as np
 MOMENTS = {"at its start": 0.0, "after 1/8": 0.125, "after 1/2": 0.5, "at its end": 1.0}
 """Shares of the vibration that are shown, by their heading."""
 
-LAST_MEASURED = "final.png"
-"""Written after all else that is measured."""
-
 
 @dataclass(frozen=True)
 class Moment:

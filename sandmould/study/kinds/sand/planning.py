@@ -1,39 +1,22 @@
-"""Studies of sand: a scenario of grains on one of the engines."""
+"""How a run of sand is planned: its engine, its price, what it is hashed by."""
 
 from __future__ import annotations
 
 import hashlib
-import json
 import math
-import platform
-import tempfile
-import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import pattern_fe
-from sandmould.engines import choosing, recording
-from sandmould.engines.driver import Driver, Opening
+from sandmould.engines import choosing
 from sandmould.engines.program import build_program
-from sandmould.engines.session import EngineStop, Session
-from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.products import SAND_PRODUCTS, Computed, Cost
 from sandmould.scenario import checks
-from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, with_hash
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.kind import Planning, Speed, SpeedClass
+from sandmould.study.kinds.sand import speed
 
-MODEL = Scenario
-WORK = "grain-steps"
-PRODUCTS = SAND_PRODUCTS
-CALIBRATION_GRAINS = 400
-CALIBRATION_FALL_WALL_S = 5.0
-CALIBRATION_WINDOWS, CALIBRATION_WINDOW_S = 8, 0.125
-"""The fastest counts: what else the machine does for a moment is not the engine's."""
 BASE_MEMORY_MB = 600
 GRAINS_PER_MB = 50
 SLOW_RATE = 1e6
@@ -46,15 +29,6 @@ IN_3D = 0.4
 PASSES = 4.0
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
-
-problems = checks.problems
-engine_problem = choosing.engine_problem
-no_cost = Cost.of
-
-
-def defaults() -> dict[str, Any]:
-    """The default scene."""
-    return Scenario().model_dump(mode="json")
 
 
 def resolved(scenario: Scenario) -> Scenario:
@@ -83,14 +57,14 @@ def template_hash(scenario: Scenario) -> str:
 
 def computed_hash(scenario: Scenario) -> str:
     """Hash of what the engine is told to compute, and of the pattern beside it."""
-    told = choosing.computed_hash(scenario)
+    of_engine = choosing.computed_hash(scenario)
     if scenario.pattern is None:
-        return told
+        return of_engine
     beside = scenario.pattern.model_dump_json() + pattern_fe.source_hash()
-    return hashlib.sha256((told + beside).encode()).hexdigest()
+    return hashlib.sha256((of_engine + beside).encode()).hexdigest()
 
 
-def lasts_s(scenario: Scenario) -> float:
+def vibration_s(scenario: Scenario) -> float:
     """The whole vibration."""
     return sum(stage.whole_duration_s for stage in scenario.vibration)
 
@@ -152,103 +126,23 @@ def plan_cells(scenario: Scenario) -> Mapping[str, str]:
     }
 
 
-def render(run: Run, folder: Path) -> None:
-    """Write the deck and the layers."""
-    program = build_program(run.scenario)
-    engine = choosing.engine_of(run.scenario)
-    engine.write_deck(program, run.sources, folder, run.run, run.study)
-
-
-def compute(run: Run, folder: Path) -> Computed:
-    """Take the scenario through its program."""
-    program = build_program(run.scenario)
-    opening: Opening = choosing.engine_of(run.scenario).open_session
-    if run.scenario.pattern is not None:
-        from pattern_fe.coupling.opening import open_coupled
-
-        opening = open_coupled
-    driver = Driver(program, folder, run.run, scenario_hash(run.scenario), opening)
-    outcome = driver.run()
-    return Computed(outcome, driver.cost, driver.is_root)
-
-
-def complete(scenario: Scenario, work: Path) -> None:
-    """Make empty tables, so that collection finds them."""
-    recording.create_tables(work, scenario.dimension)
-
-
-def measure(run: Run, folder: Path) -> None:
-    """Measure every snapshot."""
-    from sandmould.study.kinds.sand.measure import measure_sand  # draws: not every job needs that
-
-    measure_sand(folder)
-
-
-def rate(scenario: Scenario, results: Path) -> float | None:
-    """Grain-steps per second of one core of this machine, measured once and kept.
-
-    Returns
-    -------
-    float or None
-        None when the engine could not run the calibration; the study's own runs will say why.
-    """
-    path = results / "calibration.json"
-    version = choosing.engine_of(scenario).installed_version()
-    key = f"{platform.node()} {scenario.engine.name} {version} {scenario.dimension}D"
-    known: dict[str, Any] = {}
-    if path.is_file():
-        try:
-            known = json.loads(path.read_text(encoding="utf-8"))
-        except ValueError:
-            known = {}
-    if key not in known:
-        measured = _measure_rate(scenario)
-        if measured is None:
-            return None
-        known[key] = measured
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(known, indent=1), encoding="utf-8")
-    return float(known[key])
-
-
-def _measure_rate(scenario: Scenario) -> float | None:
-    """Let a few hundred grains of the scene fall and settle, and time the end of it.
-
-    Falling grains touch nothing and are too cheap to count, so they fall first, as far as a few
-    seconds of this machine take them.
-    """
-    trial = scenario.model_copy(
-        update={
-            "fill": Fill(layers=(Layer(count=CALIBRATION_GRAINS),)),
-            "obstacles": (),
-            "vibration": (),
-            "engine": scenario.engine.model_copy(update={"ranks": 1}),
-        }
-    )
-    program = build_program(trial)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        engine = choosing.engine_of(trial)
-        engine.write_deck(program, {}, folder, "calibration", "calibration")
-        try:
-            session = engine.open_session(program, folder, folder / "engine.log")
-            session.insert_layer(1)
-            session.start_stage(program.stages[0])
-            begun, rest_s = time.perf_counter(), program.expected_s / 2
-            while session.time_s < rest_s and (
-                time.perf_counter() - begun < CALIBRATION_FALL_WALL_S
-            ):
-                session.advance()
-            measured = max(_window_rate(session) for _ in range(CALIBRATION_WINDOWS))
-            session.close()
-        except EngineStop:
-            return None
-    return measured
-
-
-def _window_rate(session: Session) -> float:
-    """Grain-steps per second of wall time over a moment."""
-    steps, begun = session.steps, time.perf_counter()
-    while time.perf_counter() - begun < CALIBRATION_WINDOW_S:
-        session.advance()
-    return session.grains * (session.steps - steps) / (time.perf_counter() - begun)
+PLANNING = Planning[Scenario](
+    work_unit="grain-steps",
+    resolved=resolved,
+    problems=checks.problems,
+    engine_problem=choosing.engine_problem,
+    vibration_s=vibration_s,
+    sources=sources,
+    template_hash=template_hash,
+    computed_hash=computed_hash,
+    threads=threads,
+    ranks=ranks,
+    memory_mb=memory_mb,
+    allowed_s=allowed_s,
+    planned_work=planned_work,
+    predicted_s=predicted_s,
+    planned_s=planned_s,
+    speed_class=speed_class,
+    plan_cells=plan_cells,
+    speed=Speed(speed.stored_rate, speed.measured_rate),
+)

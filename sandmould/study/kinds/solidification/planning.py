@@ -1,26 +1,15 @@
-"""Studies of solidification: a casting in its mould, by particles of several sizes."""
+"""How a solidification is planned: a casting in its mould, by particles of several sizes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-from pathlib import Path
-from typing import Any
 
-import pandas as pd
-
-from analysis.export import elements_to_vtk
-from analysis.freezing import freezing
 from sandmould.casting.arpm import computation, scene
 from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds import casting as own_solver
+from sandmould.study.kinds.casting import casting_planning
 from sandmould.study.kinds.kind import SpeedClass
 
-MODEL = Solidification
-WORK = "element-steps"
-PRODUCTS = computation.PRODUCTS
 BASE_MEMORY_MB = 600
 ELEMENTS_PER_MB = 500
 RATE = 2e7
@@ -55,14 +44,6 @@ def predicted_s(scenario: Solidification) -> float:
     return planned_work(scenario) / (_speed(scenario) * scenario.threads)
 
 
-_given = own_solver.Given(computation, scene.problems, predicted_s)
-
-
-def __getattr__(name: str) -> Any:
-    """Entries that all kinds with our own solver have alike."""
-    return getattr(_given, name)
-
-
 def planned_s(scenario: Solidification) -> float:
     """Until all is solid, by Chvorinov's rule."""
     return scene.expected_s(scenario)
@@ -71,11 +52,6 @@ def planned_s(scenario: Solidification) -> float:
 def speed_class(scenario: Solidification) -> SpeedClass:
     """Elements or finite differences."""
     return computation.engine_of(scenario), scenario.dimensions
-
-
-def rate(scenario: Solidification, results: Path) -> float:
-    """The fixed speed."""
-    return _speed(scenario)
 
 
 def _speed(scenario: Solidification) -> float:
@@ -90,26 +66,16 @@ def plan_cells(scenario: Solidification) -> Mapping[str, str]:
     }
 
 
-def measure(run: Run, folder: Path) -> None:
-    """Write the measures against time, those of the whole run in every row, and the picture."""
-    from analysis.freezing_plots import draw_freezing
-
-    series = pd.read_csv(folder / "series.tsv", sep="\t")
-    _, _, heat_column = scene.series_columns(run.scenario)
-    clock = {"time_s": series["time_s"], "vibration_time_s": -1.0, "stage": "cooling"}
-    table = pd.DataFrame({**clock, **series.drop(columns=["time_s", heat_column])})
-    fields, draw = own_solver.read_fields(folder), None
-    if fields:
-        melts, heat = fields["melts"], series[heat_column]
-        found = freezing(
-            fields["position_m"][melts], fields["frozen_s"][melts], run.scenario.hot_spot_reach_m
-        )
-        table["enthalpy_drift_fraction"] = heat / heat.iloc[0] - 1.0
-        table["solidification_time_s"] = found.solidification_time_s
-        for axis, place_m in zip("xyz", found.last_point_m, strict=False):
-            table[f"last_point_{axis}_m"] = place_m
-        table["hot_spots"] = len(found.hot_spots_m)
-        elements_to_vtk(fields, folder / "fields.vtu")
-        draw = partial(draw_freezing, fields, found)
-    own_solver.write_measures(folder, table)
-    own_solver.write_picture(folder, (6, 5), draw)
+PLANNING = casting_planning(
+    computation,
+    work_unit="element-steps",
+    resolved=resolved,
+    problems=scene.problems,
+    threads=threads,
+    memory_mb=memory_mb,
+    planned_work=planned_work,
+    predicted_s=predicted_s,
+    planned_s=planned_s,
+    speed_class=speed_class,
+    plan_cells=plan_cells,
+)

@@ -1,0 +1,56 @@
+"""How a run of sand is computed: its deck, its session, its measures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sandmould.engines import choosing, recording
+from sandmould.engines.driver import Driver, Opening
+from sandmould.engines.program import build_program
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.products import SAND_PRODUCTS, Computed, Cost
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.kind import Execution
+
+
+def render(run: Run, folder: Path) -> None:
+    """Write the deck and the layers."""
+    program = build_program(run.scenario)
+    engine = choosing.engine_of(run.scenario)
+    engine.write_deck(program, run.sources, folder, run.run, run.study)
+
+
+def compute(run: Run, folder: Path) -> Computed:
+    """Take the scenario through its program."""
+    program = build_program(run.scenario)
+    opening: Opening = choosing.engine_of(run.scenario).open_session
+    if run.scenario.pattern is not None:
+        from pattern_fe.coupling.opening import open_coupled
+
+        opening = open_coupled
+    driver = Driver(program, folder, run.run, scenario_hash(run.scenario), opening)
+    outcome = driver.run()
+    return Computed(outcome, driver.cost, driver.is_root)
+
+
+def complete(scenario: Scenario, work: Path) -> None:
+    """Make empty tables, so that collection finds them."""
+    recording.create_tables(work, scenario.dimension)
+
+
+def measure(run: Run, folder: Path) -> None:
+    """Measure every snapshot."""
+    from sandmould.study.kinds.sand.measure import measure_sand  # draws: not every job needs that
+
+    measure_sand(run.scenario, folder)
+
+
+EXECUTION = Execution[Scenario](
+    products=SAND_PRODUCTS,
+    render=render,
+    compute=compute,
+    complete=complete,
+    no_cost=Cost.of,
+    measure=measure,
+)

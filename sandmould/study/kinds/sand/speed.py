@@ -1,0 +1,108 @@
+"""How fast an engine is on this machine, measured on a few hundred grains and stored."""
+
+from __future__ import annotations
+
+import json
+import platform
+import tempfile
+import time
+from pathlib import Path
+
+from sandmould.engines import choosing
+from sandmould.engines.program import build_program
+from sandmould.engines.session import EngineStop, Session
+from sandmould.scenario.fill import Fill, Layer
+from sandmould.scenario.scenario import Scenario
+
+STORED = "calibration.json"
+GRAINS = 400
+FALL_WALL_S = 5.0
+WINDOWS, WINDOW_S = 8, 0.125
+"""The fastest counts: what else the machine does for a moment is not the engine's."""
+
+
+def stored_rate(scenario: Scenario, results: Path) -> float | None:
+    """Grain-steps per second of one core of this machine, as measured before; starts nothing.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    results : Path
+        Folder of all results, which holds what was measured.
+    """
+    return _rates(results).get(_machine(scenario))
+
+
+def measured_rate(scenario: Scenario, results: Path) -> float | None:
+    """The same, measured now and stored where it was not; parameters as in ``stored_rate``.
+
+    Returns
+    -------
+    float or None
+        None when the engine could not run; the study's own runs will say why.
+    """
+    rates, machine = _rates(results), _machine(scenario)
+    if machine not in rates:
+        rate = _measure_rate(scenario)
+        if rate is None:
+            return None
+        rates[machine] = rate
+        results.mkdir(parents=True, exist_ok=True)
+        (results / STORED).write_text(json.dumps(rates, indent=1), encoding="utf-8")
+    return rates[machine]
+
+
+def _machine(scenario: Scenario) -> str:
+    """Machine, engine and dimension as one text."""
+    version = choosing.engine_of(scenario).installed_version()
+    return f"{platform.node()} {scenario.engine.name} {version} {scenario.dimension}D"
+
+
+def _rates(results: Path) -> dict[str, float]:
+    """All that was measured; nothing where the file is damaged."""
+    try:
+        tree = json.loads((results / STORED).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return {machine: float(rate) for machine, rate in tree.items()}
+
+
+def _measure_rate(scenario: Scenario) -> float | None:
+    """Let a few hundred grains of the scene fall and settle, and time the end of it.
+
+    Falling grains touch nothing and are too cheap to count, so they fall first, as far as a few
+    seconds of this machine take them.
+    """
+    trial = scenario.model_copy(
+        update={
+            "fill": Fill(layers=(Layer(count=GRAINS),)),
+            "obstacles": (),
+            "vibration": (),
+            "engine": scenario.engine.model_copy(update={"ranks": 1}),
+        }
+    )
+    program = build_program(trial)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        engine = choosing.engine_of(trial)
+        engine.write_deck(program, {}, folder, "calibration", "calibration")
+        try:
+            session = engine.open_session(program, folder, folder / "engine.log")
+            session.insert_layer(1)
+            session.start_stage(program.stages[0])
+            begun, rest_s = time.perf_counter(), program.expected_s / 2
+            while session.time_s < rest_s and (time.perf_counter() - begun < FALL_WALL_S):
+                session.advance()
+            measured = max(_window_rate(session) for _ in range(WINDOWS))
+            session.close()
+        except EngineStop:
+            return None
+    return measured
+
+
+def _window_rate(session: Session) -> float:
+    """Grain-steps per second of wall time over a moment."""
+    steps, begun = session.steps, time.perf_counter()
+    while time.perf_counter() - begun < WINDOW_S:
+        session.advance()
+    return session.grains * (session.steps - steps) / (time.perf_counter() - begun)
