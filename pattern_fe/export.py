@@ -106,8 +106,8 @@ def _plate(space: Space, perimeter: Perimeter, place_m: Array) -> tuple[Array, I
         edges = [len(corners) + sides.index(sorted((i, (i + 1) % len(corners)))) for i in corners]
         parts = split_face(corners, edges, 8 if len(corners) == 4 else None)
     flat = space.cells[:, np.array(parts)].reshape(-1, 3)
-    one, two = (space.node_m[flat[:, i]] - space.node_m[flat[:, 0]] for i in (1, 2))
-    turned = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] < 0.0
+    edge, next_edge = (space.node_m[flat[:, i]] - space.node_m[flat[:, 0]] for i in (1, 2))
+    turned = edge[:, 0] * next_edge[:, 1] - edge[:, 1] * next_edge[:, 0] < 0.0
     flat = np.where(turned[:, None], flat[:, ::-1], flat)
     a, b = perimeter.nodes[perimeter.facets].T
     wall = np.concatenate([np.stack([a, b, b + n], axis=1), np.stack([a, b + n, a + n], axis=1)])

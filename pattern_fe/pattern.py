@@ -1,4 +1,4 @@
-"""The foam pattern as an elastic body: what a coupling loop, an engine or a judge asks of it."""
+"""The foam pattern as an elastic body: statics, modes and explicit motion."""
 
 from __future__ import annotations
 
