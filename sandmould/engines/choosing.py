@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Protocol, cast
 
 from sandmould import ROOT
 from sandmould.dem import source_hash
+from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
-from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.scenario import Engine, Scenario
 
 
 class EngineModule(Protocol):
     """What ``sandmould.engines.<name>.engine`` offers, for each engine."""
+
+    CAPABILITIES: Capabilities
 
     @staticmethod
     def installed_version() -> int | str:
@@ -61,6 +64,12 @@ def engine_of(scenario: Scenario) -> EngineModule:
 def engine_module(name: str) -> EngineModule:
     """Import the module of an engine by its name."""
     return cast(EngineModule, importlib.import_module(f"sandmould.engines.{name}.engine"))
+
+
+def engines_that(can: Callable[[Capabilities], bool]) -> list[str]:
+    """Names of the engines whose sessions can do something, in the order of the registry."""
+    names: list[str] = Engine.model_json_schema()["properties"]["name"]["enum"]
+    return [name for name in names if can(engine_module(name).CAPABILITIES)]
 
 
 def deck_hash(scenario: Scenario) -> str:

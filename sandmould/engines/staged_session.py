@@ -197,13 +197,13 @@ class StagedSession(ABC):
             sums, samples = sums - earlier[2], samples - earlier[1]
         return sums / samples if samples else None
 
-    def keep(self) -> Any:
-        """Refuse: only checkpoints are kept."""
+    def save_checkpoint(self) -> Any:
+        """Refuse: checkpoints are written to disk alone."""
         raise RefusedError("pattern.loop.repeats", "above 0", "0 on this engine")
 
-    def go_back(self, kept: Any) -> None:
-        """Refuse as ``keep`` does."""
-        self.keep()
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Refuse as ``save_checkpoint`` does."""
+        self.save_checkpoint()
 
     def attach_mover(self, name: str, mover: StepMover) -> None:
         """Refuse: this engine calls nobody in its steps."""

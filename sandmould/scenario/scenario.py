@@ -15,7 +15,7 @@ from sandmould.scenario.contact import BackgroundDamping, Contact
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.fill import Fill
 from sandmould.scenario.geometry import Scene
-from sandmould.scenario.pattern import Pattern
+from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
@@ -108,7 +108,7 @@ class Scenario(Section):
     obstacles: tuple[Obstacle, ...] = Field(
         (), description="Plates, tubes, polygons, cylinders and meshes in the box."
     )
-    pattern: Pattern | None = Field(
+    pattern: PatternConfig | None = Field(
         None, description="A foam pattern that bends under the sand, coupled with it."
     )
     sand: Sand = Field(Sand(), description="The sand.")

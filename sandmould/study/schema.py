@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from sandmould import ROOT
-from sandmould.scenario.pattern import Pattern
+from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, models_in
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS
@@ -35,7 +35,7 @@ def schema_text() -> str:
         definitions = other["$defs"] | definitions
         schema["properties"] = other["properties"] | schema["properties"]
     # The material states a part of it, and what the study is based on another.
-    for name in (*(kind.scenario.__name__ for kind in KINDS.values()), Pattern.__name__):
+    for name in (*(kind.scenario.__name__ for kind in KINDS.values()), PatternConfig.__name__):
         definitions[name].pop("required", None)
     # The kind may be that of the study which this one is based on.
     kind_key = schema["properties"]["kind"]

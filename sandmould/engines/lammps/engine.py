@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import metadata
 from pathlib import Path
 
+from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.render import needs_callback
@@ -14,6 +15,14 @@ from sandmould.engines.lammps.session import LammpsSession
 from sandmould.engines.lammps.session import refuse as refuse
 from sandmould.engines.program import Program
 from sandmould.scenario.scenario import Scenario
+
+CAPABILITIES = Capabilities(
+    bends_meshes=(2, 3),
+    bends_in_frames=("box", "laboratory"),
+    repeats_windows=True,
+    calls_movers=True,
+    loads_of_every_step=False,
+)
 
 
 def installed_version() -> int:

@@ -260,7 +260,7 @@ class LammpsSession(DeckSession):
         """
         self._kernel_of(name).attach_mover(name, mover)
 
-    def keep(self) -> Any:
+    def save_checkpoint(self) -> Any:
         """Write LAMMPS's restart file to a temporary folder; copy what it does not hold.
 
         Raises
@@ -282,11 +282,11 @@ class LammpsSession(DeckSession):
         stage = (self.stage_over, self.at_rest, self._ended_window, dict(self._asked))
         return folder, self._kernel.state(), self._wall_loads.sums.copy(), stage
 
-    def go_back(self, kept: Any) -> None:
-        """Compute on from what ``keep`` gave: LAMMPS is set up anew, in the same stage."""
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Compute on from what ``save_checkpoint`` gave: LAMMPS is set up anew."""
         assert self._kernel is not None
         assert self._wall_loads is not None
-        folder, memory, self._wall_loads.sums[:], stage = kept
+        folder, memory, self._wall_loads.sums[:], stage = checkpoint
         self.send("clear")
         self._set_up(Path(folder.name))
         self._register(self._kernel)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sandmould.dem import source_hash
+from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
@@ -24,6 +25,14 @@ _LAW_KEYS = (
     ("damping_ratio", "damping_ratio"),
     ("rolling_arm", "rolling_arm_fraction"),
     ("k_roll", "rolling_stiffness_n_m"),
+)
+
+CAPABILITIES = Capabilities(
+    bends_meshes=(2, 3),
+    bends_in_frames=("box", "laboratory"),
+    repeats_windows=True,
+    calls_movers=True,
+    loads_of_every_step=True,
 )
 
 
