@@ -3,7 +3,7 @@
 A method is called with a problem and gives a generator of messages. It is sent the value of every
 ``{"ask": point}``, None where a run gave none. ``{"guess": {name: point}}`` and ``{"ended": why}``
 are told only; closing the generator ends the problem. The peers' programs send the same messages
-as lines of JSON; see ``benchmarks/peers/talk.py``.
+as lines of JSON; see ``benchmarks/peers/jsonl_pipe.py``.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class Nearest:
 
 
 class Peer:
-    """A program that speaks the lines of ``benchmarks/peers/talk.py``, kept for many problems."""
+    """A program that speaks over ``benchmarks/peers/jsonl_pipe.py``, for any number of problems."""
 
     def __init__(self, name: str, command: Sequence[str]) -> None:
         self.name = name

@@ -50,19 +50,19 @@ NOISE_DEG = 0.8
 FAKE = """\
 import sys
 sys.path.insert(0, {peers!r})
-from talk import serve
+from jsonl_pipe import serve
 
-def solve(talk, problem):
+def solve(pipe, problem):
     if problem["target"] < 0:
         raise ValueError("no such angle")
     print("chatter that is no message")
     tried = []
     for first in (0, 4):
-        tried += [(talk.ask(p), p) for p in problem["start"][first : first + 4]]
+        tried += [(pipe.ask(p), p) for p in problem["start"][first : first + 4]]
         known = [(abs(v - problem["target"]), p) for v, p in tried if v is not None]
         nearest = min(known)[1]
         samples = [p for _, p in known]
-        talk.guess({{"nearest": nearest}}, samples=samples, weights=[1 / len(known)] * len(known))
+        pipe.guess({{"nearest": nearest}}, samples=samples, weights=[1 / len(known)] * len(known))
     return "two generations are enough"
 
 serve(solve, ("numpy",))
