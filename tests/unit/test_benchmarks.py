@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks.engines import KEPT_JSON
-from benchmarks.engines_beds import Bed, solver_on, tiled
-from benchmarks.engines_page import page
-from benchmarks.engines_scale import advance, bytes_of
-from benchmarks.engines_timing import interleaved, ratio
+from benchmarks.engines.beds import Bed, solver_on, tiled
+from benchmarks.engines.page import page
+from benchmarks.engines.scale import advance, bytes_of
+from benchmarks.engines.timing import interleaved, ratio
 from sandmould import ROOT
 
 

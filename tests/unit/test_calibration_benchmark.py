@@ -15,14 +15,14 @@ import pytest
 
 from benchmarks import calibration_oracle
 from benchmarks.calibration import Settings, keep, measure
-from benchmarks.calibration_coverage import (
+from benchmarks.calibration.coverage import (
     counted,
     dem_coverage,
     ellipse_holds,
     our_coverage,
     planted,
 )
-from benchmarks.calibration_methods import (
+from benchmarks.calibration.methods import (
     Messages,
     Nearest,
     Ours,
@@ -32,7 +32,7 @@ from benchmarks.calibration_methods import (
     open_peers,
     problem_of,
 )
-from benchmarks.calibration_oracle import (
+from benchmarks.calibration.oracle import (
     ANGLE,
     KEYS,
     SECOND,
@@ -41,8 +41,8 @@ from benchmarks.calibration_oracle import (
     by_emulator,
     read_map,
 )
-from benchmarks.calibration_page import page
-from benchmarks.calibration_race import HELD_AFTER, Race, quartiles, run_race, summarised
+from benchmarks.calibration.page import page
+from benchmarks.calibration.race import HELD_AFTER, Race, quartiles, run_race, summarised
 from sandmould import ROOT
 from sandmould.study.plan_files import read_run
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from benchmarks.mps_page import verdict, write
-from benchmarks.mps_peers import measured
-from benchmarks.mps_solvers import poisson_of, rows_here
+from benchmarks.mps.page import verdict, write
+from benchmarks.mps.peers import measured
+from benchmarks.mps.solvers import poisson_of, rows_here
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.tank import open_tank
 

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from benchmarks.scaling import KEPT_JSON, PAGE, Progress
-from benchmarks.scaling_chart import draw
-from benchmarks.scaling_measure import executed, files
-from benchmarks.scaling_model import Assumed, Measured, drain
-from benchmarks.scaling_page import page
-from benchmarks.scaling_peers import HERE, Tool, written_lines
-from benchmarks.scaling_study import REPLICATES, Place
+from benchmarks.scaling.chart import draw
+from benchmarks.scaling.measure import executed, files
+from benchmarks.scaling.model import Assumed, Measured, drain
+from benchmarks.scaling.page import page
+from benchmarks.scaling.peers import HERE, Tool, written_lines
+from benchmarks.scaling.study import REPLICATES, Place
 from sandmould.study.build_plan import open_plan
 
 COSTS = Measured(
