@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
+from benchmarks.frame import thousands
 from sandmould.casting.arpm.method import Method
 from sandmould.casting.arpm.plates_case import Plates, PlatesRun, run_plates
 
@@ -38,7 +39,7 @@ def draw_fields(plates: Plates, least_m: float, path: Path) -> None:
         shown = _draw(panel, run, plates)
         panel.set_title(
             f"{case}, {1e3 * run.elements.size_m.min():g} mm, {exchange}: "
-            f"{number(len(run.elements.size_m))} elements",
+            f"{thousands(len(run.elements.size_m))} elements",
             fontsize=10,
         )
     panels[0].set_ylabel("y, m")

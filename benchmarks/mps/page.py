@@ -80,9 +80,10 @@ def draw(results: Mapping[str, Any], folder: Path) -> None:
     ):
         for place, row in enumerate(rows, 1):
             colour = "C2" if "version" in row else "C0" if row["source"] == "density" else "C1"
-            axis.plot(row["cpu_s_per_simulated_s"], row[key], "o", ms=4, color=colour)
+            at = (row["cpu_s_per_simulated_s"], row[key])
+            axis.plot(*at, "o", ms=4, color=colour)
             axis.annotate(
-                f"{place}", (row["cpu_s_per_simulated_s"], row[key]), xytext=(4, 2), textcoords="offset points",
+                f"{place}", at, xytext=(4, 2), textcoords="offset points",
                 fontsize=8, color=colour,
             )  # fmt: skip
         axis.margins(0.1)

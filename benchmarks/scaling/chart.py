@@ -44,7 +44,7 @@ def _growth(ax: Axes, found: dict[str, Any]) -> None:
         for n in sizes
     ]
     ax.loglog(sizes, plan_s, color="#0072B2", marker="x", label="plan")
-    ax.set(xlabel="runs of the study", ylabel="s of one core", title="WorkflowCosts on one machine")
+    ax.set(xlabel="runs of the study", ylabel="s of one core", title="Measured on one machine")
     ax.grid(alpha=0.3)
     ax.legend(fontsize=8, frameon=False)
 

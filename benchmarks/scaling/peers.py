@@ -116,7 +116,7 @@ class Trial:
         return {str(p): p.stat().st_mtime_ns for p in found}
 
     def whole(self) -> dict[str, float]:
-        """ProcessCost of all runs from nothing to the table."""
+        """Cost of all runs from nothing to the table."""
         command = self.tool.command(self.tool.run, self.points, self.cores)
         cost = timed(command, self.folder, self.environment)
         return {"wall_s": cost.wall_s / self.runs, "cpu_s": cost.cpu_s / self.runs}
