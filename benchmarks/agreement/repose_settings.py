@@ -1,24 +1,19 @@
-"""The page on the cheapest settings that change no angle: ``docs/repose_settings.md``.
-
-Refresh it from the committed results with ``python -m benchmarks.cheapest``.
-"""
+"""The page on the cheapest settings that change no angle: ``docs/repose_settings.md``."""
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.twins import Recorded, environment, read_recorded
-from sandmould import ROOT
-from sandmould.runs.formatting import number
+from benchmarks.agreement.recorded import Recorded, read_all
+from benchmarks.frame import render
+from sandmould.runs.formatting import name_of, number, seconds
 from sandmould.runs.outcome import Outcome
 from sandmould.statistics.agreement import Compared, shown_value
 from sandmould.study.records import RECORDS
 
-PAGE = ROOT / "docs" / "repose_settings.md"
 MEASURE = "heap_angle_deg"
 STUDIES = (
     "repose_scale",
@@ -129,7 +124,7 @@ def _pair(compared: tuple[Compared, ...], key: str, one: str, other: str) -> Com
     )
 
 
-def page_text(records: Path = RECORDS) -> str:
+def page(records: Path = RECORDS) -> str:
     """Write the page from the committed results.
 
     Raises
@@ -137,28 +132,15 @@ def page_text(records: Path = RECORDS) -> str:
     SystemExit
         Naming the studies that have no record yet.
     """
-    missing = [name for name in STUDIES if not (records / name / "record.json").is_file()]
-    if missing:
-        raise SystemExit(f"no record of {', '.join(missing)} in {records}: run and record them")
     factors: list[Factor] = []
     margins, confidences = set(), set()
-    for name in STUDIES:
-        recorded = read_recorded(records / name)
-        summary = pd.read_csv(records / name / "summary.tsv", sep="\t")
+    for recorded in read_all(records, STUDIES):
+        summary = pd.read_csv(records / recorded.name / "summary.tsv", sep="\t")
         factors += factors_of(recorded, summary, recorded.keys)
         margins |= {c.agreement.margin for c in recorded.compared if c.measure == MEASURE}
         confidences.add(recorded.confidence)
     (margin,), (confidence,) = margins, confidences  # one sentence holds for all
-    template = environment().get_template("repose_settings.md.j2")
-    return template.render(factors=factors, margin=margin, confidence=confidence)
-
-
-def main() -> int:
-    """Rewrite the page."""
-    PAGE.write_text(page_text(), encoding="utf-8")
-    print(PAGE.relative_to(ROOT))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return render(Path(__file__).with_name("repose_settings.md.j2"), {
+        "factors": factors, "margin": margin, "confidence": confidence,
+        "number": number, "seconds": seconds, "name_of": name_of,
+    })  # fmt: skip

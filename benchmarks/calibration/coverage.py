@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest, chi2
 
-from benchmarks.calibration.methods import Method, problem_of
+from benchmarks.calibration.methods import CalibrationMethod, problem_of
 from benchmarks.calibration.oracle import ANGLE, Floats, Map, by_emulator
 from benchmarks.calibration.race import run_race
 from sandmould.statistics.calibration.config import Target
@@ -30,14 +30,16 @@ PEER_CAP = 80
 """Runs of a posterior of GrainLearning: eight generations, as in its manual's example."""
 
 
-def planted(known: Map, count: int, seed: int = 0) -> Floats:
+def planted(angle_map: Map, count: int, seed: int = 0) -> Floats:
     """Truths, evenly over the map, (count, 2) float64."""
     rng = np.random.default_rng([seed, count])
-    truths: Floats = rng.uniform(known.truth.low, known.truth.high, (count, 2))
+    truths: Floats = rng.uniform(angle_map.truth.low, angle_map.truth.high, (count, 2))
     return truths
 
 
-def found_on(emulators: Mapping[str, Emulator], targets: Mapping[str, Target]) -> Posterior | None:
+def posterior_on(
+    emulators: Mapping[str, Emulator], targets: Mapping[str, Target]
+) -> Posterior | None:
     """Calibrate; None where a value lies off the map."""
     try:
         return posterior(emulators, targets)
@@ -45,15 +47,15 @@ def found_on(emulators: Mapping[str, Emulator], targets: Mapping[str, Target]) -
         return None
 
 
-def holds(found: Posterior | None, truth: Sequence[float]) -> bool:
+def holds(density: Posterior | None, truth: Sequence[float]) -> bool:
     """Whether the region of highest probability holds a truth; none does off the map."""
-    if found is None:
+    if density is None:
         return False
     i, j = (
         int(np.abs(axis - at).argmin())
-        for axis, at in zip((found.first, found.second), truth, strict=True)
+        for axis, at in zip((density.first, density.second), truth, strict=True)
     )
-    return bool(found.region()[i, j])
+    return bool(density.region()[i, j])
 
 
 def ellipse_holds(samples: Floats, weights: Floats, truth: Sequence[float]) -> bool:
@@ -81,40 +83,40 @@ def counted(method: str, region: str, held: Sequence[bool]) -> dict[str, Any]:
     }
 
 
-def our_coverage(known: Map, truths: Floats) -> dict[str, Any]:
+def our_coverage(angle_map: Map, truths: Floats) -> dict[str, Any]:
     """Plant truths on the emulator and calibrate each on a map simulated again with noise."""
     held = []
-    mean = known.truth.at(known.points)[0]
+    mean = angle_map.truth.at(angle_map.points)[0]
     for number, truth in enumerate(truths):
         rng = np.random.default_rng([1, number])
         again = fit_emulator(
-            ANGLE, known.points, mean + rng.normal(0.0, known.truth.noise_sd, len(mean))
+            ANGLE, angle_map.points, mean + rng.normal(0.0, angle_map.truth.noise_sd, len(mean))
         )
-        measured = rng.normal(known.mean(truth), MEASURED_SD_DEG)
+        measured = rng.normal(angle_map.mean(truth), MEASURED_SD_DEG)
         target = Target(value=measured, sd=MEASURED_SD_DEG)
-        held.append(holds(found_on({ANGLE: again}, {ANGLE: target}), truth))
+        held.append(holds(posterior_on({ANGLE: again}, {ANGLE: target}), truth))
     return counted("sandmould", "region of highest probability on the map", held)
 
 
-def peer_coverage(known: Map, method: Method, truths: Floats) -> dict[str, Any]:
+def peer_coverage(angle_map: Map, method: CalibrationMethod, truths: Floats) -> dict[str, Any]:
     """Plant truths on the emulator and take the ellipse of the peer's last weighted samples.
 
-    The method ends by itself or after ``PEER_CAP`` runs. It is told no error of the measurement:
+    The method ends by itself or after ``PEER_CAP`` runs. It gets no error of the measurement:
     it chooses its own.
     """
     held = []
     for number, truth in enumerate(truths):
         rng = np.random.default_rng([2, number])
         problem = problem_of(
-            known.truth.low.tolist(),
-            known.truth.high.tolist(),
-            rng.normal(known.mean(truth), MEASURED_SD_DEG),
+            angle_map.truth.low.tolist(),
+            angle_map.truth.high.tolist(),
+            rng.normal(angle_map.mean(truth), MEASURED_SD_DEG),
             MEASURED_SD_DEG,
-            known.tolerance,
+            angle_map.tolerance,
             seed=number,
             go_on=False,
         )
-        runs = by_emulator(known, [3, number])
+        runs = by_emulator(angle_map, [3, number])
         race = run_race(method, problem, runs, lambda point: math.inf, PEER_CAP)
         samples, weights = (np.array(race.last.get(k, [])) for k in ("samples", "weights"))
         held.append(bool(len(samples)) and ellipse_holds(samples, weights, truth))
@@ -136,7 +138,7 @@ def dem_coverage(
     runs : callable
         Gives runs by the number of the truth; the mean of some is measured.
     """
-    emulators = {measure: known.truth for measure, known in maps.items()}
+    emulators = {measure: angle_map.truth for measure, angle_map in maps.items()}
     rows = []
     for number, truth in enumerate(truths):
         simulate = runs(number)
@@ -147,21 +149,21 @@ def dem_coverage(
             for m, value in values.items()
             if math.isfinite(value)
         }
-        told = {}
+        posteriors = {}
         for name, wanted in {"first": list(maps)[:1], "all": list(maps)}.items():
             there = {m: targets[m] for m in wanted if m in targets}
-            found = found_on(emulators, there) if len(there) == len(wanted) else None
-            told[name] = {
-                "held": holds(found, truth),
-                "bits": found.bits if found else None,
-                "mode": list(found.mode) if found else None,
-                "sd": list(found.sd) if found else None,
+            density = posterior_on(emulators, there) if len(there) == len(wanted) else None
+            posteriors[name] = {
+                "held": holds(density, truth),
+                "bits": density.bits if density else None,
+                "mode": list(density.mode) if density else None,
+                "sd": list(density.sd) if density else None,
             }
         rows.append({
             "truth": truth.tolist(),
             "measured": {m: v if math.isfinite(v) else None for m, v in values.items()},
-            "emulated": {m: known.mean(truth) for m, known in maps.items()},
-            "by": told,
+            "emulated": {m: angle_map.mean(truth) for m, angle_map in maps.items()},
+            "by": posteriors,
         })  # fmt: skip
         print(f"planted {truth}: {rows[-1]}", flush=True)
     return rows

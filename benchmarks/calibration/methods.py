@@ -35,7 +35,7 @@ class PeerError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Problem:
+class CalibrationProblem:
     """One target and one start."""
 
     low: tuple[float, float]
@@ -50,13 +50,13 @@ class Problem:
     """Whether to go on past the method's own end, up to the cap of the benchmark."""
 
 
-class Method(Protocol):
+class CalibrationMethod(Protocol):
     """A way to find two parameters."""
 
     name: str
     versions: dict[str, str]
 
-    def solve(self, problem: Problem) -> Messages:
+    def solve(self, problem: CalibrationProblem) -> Messages:
         """Ask for runs and state guesses."""
         ...
 
@@ -64,11 +64,11 @@ class Method(Protocol):
 def problem_of(
     low: Sequence[float], high: Sequence[float], target: float, sd: float, tolerance: float,
     seed: int, go_on: bool = True,
-) -> Problem:  # fmt: skip
+) -> CalibrationProblem:  # fmt: skip
     """State a problem whose start is the one of its seed."""
     ends = [tuple(float(x) for x in end) for end in (low, high)]
     start = tuple(map(tuple, design(low, high, START, seed).tolist()))
-    return Problem(ends[0], ends[1], target, sd, tolerance, start, seed, go_on)
+    return CalibrationProblem(ends[0], ends[1], target, sd, tolerance, start, seed, go_on)
 
 
 class Ours:
@@ -79,7 +79,7 @@ class Ours:
     def __init__(self) -> None:
         self.versions: dict[str, str] = {}
 
-    def solve(self, problem: Problem) -> Messages:
+    def solve(self, problem: CalibrationProblem) -> Messages:
         """Fit after every run once the emulator has the fewest points it takes."""
         target = Target(value=problem.target, sd=problem.sd)
         candidates = design(problem.low, problem.high, CANDIDATES, problem.seed)
@@ -108,7 +108,7 @@ class Nearest:
     def __init__(self) -> None:
         self.versions: dict[str, str] = {}
 
-    def solve(self, problem: Problem) -> Messages:
+    def solve(self, problem: CalibrationProblem) -> Messages:
         """Guess anew after every run."""
         least = math.inf
         for point in design(problem.low, problem.high, CANDIDATES, problem.seed).tolist():
@@ -142,7 +142,7 @@ class Peer:
             raise PeerError(f"{name} cannot be started: {error}; make peers installs it") from None
         self.versions = {str(k): str(v) for k, v in self._hear()["versions"].items()}
 
-    def solve(self, problem: Problem) -> Messages:
+    def solve(self, problem: CalibrationProblem) -> Messages:
         """Pass messages on; a problem given up is stopped at the next run asked for."""
         self._say(asdict(problem))
         message = self._hear()

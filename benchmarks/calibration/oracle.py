@@ -13,13 +13,15 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from benchmarks.kept_runs import KeptRuns, Measures, key_of
+from benchmarks.frame import SCRATCH, Parts
 from sandmould import ROOT
+from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.statistics.verdict import finished_values
 from sandmould.study.collect import gather
 from sandmould.study.expand import replicate_seed
+from sandmould.study.kinds.kind import kind_of
 from sandmould.study.load_study import open_study
 from sandmould.study.measure import write_measures
 from sandmould.study.plan_files import write_plan
@@ -27,6 +29,7 @@ from sandmould.study.run import Run
 from sandmould.study.simulate import render_run, simulate
 
 Floats = NDArray[np.float64]
+Measures = dict[str, float]
 Simulate = Callable[[Sequence[float]], float]
 """One run at a point: its measure, NaN where it gave none."""
 STUDY = "repose_map"
@@ -34,7 +37,9 @@ KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fractio
 ANGLE = "heap_angle_deg"
 SECOND = "outflow_fraction"
 """What the same run tells besides and breaks the ridge best (docs/results)."""
-KEPT_RUNS = ROOT / "results" / "benchmarks" / "calibration_runs.jsonl"
+DEM_RUNS = SCRATCH / "calibration" / "runs"
+MAP = ROOT / "docs" / "results" / STUDY / "summary.tsv"
+"""The map that docs/results keeps."""
 FIRST_REPLICATE = 1001
 """Of runs by DEM: none shares its filling with a run of the map."""
 
@@ -80,11 +85,6 @@ class Map:
         return {"sd_deg": sd, "low_deg": low, "high_deg": high, "freedom": self.freedom}
 
 
-def map_file(record: bool) -> Path:
-    """Name the summary of the map: as just computed, or as kept in the record."""
-    return ROOT / ("docs/results" if record else "results") / STUDY / "summary.tsv"
-
-
 def read_map(path: Path, measure: str = ANGLE) -> Map:
     """Read a map.
 
@@ -97,8 +97,7 @@ def read_map(path: Path, measure: str = ANGLE) -> Map:
         table = pd.read_csv(path, sep="\t")
     except FileNotFoundError:
         raise NoMapError(
-            f"{path} is not there: make study STUDY=config/studies/{STUDY}.yaml writes it, "
-            "and --record takes the one that is kept in docs/results"
+            f"{path} is not there: make study STUDY=config/studies/{STUDY}.yaml computes one"
         ) from None
     except (ValueError, OSError) as error:
         raise NoMapError(f"{path} cannot be read as a table: {error}") from None
@@ -115,24 +114,24 @@ def read_map(path: Path, measure: str = ANGLE) -> Map:
     return Map(points, truth, int(counts.max()), int((counts - 1).sum()))
 
 
-def by_emulator(known: Map, seed: int | Sequence[int]) -> Simulate:
+def by_emulator(angle_map: Map, seed: int | Sequence[int]) -> Simulate:
     """Runs of the emulator: its mean, with the noise of one heap."""
     rng = np.random.default_rng(seed)
-    return lambda point: known.mean(point) + float(rng.normal(0.0, known.truth.noise_sd))
+    return lambda point: angle_map.mean(point) + float(rng.normal(0.0, angle_map.truth.noise_sd))
 
 
-def by_dem(seed: int, kept: Path = KEPT_RUNS) -> Simulate:
+def by_dem(seed: int, folder: Path = DEM_RUNS) -> Simulate:
     """Heaps of the engine that the map's study names, each of another filling."""
-    run = rows_by_dem(seed, kept)
+    run = rows_by_dem(seed, folder)
     return lambda point: float(run(point)[ANGLE])
 
 
-def rows_by_dem(seed: int, kept: Path = KEPT_RUNS) -> Callable[[Sequence[float]], Measures]:
-    """Both measures of such runs, NaN where a run gave none; made ones are kept in a file.
+def rows_by_dem(seed: int, folder: Path = DEM_RUNS) -> Callable[[Sequence[float]], Measures]:
+    """Both measures of such runs, NaN where a run gave none; each is kept in a file.
 
     A run goes the workflow's way, plan, deck, engine, measures, in a folder that is then removed.
     """
-    runs = KeptRuns(kept)
+    runs = Parts(folder)
     base = open_study(ROOT / "config" / "studies" / f"{STUDY}.yaml").study.scenario
     number = FIRST_REPLICATE + 1000 * seed
 
@@ -148,24 +147,22 @@ def rows_by_dem(seed: int, kept: Path = KEPT_RUNS) -> Callable[[Sequence[float]]
             section[last] = float(value)
         tree["seed"] = replicate_seed(base.seed, number)
         parameters = dict(zip(KEYS, map(float, point), strict=True))
-        one = Run(STUDY, "one", parameters, number, Scenario.model_validate(tree), {})
-        key = key_of(one.scenario)
-        measures = runs.get(key)
-        if measures is None:
-            measures = _measured(one)
-            runs.add(key, measures)
+        scenario = Scenario.model_validate(tree)
+        planned = Run(STUDY, "one", parameters, number, scenario, {})
+        key = scenario_hash(scenario) + kind_of(scenario).computed_hash(scenario)
+        measures: Measures = runs.get(key, lambda: _measures_of(planned))
         return measures
 
     return run
 
 
-def _measured(one: Run) -> Measures:
+def _measures_of(run: Run) -> Measures:
     """Simulate and measure a run."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_plan([one], folder)
-        render_run(folder / "runs" / one.run)
-        simulate(folder / "runs" / one.run)
-        write_measures(folder / "runs" / one.run, folder / "runs" / one.run / "measures.tsv")
+        write_plan([run], folder)
+        render_run(folder / "runs" / run.run)
+        simulate(folder / "runs" / run.run)
+        write_measures(folder / "runs" / run.run, folder / "runs" / run.run / "measures.tsv")
         summary = gather(folder).summary
     return {m: float(finished_values(summary, m).iloc[0]) for m in (ANGLE, SECOND)}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.calibration.methods import Messages, Method, Problem
+from benchmarks.calibration.methods import CalibrationMethod, CalibrationProblem, Messages
 from benchmarks.calibration.oracle import Simulate
 
 CAP = 150
@@ -33,7 +33,7 @@ class Race:
     last: dict[str, Any] = field(default_factory=dict)
     """Last message with guesses, with all that came with it."""
 
-    def told(
+    def enter(
         self, message: dict[str, Any], miss_of: Callable[..., float], tolerance: float
     ) -> None:
         """Enter guesses."""
@@ -58,8 +58,8 @@ class Race:
 
 
 def run_race(
-    method: Method, problem: Problem, simulate: Simulate, miss_of: Callable[..., float],
-    cap: int = CAP, held_after: int = HELD_AFTER,
+    method: CalibrationMethod, problem: CalibrationProblem, simulate: Simulate,
+    miss_of: Callable[..., float], cap: int = CAP, held_after: int = HELD_AFTER,
 ) -> Race:  # fmt: skip
     """Let a method ask for runs until its guesses are good, it ends, or the cap is reached.
 
@@ -67,8 +67,8 @@ def run_race(
 
     Parameters
     ----------
-    method : Method
-    problem : Problem
+    method : CalibrationMethod
+    problem : CalibrationProblem
     simulate : callable
     miss_of : callable
         True miss of a point, degrees.
@@ -89,7 +89,7 @@ def run_race(
                 value = value if math.isfinite(value) else None
                 race.runs += 1
             elif "guess" in message:
-                race.told(message, miss_of, problem.tolerance)
+                race.enter(message, miss_of, problem.tolerance)
             else:
                 race.ended = message["ended"]
             message = messages.send(value)
@@ -106,8 +106,8 @@ def quartiles(firsts: Sequence[int | None]) -> list[float | None]:
     Failures count as longer than anything, so they move the quartiles as they should.
     """
     ordered = np.array([math.inf if n is None else n for n in firsts], dtype=np.float64)
-    found = np.quantile(ordered, [0.25, 0.5, 0.75], method="inverted_cdf")
-    return [float(x) if math.isfinite(x) else None for x in found]
+    quantiles = np.quantile(ordered, [0.25, 0.5, 0.75], method="inverted_cdf")
+    return [float(x) if math.isfinite(x) else None for x in quantiles]
 
 
 def summarised(method: str, target: float, races: Sequence[Race]) -> list[dict[str, Any]]:
