@@ -66,9 +66,12 @@ def problem_of(
     seed: int, go_on: bool = True,
 ) -> CalibrationProblem:  # fmt: skip
     """State a problem whose start is the one of its seed."""
-    ends = [tuple(float(x) for x in end) for end in (low, high)]
+    (low_1, low_2), (high_1, high_2) = low, high
     start = tuple(map(tuple, design(low, high, START, seed).tolist()))
-    return CalibrationProblem(ends[0], ends[1], target, sd, tolerance, start, seed, go_on)
+    return CalibrationProblem(
+        (float(low_1), float(low_2)), (float(high_1), float(high_2)), target, sd, tolerance, start,
+        seed, go_on,
+    )  # fmt: skip
 
 
 class Ours:

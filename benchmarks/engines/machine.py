@@ -74,7 +74,7 @@ def _liggghts() -> str:
 
 def _reference() -> str:
     version = ".".join(str(part) for part in llvm.llvm_version_info)
-    level = int(numba.config.OPT)
+    level = int(numba.config.OPT)  # type: ignore[attr-defined]
     return (
         f"compiled on the spot by numba {numba.__version__} with LLVM {version} at -O{level} for "
         f"{llvm.get_host_cpu_name()}; fused multiply-add and no signed zeros allowed, no other "

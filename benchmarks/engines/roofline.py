@@ -54,10 +54,11 @@ stays in the core's cache from its first contact to its drift."""
 
 def flops(dimension: int, listed: float, contacts: float) -> float:
     """Operations of a grain-step, square roots and quotients apart."""
-    column = dimension - 1
-    per_listed = sum(row[column] for row in FLOPS_PER_LISTED)
-    per_contact = sum(row[column] for row in FLOPS_PER_CONTACT)
-    return listed * per_listed + contacts * per_contact + sum(r[column] for r in FLOPS_PER_GRAIN)
+    per_listed, per_contact, per_grain = (
+        sum(row[1:][dimension - 2] for row in counted)
+        for counted in (FLOPS_PER_LISTED, FLOPS_PER_CONTACT, FLOPS_PER_GRAIN)
+    )
+    return listed * per_listed + contacts * per_contact + per_grain
 
 
 def traffic_bytes(solver: Solver) -> float:

@@ -88,7 +88,7 @@ def measure_threads(extent: Extent) -> dict[str, Any]:
 def bytes_of(solver: Solver) -> dict[str, int]:
     """Bytes of every array that the step loop is given."""
     moving = solver.moving
-    parts = {
+    parts: dict[str, Any] = {
         "grains": moving.grains,
         "kinds": moving.kinds,
         "pairs": moving.pairs,

@@ -1,7 +1,7 @@
 """What all benchmarks share: one command line, one way to keep parts, one kind of page."""
 
 from benchmarks.frame.benchmark import SCRATCH, Benchmark, BenchmarkRun
-from benchmarks.frame.page import environment, render, table, thousands
+from benchmarks.frame.page import render, table, thousands
 from benchmarks.frame.parts import Parts
 
 __all__ = [
@@ -9,7 +9,6 @@ __all__ = [
     "Benchmark",
     "BenchmarkRun",
     "Parts",
-    "environment",
     "render",
     "table",
     "thousands",

@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -136,8 +137,7 @@ class Benchmark:
         measured: Results = {}
         for name in options.part:
             print(f"{time.strftime('%H:%M:%S')} {self.theme}: {name}", flush=True)
-            part = self.parts[name]
-            measured[name] = run.results[name] = parts.get(name, lambda part=part: part(run))
+            measured[name] = run.results[name] = parts.get(name, partial(self.parts[name], run))
         arranged = self.arrange(measured, run)
         parts.remove()
         return results | arranged

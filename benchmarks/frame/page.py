@@ -11,14 +11,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 FRAME = Path(__file__).parent
 
 
-def environment(folder: Path) -> Environment:
-    """Templates of a folder, with the table and the forms of numbers that all pages use.
+def _environment(folder: Path) -> Environment:
+    """Templates of a folder, with the forms of numbers that all pages use.
 
     ``form`` writes a number by a format of Python, ``thousands`` a whole one, ``spread`` a median
-    with its range; ``table(head, rows)`` is a table in Markdown.
+    with its range.
     """
     made = Environment(
-        loader=FileSystemLoader([folder, FRAME]),
+        loader=FileSystemLoader(folder),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -26,7 +26,6 @@ def environment(folder: Path) -> Environment:
     )
     made.filters |= {"form": format, "thousands": thousands, "spread": with_range}
     made.globals["zip"] = zip
-    made.globals["table"] = getattr(made.get_template("table.md.j2").module, "table")  # noqa: B009
     return made
 
 
@@ -38,7 +37,7 @@ def render(template: Path, values: Mapping[str, Any]) -> str:
     jinja2.UndefinedError
         Where it names what it is not given.
     """
-    return environment(template.parent).get_template(template.name).render(**values)
+    return _environment(template.parent).get_template(template.name).render(**values)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -50,7 +49,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     rows : iterable of sequence of str
         Cells, as many a row as in the head.
     """
-    return str(environment(FRAME).globals["table"](head, list(rows)))
+    macros = vars(_environment(FRAME).get_template("table.md.j2").module)
+    return str(macros["table"](head, list(rows)))
 
 
 def with_range(spread: Mapping[str, float], form: str = ".1f", unit: float = 1.0) -> str:

@@ -203,10 +203,10 @@ def peers(folder: Path, runs: int, cores: int) -> dict[str, Any]:
     cores : int
     """
     points = runs // REPLICATES
-    rows = {}
+    rows: dict[str, dict[str, Any]] = {}
     for tool in tools():
         trial = Trial(folder / tool.folder, tool, points, cores)
-        row = {"lines": written_lines(tool), "commands_after_kill": len(tool.again)}
+        row: dict[str, Any] = {"lines": written_lines(tool), "commands_after_kill": len(tool.again)}
         row["whole"] = trial.whole()
         row["failing"] = Trial(folder / tool.folder, tool, points, cores).failing()
         row["killed"] = Trial(folder / tool.folder, tool, points, cores).killed()

@@ -14,13 +14,14 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from sandmould import ROOT
 from sandmould.study.build_plan import open_plan
 
 REPLICATES = 5
 FIRST_HZ, STEP_HZ = 20.0, 0.04
-SHARED = {"wall_s": 10.0, "least": 2}
+SHARED: dict[str, Any] = {"wall_s": 10.0, "least": 2}
 """As ``profiles/default`` shares jobs."""
 LINKED = ("Snakefile", "workflow", "templates", "config", "profiles")
 _STUDY = """\

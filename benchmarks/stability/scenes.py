@@ -174,5 +174,7 @@ def limits_of(scene: str, damping_ratio: float, rotational_inertia: str = "physi
     with Opened(scenario) as opened:
         opened.begin(start.position_m, np.zeros_like(start.position_m))
         contacts = active_contacts(opened.session.solver)  # type: ignore[attr-defined]
-    steps = (estimate(contacts) for estimate in (simplified_step, grain_step, whole_step))
-    return Limits(*steps, scenario.critical_step.step_s)
+    return Limits(
+        simplified_step(contacts), grain_step(contacts), whole_step(contacts),
+        scenario.critical_step.step_s,
+    )  # fmt: skip
