@@ -20,7 +20,7 @@ class StopAskedError(Exception):
     """The benchmark wants no more of this problem."""
 
 
-class Talk:
+class JsonlPipe:
     """The program's end of the line."""
 
     def __init__(self) -> None:
@@ -53,24 +53,24 @@ class Talk:
         self.say({"guess": named, **more})
 
 
-def serve(solve: Callable[[Talk, dict[str, Any]], str], packages: Iterable[str]) -> None:
+def serve(solve: Callable[[JsonlPipe, dict[str, Any]], str], packages: Iterable[str]) -> None:
     """Solve one problem after the other until the benchmark hangs up.
 
     Parameters
     ----------
     solve : callable
-        Takes the line and the problem, and returns why it ended.
+        Takes the pipe and the problem, and returns why it ended.
     packages : iterable of str
         Whose versions are told.
     """
-    talk = Talk()
-    talk.say({"versions": {name: metadata.version(name) for name in packages}})
+    pipe = JsonlPipe()
+    pipe.say({"versions": {name: metadata.version(name) for name in packages}})
     for line in sys.stdin:
         try:
-            why = solve(talk, json.loads(line))
+            why = solve(pipe, json.loads(line))
         except StopAskedError:
             why = "asked to stop"
         except Exception as error:
             # A method that breaks has failed this problem, not the benchmark.
             why = f"{type(error).__name__}: {error}"
-        talk.say({"ended": why})
+        pipe.say({"ended": why})

@@ -17,7 +17,7 @@ from typing import Any
 import coexist
 import numpy as np
 from coexist.schedulers import Scheduler
-from talk import Talk, serve
+from jsonl_pipe import JsonlPipe, serve
 
 SCRIPT = """\
 # ACCESS PARAMETERS START
@@ -35,8 +35,8 @@ NEVER = 1e-9
 class FromBenchmark(Scheduler):
     """Runs that the benchmark makes."""
 
-    def __init__(self, talk: Talk, target: float) -> None:
-        self.talk, self.target = talk, target
+    def __init__(self, pipe: JsonlPipe, target: float) -> None:
+        self.pipe, self.target = pipe, target
         self.access: coexist.Access | None = None
 
     def __repr__(self) -> str:
@@ -49,7 +49,7 @@ class FromBenchmark(Scheduler):
             self.guess(progress.epochs[-1, :2])
         results = Path(dirpath) / "results"
         parameters = pickle.loads((results / f"parameters.{index}.pickle").read_bytes())
-        value = self.talk.ask(parameters["value"])
+        value = self.pipe.ask(parameters["value"])
         if value is not None:
             error = pickle.dumps(abs(value - self.target))
             (results / f"result.{index}.pickle").write_bytes(error)
@@ -60,12 +60,12 @@ class FromBenchmark(Scheduler):
         history = self.access.progress.history
         if np.isfinite(history[:, -1]).any():
             best = history[int(np.nanargmin(history[:, -1])), :2]
-            self.talk.guess({"estimate": favourite, "best run": best})
+            self.pipe.guess({"estimate": favourite, "best run": best})
 
 
-def solve(talk: Talk, problem: dict[str, Any]) -> str:
+def solve(pipe: JsonlPipe, problem: dict[str, Any]) -> str:
     """Learn with the defaults: epochs of eight, and the first point of the start as its start."""
-    scheduler = FromBenchmark(talk, problem["target"])
+    scheduler = FromBenchmark(pipe, problem["target"])
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         text = SCRIPT.format(
             low=problem["low"], high=problem["high"], values=list(problem["start"][0])

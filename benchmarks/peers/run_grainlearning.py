@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from grainlearning import DynamicSystem, IterativeBayesianFilter
-from talk import Talk, serve
+from jsonl_pipe import JsonlPipe, serve
 
 SAMPLES = 10
 """Of a generation, and the settings below: those of the two-parameter example in its manual."""
@@ -19,7 +19,7 @@ NO_VALUE = 0.0
 """Told for a run without a value, far from any target: the filter takes no gaps."""
 
 
-def solve(talk: Talk, problem: dict[str, Any]) -> str:
+def solve(pipe: JsonlPipe, problem: dict[str, Any]) -> str:
     """Run generations until the filter's own end, or on beyond it where the problem says so."""
     system = DynamicSystem.from_dict({
         "param_names": ["first", "second"],
@@ -37,13 +37,13 @@ def solve(talk: Talk, problem: dict[str, Any]) -> str:
     while True:
         points = inference.param_data_list[-1]
         system.set_param_data(points)
-        values = [talk.ask(point) for point in points]
+        values = [pipe.ask(point) for point in points]
         told = [NO_VALUE if value is None else value for value in values]
         system.set_sim_data(np.array(told).reshape(SAMPLES, 1, 1))
         # The posterior is known before new points are drawn, and drawing may fail.
         inference.run_inference(system)
         weights = inference.posterior
-        talk.guess(
+        pipe.guess(
             {"most probable": points[int(weights.argmax())], "mean": weights @ points},
             samples=points.tolist(),
             weights=weights.tolist(),

@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks import twins
-from sandmould import ROOT
+from benchmarks.agreement import engine_twins
 from sandmould.report.agreement import row_name
 from sandmould.statistics.agreement import (
     COLUMNS,
@@ -166,21 +165,21 @@ def test_speed_of_each_engine_fastest_first(tmp_path: Path) -> None:
 
 def records(folder: Path) -> Path:
     """Committed results of all studies of the page, the twins' own with planted values."""
-    for name in (twins.TWINS, *twins.EFFECTS):
+    for name in (engine_twins.TWINS, *engine_twins.EFFECTS):
         made = write_twins(folder / "made" / name, EQUAL, DENSE)
         collect(made)
         kept = folder / "records" / name
         kept.mkdir(parents=True)
         for file in ("runs.tsv", "summary.tsv"):
             shutil.copy(made / file, kept / file)
-        record = {"study": f"config/studies/{twins.TWINS}.yaml", "commit": "abc1234",
+        record = {"study": f"config/studies/{engine_twins.TWINS}.yaml", "commit": "abc1234",
                   "machine": {"processor": "one", "cores": 2}}  # fmt: skip
         (kept / "record.json").write_text(json.dumps(record))
     return folder / "records"
 
 
 def test_page_on_the_engines_has_its_tables(tmp_path: Path) -> None:
-    text = twins.page_text(records(tmp_path))
+    text = engine_twins.page(records(tmp_path))
     assert "# Do three engines fill and shake the same box alike?" in text
     assert "| solid fraction | lammps − reference | 0.81" in text
     assert text.count("| equivalent |") >= 6
@@ -193,10 +192,4 @@ def test_page_names_what_was_not_recorded(tmp_path: Path) -> None:
     folder = records(tmp_path)
     shutil.rmtree(folder / "frames")
     with pytest.raises(SystemExit, match="no record of frames"):
-        twins.page_text(folder)
-
-
-@pytest.mark.skipif(not twins.PAGE.exists(), reason="the engines' page is not committed yet")
-def test_committed_page_is_that_of_the_committed_results() -> None:
-    written = twins.PAGE.read_text(encoding="utf-8")
-    assert written == twins.page_text(), f"make twins, in {ROOT}"
+        engine_twins.page(folder)

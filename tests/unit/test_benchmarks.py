@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
-from benchmarks.engines import KEPT_JSON
-from benchmarks.engines_beds import Bed, solver_on, tiled
-from benchmarks.engines_page import page
-from benchmarks.engines_scale import advance, bytes_of
-from benchmarks.engines_timing import interleaved, ratio
-from sandmould import ROOT
+from benchmarks.engines.beds import Bed, solver_on, tiled
+from benchmarks.engines.scale import advance, bytes_of
+from benchmarks.engines.timing import interleaved, ratio
 
 
 @pytest.fixture
@@ -45,9 +40,3 @@ def test_ratios_are_taken_within_turns():
     found = interleaved({"a": lambda: next(turns), "b": lambda: next(turns)}, 3)
     assert found == {"a": [1.0, 2.0, 3.0], "b": [10.0, 4.0, 9.0]}
     assert ratio(found["b"], found["a"]) == {"median": 3.0, "least": 2.0, "most": 10.0}
-
-
-@pytest.mark.skipif(not KEPT_JSON.exists(), reason="make benchmarks has not run yet")
-def test_the_page_is_that_of_the_kept_numbers():
-    kept = json.loads(KEPT_JSON.read_text(encoding="utf-8"))
-    assert (ROOT / "docs" / "speed.md").read_text(encoding="utf-8") == page(kept)

@@ -13,26 +13,26 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks import calibration_oracle
-from benchmarks.calibration import Settings, keep, measure
-from benchmarks.calibration_coverage import (
+from benchmarks.calibration import oracle
+from benchmarks.calibration.coverage import (
     counted,
     dem_coverage,
     ellipse_holds,
     our_coverage,
     planted,
 )
-from benchmarks.calibration_methods import (
+from benchmarks.calibration.measure import CalibrationExtent, measure
+from benchmarks.calibration.methods import (
+    CalibrationProblem,
     Messages,
     Nearest,
     Ours,
     Peer,
     PeerError,
-    Problem,
     open_peers,
     problem_of,
 )
-from benchmarks.calibration_oracle import (
+from benchmarks.calibration.oracle import (
     ANGLE,
     KEYS,
     SECOND,
@@ -41,8 +41,8 @@ from benchmarks.calibration_oracle import (
     by_emulator,
     read_map,
 )
-from benchmarks.calibration_page import page
-from benchmarks.calibration_race import HELD_AFTER, Race, quartiles, run_race, summarised
+from benchmarks.calibration.page import page
+from benchmarks.calibration.race import HELD_AFTER, Race, quartiles, run_race, summarised
 from sandmould import ROOT
 from sandmould.study.plan.plan_files import read_run
 
@@ -50,19 +50,19 @@ NOISE_DEG = 0.8
 FAKE = """\
 import sys
 sys.path.insert(0, {peers!r})
-from talk import serve
+from jsonl_pipe import serve
 
-def solve(talk, problem):
+def solve(pipe, problem):
     if problem["target"] < 0:
         raise ValueError("no such angle")
     print("chatter that is no message")
     tried = []
     for first in (0, 4):
-        tried += [(talk.ask(p), p) for p in problem["start"][first : first + 4]]
+        tried += [(pipe.ask(p), p) for p in problem["start"][first : first + 4]]
         known = [(abs(v - problem["target"]), p) for v, p in tried if v is not None]
         nearest = min(known)[1]
         samples = [p for _, p in known]
-        talk.guess({{"nearest": nearest}}, samples=samples, weights=[1 / len(known)] * len(known))
+        pipe.guess({{"nearest": nearest}}, samples=samples, weights=[1 / len(known)] * len(known))
     return "two generations are enough"
 
 serve(solve, ("numpy",))
@@ -95,7 +95,7 @@ def fake(tmp_path: Path) -> Iterator[Peer]:
     peer.close()
 
 
-def problem(target: float = 25.0, tolerance: float = 0.8) -> Problem:
+def problem(target: float = 25.0, tolerance: float = 0.8) -> CalibrationProblem:
     return problem_of([0.1, 0.0], [0.8, 0.3], target, 0.5, tolerance, seed=1)
 
 
@@ -108,7 +108,7 @@ class Scripted:
         self.guesses = guesses
         self.got: list[float | None] = []
 
-    def solve(self, problem: Problem) -> Messages:
+    def solve(self, problem: CalibrationProblem) -> Messages:
         for guess in self.guesses:
             for _ in range(2):
                 self.got.append((yield {"ask": [0.0, 0.0]}))
@@ -148,7 +148,7 @@ def test_a_map_that_cannot_be_used_is_told_in_a_sentence(summary: Path, tmp_path
     with pytest.raises(NoMapError, match="cannot be read as a table"):
         read_map(bad)
     with pytest.raises(NoMapError, match="no angle of 80 degrees"):
-        measure(summary, [], Settings(targets=(80.0,)))
+        measure(summary, [], CalibrationExtent(targets=(80.0,)))
 
 
 def test_a_run_by_dem_is_the_studys_with_the_point_and_another_filling(
@@ -160,11 +160,10 @@ def test_a_run_by_dem_is_the_studys_with_the_point_and_another_filling(
         planned.append(read_run(folder / "scenario.yaml").scenario)
         return 0
 
-    monkeypatch.setattr(calibration_oracle, "simulate", simulated)
-    monkeypatch.setattr(calibration_oracle, "render_run", lambda folder: None)
-    monkeypatch.setattr(calibration_oracle, "write_measures", lambda folder, out: None)
-    kept = tmp_path / "runs.jsonl"
-    run = by_dem(1, kept)
+    monkeypatch.setattr(oracle, "simulate", simulated)
+    monkeypatch.setattr(oracle, "render_run", lambda folder: None)
+    monkeypatch.setattr(oracle, "write_measures", lambda folder, out: None)
+    run = by_dem(1, tmp_path)
     # Nothing was computed, so there is no angle.
     assert [math.isnan(run(point)) for point in ((0.3, 0.1), (0.3, 0.2))] == [True, True]
     first, second = planned
@@ -173,8 +172,9 @@ def test_a_run_by_dem_is_the_studys_with_the_point_and_another_filling(
     assert first.sand.size_scale == 8
     assert first.seed != second.seed
     # What was made is not made again, and what was cut off while it was written is.
-    kept.write_text(kept.read_text(encoding="utf-8")[:-10], encoding="utf-8")
-    run = by_dem(1, kept)
+    last = max(tmp_path.glob("*.json"), key=lambda path: path.stat().st_mtime_ns)
+    last.write_text(last.read_text(encoding="utf-8")[:-10], encoding="utf-8")
+    run = by_dem(1, tmp_path)
     run((0.3, 0.1))
     assert len(planned) == 2
     run((0.3, 0.2))
@@ -288,14 +288,9 @@ def test_regions_hold_what_they_should(summary: Path) -> None:
 
 
 def test_the_page_says_what_was_measured(summary: Path, fake: Peer, tmp_path: Path) -> None:
-    settings = Settings(seeds=2, truths=3, targets=(25.0,), cap=12)
+    settings = CalibrationExtent(seeds=2, truths=3, targets=(25.0,), cap=12)
     found = measure(summary, [Ours(), fake, Nearest()], settings)
-    file = tmp_path / "kept" / "calibration.json"
-    keep(found, "emulator", file)
-    keep(dem(found), "dem", file)
-    kept = json.loads(file.read_text(encoding="utf-8"))
-    assert list(kept) == ["emulator", "dem"]
-    text = page(kept)
+    text = page(json.loads(json.dumps({"emulator": found, "dem": dem(found)})))
     noise = found["noise"]["sd_deg"]
     assert f"differs from the mean of its point by {noise:.2f} degrees" in text
     assert "| 25 | sandmould | least expected miss |" in text

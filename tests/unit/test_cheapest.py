@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks import cheapest
-from benchmarks.cheapest import Factor, factors_of
-from benchmarks.twins import Recorded
+from benchmarks.agreement.recorded import Recorded
+from benchmarks.agreement.repose_settings import Factor, factors_of
 from sandmould.study.collect import compare_study
 from sandmould.study.definition.study import Study
 
@@ -59,8 +58,3 @@ def test_where_none_agrees_nothing_is_saved() -> None:
     assert found.saving == 1.0
     # The dearest minus this one, whichever came first in the sweep.
     assert found.levels[1].against.startswith("different: −3.")
-
-
-@pytest.mark.skipif(not cheapest.PAGE.exists(), reason="the page is not committed yet")
-def test_the_page_says_what_the_results_say() -> None:
-    assert cheapest.PAGE.read_text(encoding="utf-8") == cheapest.page_text()

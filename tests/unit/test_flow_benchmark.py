@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from benchmarks.mps_page import verdict, write
-from benchmarks.mps_peers import measured
-from benchmarks.mps_solvers import poisson_of, rows_here
+from benchmarks.mps.page import comparisons, draw, page
+from benchmarks.mps.peers import measured
+from benchmarks.mps.solvers import poisson_of, rows_here
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.tank import open_tank
 
@@ -25,15 +25,18 @@ def row(scheme: str, relaxations: int, cost: float, noise: float, **more: Any) -
 
 def test_several_relaxations_are_worth_it_where_no_cheaper_single_solve_is_calmer() -> None:
     several, single = row("MR5-0.5", 5, 4.0, 20.0), row("MR1-0.5", 1, 3.0, 50.0)
-    assert "**1 of 1 settings" in verdict([several, single])
+    assert comparisons([several, single]) == [
+        {"several": several, "single": single, "is_worth": True}
+    ]
     calmer = row("divergence", 1, 4.0, 10.0)
-    told = verdict([several, single, calmer])
-    assert "**0 of 1 settings" in told
-    assert "divergence: 4 s, 10 Pa" in told
+    assert comparisons([several, single, calmer]) == [
+        {"several": several, "single": calmer, "is_worth": False}
+    ]
     # one that costs more, or that a guard stopped, does not compete
-    assert "**1 of 1" in verdict([several, single, calmer | {"cpu_s_per_simulated_s": 4.1}])
-    assert "**1 of 1" in verdict([several, single, calmer | {"stopped": "it diverged"}])
-    assert "Not answered" in verdict([several])
+    for rival in ({"cpu_s_per_simulated_s": 4.1}, {"stopped": "it diverged"}):
+        (compared,) = comparisons([several, single, calmer | rival])
+        assert compared["is_worth"]
+    assert comparisons([several]) == []
 
 
 def test_solvers_solve_the_system_of_a_flow() -> None:
@@ -63,31 +66,33 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
     assert peer["mean_pressure_over_ideal"] == pytest.approx(1.0)
     assert peer["pressure_noise_pa"] == pytest.approx(100.0)
     assert peer["mean_speed_m_s"] == pytest.approx(0.2)
-    write(
-        {
-            "schemes": origin | {
-                "rows": [row("MR10-0.5", 10, 4.0, 20.0), row("MR1", 1, 3.0, 50.0)],
-                "again": [row("MR10-0.5", 10, 5.0, 20.0), row("MR10-0.5", 10, 3.0, 20.0)],
-            },
-            "solvers": origin | {"rows": [
-                {"solver": "SciPy cg, overrelaxed", "unknowns": 1000, "iterations": 18,
-                 "residual_fraction": 2e-3, "cpu_s": 8e-4},
-                {"solver": "SciPy spsolve", "unknowns": 1000, "iterations": 0,
-                 "residual_fraction": 1e-15, "cpu_s": 0.01},
-            ]},
-            "large": origin | {"row": large},
-            "peers": origin | {"own": row("MR10-0.5", 10, 4.5, 21.0),
-                               "rows": [peer | {"scheme": "PySPH iisph"},
-                                        {"scheme": "PySPH sisph", "stopped": "no compiler"}]},
+    results = {
+        "schemes": origin | {
+            "rows": [row("MR10-0.5", 10, 4.0, 20.0), row("MR1", 1, 3.0, 50.0)],
+            "again": [row("MR10-0.5", 10, 5.0, 20.0), row("MR10-0.5", 10, 3.0, 20.0)],
         },
-        tmp_path,
-    )  # fmt: skip
-    page = (tmp_path / "metal_flow.md").read_text()
-    assert "cost 0.9, 1.2, 1.5 s of processor time in 3 runs" in page
-    assert "takes 40 % of a step and finding neighbours 30 %" in page
-    assert "100 000 particles of metal and 70 000 of the mould" in page
-    assert "| 1 000 | SciPy cg, overrelaxed | 18 | 0.002 | 0.8 |" in page
-    assert "| SciPy spsolve | - |" in page
-    assert "| MR10-0.5 | this | 4.50 | 21.0 |" in page
-    assert "PySPH sisph gave no result: no compiler" in page
+        "solvers": origin | {"rows": [
+            {"solver": "SciPy cg, overrelaxed", "unknowns": 1000, "iterations": 18,
+             "residual_fraction": 2e-3, "cpu_s": 8e-4},
+            {"solver": "SciPy spsolve", "unknowns": 1000, "iterations": 0,
+             "residual_fraction": 1e-15, "cpu_s": 0.01},
+        ]},
+        "large": origin | {"row": large},
+        "peers": origin | {"own": row("MR10-0.5", 10, 4.5, 21.0),
+                           "rows": [peer | {"scheme": "PySPH iisph"},
+                                    {"scheme": "PySPH sisph", "stopped": "no compiler"}]},
+    }  # fmt: skip
+    draw(results, tmp_path)
+    text = page(results)
+    assert "**1 of 1 settings" in text
+    assert "MR10-0.5: 4 s, 20 Pa | MR1: 3 s, 50 Pa | yes" in text
+    assert "cost 0.9, 1.2, 1.5 s of processor time in 3 runs" in text
+    assert "takes 40 % of a step and finding neighbours 30 %" in text
+    assert "100 000 particles of metal and 70 000 of the mould" in text
+    assert "| 1 000 | SciPy cg, overrelaxed | 18 | 0.002 | 0.8 |" in text
+    assert "| SciPy spsolve | - |" in text
+    assert "| MR10-0.5 | this | 4.50 | 21.0 |" in text
+    assert "PySPH sisph gave no result: no compiler" in text
     assert (tmp_path / "metal_flow.png").stat().st_size > 5000
+    results["schemes"]["rows"].pop()
+    assert "Not answered: no scheme of one kind ran to its end." in page(results)

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks.scaling import KEPT_JSON, PAGE, Progress
-from benchmarks.scaling_chart import draw
-from benchmarks.scaling_measure import executed, files
-from benchmarks.scaling_model import Assumed, Measured, drain
-from benchmarks.scaling_page import page
-from benchmarks.scaling_peers import HERE, Tool, written_lines
-from benchmarks.scaling_study import REPLICATES, Place
+from benchmarks.scaling.chart import draw
+from benchmarks.scaling.measure import executed, files
+from benchmarks.scaling.model import Assumed, WorkflowCosts, drain
+from benchmarks.scaling.page import page
+from benchmarks.scaling.peers import HERE, Tool, written_lines
+from benchmarks.scaling.study import REPLICATES, Place
 from sandmould.study.plan.build_plan import open_plan
 
-COSTS = Measured(
+COSTS = WorkflowCosts(
     plan_s=0.001, graph_s=0.005, snakemake_s=2.0, job_start_s=1.5, job_start_s_per_run=0.0,
     imports_s=1.5, run_s=1.5, tables_s=0.005,
 )  # fmt: skip
@@ -92,14 +90,8 @@ def test_page_and_picture_are_made_from_numbers(found: dict[str, Any], tmp_path:
     assert (tmp_path / "scaling.png").stat().st_size > 1e4
 
 
-@pytest.mark.skipif(not KEPT_JSON.exists(), reason="make scaling has not run yet")
-def test_the_page_is_that_of_the_kept_numbers() -> None:
-    kept = json.loads(KEPT_JSON.read_text(encoding="utf-8"))
-    assert PAGE.read_text(encoding="utf-8") == page(kept)
-
-
 def test_slopes_are_read_from_the_smallest_and_the_largest_study(found: dict[str, Any]) -> None:
-    costs = Measured.of(found)
+    costs = WorkflowCosts.of(found)
     assert costs.graph_s == pytest.approx((0.0165 - 0.0015) / 3)
     assert costs.job_start_s_per_run == pytest.approx(5e-4)
     assert costs.run_s == pytest.approx(1.3 + 0.5 + 0.5)
@@ -140,22 +132,6 @@ def test_the_stand_in_is_planned_in_any_number(tmp_path: Path) -> None:
         plan = open_plan(place.study(runs))
         assert len(plan.runs) == runs
     assert len(open_plan(place.study(200, more_points=1)).runs) == 200 + REPLICATES
-
-
-def test_a_stopped_benchmark_goes_on(tmp_path: Path) -> None:
-    origin = {"commit": "abc"}
-    first = Progress(tmp_path / "kept.json", origin)
-    assert first.part("10 runs", lambda: {"cpu_s": 1.0}) == {"cpu_s": 1.0}
-    again = Progress(tmp_path / "kept.json", origin)
-    assert again.goes_on
-    assert again.part("10 runs", lambda: {"cpu_s": 2.0}) == {"cpu_s": 1.0}
-    assert again.kept["took_s"] == first.kept["took_s"]
-    changed = {"commit": "abc-dirty"}
-    Progress(tmp_path / "changed.json", changed).part("10 runs", dict)
-    assert not Progress(tmp_path / "changed.json", changed).goes_on
-    other = Progress(tmp_path / "kept.json", {"commit": "other"})
-    assert not other.goes_on
-    assert other.part("10 runs", lambda: {"cpu_s": 2.0}) == {"cpu_s": 2.0}
 
 
 @pytest.mark.slow

@@ -11,8 +11,8 @@ import math
 
 import pytest
 
-from benchmarks.stability_runs import BLOWS_UP, DRIFTS, STABLE, disturb
-from benchmarks.stability_scenes import limits_of, scenario_of
+from benchmarks.stability.runs import BLOWS_UP, DRIFTS, STABLE, disturb
+from benchmarks.stability.scenes import limits_of, scenario_of
 from sandmould.engines.choosing import engine_problem
 from tests.liggghts_scenes import needs_liggghts
 

@@ -1,0 +1,22 @@
+"""The pages on studies whose settings should agree, from the committed results.
+
+``python -m benchmarks.agreement`` writes docs/engine_twins.md and docs/repose_settings.md;
+``make twins`` computes and records the studies of the first before.
+"""
+
+from __future__ import annotations
+
+from benchmarks.agreement import engine_twins, repose_settings
+from benchmarks.frame import Benchmark
+
+BENCHMARK = Benchmark(
+    __file__,
+    __doc__,
+    pages={
+        "engine_twins.md": lambda results: engine_twins.page(),
+        "repose_settings.md": lambda results: repose_settings.page(),
+    },
+)
+
+if __name__ == "__main__":
+    BENCHMARK.command()

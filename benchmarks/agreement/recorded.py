@@ -1,0 +1,77 @@
+"""Committed studies and what they compared."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from sandmould import ROOT
+from sandmould.statistics.agreement import Compared, Speed, agreement_sentences, speeds
+from sandmould.study.collect import compare_study, swept_keys
+from sandmould.study.plan.load_study import open_study
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A committed study and what it compared."""
+
+    name: str
+    title: str
+    replicates: int
+    confidence: float
+    record: dict[str, Any]
+    keys: tuple[str, ...]
+    """Keys whose values are compared."""
+    compared: tuple[Compared, ...]
+    speeds: tuple[Speed, ...]
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Whether its settings agree."""
+        return agreement_sentences(self.compared, self.confidence)
+
+
+def read_recorded(folder: Path) -> Recorded:
+    """Judge a committed study again, by the margins of its file.
+
+    Raises
+    ------
+    OSError
+        When the folder holds no whole record.
+    """
+    record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
+    study = open_study(ROOT / record["study"]).study
+    summary = pd.read_csv(folder / "summary.tsv", sep="\t", dtype={"run": str, "version": str})
+    keys = swept_keys(pd.read_csv(folder / "runs.tsv", sep="\t"))
+    return Recorded(
+        folder.name,
+        study.title,
+        study.replicates,
+        study.equivalence.confidence,
+        record,
+        study.equivalence.keys,
+        compare_study(summary, keys, study),
+        speeds(summary),
+    )
+
+
+def read_all(records: Path, names: Sequence[str]) -> list[Recorded]:
+    """Read committed studies.
+
+    Raises
+    ------
+    SystemExit
+        Naming the studies that have no record yet.
+    """
+    missing = [name for name in names if not (records / name / "record.json").is_file()]
+    if missing:
+        raise SystemExit(
+            f"no record of {', '.join(missing)} in {records}: compute and record them "
+            "(make twins does for docs/engine_twins.md)"
+        )
+    return [read_recorded(records / name) for name in names]

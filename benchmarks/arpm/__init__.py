@@ -1,0 +1,1 @@
+"""Ways to solidify: docs/solidification.md."""

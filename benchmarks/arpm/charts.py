@@ -1,0 +1,104 @@
+"""The pictures of the page on solidification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from benchmarks.arpm.ways import FEM, PAPERS
+
+matplotlib.use("Agg")
+CASES = ("1-1", "1-2", "1-3", "1-4", "1-3A", "1-3B")
+COMPETITORS = ("finite differences", FEM)
+SHOWN_FROM_MM = 2.0
+"""Courses of one size are shown from here up, as finer ones lie on the axis."""
+Row = Mapping[str, Any]
+
+
+def draw(results: Mapping[str, Any], folder: Path) -> None:
+    """Draw all pictures that need no computation."""
+    contact, ways, space = (results[part]["rows"] for part in ("contact", "ways", "space"))
+    draw_ways(ways, space, folder / "solidification.png")
+    draw_courses(ways, folder / "solidification_courses.png")
+    draw_contact(contact, folder / "solidification_contact.png")
+
+
+def draw_ways(ways: Sequence[Row], space: Sequence[Row], path: Path) -> None:
+    """Mean error where the casting is thinnest over the processor's time, in 2D and 3D."""
+    figure = Figure(figsize=(13, 5.6), layout="constrained")
+    plane, solid = figure.subplots(1, 2)
+    _draw_cost(plane, ways[1:], "A")
+    _draw_cost(solid, space[1:], "plate")
+    plane.set_title("four plates in 2D, at A")
+    solid.set_title("block with a plate in 3D, in the plate")
+    figure.savefig(path, dpi=120)
+
+
+def _draw_cost(panel: Axes, rows: Sequence[Row], probe: str) -> None:
+    colours = matplotlib.colormaps["tab20"]
+    for place, name in enumerate(dict.fromkeys(r["way"] for r in rows)):
+        own = [r for r in rows if r["way"] == name]
+        rival = name in COMPETITORS
+        panel.loglog(
+            [r["cpu_s"] for r in own], [r["mean_error_percent"][probe] for r in own],
+            marker="osD^vP*X<>hpd8"[place], color="black" if rival else colours(place),
+            ls="--" if rival else "-", lw=1.2, ms=5, label=name,
+        )  # fmt: skip
+    panel.set_xlabel("processor time, s")
+    panel.set_ylabel("mean error of the cooling curve, % of 1530 K")
+    panel.grid(alpha=0.3, which="both")
+    panel.legend(fontsize=7)
+
+
+def draw_courses(ways: Sequence[Row], path: Path) -> None:
+    """Draw solidification time over size, error at A and enthalpy over time.
+
+    They are ours of the paper's Figures 8, 9 and 11, and 14.
+    """
+    figure = Figure(figsize=(13, 4.4), layout="constrained")
+    times, curves, drifts = figure.subplots(1, 3)
+    for name in (PAPERS[0], COMPETITORS[0]):
+        own = sorted((r for r in ways if r["way"] == name), key=lambda r: float(r["size_mm"]))
+        times.plot([r["size_mm"] for r in own], [r["solidification_time_s"] for r in own],
+                   marker="o", label=name)  # fmt: skip
+    times.set(xlabel="element size, mm", ylabel="solid after, s")
+    for row in (r for r in ways if r["way"] in PAPERS and r["size_mm"] >= SHOWN_FROM_MM):
+        case = "2-1" if row["way"] == PAPERS[0] else str(row["way"]).split(",")[0]
+        drawn = {"label": f"{case}, {row['size_mm']:g} mm", "lw": 1.2}
+        drawn["ls"] = "--" if case == "2-1" else "-"
+        curves.plot(row["course_s"], row["course_error_percent"], **drawn)
+        if case != "2-1" and row["size_mm"] == SHOWN_FROM_MM:
+            drifts.plot(row["course_s"], row["course_drift_percent"], **drawn)
+    curves.set(xlabel="time, s", ylabel="warmer at A than the reference, % of 1530 K")
+    drifts.set(xlabel="time, s", ylabel="change of the total enthalpy, %")
+    for panel in (times, curves, drifts):
+        panel.grid(alpha=0.3)
+        panel.legend(fontsize=7)
+    figure.savefig(path, dpi=120)
+
+
+def draw_contact(rows: Sequence[Row], path: Path) -> None:
+    """Figures 3 and 4 of the paper as ours."""
+    figure = Figure(figsize=(9, 6.5), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True)
+    own = [r for r in rows if r["exchange"] == "corrected"]
+    for line, resistance in zip(panels, sorted({r["resistance_m2k_w"] for r in own}), strict=True):
+        for panel, cases in zip(line, (CASES[:4], ("1-1", "1-3", *CASES[4:])), strict=True):
+            for case in cases:
+                of_case = [
+                    r for r in own if (r["case"], r["resistance_m2k_w"]) == (case, resistance)
+                ]
+                panel.plot([r["kernel_size"] for r in of_case],
+                           [r["error_percent"] for r in of_case], marker="o", ms=4,
+                           color=f"C{CASES.index(case)}", label=case)  # fmt: skip
+            panel.axhline(0.0, color="black", lw=0.6)
+            panel.set_ylabel(f"error (6), %, R = {resistance:g} m²K/W")
+            panel.legend(fontsize=8)
+    for panel in panels[1]:
+        panel.set_xlabel("kernel size c_k")
+    figure.savefig(path, dpi=120)

@@ -1,0 +1,122 @@
+"""The page on solidification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from benchmarks.arpm.charts import CASES, COMPETITORS
+from benchmarks.arpm.ways import PAPERS
+from benchmarks.frame import render
+
+PAPERS_SIZES_MM = (10.0, 5.0, 4.0, 2.5, 2.0, 1.0)
+UNIFORM = (PAPERS[0], 2.0)
+"""The paper's standard of accuracy, and what is to beat it."""
+ADAPTIVE = ("2-3B, faces, local steps", 2.0)
+KERNELS, LOCAL = (PAPERS[0], 1.0), ("uniform, faces, local steps", 1.0)
+LIMITS_PERCENT = (2.0, 1.0, 0.5, 0.2, 0.1)
+Row = Mapping[str, Any]
+
+
+class Pivot(NamedTuple):
+    """One value of rows, by some of their keys and over another."""
+
+    columns: list[Any]
+    lines: dict[tuple[Any, ...], list[Any]]
+
+
+def page(results: Mapping[str, Any]) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    results : mapping
+        What ``benchmarks.arpm`` measured.
+    """
+    contact, ways, space = (results[part]["rows"] for part in ("contact", "ways", "space"))
+    limits = results["limits"]
+    faces = [r for r in contact if r["exchange"] == "faces"]
+    of_one_side = [
+        r for r in contact
+        if (r["exchange"], r["case"], r["resistance_m2k_w"]) == ("corrected", "1-3A", 0.0)
+    ]  # fmt: skip
+    rows = {(r["way"], r["size_mm"]): r for r in reversed(ways)}
+    return render(Path(__file__).with_name("page.md.j2"), {
+        "papers": PAPERS,
+        "worst": worst,
+        "duels_of": duels_of,
+        "ways": ways,
+        "space": space,
+        "uniform": rows[UNIFORM], "adaptive": rows[ADAPTIVE], "kernels": rows[KERNELS],
+        "local": rows[LOCAL],
+        "papers_rows": [
+            r for r in ways if r["way"] in PAPERS and r["size_mm"] in PAPERS_SIZES_MM
+        ],
+        "contact_errors": {form: _contact_errors(contact, form)
+                           for form in ("corrected", "printed")},
+        "least_of_one_side": min(of_one_side, key=lambda r: abs(r["error_percent"])),
+        "faces_most_percent": max(abs(r["error_percent"]) for r in faces),
+        "faces_largest_k": max(r["largest_k"] for r in faces),
+        "limits": limits,
+        "jumps": pivot(limits["jumps"], ("exchange", "kernel_size"), "ratio", "largest_k"),
+        "scatter": pivot(limits["scatter"], ("exchange",), "scatter", "largest_k"),
+        "origins": results,
+    })  # fmt: skip
+
+
+def worst(row: Row) -> float:
+    """The larger of the mean error at the worst probe and that of the solidification time, %."""
+    return max(*row["mean_error_percent"].values(), abs(float(row["time_error_percent"])))
+
+
+def cheapest(rows: Sequence[Row], error_percent: float, are_rivals: bool) -> Row | None:
+    """The least costly of the rows that are no worse than an error; None if none is.
+
+    Parameters
+    ----------
+    rows : sequence of rows
+        The reference left out.
+    error_percent : float
+    are_rivals : bool
+        Whether to look among finite differences and scikit-fem, or among elements.
+    """
+    good = [
+        r for r in rows if worst(r) <= error_percent and (r["way"] in COMPETITORS) == are_rivals
+    ]
+    return min(good, key=lambda r: float(r["cpu_s"]), default=None)
+
+
+def duels_of(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """The cheapest elements and the cheapest competitor at several accuracies.
+
+    Parameters
+    ----------
+    rows : sequence of rows
+        The reference first.
+    """
+    duels = []
+    for limit in LIMITS_PERCENT:
+        elements, rival = (cheapest(rows[1:], limit, are_rivals) for are_rivals in (False, True))
+        if elements is not None and rival is not None:
+            times = float(rival["cpu_s"]) / float(elements["cpu_s"])
+            duels.append({"limit_percent": limit, "elements": elements, "rival": rival,
+                          "times": times})  # fmt: skip
+    return duels
+
+
+def pivot(rows: Sequence[Row], by: Sequence[str], over: str, value: str) -> Pivot:
+    """Lines by some keys, columns by another in its order."""
+    columns = sorted({r[over] for r in rows})
+    values = {(*(r[key] for key in by), r[over]): r[value] for r in rows}
+    lines = dict.fromkeys(tuple(r[key] for key in by) for r in rows)
+    return Pivot(columns, {line: [values[*line, column] for column in columns] for line in lines})
+
+
+def _contact_errors(rows: Sequence[Row], form: str) -> Pivot:
+    """Error (6) of each case over the size of the kernel, in the paper's order."""
+    own = sorted(
+        (r for r in rows if r["exchange"] == form),
+        key=lambda r: (r["resistance_m2k_w"], CASES.index(r["case"])),
+    )
+    return pivot(own, ("resistance_m2k_w", "case"), "kernel_size", "error_percent")

@@ -1,0 +1,1 @@
+"""Calibration beside its peers: docs/calibration_peers.md."""

@@ -1,0 +1,15 @@
+"""What all benchmarks share: one command line, one way to keep parts, one kind of page."""
+
+from benchmarks.frame.benchmark import SCRATCH, Benchmark, BenchmarkRun
+from benchmarks.frame.page import render, table, thousands
+from benchmarks.frame.parts import Parts
+
+__all__ = [
+    "SCRATCH",
+    "Benchmark",
+    "BenchmarkRun",
+    "Parts",
+    "render",
+    "table",
+    "thousands",
+]

@@ -1,0 +1,1 @@
+"""Ways to let metal flow: docs/metal_flow.md."""

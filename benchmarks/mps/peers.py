@@ -1,0 +1,57 @@
+"""PySPH's implicit schemes on the same tank, in an environment of their own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sandmould import ROOT
+from sandmould.casting.mps.stability import ideal_pa
+
+PYTHON = ROOT / ".venv-peers-flow" / "bin" / "python"
+PROGRAM = Path(__file__).parents[1] / "peers" / "run_pysph.py"
+SCHEMES = ("iisph", "sisph")
+LIMIT_S = 3600.0
+"""Wall time after which a peer is stopped."""
+TOLD = 300
+"""Characters of an error that are kept."""
+
+
+def peer_rows(duration_s: float) -> list[dict[str, Any]]:
+    """Run each scheme; a row of one that fails says why."""
+    rows = [_row(scheme, duration_s) for scheme in SCHEMES]
+    print(rows, flush=True)
+    return rows
+
+
+def _row(scheme: str, duration_s: float) -> dict[str, Any]:
+    name = {"scheme": f"PySPH {scheme}"}
+    command = [str(PYTHON), str(PROGRAM), scheme, str(duration_s)]
+    try:
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
+    except subprocess.TimeoutExpired:
+        return name | {"stopped": f"no answer within {LIMIT_S:g} s, compiling included"}
+    except OSError as error:
+        return name | {"stopped": f"{error}: make flow makes its environment"}
+    if ran.returncode:
+        return name | {"stopped": ran.stderr.strip()[-TOLD:]}
+    return name | measured(json.loads(ran.stdout), duration_s)
+
+
+def measured(told: dict[str, Any], duration_s: float) -> dict[str, Any]:
+    """Take noise, speed and cost from what a peer tells, over the second half of its run."""
+    time_s = np.array(told["time_s"])
+    later = time_s > 0.5 * duration_s
+    pressure = np.array(told["pressure_pa"])[later]
+    return {
+        "version": told["version"],
+        "stopped": "",
+        "cpu_s_per_simulated_s": told["cpu_s"] / float(time_s[-1]),
+        "mean_pressure_over_ideal": float(pressure.mean() / ideal_pa()[-1]),
+        "pressure_noise_pa": float(pressure.std()),
+        "mean_speed_m_s": float(np.array(told["mean_speed_m_s"])[later].mean()),
+    }

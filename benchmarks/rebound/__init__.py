@@ -1,0 +1,1 @@
+"""Rebound by engine and step."""

@@ -1,0 +1,42 @@
+"""Angle of heaps by where the fit of their slope begins: ``python -m benchmarks.heap_fit FOLDER``.
+
+FOLDER is that of a finished study, such as results/repose_paper; its last snapshots are measured.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from analysis import repose
+from benchmarks.frame import table
+from sandmould.engines.snapshot import Snapshot
+from sandmould.study.kinds.sand.moments import list_moments
+from sandmould.study.kinds.sand.outflow import slopes
+from sandmould.study.plan.plan_files import read_run
+
+FEET = (0.2, 0.3, repose.HEAP_FOOT, 0.4, 0.5)
+
+
+def main(study: Path) -> None:
+    """Measure, print."""
+    heaps = [
+        (read_run(folder / "scenario.yaml").scenario, Snapshot.load(list_moments(folder)[-1].path))
+        for folder in sorted((study / "runs").iterdir())
+    ]
+    rows = []
+    for foot in FEET:
+        repose.HEAP_FOOT = foot
+        found = [slopes(scenario, sand)[0] for scenario, sand in heaps]
+        angle = [slope.angle_deg for slope in found]
+        error = np.mean([slope.se_deg for slope in found])
+        rows.append([f"{foot:.0%}", f"{np.mean(angle):.1f}", f"{np.std(angle, ddof=1):.1f}",
+                     f"{error:.1f}"])  # fmt: skip
+    head = ["fitted from", "angle, degrees", "sd of heaps", "error of one fit, mean"]
+    print(table(head, rows))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

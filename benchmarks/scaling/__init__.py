@@ -1,0 +1,1 @@
+"""Thousands of runs: docs/scaling.md."""

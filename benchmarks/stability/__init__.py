@@ -1,0 +1,1 @@
+"""Where the time step fails: docs/stability.md."""
