@@ -23,7 +23,7 @@ from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.gain import measure_gain
 from pattern_fe.coupling.relaxation import MeasuredRelaxation, relaxation_of
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
-from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.session import EngineStop, RefusedError, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
@@ -237,6 +237,20 @@ class CoupledSession(DelegatingSession):
         """State of all grains relative to the box, and the pattern among them."""
         moved_m = self._body.vertices_m + self.displacement_m
         return replace(self.sand.snapshot(), pattern_m=moved_m, pattern_load_n=self._load)
+
+    def save_checkpoint(self) -> Any:
+        """Refuse: the loop repeats its windows itself.
+
+        Raises
+        ------
+        RefusedError
+        """
+        valid = "a scheme without windows, where windows are repeated from outside"
+        raise RefusedError("pattern.loop.scheme", self._loop.scheme, valid)
+
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Refuse as ``save_checkpoint`` does."""
+        self.save_checkpoint()
 
     def write_checkpoint(self, folder: Path) -> None:
         """Write the engine's state and the loop's."""

@@ -67,7 +67,13 @@ def engine_module(name: str) -> EngineModule:
 
 
 def engines_that(can: Callable[[Capabilities], bool]) -> list[str]:
-    """Names of the engines whose sessions can do something, in the order of the registry."""
+    """Names of the engines whose sessions can do something, in the order of the registry.
+
+    Parameters
+    ----------
+    can : callable
+        Whether capabilities are enough.
+    """
     names: list[str] = Engine.model_json_schema()["properties"]["name"]["enum"]
     return [name for name in names if can(engine_module(name).CAPABILITIES)]
 

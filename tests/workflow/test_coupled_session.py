@@ -17,7 +17,7 @@ from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.session import EngineStop, RefusedError, Session
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
@@ -118,6 +118,15 @@ def after(session: CoupledSession, folder: Path) -> tuple[pd.DataFrame, Any]:
     session._shapes.flush()
     ledger = read_convergence_log(folder / CONVERGENCE_LOG)
     return ledger, ledger.iloc[-1]
+
+
+def test_windows_are_not_repeated_from_outside(tmp_path: Path) -> None:
+    session = coupled(tmp_path)
+    with pytest.raises(
+        RefusedError, match=r"pattern.loop.scheme = 'fixed' .* a scheme without win"
+    ):
+        session.save_checkpoint()
+    session.close()
 
 
 def test_shapes_and_loads_are_those_of_every_record(tmp_path: Path) -> None:
