@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from benchmarks.engines_timing import interleaved, seconds, spread
+from sandmould.compiled import njit
 from sandmould.dem.motion import drift, kick
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.pairs import gather_incoming, press_pairs

@@ -5,7 +5,6 @@ its arrays says whether it computes discs (2) or spheres (3); nothing else diffe
 """
 
 import hashlib
-import os
 from pathlib import Path
 
 import numba
@@ -17,9 +16,3 @@ def source_hash() -> str:
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
-
-
-# Numba notices a change in a kernel's own file, not in the files of what it calls: each state of
-# the room has a cache of its own.
-_CACHES = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "sandmould"
-numba.config.CACHE_DIR = str(_CACHES / f"kernels-{source_hash()}")  # type: ignore[attr-defined]

@@ -6,9 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.nearest_point import nearest
 from sandmould.dem.surfaces import SurfaceArrays
 from sandmould.dem.vectors import OPTIONS, dot, load, plus, store, times

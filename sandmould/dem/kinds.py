@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.contact_law import Law, Pairing, pairing
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.vectors import INLINED, OPTIONS
@@ -60,7 +60,7 @@ def _pair_up(radius: Floats, mass: Floats, law: Law, pairings: Floats) -> None:
 
 
 @njit(**INLINED)
-def pairing_of(pairings: Floats, kind_1: int, kind_2: int) -> Pairing:
+def pairing_of(pairings: Floats, kind_1: int | np.uint64, kind_2: int | np.uint64) -> Pairing:
     """Give what two kinds make of each other."""
     return Pairing(
         pairings[kind_1, kind_2, 0], pairings[kind_1, kind_2, 1], pairings[kind_1, kind_2, 2]

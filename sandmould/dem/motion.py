@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from numba import njit
-
+from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.vectors import (
     INLINED,

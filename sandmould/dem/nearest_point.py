@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.vectors import INLINED, dot, load, plus, times
 
 FAR = math.inf

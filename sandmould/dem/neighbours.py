@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.vectors import OPTIONS, dot, like, load, load_spin, plus, store, times
 

@@ -11,8 +11,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sandmould.compiled import njit
 from sandmould.dem.contact_law import Law, contact
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.kinds import Kinds, pairing_of

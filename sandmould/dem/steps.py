@@ -6,8 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sandmould.compiled import njit
 from sandmould.dem.barrier import wait_for_all
 from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.contact_law import Law

@@ -12,9 +12,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.contact_law import Law, contact, pairing
 from sandmould.dem.nearest_point import FAR, nearest

@@ -13,21 +13,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from llvmlite import binding
 from numba.extending import overload, register_jitable
 
-binding.set_option("sandmould", "-align-all-functions=6")  # at the beginning of a line of 64 bytes
 OPTIONS: dict[str, Any] = {
-    "cache": True,
     "nogil": True,
     "fastmath": {"contract", "nsz"},
     "error_model": "numpy",
 }
-"""How every kernel is compiled: fused multiply-add allowed, no other change of the arithmetic.
-
-Functions begin lines of the cache: taken from the disk they lie elsewhere than freshly compiled,
-and the same instructions were a quarter slower where they began in the middle of a line.
-"""
+"""How every kernel is compiled: fused multiply-add allowed, no other change of the arithmetic."""
 INLINED = OPTIONS | {"forceinline": True}
 """For functions called for every contact: their many arguments stay in registers."""
 index = np.uint64

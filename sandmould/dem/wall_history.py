@@ -10,9 +10,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS, dot, load, load_spin, no_spin, store
 
 SAME_CONTACT = math.cos(math.radians(30.0))

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.broad_phase import find_candidates
 from sandmould.dem.nearest_point import nearest
 from sandmould.dem.surfaces import Surfaces, farthest_moved, move_vertices

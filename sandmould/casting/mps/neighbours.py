@@ -6,12 +6,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
 from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight
+from sandmould.compiled import njit
 
 SKIN = 0.35
 """Over the particle size. Wider lists last longer, and each pass over them costs more."""

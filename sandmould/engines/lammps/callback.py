@@ -2,8 +2,7 @@
 
 No Python runs in a step: LAMMPS gets the address of a compiled function and of a table of arrays
 that the session owns. The grains' own arrays are asked of LAMMPS in each call, since it moves them
-when grains are inserted. All that is compiled for LAMMPS alone stands in this one file, whose
-changes numba notices; those of the kernels it knows from their hash.
+when grains are inserted.
 """
 
 from __future__ import annotations
@@ -12,8 +11,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import carray, types
 
+from sandmould.compiled import cfunc, njit
 from sandmould.dem.addresses import (
     Floats,
     Ints,
@@ -378,6 +378,6 @@ def address_of(what: str, dimension: int) -> int:
     """Address of the function that LAMMPS is to call: ``press`` or ``damp``."""
     key = (what, dimension)
     if key not in _COMPILED:
-        _COMPILED[key] = cfunc(_SIGNATURE, cache=True)(_PLAIN[key])
+        _COMPILED[key] = cfunc(_SIGNATURE)(_PLAIN[key])
     address: int = _COMPILED[key].address
     return address

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sandmould.compiled import njit
 from sandmould.dem.addresses import call_with_two
 from sandmould.dem.barrier import new_barrier, wait_for_all
 from sandmould.dem.grains import Floats, Ints
