@@ -7,7 +7,6 @@ and of the processor: nodes of a cluster that share a home may differ in what th
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -17,6 +16,8 @@ from typing import Any, TypeVar
 import llvmlite
 import numba
 from llvmlite import binding
+
+from sandmould.digest import SHORT, digest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 PACKAGES = ("sandmould", "pattern_fe", "analysis")
@@ -80,9 +81,8 @@ def cache_key(sources: Iterable[bytes], versions: Iterable[str], processor: Iter
     processor : iterable of str
         Its name and its features, as LLVM names them.
     """
-    parts = [*sources, *(text.encode() for text in (*versions, *processor))]
-    digests = (hashlib.sha256(part).digest() for part in parts)
-    return hashlib.sha256(b"".join(digests)).hexdigest()[:12]
+    parts: list[str | bytes] = [*sources, *versions, *processor]
+    return digest(*map(digest, parts))[:SHORT]
 
 
 def cache_folder() -> Path:

@@ -9,7 +9,7 @@ from typing import TextIO
 from sandmould.engines.guard import Health
 from sandmould.engines.session import Array
 from sandmould.engines.snapshot import Snapshot
-from sandmould.runs.checkpoint import Mark
+from sandmould.runs.checkpoint_folders import Mark
 
 _SERIES = ("time_s", "vibration_time_s", "stage", "grains", "kinetic_energy_j", "rms_speed_m_s",
            "largest_overlap_fraction")  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import time
 from dataclasses import dataclass
@@ -18,8 +17,9 @@ from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.solidification import Cooling, UnstableError, solidify
 from sandmould.casting.arpm.solidification import Progress as Cooled
 from sandmould.casting.arpm.solidification import Solidification as Found
-from sandmould.casting.checkpoint import Checkpoint
-from sandmould.casting.hashing import hash_with
+from sandmould.digest import sources_digest
+from sandmould.runs.checkpoint_file import CheckpointFile
+from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, peak_memory_bytes
 from sandmould.runs.progress import Progress
@@ -51,12 +51,12 @@ def source_files() -> list[Path]:
 
 def source_hash() -> str:
     """State of the solver, which stands in place of a version."""
-    return hashlib.sha256(b"".join(f.read_bytes() for f in source_files())).hexdigest()[:12]
+    return sources_digest(source_files())
 
 
 def computed_hash(scenario: Solidification) -> str:
     """Hash of scenario and solver."""
-    return hash_with(scenario, source_hash())
+    return solution_hash(scenario, source_hash())
 
 
 def engine_of(scenario: Solidification) -> str:
@@ -88,8 +88,8 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     elements, filling = scene.elements_of(scenario), scene.filling_of(scenario)
     cost.elements = len(elements.size_m)
     cooled = Cooled(0.0, 0.0, 0.0, 0)
-    checkpoint = Checkpoint(work / CHECKPOINT, computed_hash(scenario))
-    newest = checkpoint.newest()
+    checkpoint = CheckpointFile(work / CHECKPOINT, computed_hash(scenario))
+    newest = checkpoint.read()
 
     def tell(now: Cooled) -> None:
         nonlocal cooled
@@ -103,7 +103,8 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
         probes_m = {probe.name: np.array(probe.at_m) for probe in scenario.probes}
         found = solidify(
             elements, filling, marching, probes_m, scenario.record_s, scenario.until_s, tell,
-            Cooling.of(newest) if newest else None, lambda now: checkpoint.keep(now.arrays),
+            Cooling.of(newest) if newest else None,
+            lambda now: checkpoint.write_when_due(now.arrays),
         )  # fmt: skip
     except (UnstableError, ValueError) as stop:
         code = Outcome.UNSTABLE if isinstance(stop, UnstableError) else Outcome.BAD_INPUT

@@ -174,8 +174,7 @@ def _corrected(kernel: Kernel, near: Neighbours, kind: Kinds, gradient: Floats) 
         moment[:, 2, 2] = 1.0
     # where too few neighbours span the space, the uncorrected gradient stays
     moment[np.linalg.det(moment) < SMALLEST_MOMENT] = np.eye(3)
-    corrected: Floats = np.linalg.solve(moment, gradient)
-    return corrected
+    return np.asarray(np.linalg.solve(moment, gradient), dtype=np.float64)
 
 
 def pressure_gradient(

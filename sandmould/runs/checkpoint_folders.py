@@ -1,14 +1,15 @@
-"""Checkpoints on disk: two in turn, each whole or not there at all."""
+"""Checkpoints that engines write to folders: two in turn, each whole or not there at all."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+from sandmould.digest import file_digest
+from sandmould.runs.files import write_text
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,9 @@ class Mark:
     """The cost row so far."""
 
 
-def _digest(folder: Path) -> dict[str, str]:
+def _digests(folder: Path) -> dict[str, str]:
     return {
-        p.name: hashlib.sha256(p.read_bytes()).hexdigest()
+        p.name: file_digest(p)
         for p in sorted(folder.iterdir())
         if not p.name.startswith("mark.json")
     }
@@ -37,10 +38,8 @@ def _digest(folder: Path) -> dict[str, str]:
 
 def seal(folder: Path, mark: Mark) -> None:
     """Close a checkpoint folder: the mark with the files' hashes comes last."""
-    partial = folder / "mark.json.partial"
-    text = json.dumps({"mark": asdict(mark), "sha256": _digest(folder)})
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, folder / "mark.json")
+    text = json.dumps({"mark": asdict(mark), "sha256": _digests(folder)})
+    write_text(folder / "mark.json", text)
 
 
 def next_folder(work: Path) -> Path:
@@ -80,7 +79,7 @@ def newest_checkpoint(work: Path) -> tuple[tuple[Path, Mark] | None, list[str]]:
             continue
         try:
             sealed = json.loads((folder / "mark.json").read_text(encoding="utf-8"))
-            if sealed["sha256"] != _digest(folder):
+            if sealed["sha256"] != _digests(folder):
                 raise ValueError("its files do not match their hashes")
             whole.append((folder, Mark(**sealed["mark"])))
         except (OSError, ValueError, KeyError, TypeError) as error:
