@@ -18,7 +18,7 @@ from sandmould.engines.recording import Recorder
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs import checkpoint_folders as checkpoints
-from sandmould.runs.checkpoint_folders import Mark
+from sandmould.runs.checkpoint_folders import CheckpointMark
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Cost, cpu_time_s, peak_memory_bytes
 from sandmould.runs.progress import Progress
@@ -138,7 +138,7 @@ class Driver:
         # Last, since the time of an engine of its own process counts once that has ended.
         self._read_clocks()
 
-    def _go(self, session: Session, mark: Mark | None) -> None:
+    def _go(self, session: Session, mark: CheckpointMark | None) -> None:
         names = [stage.name for stage in self._program.stages]
         first = names.index(mark.stage) if mark else 0
         for number, stage in enumerate(self._program.stages[first:], start=first):
@@ -218,7 +218,7 @@ class Driver:
             series_bytes, loads_bytes = self._recorder.sizes()
             checkpoints.seal(
                 folder,
-                Mark(
+                CheckpointMark(
                     self._hash,
                     session.stage.name,
                     session.steps,

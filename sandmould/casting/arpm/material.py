@@ -17,7 +17,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Material:
+class ThermalMaterial:
     """Constant properties; between solidus and liquidus the latent heat goes linearly.
 
     Raises
@@ -102,7 +102,7 @@ class EnthalpyTable:
         return np.asarray(_temperatures(enthalpy_j_m3, material, self.rows, self.reference_k))
 
 
-def enthalpy_table(materials: Sequence[Material], reference_k: float) -> EnthalpyTable:
+def enthalpy_table(materials: Sequence[ThermalMaterial], reference_k: float) -> EnthalpyTable:
     """Tabulate materials.
 
     Parameters

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 from sandmould.casting.mps import scene
-from sandmould.casting.mps.flow import EscapedError, Flow
-from sandmould.casting.mps.flow import Progress as Flowed
+from sandmould.casting.mps.flow import EscapedError, Flow, FlowProgress
 from sandmould.casting.mps.pressure import ClosedRegionError
-from sandmould.casting.mps.record import OF_FLUID, Record
+from sandmould.casting.mps.record import OF_FLUID, FlowRecord
 from sandmould.digest import sources_digest
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.hashing import solution_hash
@@ -90,16 +89,16 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)
     begun, cost = time.monotonic(), no_cost(scenario)
-    shown = Progress(run, work, scene.expected_work(scenario), WORK)
+    progress = Progress(run, work, scene.expected_work(scenario), WORK)
     with contextlib.suppress(ArithmeticError):
         scene.open_flow(scenario).step()  # compiled before it is timed
     course = _Course(scenario, CheckpointFile(work / CHECKPOINT, computed_hash(scenario)))
     flow, outcome, detail = course.flow, Outcome.FINISHED, ""
 
-    def tell(now: Flowed | None = None) -> None:
+    def tell(now: FlowProgress | None = None) -> None:
         done = flow.cost.particle_solves
         rate = done / max(flow.cost.wall_s, 1e-9)
-        shown.show(course.stage, flow.time_s, done, rate, last=now is None)
+        progress.show(course.stage, flow.time_s, done, rate, last=now is None)
 
     try:
         flow.advance(scenario.duration_s, course, tell)
@@ -126,7 +125,7 @@ class _Course:
         self.flow = scene.open_flow(scenario)
         self._ladle = scene.ladle_of(scenario, self.flow)
         up = -np.asarray(self.flow.metal.gravity_m_s2) / scenario.metal.gravity_m_s2
-        self.record = Record(scene.places_of(scenario), scenario.record_s, up)
+        self.record = FlowRecord(scene.places_of(scenario), scenario.record_s, up)
         self._checkpoint = checkpoint
         self._clock_s = {"cpu_s": time.process_time(), "wall_s": time.monotonic()}
         self.before_s = dict.fromkeys(self._clock_s, 0.0)

@@ -28,7 +28,7 @@ from sandmould.dem.addresses import (
 from sandmould.dem.broad_phase import Candidates, find_candidates
 from sandmould.dem.contact_law import Law
 from sandmould.dem.motion import ISOTROPIC, damped
-from sandmould.dem.surface_contacts import press_on_surfaces
+from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
 from sandmould.dem.vectors import (
     OPTIONS,
@@ -288,7 +288,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         numbers[6] != 0.0,
         numbers[7] != 0.0,
     )
-    press_on_surfaces(
+    surface_forces(
         dim,
         0,
         counts[ROWS],
