@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 import re
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+
+from sandmould.digest import SHORT, digest
+from sandmould.runs.files import write_text
 
 
 class Parts:
@@ -35,7 +36,7 @@ class Parts:
 
     def path(self, name: str) -> Path:
         """File of a part."""
-        key = hashlib.sha256(f"{self._origin}\n{name}".encode()).hexdigest()[:16]
+        key = digest(f"{self._origin}\n{name}")[:SHORT]
         return self.folder / f"{re.sub('[^a-z0-9]+', '_', name.lower())[:40]}_{key}.json"
 
     def get(self, name: str, measure: Callable[[], Any]) -> Any:
@@ -56,9 +57,7 @@ class Parts:
             value = measure()
             text = json.dumps({"took_s": time.perf_counter() - begun, "value": value})
             self.folder.mkdir(parents=True, exist_ok=True)
-            partial = path.with_name(path.name + ".partial")
-            partial.write_text(text, encoding="utf-8")
-            os.replace(partial, path)
+            write_text(path, text)
             stored = json.loads(text)
         return stored["value"]
 

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, njit, types
+from numba import carray, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS
 
 Floats = NDArray[np.float64]

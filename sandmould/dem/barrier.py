@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS
 
 _ARRIVED, _TURN = 0, 8

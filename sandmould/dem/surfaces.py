@@ -11,9 +11,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS
 
 Array = NDArray[np.float64]

@@ -11,12 +11,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange, set_num_threads
+from numba import prange, set_num_threads
 from numpy.typing import NDArray
 
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
 from sandmould.casting.arpm.raster import Raster
+from sandmould.compiled import njit
 
 Array = NDArray[np.float64]
 
@@ -88,7 +89,7 @@ def _between(material: Any, axis: int, cell_m: float, conductivity: Array, resis
     return found
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _difference_steps(
     steps: int, dt: float, time_s: float, through_x: Any, through_y: Any, through_z: Any,
     material: Any, rows: Any, reference: float, enthalpy: Any, temperature: Any, frozen: Any,

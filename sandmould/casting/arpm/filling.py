@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.marching import Heat, Substance
-from sandmould.casting.arpm.material import EnthalpyTable, Material, enthalpy_table
+from sandmould.casting.arpm.material import EnthalpyTable, ThermalMaterial, enthalpy_table
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class Filling:
         When the lists differ in length or a temperature is not above 0 K.
     """
 
-    materials: tuple[Material, ...]
+    materials: tuple[ThermalMaterial, ...]
     """The first is the mould."""
     initial_k: tuple[float, ...]
     resistance_m2k_w: float = 0.0

@@ -13,12 +13,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange, set_num_threads
+from numba import prange, set_num_threads
 from numpy.typing import NDArray
 
 from sandmould.casting.arpm.exchange import Exchange
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat, Substance
 from sandmould.casting.arpm.material import temperature_of
+from sandmould.compiled import njit
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -108,7 +109,7 @@ class LocalSteps:
         heat.element_steps += cycles * int((of_level * 2 ** np.arange(top, -1, -1)).sum())
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _update(
     ending: int, at: int, dt: float, time_s: float, level: Any, fastest: Any, start: Any,
     neighbour: Any, rate: Any, material: Any, rows: Any, reference: float, integral: Any,
@@ -140,7 +141,7 @@ def _update(
             frozen[i] = time_s + at * dt - (1.0 - share) * own_dt
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _keep(ending: int, at: int, dt: float, level: Any, slowest: Any, integral: Any,
           temperature: Any, new: Any) -> None:  # fmt: skip
     """Add ended steps to the integrals that slower neighbours read, and take new temperatures."""
@@ -153,7 +154,7 @@ def _keep(ending: int, at: int, dt: float, level: Any, slowest: Any, integral: A
         temperature[i] = new[i]
 
 
-@njit(cache=True)
+@njit()
 def _local_steps(
     cycles: int, dt: float, time_s: float, end: Any, level: Any, slowest: Any, fastest: Any,
     start: Any, neighbour: Any, rate: Any, material: Any, rows: Any, reference: float,

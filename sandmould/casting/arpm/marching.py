@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numba import njit, prange, set_num_threads
+from numba import prange, set_num_threads
 from numpy.typing import NDArray
 
 from sandmould.casting.arpm.exchange import Exchange
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
+from sandmould.compiled import njit
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -103,7 +104,7 @@ class ExplicitSteps:
         heat.element_steps += steps * len(s.material)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _explicit_steps(
     steps: int, dt: float, time_s: float, start: Any, neighbour: Any, rate: Any,
     material: Any, rows: Any, reference: float, enthalpy: Any, temperature: Any, frozen: Any,

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from sandmould.compiled import njit
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Material:
+class ThermalMaterial:
     """Constant properties; between solidus and liquidus the latent heat goes linearly.
 
     Raises
@@ -101,7 +102,7 @@ class EnthalpyTable:
         return np.asarray(_temperatures(enthalpy_j_m3, material, self.rows, self.reference_k))
 
 
-def enthalpy_table(materials: Sequence[Material], reference_k: float) -> EnthalpyTable:
+def enthalpy_table(materials: Sequence[ThermalMaterial], reference_k: float) -> EnthalpyTable:
     """Tabulate materials.
 
     Parameters
@@ -121,7 +122,7 @@ def enthalpy_table(materials: Sequence[Material], reference_k: float) -> Enthalp
     return EnthalpyTable(reference_k, np.array(rows, dtype=np.float64))
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     """Temperature (K) of an enthalpy (J/m3) of material m; compiled code takes it in."""
     if enthalpy < rows[m, 1]:
@@ -132,7 +133,7 @@ def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     return rows[m, 4] + (enthalpy - rows[m, 2]) / rows[m, 0]
 
 
-@njit(cache=True)
+@njit()
 def _temperatures(enthalpy: Any, material: Any, rows: Any, reference: float) -> Any:
     found = np.empty(len(enthalpy))
     for i in range(len(enthalpy)):

@@ -27,7 +27,7 @@ class UnstableError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Progress:
+class CoolingProgress:
     """How far a run is."""
 
     time_s: float
@@ -38,7 +38,7 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class Solidification:
+class SolidificationResult:
     """What a run found."""
 
     time_s: Array
@@ -100,10 +100,10 @@ def solidify(
     probes_m: Mapping[str, Array] | None = None,
     record_s: float = 5.0,
     until_s: float = 20_000.0,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[CoolingProgress], None] | None = None,
     start: Cooling | None = None,
     keep: Callable[[Cooling], None] | None = None,
-) -> Solidification:
+) -> SolidificationResult:
     """Cool a casting until all of it is below its solidus.
 
     Parameters
@@ -158,10 +158,10 @@ def solidify(
         if progress:
             share = max(volume[frozen].sum() / volume.sum(), target_s / until_s)
             rate = heat.element_steps / now.wall_s
-            progress(Progress(target_s, 100.0 * float(share), rate, heat.element_steps))
+            progress(CoolingProgress(target_s, 100.0 * float(share), rate, heat.element_steps))
         if keep:
             keep(now)
-    return Solidification(
+    return SolidificationResult(
         np.array(now.time_s),
         dict(zip(probes_m or {}, np.array(now.probe_k).T, strict=True)),
         np.array(now.enthalpy_j),

@@ -10,12 +10,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange, set_num_threads
+from numba import prange, set_num_threads
 from numpy.typing import NDArray
 
 from sandmould.casting.arpm.exchange import Exchange
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat, Substance
 from sandmould.casting.arpm.material import temperature_of
+from sandmould.compiled import njit
 
 Array = NDArray[np.float64]
 STAGES = 9
@@ -109,7 +110,7 @@ def _gain(stages: int) -> float:
     return (stages**2 + stages - 2) / 4.0
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _taken(start: Any, neighbour: Any, rate: Any, temperature: Any, taken: Any) -> None:
     """Heat that each element takes up, W/m3, into an array."""
     for i in prange(len(taken)):
@@ -119,7 +120,7 @@ def _taken(start: Any, neighbour: Any, rate: Any, temperature: Any, taken: Any) 
         taken[i] = total
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _stage(
     weights: Any, dt: float, begin: Any, at_begin: Any, last: Any, older: Any, taken: Any,
     material: Any, rows: Any, reference: float, temperature: Any,
@@ -132,7 +133,7 @@ def _stage(
         temperature[i] = temperature_of(older[i], material[i], rows, reference)
 
 
-@njit(cache=True)
+@njit()
 def _super_steps(
     steps: int, dt: float, time_s: float, weights: Any, start: Any, neighbour: Any, rate: Any,
     material: Any, rows: Any, reference: float, enthalpy: Any, temperature: Any, frozen: Any,

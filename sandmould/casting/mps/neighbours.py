@@ -6,18 +6,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
 from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight
+from sandmould.compiled import njit
 
 SKIN = 0.35
 """Over the particle size. Wider lists last longer, and each pass over them costs more."""
 
 
-class Candidates(NamedTuple):
+class VerletList(NamedTuple):
     """Particles that may come within the kernel of each other, both ways round."""
 
     start: NDArray[np.int64]
@@ -76,7 +76,7 @@ def _both_ways(
     return start, other
 
 
-def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> Candidates:
+def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> VerletList:
     """List candidates.
 
     Parameters
@@ -96,7 +96,7 @@ def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> Candidat
     reach_m = kernel.reach_m + SKIN * kernel.spacing_m
     pair = tree.query_pairs(reach_m, output_type="ndarray")
     start, other = _both_ways(len(position_m), pair, kind)
-    return Candidates(start, other, position_m.copy())
+    return VerletList(start, other, position_m.copy())
 
 
 @njit(**OPTIONS)
@@ -120,14 +120,14 @@ def _nearest(apart: float, period: float) -> float:
 
 @njit(**OPTIONS)
 def find_neighbours(
-    kernel: Kernel, listed: Candidates, position: Floats, kind: Kinds
+    kernel: Kernel, listed: VerletList, position: Floats, kind: Kinds
 ) -> Neighbours:
     """Pick the neighbours out of the candidates and weigh them.
 
     Parameters
     ----------
     kernel : Kernel
-    listed : Candidates
+    listed : VerletList
         Not old.
     position : (n, 3) float64, m
     kind : (n,) int8

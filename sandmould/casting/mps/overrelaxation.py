@@ -12,12 +12,12 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
 from sandmould.casting.mps.particles import Floats
 from sandmould.casting.mps.weight import INLINED, OPTIONS
+from sandmould.compiled import njit
 
 RELAXATION = 1.5
 MOST_ITERATIONS = 2000

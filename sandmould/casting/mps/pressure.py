@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
@@ -15,6 +14,7 @@ from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.overrelaxation import System, solve
 from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
 from sandmould.casting.mps.weight import OPTIONS, Kernel
+from sandmould.compiled import njit
 
 Flags = NDArray[np.bool_]
 Numbers = NDArray[np.int64]

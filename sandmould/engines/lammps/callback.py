@@ -2,8 +2,7 @@
 
 No Python runs in a step: LAMMPS gets the address of a compiled function and of a table of arrays
 that the session owns. The grains' own arrays are asked of LAMMPS in each call, since it moves them
-when grains are inserted. All that is compiled for LAMMPS alone stands in this one file, whose
-changes numba notices; those of the kernels it knows from their hash.
+when grains are inserted.
 """
 
 from __future__ import annotations
@@ -12,8 +11,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import carray, types
 
+from sandmould.compiled import cfunc, njit
 from sandmould.dem.addresses import (
     Floats,
     Ints,
@@ -28,7 +28,7 @@ from sandmould.dem.addresses import (
 from sandmould.dem.broad_phase import Candidates, find_candidates
 from sandmould.dem.contact_law import Law
 from sandmould.dem.motion import ISOTROPIC, damped
-from sandmould.dem.surface_contacts import press_on_surfaces
+from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
 from sandmould.dem.vectors import (
     OPTIONS,
@@ -288,7 +288,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         numbers[6] != 0.0,
         numbers[7] != 0.0,
     )
-    press_on_surfaces(
+    surface_forces(
         dim,
         0,
         counts[ROWS],
@@ -378,6 +378,6 @@ def address_of(what: str, dimension: int) -> int:
     """Address of the function that LAMMPS is to call: ``press`` or ``damp``."""
     key = (what, dimension)
     if key not in _COMPILED:
-        _COMPILED[key] = cfunc(_SIGNATURE, cache=True)(_PLAIN[key])
+        _COMPILED[key] = cfunc(_SIGNATURE)(_PLAIN[key])
     address: int = _COMPILED[key].address
     return address

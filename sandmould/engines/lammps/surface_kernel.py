@@ -10,7 +10,7 @@ import numpy as np
 
 from sandmould.dem.addresses import table_of
 from sandmould.dem.surfaces import Surfaces
-from sandmould.dem.vectors import like
+from sandmould.dem.vectors import dim_of
 from sandmould.dem.wall_history import new_history
 from sandmould.engines.box_motion import displacements
 from sandmould.engines.lammps.callback import (
@@ -61,7 +61,7 @@ class SurfaceKernel:
         d, n = scenario.dimension, sum(program.counts)
         self._dimension = d
         arrays = self._surfaces.arrays
-        memory = new_history(like(d), n)
+        memory = new_history(dim_of(d), n)
         # The names must live as long as LAMMPS is asked by their addresses.
         self._names = [ctypes.create_string_buffer(name) for name in GRAIN_ARRAYS]
         law = scene_of(scenario, program.stages[0], self._counts.step_s).wall_law

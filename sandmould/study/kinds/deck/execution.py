@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 
 import pandas as pd
 
 from sandmould.engines.own_deck import computation
 from sandmould.engines.own_deck import deck as own_deck
+from sandmould.runs.files import replaced, write_text
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.definition.run import LAST_MEASURED, Run
@@ -20,9 +20,7 @@ def render(run: Run, folder: Path) -> None:
     """Write the deck as the engine reads it at the beginning."""
     own_deck.check_unchanged(run.scenario)
     text = own_deck.render(run.scenario, run.run, run.study)
-    partial = folder / "deck.in.partial"
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
+    write_text(folder / "deck.in", text)
 
 
 def compute(run: Run, folder: Path) -> Computed:
@@ -42,9 +40,8 @@ def measure(run: Run, folder: Path) -> None:
     time_s = series["time_s"] if "time_s" in series else pd.Series(dtype=float)
     clock = {"time_s": time_s, "vibration_time_s": -1.0, "stage": "deck"}
     table = pd.DataFrame({**clock, **{name: series[name] for name in names}})
-    partial = folder / "measures.tsv.partial"
-    table.to_csv(partial, sep="\t", index=False)
-    os.replace(partial, folder / "measures.tsv")
+    with replaced(folder / "measures.tsv") as partial:
+        table.to_csv(partial, sep="\t", index=False)
     _draw(table, names, folder / LAST_MEASURED)
 
 

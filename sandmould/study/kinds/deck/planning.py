@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from sandmould.digest import SHORT, digest
 from sandmould.engines.choosing import engine_module
 from sandmould.engines.own_deck import deck as own_deck
 from sandmould.scenario.bad_input import Problem
@@ -35,13 +35,12 @@ def sources(scenario: OwnDeck) -> list[Path]:
 def template_hash(scenario: OwnDeck) -> str:
     """Hash of template and files as they are now."""
     now = own_deck.with_hashes(scenario.model_copy(update={"sha256": {}})).sha256
-    return hashlib.sha256("".join(sorted(now.values())).encode()).hexdigest()[:12]
+    return digest(*sorted(now.values()))[:SHORT]
 
 
 def computed_hash(scenario: OwnDeck) -> str:
     """Hash of the rendered deck and of the files that it reads."""
-    text = own_deck.render(scenario, "run", "study") + template_hash(scenario)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return digest(own_deck.render(scenario, "run", "study"), template_hash(scenario))
 
 
 def threads(scenario: OwnDeck) -> int:

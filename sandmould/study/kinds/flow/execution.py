@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from sandmould.casting.mps import computation, scene
-from sandmould.casting.mps.measured import by_window, measure_flow
+from sandmould.casting.mps.stability_measures import by_window, measure_flow
 from sandmould.runs.outcome import RunOutcome
 from sandmould.scenario.flow import MetalFlow
 from sandmould.study.definition.run import Run

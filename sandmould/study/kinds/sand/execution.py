@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from sandmould.engines import choosing, recording
+from sandmould.engines.cost import cost_before
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.program import build_program
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.products import SAND_PRODUCTS, Computed, Cost
+from sandmould.runs.products import SAND_PRODUCTS, Computed
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import Execution
@@ -51,6 +52,6 @@ EXECUTION = Execution[Scenario](
     render=render,
     compute=compute,
     complete=complete,
-    no_cost=Cost.of,
+    no_cost=cost_before,
     measure=measure,
 )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from pathlib import Path
 
 import pattern_fe
+from sandmould.digest import digest
 from sandmould.engines import choosing
 from sandmould.engines.program import build_program
 from sandmould.scenario import checks
@@ -60,8 +60,7 @@ def computed_hash(scenario: Scenario) -> str:
     of_engine = choosing.computed_hash(scenario)
     if scenario.pattern is None:
         return of_engine
-    beside = scenario.pattern.model_dump_json() + pattern_fe.source_hash()
-    return hashlib.sha256((of_engine + beside).encode()).hexdigest()
+    return digest(of_engine, scenario.pattern.model_dump_json(), pattern_fe.source_hash())
 
 
 def vibration_s(scenario: Scenario) -> float:
