@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -145,7 +144,7 @@ def _unfinished(study: OpenStudy, results: Path) -> Iterator[Problem]:
     for i, name in enumerate(study.study.calibration.also):
         if not (results / name / "summary.tsv").is_file():
             key = f"calibration.also.{i}"
-            valid = f"a study with results: make study STUDY=config/studies/{name}.yaml comes first"
+            valid = f"a study with results: sandmould run {name} comes first"
             yield Problem(key, name, valid, study.origin.file_of(key))
 
 
@@ -181,17 +180,3 @@ def announce(plan: Plan, results: Path, cores: int) -> str:
     rates = {each: kind.rate(one, results) for each, one in one_each.items()}
     title = plan.study.study.title or plan.study.name
     return f"\n{title}\n{plan_table(plan.runs, rates, cores)}"
-
-
-def main(path: Path) -> int:
-    """Check a study and print its plan; nothing starts."""
-    try:
-        print(announce(open_plan(path), RESULTS, os.cpu_count() or 1))
-    except BadInputError as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main(Path(sys.argv[1])))

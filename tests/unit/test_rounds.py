@@ -248,7 +248,7 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
 
     monkeypatch.setattr(driving, "_snakemake", snakemake)
     monkeypatch.setattr("sandmould.study.kinds.sand.rate", lambda *_: 1e7)
-    assert driving.main(["trial.yaml"]) == 0
+    assert driving.drive(Path("trial.yaml"), []) == 0
     # Three rounds of four runs after the ten of the sweep, then the controls, each computed once.
     assert calls == [["results/trial/summary.tsv"]] * 4 + [[]]
     assert len(computed) == len(set(computed))
@@ -264,5 +264,5 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
     assert all((swept[FREQUENCY] == f).sum() >= 2 for f in (low, best, high))
     # Again: nothing is left to compute.
     many = len(computed)
-    assert driving.main(["trial.yaml"]) == 0
+    assert driving.drive(Path("trial.yaml"), []) == 0
     assert len(computed) == many
