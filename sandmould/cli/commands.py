@@ -7,9 +7,8 @@ imported in its body, so that no verb waits for the imports of another.
 from __future__ import annotations
 
 import os
-from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -35,7 +34,7 @@ Cores = Annotated[
 class _Verbs(TyperGroup):
     """Verbs that say what is wrong with an input in one sentence a problem."""
 
-    def invoke(self, ctx: typer.Context) -> object:
+    def invoke(self, ctx: Any) -> Any:
         """Call a verb; status 1 after bad input."""
         try:
             return super().invoke(ctx)
@@ -55,6 +54,8 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version
+
         typer.echo(f"sandmould {version('sandmould')}")
         raise typer.Exit
 
@@ -82,7 +83,9 @@ def run(
     study: StudyFile,
     options: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[-- SNAKEMAKE'S OPTIONS]", help="As in -- --workflow-profile slurm"),
+        typer.Argument(
+            metavar="[-- SNAKEMAKE'S OPTIONS]", help="Such as -- --workflow-profile slurm"
+        ),
     ] = None,
     cores: Cores = None,
 ) -> None:

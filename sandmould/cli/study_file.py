@@ -28,7 +28,7 @@ def study_file(text: str) -> Path:
     if text in shipped_studies():
         return shipped
     path = Path(text)
-    if path.exists():
+    if path.is_file():
         return path
     near = difflib.get_close_matches(path.stem, shipped_studies(), n=3, cutoff=0.5)
     names = ", ".join(near or shipped_studies())
