@@ -218,6 +218,7 @@ def test_what_cannot_be_refined_is_told(tmp_path: Path, changes: dict[str, Any],
         opened(tmp_path, **changes)
 
 
+@pytest.mark.slow
 def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The runs are planted instead of computed: Snakemake itself is tested in tests/workflow."""
     monkeypatch.chdir(tmp_path)

@@ -23,7 +23,6 @@ reference: {exchange: corrected, element_m: 0.01}
 """
 
 
-@pytest.mark.slow
 def test_a_study_from_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("coarse.yaml").write_text(COARSE)
