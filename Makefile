@@ -1,10 +1,4 @@
-# make demo   the main job on real input: sand flows into a tube at six frequencies
-# make test   lint, types, import contract and all tests
-# The rest: make study STUDY=config/studies/tube_frequency.yaml, plan, status, decks, schema, lock,
-# twins (the engines compared, docs/engine_twins.md), verification (docs/verification.md),
-# stability (docs/stability.md), benchmarks (docs/speed.md), peers (docs/calibration_peers.md),
-# scaling (docs/scaling.md), solidification (docs/solidification.md), flow (docs/metal_flow.md),
-# results-check, clean.
+# `make` alone lists the targets: a line of two hashes above a target is its help.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= $(shell nproc)
@@ -14,20 +8,71 @@ INSTALLED := .venv/installed
 
 TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 
-.PHONY: demo study plan status twins verification stability test lint decks schema lock results-check clean benchmarks peers scaling solidification flow
+LINT := lint-style lint-types lint-imports lint-rules lint-names
 
+.DEFAULT_GOAL := help
+.PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
+.PHONY: twins verification stability benchmarks peers scaling solidification flow
+
+help:
+	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
+	@awk '/^## / {help = substr($$0, 4); next} \
+	  help && /^[a-z-]+:/ {sub(/:.*/, "", $$1); printf "  %-14s %s\n", $$1, help} {help = ""}' \
+	  $(firstword $(MAKEFILE_LIST))
+	@echo 'The command itself: $(BIN)/sandmould --help'
+
+## the main job on real input: sand flows into a tube at six frequencies
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
 
+## compute STUDY, or what is missing of it, and write its report
 study: $(INSTALLED)
-	@$(BIN)/python -m sandmould.study.run_study $(STUDY) --cores $(CORES) --quiet rules host
+	@$(BIN)/sandmould run $(STUDY) --cores $(CORES) -- --quiet rules host
 
+## check STUDY and print its runs and their price; nothing starts
 plan: $(INSTALLED)
-	@$(BIN)/python -m sandmould.study.plan.build_plan $(STUDY)
+	@$(BIN)/sandmould plan $(STUDY) --cores $(CORES)
 
+## where STUDY stands and what is left of it
 status: $(INSTALLED)
-	@$(BIN)/python -m sandmould.study.status $(STUDY)
+	@$(BIN)/sandmould status $(STUDY) --cores $(CORES)
 
+## write the report of STUDY again from its results
+report: $(INSTALLED)
+	@$(BIN)/sandmould report $(STUDY)
+
+## lint, types, import contract and the fast half of the tests, in two minutes on two cores
+quick: $(INSTALLED)
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint fast-tests
+
+## lint, types, import contract and all tests
+test: lint
+	$(BIN)/pytest -n 2 --dist loadfile
+
+fast-tests: $(INSTALLED)
+	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser"
+
+## lint, types and import contract alone
+lint: $(LINT)
+
+lint-style: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+lint-types: $(INSTALLED)
+	$(BIN)/mypy
+
+lint-imports: $(INSTALLED)
+	$(BIN)/lint-imports
+
+lint-rules: $(INSTALLED)
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakemake --lint
+
+lint-names: $(INSTALLED)
+	$(BIN)/python -m benchmarks.house.names
+
+## the engines compared: docs/engine_twins.md
 twins: $(INSTALLED)
 	@for name in $(TWINS); do \
 	  $(MAKE) --no-print-directory study STUDY=config/studies/$$name.yaml \
@@ -35,19 +80,24 @@ twins: $(INSTALLED)
 	done
 	@$(BIN)/python -m benchmarks.twins
 
+## exact cases on all engines: docs/verification.md
 verification: $(INSTALLED)
 	$(BIN)/python -m tests.verification.table
 
+## where each engine becomes unstable: docs/stability.md
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
 
+## how fast the engines are: docs/speed.md
 benchmarks: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.engines $(QUICK)
 
 # The peers need an older numpy, so they have an environment of their own.
+## calibration beside other tools: docs/calibration_peers.md
 peers: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.calibration $(QUICK)
 
+## what the workflow costs up to 10 000 runs: docs/scaling.md
 scaling: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.scaling $(QUICK)
 
@@ -61,38 +111,38 @@ scaling: $(INSTALLED) .venv-peers/installed
 	.venv-peers-flow/bin/pip install --quiet --disable-pip-version-check --requirement $<
 	touch $@
 
+## metal flow: docs/metal_flow.md
 flow: $(INSTALLED) .venv-peers-flow/installed
 	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.mps $(QUICK)
 
 # Compiled loops of one thread wait for no other.
+## solidification: docs/solidification.md
 solidification: $(INSTALLED)
 	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.arpm $(QUICK)
 
-test: lint
-	$(BIN)/pytest -n 2 --dist loadfile
+## draw the rooms and write docs/architecture.md
+architecture: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.house.architecture
 
-lint: $(INSTALLED)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports
-	$(BIN)/snakefmt --check Snakefile workflow
-	$(BIN)/snakemake --lint
-
+## render the golden decks again
 decks: $(INSTALLED)
 	$(BIN)/pytest tests/decks --refresh-golden
 
+## config/schema.json and config/default.yaml from the types
 schema: $(INSTALLED)
 	$(BIN)/python -m sandmould.study.schema
 
+## pin all dependencies in requirements.lock
 lock:
 	$(BIN)/pip-compile --quiet --extra dev --generate-hashes --allow-unsafe --strip-extras \
 	  --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-header \
 	  --output-file requirements.lock pyproject.toml
 
+## list stale results of docs/results and compute the smallest again
 results-check: $(INSTALLED)
 	$(BIN)/python -m sandmould.study.records check
 
+## remove results
 clean:
 	rm -rf results .snakemake
 

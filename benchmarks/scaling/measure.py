@@ -72,7 +72,7 @@ def finished(place: Place, runs: int, study: Path) -> Row:
     folder = f"Path('results/{study.stem}')"
     return {
         "nothing_to_do": asdict(place.snakemake(study, "--cores", "2", shared=True)),
-        "status": asdict(place.python("-m", "sandmould.study.status", study.name)),
+        "status": asdict(place.python("-m", "sandmould.cli", "status", study.name)),
         "collect": asdict(place.python("-c", _COLLECT.format(folder))),
         "report": asdict(place.python("-c", _REPORT.format(folder))),
         "report_bytes": (place.results(runs) / "report.html").stat().st_size,

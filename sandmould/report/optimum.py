@@ -163,7 +163,7 @@ def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
     return (
         f"{many} added {added or 'any'} runs to the {swept} of the sweep, "
         f"{number(spent_h, 2)} h of processor time in all. "
-        f"{ledger.ended or 'Rounds go on: make study continues them.'}"
+        f"{ledger.ended or 'Rounds go on: sandmould run continues them.'}"
     )
 
 

@@ -1,4 +1,4 @@
-"""A study from its file to its report: ``python -m sandmould.study.run_study STUDY.yaml``.
+"""A study from its file to its report.
 
 Snakemake computes the runs; where the study asks for rounds, its results choose the runs of the
 next one, which are appended until there is reason to end, then those of its certificate. Options
@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from sandmould.scenario.bad_input import BadInputError
+from sandmould import ROOT
 from sandmould.study.collect import gather
 from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.rounds.decide import next_runs, told
@@ -61,25 +61,10 @@ def drive(path: Path, options: Sequence[str]) -> int:
 
 def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> int:
     cores = [] if any(o in ("--cores", "-c", "--jobs", "-j") for o in options) else _all_cores()
-    command = [sys.executable, "-m", "snakemake", *cores, "--configfile", str(path), *options]
+    workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path)]
+    command = [sys.executable, "-m", "snakemake", *cores, *workflow, *options]
     return subprocess.run([*command, *(["--", *targets] if targets else [])]).returncode
 
 
 def _all_cores() -> list[str]:
     return ["--cores", str(os.cpu_count() or 1)]
-
-
-def main(arguments: Sequence[str]) -> int:
-    """Say what is wrong with a study, or drive it."""
-    if not arguments:
-        print("which study? such as config/studies/tube_demo.yaml", file=sys.stderr)
-        return 2
-    try:
-        return drive(Path(arguments[0]), arguments[1:])
-    except BadInputError as error:
-        print(error, file=sys.stderr)
-        return 1
-
-
-if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))

@@ -1,4 +1,4 @@
-"""Where a study stands: ``python -m sandmould.study.status STUDY.yaml``; ``make status``."""
+"""Where a study stands: runs done, running, failed, time left and cost so far."""
 
 from __future__ import annotations
 
@@ -6,11 +6,8 @@ import contextlib
 import fcntl
 import json
 import math
-import os
-import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -19,9 +16,8 @@ import pandas as pd
 
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.plan.build_plan import DEFAULT_STUDY, RESULTS, Plan, open_plan
+from sandmould.study.plan.build_plan import Plan
 from sandmould.study.rounds.ledger import read_ledger
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
@@ -146,18 +142,3 @@ def _left(plan: Plan, found: dict[str, RunStatus], cores: int) -> str:
         if left_s
         else ("nothing left")
     )
-
-
-def main(arguments: Sequence[str]) -> int:
-    """Print where a study stands; nothing starts."""
-    try:
-        plan = open_plan(Path(arguments[0]) if arguments else DEFAULT_STUDY)
-    except BadInputError as error:
-        print(error, file=sys.stderr)
-        return 1
-    print(status_text(plan, RESULTS, os.cpu_count() or 1))
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))

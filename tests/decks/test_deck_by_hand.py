@@ -52,6 +52,7 @@ def run_through(session: LammpsSession | LiggghtsSession) -> None:
         session.end_stage()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scene",
     [

@@ -87,6 +87,7 @@ def test_a_deck_without_rolling_names_no_rolling_model() -> None:
     assert "coefficientRollingFriction" not in text
 
 
+@pytest.mark.slow
 @needs_liggghts
 @pytest.mark.parametrize("frame", ["box", "laboratory"])
 def test_deck_by_hand_equals_the_session_to_the_last_digit(frame: str, tmp_path: Path) -> None:

@@ -216,6 +216,7 @@ def test_failures_count_as_longer_than_anything() -> None:
     assert (row["guess"], row["failures"]) == ("none stated", 1)
 
 
+@pytest.mark.slow
 def test_our_method_finds_the_ridge_of_the_map(summary: Path) -> None:
     known = read_map(summary)
     race = run_race(

@@ -88,6 +88,7 @@ def test_picture_of_a_run_without_snapshots_shows_the_scene(folder: Path) -> Non
     assert list(pd.read_csv(folder / "measures.tsv", sep="\t").columns)
 
 
+@pytest.mark.slow
 def test_record_is_stale_when_its_study_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,6 +108,7 @@ def test_record_is_stale_when_its_study_changes(
     assert "gone" in told["gone"]
 
 
+@pytest.mark.slow
 def test_record_of_a_study_with_rounds_rests_on_the_runs_they_added(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

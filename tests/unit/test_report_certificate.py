@@ -82,6 +82,7 @@ def shaken_loads(run: Run) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns).assign(vibration_time_s=-1.0)
 
 
+@pytest.mark.slow
 def test_an_artefact_is_the_first_sentence_of_the_report(tmp_path: Path) -> None:
     moved = {"hold velocity": 75.0, "hold displacement": 110.0}
     folder = write_certified(tmp_path / "held", moved)

@@ -82,6 +82,7 @@ def test_the_chart_has_a_curve_a_time_and_what_others_found(tmp_path: Path) -> N
     assert chart.lines[4].xy[:, 1].argmax() == 2
 
 
+@pytest.mark.slow
 def test_the_page_shows_it(tmp_path: Path) -> None:
     folder = write_study(tmp_path / "tube")
     write_report(folder, folder / "report.html")
@@ -90,6 +91,7 @@ def test_the_page_shows_it(tmp_path: Path) -> None:
     assert "the box moves" in page
 
 
+@pytest.mark.slow
 def test_its_figures_are_files_too(tmp_path: Path) -> None:
     folder = write_study(tmp_path / "tube")
     write_report(folder, folder / "report.html")

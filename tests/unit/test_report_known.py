@@ -127,6 +127,7 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_map_has_its_table_its_picture_and_its_sands(mapped: Path) -> None:
     write_report(mapped, mapped / "report.html")
     text = (mapped / "report.html").read_text(encoding="utf-8")

@@ -35,6 +35,7 @@ def write_refined(folder: Path, best_hz: float = BEST_HZ, width_hz: float = 40.0
     return folder
 
 
+@pytest.mark.slow
 def test_the_report_begins_with_the_optimum(tmp_path: Path) -> None:
     folder = write_refined(tmp_path / "refined")
     study = read_study(folder)

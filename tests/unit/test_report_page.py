@@ -154,6 +154,7 @@ def test_method_is_told(text: str) -> None:
         assert said.lower() in words.lower(), said
 
 
+@pytest.mark.slow
 def test_same_study_gives_the_same_page(text: str, study: Path, tmp_path: Path) -> None:
     write_report(study, study / "again.html")
     assert (study / "again.html").read_text(encoding="utf-8") == text

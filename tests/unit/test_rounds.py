@@ -218,6 +218,7 @@ def test_what_cannot_be_refined_is_told(tmp_path: Path, changes: dict[str, Any],
         opened(tmp_path, **changes)
 
 
+@pytest.mark.slow
 def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The runs are planted instead of computed: Snakemake itself is tested in tests/workflow."""
     monkeypatch.chdir(tmp_path)
@@ -247,7 +248,7 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
         return 0
 
     monkeypatch.setattr(driving, "_snakemake", snakemake)
-    assert driving.main(["trial.yaml"]) == 0
+    assert driving.drive(Path("trial.yaml"), []) == 0
     # Three rounds of four runs after the ten of the sweep, then the controls, each computed once.
     assert calls == [["results/trial/summary.tsv"]] * 4 + [[]]
     assert len(computed) == len(set(computed))
@@ -263,5 +264,5 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
     assert all((swept[FREQUENCY] == f).sum() >= 2 for f in (low, best, high))
     # Again: nothing is left to compute.
     many = len(computed)
-    assert driving.main(["trial.yaml"]) == 0
+    assert driving.drive(Path("trial.yaml"), []) == 0
     assert len(computed) == many

@@ -106,6 +106,7 @@ def test_what_a_study_cannot_ask_is_told(tmp_path: Path, top: dict[str, Any], to
         open_study(opened(tmp_path, top))
 
 
+@pytest.mark.slow
 def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     points = [{"exchange": e, "element_m": s} for e, s in (("faces", 0.01), ("difference", 0.005))]
     study = open_study(

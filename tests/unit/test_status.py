@@ -14,7 +14,7 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.kinds.sand.planning import planned_work
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.plan_files import write_plan
-from sandmould.study.status import main, run_status, status_text
+from sandmould.study.status import run_status, status_text
 
 FREQUENCY = "vibration.0.frequency_hz"
 
@@ -80,12 +80,11 @@ def test_every_state_is_told(plan: Plan) -> None:
     ]
 
 
-def test_a_finished_study_has_nothing_left(plan: Plan, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_finished_study_has_nothing_left(plan: Plan) -> None:
     for place in range(6):
         ended(plan, place, Outcome.FINISHED, 60.0)
-    assert main(["trial.yaml"]) == 0
-    said = capsys.readouterr().out
-    assert said == "trial: 6 done of 6 runs\nprocessor time so far: 6.0 min; nothing left\n"
+    said = status_text(plan, Path("results"), 2)
+    assert said == "trial: 6 done of 6 runs\nprocessor time so far: 6.0 min; nothing left"
 
 
 def test_broken_files_count_as_not_there(plan: Plan) -> None:

@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -195,6 +196,7 @@ def scaled_studies(draw: st.DrawFn) -> Any:
     return tree
 
 
+@pytest.mark.slow
 @settings(
     max_examples=200,
     deadline=None,
@@ -206,6 +208,7 @@ def test_mutated_study_opens_or_tells(tree: Any) -> None:
     opens_or_tells(yaml.safe_dump(tree).encode())
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(tree=scaled_studies())
 def test_scaled_study_opens_or_tells(tree: Any) -> None:

@@ -97,6 +97,7 @@ def test_faces_converge_with_second_order() -> None:
     assert math.log2(largest[0] / largest[1]) == pytest.approx(2.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_the_kernels_resistance_is_too_small_at_any_size() -> None:
     # As elements shrink, R/r outweighs 1/lambda in (5), and all pairs across the interface add up
     # to (2 d / n0) sum w/r over R, counting a pair at distance 2 in both rows that it spans. By

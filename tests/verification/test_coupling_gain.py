@@ -86,6 +86,7 @@ def test_a_fixed_factor_holds_up_to_its_limit_and_not_beyond(tmp_path: Path) -> 
     assert left[2] > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_measured_scheme_finds_its_factor_and_comes_to_rest(engine: str, tmp_path: Path) -> None:
     loop = {"scheme": "measured", "factor": 1e-3}

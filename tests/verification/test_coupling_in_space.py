@@ -98,6 +98,7 @@ def test_vertices_carry_force_and_moment_of_contacts(tmp_path: Path) -> None:
     session.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_grain_on_a_cantilever_bends_it_as_a_point_load_does(engine: str, tmp_path: Path) -> None:
     scenario = cantilever_scene(engine={"name": engine})

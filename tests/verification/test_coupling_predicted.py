@@ -72,6 +72,7 @@ def test_a_bed_answers_as_predicted(window_s: float, tmp_path: Path) -> None:
     assert 1 / 1.5 < found.gain / predicted.gain < 1.5
 
 
+@pytest.mark.slow
 def test_a_share_far_below_the_limit_holds_and_one_far_above_does_not(tmp_path: Path) -> None:
     window_s = 0.001
     scenario = plank_scene(window_s, 0.01)

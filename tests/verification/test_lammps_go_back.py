@@ -28,6 +28,7 @@ def follow(session: LammpsSession) -> dict[str, Any]:
     return {**grains, **(walls or {}), "vertices": vertices}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["box", "laboratory"])
 def test_what_follows_follows_again(frame: str, tmp_path: Path) -> None:
     form = {"form": "nonviscous_isotropic"}

@@ -88,6 +88,7 @@ def test_planes_of_spheres_stay_planes(tmp_path: Path) -> None:
     assert np.abs(id_to_radius[:, 9]).max() > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dimension", "direction", "ramp_s"), [(2, [0.6, 0.8], 0.01), (3, "vertical", 0.0)]
 )

@@ -14,7 +14,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sandmould import ROOT
 from tests.workflow.slurm_node import SlurmNode, missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=f"needs Debian's slurmd: {missing()}")
@@ -71,18 +70,16 @@ def simulating(folder: Path) -> list[int]:
 
 
 def study_folder(folder: Path, study: str) -> Path:
-    """A place to run a study in, with all that the workflow needs."""
+    """A place to run a study in."""
     folder.mkdir()
-    for name in ("Snakefile", "workflow", "templates", "config", "profiles"):
-        (folder / name).symlink_to(ROOT / name)
     (folder / "small.yaml").write_text(study)
     return folder
 
 
 # Two or so runs share a job, and the queue of an empty node is asked more often.
 COMMAND = [
-    sys.executable, "-m", "sandmould.study.run_study", "small.yaml",
-    "--workflow-profile", "profiles/slurm", "--config", "batch_wall_s=8",
+    sys.executable, "-m", "sandmould.cli", "run", "small.yaml", "--",
+    "--workflow-profile", "slurm", "--config", "batch_wall_s=8",
     "--slurm-init-seconds-before-status-checks", "1", "--latency-wait", "5",
     "--default-resources", "mem_mb=500", "runtime=5",
 ]  # fmt: skip

@@ -85,7 +85,7 @@ def test_a_study_that_rests_on_another_says_what_comes_first(checkout: Path) -> 
     assert ran.returncode != 0
     assert (
         "calibrate_sand.yaml: calibration.also.0 = 'repose_map' cannot be used: valid is a study "
-        "with results: make study STUDY=config/studies/repose_map.yaml comes first." in ran.stderr
+        "with results: sandmould run repose_map comes first." in ran.stderr
     )
 
 
@@ -145,7 +145,7 @@ def test_one_command_computes_a_sweep_and_its_rounds(checkout: Path) -> None:
         + "sweep: {keys: {vibration.0.frequency_hz: [25, 50, 100, 200]}}\n"
         "refine: {rounds: 1, runs: 2}\n"
     )
-    command = [sys.executable, "-m", "sandmould.study.run_study", str(study), "--cores", "2"]
+    command = [sys.executable, "-m", "sandmould.cli", "run", str(study), "--cores", "2"]
     ran = subprocess.run(command, cwd=checkout, capture_output=True, text=True, timeout=300)
     assert ran.returncode == 0, ran.stderr
     assert "Round 1 of at most 1: best so far is frequency" in ran.stderr

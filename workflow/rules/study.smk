@@ -3,6 +3,7 @@
 import os
 import sys
 
+from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.plan.batches import alone
 from sandmould.study.plan.build_plan import (
@@ -39,7 +40,9 @@ ALSO = [f"results/{name}/summary.tsv" for name in STUDY.study.calibration.also]
 BATCHES = {batch.name: [run.run for run in batch.runs] for batch in BATCHED}
 SIDE_BY_SIDE = {batch.name: batch.side_by_side for batch in BATCHED}
 ALONE = alone(PLAN.runs, BATCHED)
-REPORT_TEMPLATES = sorted(str(p) for p in Path("templates/report").iterdir())
+# As seen from here, wherever that is.
+TEMPLATES = ROOT / "templates" / "report"
+REPORT_TEMPLATES = sorted(os.path.relpath(path) for path in TEMPLATES.iterdir())
 
 
 def deck_sources_of(wildcards):

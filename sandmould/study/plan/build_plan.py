@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -151,7 +150,7 @@ def _unfinished(study: OpenStudy, results: Path) -> Iterator[Problem]:
     for i, name in enumerate(study.study.calibration.also):
         if not (results / name / "summary.tsv").is_file():
             key = f"calibration.also.{i}"
-            valid = f"a study with results: make study STUDY=config/studies/{name}.yaml comes first"
+            valid = f"a study with results: sandmould run {name} comes first"
             yield Problem(key, name, valid, study.origin.file_of(key))
 
 
@@ -215,19 +214,3 @@ def measure_speeds(plan: Plan, results: Path) -> bool:
     missing = [scenario for each, scenario in plan.classes.items() if each not in before]
     measured = [speed.measured(scenario, results) for scenario in missing]
     return any(rate is not None for rate in measured)
-
-
-def main(path: Path) -> int:
-    """Check a study, measure the machine where it is not known, and print the plan."""
-    try:
-        plan, cores = open_plan(path), os.cpu_count() or 1
-        text = announce(plan, RESULTS, cores)
-        print(announce(plan, RESULTS, cores) if measure_speeds(plan, RESULTS) else text)
-    except BadInputError as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main(Path(sys.argv[1])))

@@ -1,0 +1,1 @@
+"""The command ``sandmould``: thin, each verb calls the rooms below."""

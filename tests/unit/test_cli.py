@@ -1,0 +1,144 @@
+"""The command ``sandmould``: verbs, names of studies, and what is said of bad input."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from sandmould.cli.commands import app
+from sandmould.cli.study_file import SHIPPED, shipped_studies, study_file
+from sandmould.scenario.bad_input import BadInputError
+
+COARSE = """\
+based_on: plates
+sweep: {design: list, points: [{exchange: corrected, element_m: 0.01, layers: []}]}
+reference: {exchange: corrected, element_m: 0.01}
+"""
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def sandmould(*arguments: str) -> Result:
+    return CliRunner().invoke(app, arguments)
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"]])
+def test_help_lists_the_verbs(arguments: list[str]) -> None:
+    said = sandmould(*arguments)
+    for verb in ("plan", "run", "status", "report"):
+        assert f"\n  {verb} " in said.output
+    # Every verb's sentence fits its line.
+    assert "..." not in said.output.partition("Commands:")[2]
+
+
+def test_version() -> None:
+    said = sandmould("--version")
+    assert (said.exit_code, said.output.split()[0]) == (0, "sandmould")
+
+
+@pytest.mark.parametrize(
+    ("study", "question", "runs"),
+    [
+        ("plates_small", "How much accuracy do coarse elements lose on four plates", 9),
+        # The speed of two engines is measured first.
+        pytest.param("tube_demo", "At which frequency does sand", 42, marks=pytest.mark.slow),
+    ],
+)
+def test_plan_of_a_shipped_study_goes_to_the_results_of_this_folder(
+    study: str, question: str, runs: int, elsewhere: Path
+) -> None:
+    said = sandmould("plan", study, "--cores", "3")
+    assert said.exit_code == 0, said.output
+    assert question in said.output
+    assert "wall time on 3 cores" in said.output
+    assert [p.name for p in elsewhere.iterdir()] == ["results"]
+    assert len(list((elsewhere / "results" / study / "runs").iterdir())) == runs
+
+
+def test_state_of_a_study_of_the_user(elsewhere: Path) -> None:
+    (elsewhere / "coarse.yaml").write_text(COARSE)
+    said = sandmould("status", "coarse.yaml")
+    assert said.exit_code == 0, said.output
+    assert said.output.startswith("coarse: 1 waiting of 1 runs\n")
+
+
+def test_bad_key_is_one_sentence(elsewhere: Path) -> None:
+    (elsewhere / "bad.yaml").write_text(COARSE.replace("exchange:", "exhange:"))
+    for verb in ("plan", "run", "status"):
+        said = sandmould(verb, "bad.yaml")
+        assert said.exit_code == 1
+        assert isinstance(said.exception, SystemExit)  # no traceback
+        (sentence,) = said.stderr.splitlines()
+        assert sentence.startswith("bad.yaml: ")
+        assert "exhange" in sentence
+        assert said.stdout == ""
+    assert not (elsewhere / "results").exists()
+
+
+def test_unknown_study_gets_the_nearest_names() -> None:
+    said = sandmould("plan", "tube_dmo")
+    assert said.exit_code == 1
+    (sentence,) = said.stderr.splitlines()
+    assert sentence.startswith("STUDY = 'tube_dmo' cannot be used: valid is the path of a study's")
+    assert "such as tube_demo, " in sentence
+
+
+def test_a_study_is_a_file_or_the_name_of_a_shipped_one(elsewhere: Path) -> None:
+    mine = elsewhere / "mine.yaml"
+    mine.touch()
+    assert study_file("mine.yaml") == Path("mine.yaml")
+    assert study_file(str(mine)) == mine
+    assert study_file("tube_demo") == SHIPPED / "tube_demo.yaml"
+    assert shipped_studies("plates") == ["plates", "plates_small"]
+    for missing in ("mine", "", "../tube_demo", "no/tube_demo.yaml"):
+        with pytest.raises(BadInputError, match="tube_demo"):
+            study_file(missing)
+
+
+def test_no_report_without_results(elsewhere: Path) -> None:
+    said = sandmould("report", "tube_demo")
+    assert said.exit_code == 1
+    assert said.stderr == (
+        "STUDY = 'tube_demo' cannot be used: valid is a study with results: "
+        "sandmould run tube_demo comes first.\n"
+    )
+    broken = elsewhere / "results" / "tube_demo"
+    broken.mkdir(parents=True)
+    (broken / "runs.tsv").write_text("run\treplicate\tseed\n")
+    said = sandmould("report", "tube_demo")
+    assert said.exit_code == 1
+    assert isinstance(said.exception, SystemExit)
+    (sentence,) = said.stderr.splitlines()
+    assert sentence.startswith("results = 'results/tube_demo' cannot be used: valid is a folder")
+
+
+def test_run_hands_options_on_to_snakemake(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[Path, list[str]]] = []
+
+    def drive(path: Path, options: list[str]) -> int:
+        calls.append((path, options))
+        return 7
+
+    monkeypatch.setattr("sandmould.study.run_study.drive", drive)
+    said = sandmould("run", "tube_demo", "--cores", "2", "--", "--quiet", "rules", "host")
+    assert said.exit_code == 7
+    assert sandmould("run", "tube_demo").exit_code == 7
+    file = SHIPPED / "tube_demo.yaml"
+    assert calls == [(file, ["--cores", "2", "--quiet", "rules", "host"]), (file, [])]
+
+
+def test_names_of_studies_are_completed() -> None:
+    words = {
+        "_SANDMOULD_COMPLETE": "complete_bash",
+        "COMP_WORDS": "sandmould plan plates_",
+        "COMP_CWORD": "2",
+    }
+    said = CliRunner().invoke(app, [], prog_name="sandmould", env=words)
+    assert said.stdout.split() == ["plates_small"]

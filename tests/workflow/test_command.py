@@ -1,0 +1,47 @@
+"""The command ``sandmould`` computes and reports a study of seconds in an empty folder."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from sandmould.cli.commands import app
+
+COARSE = """\
+based_on: plates
+sweep:
+  design: list
+  points:
+    - {exchange: corrected, element_m: 0.01, layers: []}
+    - {exchange: faces, element_m: 0.01, layers: []}
+reference: {exchange: corrected, element_m: 0.01}
+"""
+
+
+def test_a_study_from_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("coarse.yaml").write_text(COARSE)
+    command = [sys.executable, "-m", "sandmould.cli", "run", "coarse.yaml", "--cores", "2"]
+    options = ["--", "--quiet", "rules", "host"]
+    ran = subprocess.run([*command, *options], capture_output=True, text=True, timeout=120)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout == "The report: results/coarse/report.html\n"
+    results = Path("results", "coarse")
+    # The shipped profile lets two short runs share a job.
+    assert len(list((results / "batches").glob("*.done"))) == 1
+    summary = pd.read_csv(results / "summary.tsv", sep="\t")
+    assert list(summary["outcome"]) == ["finished"] * 2
+    assert {p.name for p in tmp_path.iterdir()} == {".snakemake", "coarse.yaml", "results"}
+
+    said = CliRunner().invoke(app, ["status", "coarse.yaml"])
+    assert said.stdout.startswith("coarse: 2 done of 2 runs\n")
+    page = results / "report.html"
+    page.unlink()
+    again = CliRunner().invoke(app, ["report", "coarse.yaml"])
+    assert again.exit_code == 0, again.output
+    assert page.stat().st_size > 1e5
