@@ -33,7 +33,7 @@ twins: $(INSTALLED)
 	  $(MAKE) --no-print-directory study STUDY=config/studies/$$name.yaml \
 	    && $(BIN)/python -m sandmould.study.records record config/studies/$$name.yaml || exit 1; \
 	done
-	@$(BIN)/python -m benchmarks.twins
+	@$(BIN)/python -m benchmarks.agreement
 
 verification: $(INSTALLED)
 	$(BIN)/python -m tests.verification.table
