@@ -78,7 +78,7 @@ twins: $(INSTALLED)
 	  $(MAKE) --no-print-directory study STUDY=config/studies/$$name.yaml \
 	    && $(BIN)/python -m sandmould.study.records record config/studies/$$name.yaml || exit 1; \
 	done
-	@$(BIN)/python -m benchmarks.twins
+	@$(BIN)/python -m benchmarks.agreement
 
 ## exact cases on all engines: docs/verification.md
 verification: $(INSTALLED)

@@ -1,6 +1,6 @@
 """What share of a recorded study of bent patterns went into anything but grains.
 
-``python -m benchmarks.coupling_cost docs/results/l_deflection`` prints, for each run, the share of
+``python -m benchmarks.coupling docs/results/l_deflection`` prints, for each run, the share of
 its wall time outside the engine (opening, guards, tables), in the pattern's solves, and in the
 pattern's own steps inside the engine: their number times what one takes on this machine now.
 """

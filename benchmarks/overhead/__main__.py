@@ -1,14 +1,12 @@
 """What a run costs beside the engine's own loop, and whether a sweep keeps its cores busy.
 
-``python benchmarks/overhead.py`` runs a study of one run of about ten minutes on one core through
-snakemake, times recording and analysis on its own snapshots, and writes overhead.json beside
-this file. ``python benchmarks/overhead.py --sweep results/STUDY SECONDS CORES`` adds how busy
-the cores were in a sweep that took SECONDS in all.
+``python -m benchmarks.overhead`` runs a study of one run of about ten minutes on one core through
+snakemake and times recording and analysis on its own snapshots. ``--part sweep --sweep
+results/STUDY SECONDS CORES`` adds how busy the cores were in a sweep that took SECONDS in all.
 """
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import tempfile
@@ -19,6 +17,7 @@ from typing import Any
 
 import pandas as pd
 
+from benchmarks.frame import Benchmark, BenchmarkRun
 from sandmould import ROOT
 from sandmould.engines.guard import Guard
 from sandmould.engines.snapshot import Snapshot
@@ -27,7 +26,6 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.simulate import provenance
 
-OUT = Path(__file__).with_name("overhead.json")
 STUDY = Path(__file__).with_name("ten_minutes.yaml")
 REPEATS = 5
 
@@ -94,17 +92,29 @@ def sweep_busy(folder: Path, total_s: float, cores: int) -> dict[str, Any]:
     }
 
 
-def main(arguments: list[str]) -> None:
-    """Measure and keep."""
-    kept = json.loads(OUT.read_text(encoding="utf-8")) if OUT.exists() else {}
-    if arguments[:1] == ["--sweep"]:
-        folder, seconds, cores = arguments[1:]
-        kept["sweep"] = sweep_busy(Path(folder), float(seconds), int(cores))
-    else:
-        kept["one_run"] = one_run()
-    OUT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps(kept, indent=1))
+def sweep(run: BenchmarkRun) -> dict[str, Any]:
+    """Share of the cores' time in the sweep that the command line names.
 
+    Raises
+    ------
+    SystemExit
+        When it names none.
+    """
+    if run.options.sweep is None:
+        raise SystemExit("the part sweep needs --sweep results/STUDY SECONDS CORES")
+    folder, total_s, cores = run.options.sweep
+    return sweep_busy(Path(folder), float(total_s), int(cores))
+
+
+BENCHMARK = Benchmark(
+    __file__,
+    __doc__,
+    parts={"one_run": lambda run: one_run(), "sweep": sweep},
+    by_default=("one_run",),
+    add_options=lambda parser: parser.add_argument(
+        "--sweep", nargs=3, metavar=("FOLDER", "SECONDS", "CORES"), help="a finished sweep"
+    ),
+)
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    BENCHMARK.command()

@@ -1,4 +1,4 @@
-"""Angle of heaps by where the fit of their slope begins: ``python -m benchmarks.heap_fit FOLDER``.
+"""Angle of heaps by where the fit of their slope begins: ``python -m benchmarks.repose FOLDER``.
 
 FOLDER is that of a finished study, such as results/repose_paper; its last snapshots are measured.
 """

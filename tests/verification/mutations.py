@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.frame import table
 from sandmould import ROOT
 from sandmould.dem import source_hash
 from sandmould.dem.motion import COMPONENTWISE, ISOTROPIC
@@ -184,7 +185,7 @@ def _break(mutation: Mutation) -> None:
 def _copy_of_sources(folder: Path, mutation: Mutation) -> None:
     """Lay out the sources with one text replaced."""
     shutil.copytree(ROOT / "sandmould", folder / "sandmould")
-    for name in ("templates", "config", "tests"):
+    for name in ("templates", "config", "tests", "benchmarks"):
         (folder / name).symlink_to(ROOT / name)
     if mutation.source is not None:
         file, old, new = mutation.source
@@ -218,24 +219,22 @@ def run(index: int) -> list[str]:
 
 def section(found: list[list[str]]) -> str:
     """The section of the page."""
-    lines = [
-        f"`python -m tests.verification.mutations`, reference solver {source_hash()}: each law is "
-        "broken by 5 % (or in its structure, where that is said), the exact values are not. "
-        f"{sum(map(bool, found))} of {len(found)} mutations are noticed.",
-        "",
-        "| broken | equation | noticed by |",
-        "|---|---|---|",
-    ]
+    rows = []
     for mutation, names in zip(MUTATIONS, found, strict=True):
         words = ", ".join(names[:SHOWN]) or "**nobody**"
         if len(names) > SHOWN:
             words += f" and {len(names) - SHOWN} more"
-        lines.append(f"| {mutation.what} | {mutation.equation} | {words} |")
+        rows.append([mutation.what, mutation.equation, words])
     noticed = {name for names in found for name in names}
     quiet = {case.family: 0 for case in CASES if "reference" in case.engines}
     idle = ", ".join(name for name in quiet if name not in noticed) or "none"
-    lines += ["", f"Cases that notice no broken law, for they hold under any: {idle}."]
-    return "\n".join(lines)
+    return (
+        f"`python -m tests.verification.mutations`, reference solver {source_hash()}: each law is "
+        "broken by 5 % (or in its structure, where that is said), the exact values are not. "
+        f"{sum(map(bool, found))} of {len(found)} mutations are noticed.\n\n"
+        f"{table(['broken', 'equation', 'noticed by'], rows)}\n"
+        f"Cases that notice no broken law, for they hold under any: {idle}."
+    )
 
 
 def main() -> int:

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
+from benchmarks.frame import render
 from sandmould import ROOT
 from sandmould.engines.choosing import engine_of
 from sandmould.runs.files import write_text
@@ -65,7 +66,7 @@ class Family:
 
     @property
     def title(self) -> str:
-        family = self.cases[0].family
+        family = self.first.family
         return family[0].upper() + family[1:]
 
     @property
@@ -75,50 +76,49 @@ class Family:
     def of(self, engine: str) -> list[Result]:
         return [r for r in self.results if r.engine == engine]
 
-    def summary(self) -> str:
-        """A row of the summary: numbers and the largest error over its tolerance."""
-        cells = [f"[{self.title}](#{self.anchor})", self.cases[0].equation]
+    @property
+    def first(self) -> Case:
+        """Case whose equations, reason and derivation stand for all."""
+        return self.cases[0]
+
+    @property
+    def derivation(self) -> str:
+        return inspect.getdoc(self.first.function) or ""
+
+    def summary(self, engine: str) -> str:
+        """Numbers of an engine and the largest error over its tolerance."""
+        results = self.of(engine)
+        if not results:
+            return "refused" if engine in self.refusals else ""
+        used = max((abs(r.error) / r.tolerance if r.tolerance else float(not r.holds))
+                   for r in results)  # fmt: skip
+        failed = sum(not r.holds for r in results)
+        return f"{len(results)}, {used:.2g}" + (f", **{failed} FAIL**" if failed else "")
+
+    def rows(self) -> list[list[str]]:
+        """Cells of each number: what, exact, measured by each engine, tolerance."""
+        numbers: dict[tuple[str, int], dict[str, Result]] = {}
+        for result in self.results:
+            numbers.setdefault((result.name, result.dimension), {})[result.engine] = result
+        return [
+            [name, f"{dimension}D", *self._cells(of_engine)]
+            for (name, dimension), of_engine in numbers.items()
+        ]
+
+    def _cells(self, of_engine: dict[str, Result]) -> list[str]:
+        unit = next(iter(of_engine.values())).unit
+        exact = shared({e: number(r.exact) for e, r in of_engine.items()})
+        cells = [exact if unit == "1" else f"{exact} {unit}"]
         for engine in ENGINES:
-            found = self.of(engine)
-            if not found:
+            if engine not in of_engine:
                 cells.append("refused" if engine in self.refusals else "")
                 continue
-            used = max((abs(r.error) / r.tolerance if r.tolerance else float(not r.holds))
-                       for r in found)  # fmt: skip
-            failed = sum(not r.holds for r in found)
-            cells.append(f"{len(found)}, {used:.2g}" + (f", **{failed} FAIL**" if failed else ""))
-        return "| " + " | ".join(cells) + " |"
-
-    def section(self) -> str:
-        """Heading, derivation, reason of the tolerance and the table."""
-        first = self.cases[0]
-        text = inspect.getdoc(first.function) or ""
-        lines = [f"### {self.title}", "", text, "", f"Equations: {first.equation}. Tolerance: "
-                 f"{first.reason}.", ""]  # fmt: skip
-        for engine, refusal in self.refusals.items():
-            lines += [f"Refused by {engine}: {refusal}.", ""]
-        lines += [f"| what | | exact | {' | '.join(ENGINES)} | tolerance |",
-                  "|---|---|---|" + "---|" * (len(ENGINES) + 1)]  # fmt: skip
-        rows: dict[tuple[str, int], dict[str, Result]] = {}
-        for result in self.results:
-            rows.setdefault((result.name, result.dimension), {})[result.engine] = result
-        for (name, dimension), found in rows.items():
-            unit = next(iter(found.values())).unit
-            cells = [name, f"{dimension}D"]
-            exact = shared({e: number(r.exact) for e, r in found.items()})
-            cells.append(exact if unit == "1" else f"{exact} {unit}")
-            for engine in ENGINES:
-                if engine not in found:
-                    cells.append("refused" if engine in self.refusals else "")
-                    continue
-                result = found[engine]
-                error = f"{result.error:+.1e}" if result.error else "+0"
-                mark = "" if result.holds else " **FAIL**"
-                cells.append(f"{number(result.measured)} ({error}){mark}")
-            cells.append(shared({e: f"{r.tolerance:.1e}" if r.tolerance else "0"
-                                 for e, r in found.items()}))  # fmt: skip
-            lines.append("| " + " | ".join(cells) + " |")
-        return "\n".join(lines) + "\n"
+            result = of_engine[engine]
+            error = f"{result.error:+.1e}" if result.error else "+0"
+            mark = "" if result.holds else " **FAIL**"
+            cells.append(f"{number(result.measured)} ({error}){mark}")
+        tolerances = {e: f"{r.tolerance:.1e}" if r.tolerance else "0" for e, r in of_engine.items()}
+        return [*cells, shared(tolerances)]
 
 
 def families(cases: Iterable[Case]) -> list[Family]:
@@ -155,37 +155,14 @@ def provenance() -> str:
 
 def page(made: list[Family], mutations: str) -> str:
     """The whole page."""
-    head = f"""\
-# Verification
-
-Written by `make verification`; the same cases run in `make test`. {provenance()}
-
-Every case computes a few grains through the session that a study uses, on each engine that can do
-it, against a closed form or an independent integration. A cell shows what was measured and, in
-brackets, how far it is from exact. Discs of LIGGGHTS are a plane of spheres with I = 2/5 m r^2, so
-some of its exact values in 2D are others: kappa = I/(m r^2) is 1/2 for a disc, 2/5 for a sphere.
-
-## Summary
-
-Numbers, and the largest error over its tolerance.
-"""
-    summary = ["| case | equations | " + " | ".join(ENGINES) + " |",
-               "|---|---|" + "---|" * len(ENGINES)] + [f.summary() for f in made]  # fmt: skip
-    return "\n".join([
-        head,
-        *summary,
-        "",
-        ELSEWHERE.read_text(encoding="utf-8"),
-        "## Mutations",
-        "",
-        BEGIN,
-        mutations,
-        END,
-        "",
-        "## Cases",
-        "",
-        *(f.section() for f in made),
-    ])  # fmt: skip
+    return render(Path(__file__).with_name("page.md.j2"), {
+        "provenance": provenance(),
+        "engines": ENGINES,
+        "families": made,
+        "elsewhere": ELSEWHERE.read_text(encoding="utf-8"),
+        "begin": BEGIN, "end": END,
+        "mutations": mutations,
+    })  # fmt: skip
 
 
 def write(text: str) -> None:
