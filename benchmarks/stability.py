@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.stability_page import FIGURE, PAGE, draw, write
 from benchmarks.stability_runs import STABLE, disturb, follow_bed
 from benchmarks.stability_scenes import RADIUS_M, SCENES, Opened, limits_of, scenario_of, start_of
-from sandmould.engines.choosing import engine_of, engine_problem
+from sandmould.engines.registry import engine_of, engine_problem
 
 OUT = Path(__file__).with_name("stability.json")
 ENGINES = ("reference", "lammps", "liggghts")

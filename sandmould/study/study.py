@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from sandmould.scenario.contact import BackgroundDamping, Contact
+from sandmould.scenario.engine import EngineName
 from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import NAME, Section, quantity
@@ -23,9 +24,7 @@ from sandmould.study.sweep import Sweep
 class CrossCheck(Section):
     """Runs of one swept point again, on another engine; margins are those of equivalence."""
 
-    engine: Literal["lammps", "liggghts", "reference"] = quantity(
-        ..., "Engine that computes them.", source="user"
-    )
+    engine: EngineName = quantity(..., "Engine that computes them.", source="user")
     at: dict[str, Any] = Field(
         {}, description="The swept point: a value of every swept key, as the sweep has it."
     )

@@ -15,9 +15,10 @@ from itertools import groupby
 from pathlib import Path
 
 from sandmould import ROOT
-from sandmould.engines.choosing import engine_of
+from sandmould.engines.registry import engine_of
+from sandmould.scenario.engine import ENGINE_NAMES
 from tests.verification.cases.bench import scene
-from tests.verification.cases.case import ENGINES, Case, RefusedCase, Result
+from tests.verification.cases.case import Case, RefusedCase, Result
 from tests.verification.cases.catalogue import CASES
 
 PAGE = ROOT / "docs" / "verification.md"
@@ -77,7 +78,7 @@ class Family:
     def summary(self) -> str:
         """A row of the summary: numbers and the largest error over its tolerance."""
         cells = [f"[{self.title}](#{self.anchor})", self.cases[0].equation]
-        for engine in ENGINES:
+        for engine in ENGINE_NAMES:
             found = self.of(engine)
             if not found:
                 cells.append("refused" if engine in self.refusals else "")
@@ -96,8 +97,8 @@ class Family:
                  f"{first.reason}.", ""]  # fmt: skip
         for engine, refusal in self.refusals.items():
             lines += [f"Refused by {engine}: {refusal}.", ""]
-        lines += [f"| what | | exact | {' | '.join(ENGINES)} | tolerance |",
-                  "|---|---|---|" + "---|" * (len(ENGINES) + 1)]  # fmt: skip
+        lines += [f"| what | | exact | {' | '.join(ENGINE_NAMES)} | tolerance |",
+                  "|---|---|---|" + "---|" * (len(ENGINE_NAMES) + 1)]  # fmt: skip
         rows: dict[tuple[str, int], dict[str, Result]] = {}
         for result in self.results:
             rows.setdefault((result.name, result.dimension), {})[result.engine] = result
@@ -106,7 +107,7 @@ class Family:
             cells = [name, f"{dimension}D"]
             exact = shared({e: number(r.exact) for e, r in found.items()})
             cells.append(exact if unit == "1" else f"{exact} {unit}")
-            for engine in ENGINES:
+            for engine in ENGINE_NAMES:
                 if engine not in found:
                     cells.append("refused" if engine in self.refusals else "")
                     continue
@@ -136,7 +137,7 @@ def families(cases: Iterable[Case]) -> list[Family]:
 
 def provenance() -> str:
     """Engines and sources that the numbers come from."""
-    versions = {e: engine_of(scene(e, 3)).installed_version() for e in ENGINES}
+    versions = {e: engine_of(scene(e, 3)).installed_version() for e in ENGINE_NAMES}
 
     def git(*words: str) -> str:
         return subprocess.run(
@@ -168,8 +169,8 @@ some of its exact values in 2D are others: kappa = I/(m r^2) is 1/2 for a disc, 
 
 Numbers, and the largest error over its tolerance.
 """
-    summary = ["| case | equations | " + " | ".join(ENGINES) + " |",
-               "|---|---|" + "---|" * len(ENGINES)] + [f.summary() for f in made]  # fmt: skip
+    summary = ["| case | equations | " + " | ".join(ENGINE_NAMES) + " |",
+               "|---|---|" + "---|" * len(ENGINE_NAMES)] + [f.summary() for f in made]  # fmt: skip
     return "\n".join([
         head,
         *summary,

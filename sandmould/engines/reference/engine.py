@@ -10,12 +10,15 @@ from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
+from sandmould.engines.ranks import Ranks
 from sandmould.engines.reference.model import surfaces_of
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
 
+GRAIN_STEPS_PER_S = 1.5e7
+RANKS = Ranks.THREADS
 _LAWS = (("grain", "contact.grain_grain"), ("wall", "contact.grain_wall"))
 _LAW_KEYS = (
     ("k_n", "normal_stiffness_n_m"),

@@ -11,9 +11,9 @@ from typing import Any
 
 import pandas as pd
 
-from sandmould.engines.choosing import engine_module
 from sandmould.engines.own_deck import computation
 from sandmould.engines.own_deck import deck as own_deck
+from sandmould.engines.registry import engine_module
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck

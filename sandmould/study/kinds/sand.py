@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pattern_fe
-from sandmould.engines import choosing, recording
+from sandmould.engines import recording, registry
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop, Session
@@ -38,17 +38,14 @@ BASE_MEMORY_MB = 600
 GRAINS_PER_MB = 50
 SLOW_RATE = 1e6
 """Grain-steps per second of a slow core; benchmarks/ has those measured."""
-RATE = {"reference": 1.5e7, "lammps": 2.5e6, "liggghts": 3e6}
-"""Grain-steps per second of one core in 2D that batches are filled by (docs/speed.md); fixed, so
-that a study has the same batches on every machine."""
 IN_3D = 0.4
-"""Share of that in 3D."""
+"""Share in 3D of an engine's speed in 2D."""
 PASSES = 4.0
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
 
 problems = checks.problems
-engine_problem = choosing.engine_problem
+engine_problem = registry.engine_problem
 no_cost = Cost.of
 
 
@@ -73,17 +70,17 @@ def resolved(scenario: Scenario) -> Scenario:
 def sources(scenario: Scenario) -> list[Path]:
     """Templates, and our own code where it computes."""
     ours = pattern_fe.source_files() if scenario.pattern else []
-    return choosing.deck_sources(scenario) + ours
+    return registry.deck_sources(scenario) + ours
 
 
 def template_hash(scenario: Scenario) -> str:
     """Hash of all that turns a scenario into a deck, and of our code where it computes."""
-    return choosing.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
+    return registry.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
 
 
 def computed_hash(scenario: Scenario) -> str:
     """Hash of what the engine is told to compute, and of the pattern beside it."""
-    told = choosing.computed_hash(scenario)
+    told = registry.computed_hash(scenario)
     if scenario.pattern is None:
         return told
     beside = scenario.pattern.model_dump_json() + pattern_fe.source_hash()
@@ -101,8 +98,8 @@ def threads(scenario: Scenario) -> int:
 
 
 def ranks(scenario: Scenario) -> int:
-    """MPI ranks; the reference engine's ranks are threads of one process."""
-    return 1 if scenario.engine.name == "reference" else scenario.engine.ranks
+    """MPI ranks; the ranks of some engines are threads of one process."""
+    return registry.mpi_ranks(scenario)
 
 
 def memory_mb(scenario: Scenario) -> int:
@@ -124,7 +121,8 @@ def planned_work(scenario: Scenario) -> float:
 def predicted_s(scenario: Scenario) -> float:
     """Wall time at fixed speeds."""
     in_3d = IN_3D if scenario.dimension == 3 else 1.0
-    return planned_work(scenario) / (RATE[scenario.engine.name] * scenario.engine.ranks * in_3d)
+    of_core = registry.engine_of(scenario).GRAIN_STEPS_PER_S
+    return planned_work(scenario) / (of_core * scenario.engine.ranks * in_3d)
 
 
 def planned_s(scenario: Scenario) -> float:
@@ -155,14 +153,14 @@ def plan_cells(scenario: Scenario) -> Mapping[str, str]:
 def render(run: Run, folder: Path) -> None:
     """Write the deck and the layers."""
     program = build_program(run.scenario)
-    engine = choosing.engine_of(run.scenario)
+    engine = registry.engine_of(run.scenario)
     engine.write_deck(program, run.sources, folder, run.run, run.study)
 
 
 def compute(run: Run, folder: Path) -> Computed:
     """Take the scenario through its program."""
     program = build_program(run.scenario)
-    opening: Opening = choosing.engine_of(run.scenario).open_session
+    opening: Opening = registry.engine_of(run.scenario).open_session
     if run.scenario.pattern is not None:
         from pattern_fe.coupling.opening import open_coupled
 
@@ -193,7 +191,7 @@ def rate(scenario: Scenario, results: Path) -> float | None:
         None when the engine could not run the calibration; the study's own runs will say why.
     """
     path = results / "calibration.json"
-    version = choosing.engine_of(scenario).installed_version()
+    version = registry.engine_of(scenario).installed_version()
     key = f"{platform.node()} {scenario.engine.name} {version} {scenario.dimension}D"
     known: dict[str, Any] = {}
     if path.is_file():
@@ -228,7 +226,7 @@ def _measure_rate(scenario: Scenario) -> float | None:
     program = build_program(trial)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        engine = choosing.engine_of(trial)
+        engine = registry.engine_of(trial)
         engine.write_deck(program, {}, folder, "calibration", "calibration")
         try:
             session = engine.open_session(program, folder, folder / "engine.log")
