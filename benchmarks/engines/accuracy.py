@@ -9,8 +9,8 @@ import numpy as np
 
 from benchmarks.engines.beds import SPRING_N_M, opened, scene
 from benchmarks.engines.timing import Extent
-from sandmould.engines.choosing import engine_problem
 from sandmould.engines.program import build_program
+from sandmould.engines.registry import engine_problem
 from sandmould.scenario.scenario import Scenario
 
 _SPEED_M_S = 0.01

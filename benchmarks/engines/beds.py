@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from benchmarks.frame import SCRATCH, Parts
 from sandmould.dem import source_hash
 from sandmould.dem.solver import Solver
-from sandmould.engines.choosing import engine_of
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.model import grains_of, solver_of
+from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.reading import Origin, merge

@@ -11,11 +11,11 @@ import numpy as np
 
 from benchmarks.engines.beds import PERIOD_S, Bed, opened, scene
 from benchmarks.engines.timing import Extent, interleaved, ratio, seconds, spread, steps_lasting
-from sandmould.engines.choosing import engine_problem
 from sandmould.engines.deck_lines import skin_m
 from sandmould.engines.neighbours import touching_pairs
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.model import SKIN_OVER_DIAMETER
+from sandmould.engines.registry import engine_problem
 from sandmould.engines.session import Session
 from sandmould.scenario.scenario import Scenario
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.stability.runs import STABLE, disturb, follow_bed
 from benchmarks.stability.scenes import RADIUS_M, Opened, limits_of, scenario_of
-from sandmould.engines.choosing import engine_of, engine_problem
+from sandmould.engines.registry import engine_of, engine_problem
 
 ENGINES = ("reference", "lammps", "liggghts")
 

@@ -18,9 +18,9 @@ from sandmould.dem.critical_step import (
     simplified_step,
     whole_step,
 )
-from sandmould.engines.choosing import engine_of
 from sandmould.engines.guard import grain_masses_kg
 from sandmould.engines.program import build_program
+from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario

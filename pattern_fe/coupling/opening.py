@@ -15,8 +15,8 @@ from pattern_fe.coupling.schemes import explicit_foam, in_step_foam
 from pattern_fe.coupling.selective_mass import SelectiveMass
 from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.scene import pattern_of
-from sandmould.engines.choosing import engine_of
 from sandmould.engines.program import Program
+from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
 from sandmould.engines.step_counts import StepCounts
 

@@ -11,7 +11,7 @@ from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.pattern import Pattern
 from sandmould.engines.capabilities import Capabilities
-from sandmould.engines.choosing import engine_of, engines_that
+from sandmould.engines.registry import engine_of, engines_that
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.pattern import Loop, Scheme
 from sandmould.scenario.scenario import Scenario

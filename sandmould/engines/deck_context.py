@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from sandmould.engines.deck_lines import (
+    SKIN,
     Lines,
     planned_masses_kg,
     size_classes,
@@ -43,6 +44,7 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
         "step_s": counts.step_s,
         "step_fraction": counts.step_s / critical.step_s,
         "skin": skin_m(scenario),
+        "skin_source": f"{SKIN:g} of the mean diameter",
         "obstacle_top": scenario.pouring_top_m,
         "down": "0 -1 0" if scenario.dimension == 2 else "0 0 -1",
         "window_steps": counts.window,

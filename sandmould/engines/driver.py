@@ -10,11 +10,11 @@ from pathlib import Path
 from types import FrameType
 
 from sandmould.engines.blockage import what_blocks
-from sandmould.engines.choosing import engine_of
 from sandmould.engines.cost import cost_before
 from sandmould.engines.guard import Guard
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.recording import Recorder
+from sandmould.engines.registry import engine_of
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs import checkpoint_folders as checkpoints

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -56,6 +56,15 @@ class ContactLaw(Section):
         return 1e-100 if z == 1.0 else max(math.exp(-math.pi * z / math.sqrt(1 - z * z)), 1e-100)
 
 
+SYMBOLS = {
+    "k_n": "normal_stiffness_n_m",
+    "k_t": "tangential_stiffness_n_m",
+    "friction": "friction",
+    "damping_ratio": "damping_ratio",
+    "rolling_arm": "rolling_arm_fraction",
+    "k_roll": "rolling_stiffness_n_m",
+}
+"""Key of a contact law for each of its numbers, by the short names of decks and solvers."""
 WALL_LAW = ContactLaw(
     normal_stiffness_n_m=2e4,
     tangential_stiffness_n_m=2e4,
@@ -81,6 +90,21 @@ class Contact(Section):
         "reads, twist about the normal too.",
         source=ARGUED,
     )
+
+    def parameters(self, law: ContactLaw, dimension: int) -> dict[str, Any]:
+        """Give all that one law computes with, by the short names of decks and solvers.
+
+        Parameters
+        ----------
+        law : ContactLaw
+            One of the two.
+        dimension : int
+        """
+        return {
+            **{symbol: getattr(law, key) for symbol, key in SYMBOLS.items()},
+            "clip_total": self.no_tension == "total",
+            "twist": dimension == 3 and self.rolling_axes == "all",
+        }
 
 
 class BackgroundDamping(Section):

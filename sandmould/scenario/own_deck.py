@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from sandmould import ROOT
+from sandmould.scenario.engine import DeckReader
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
 
@@ -21,9 +22,7 @@ CLOCK = "Time"
 class DeckEngine(Section):
     """Which program reads the deck, and with how many ranks."""
 
-    name: Literal["lammps", "liggghts"] = quantity(
-        "lammps", "Engine that reads the deck.", source=ARGUED
-    )
+    name: DeckReader = quantity("lammps", "Engine that reads the deck.", source=ARGUED)
     ranks: int = quantity(1, "MPI ranks of one run; 1 on liggghts.", source=ARGUED, ge=1, le=4096)
 
 

@@ -13,6 +13,7 @@ from pydantic import Field
 from sandmould.scenario.box import Box, Obstacle, Plate, build_scene
 from sandmould.scenario.contact import BackgroundDamping, Contact
 from sandmould.scenario.discharge import Discharge
+from sandmould.scenario.engine import Engine
 from sandmould.scenario.fill import Fill
 from sandmould.scenario.geometry import Scene
 from sandmould.scenario.pattern import PatternConfig
@@ -23,17 +24,6 @@ from sandmould.scenario.vibration import VibrationStage
 
 FILLING = ("settle_", "between_")
 """How the names of those stages of a run begin in which sand is filled in."""
-
-
-class Engine(Section):
-    """Which engine computes the scene, and with how many ranks."""
-
-    name: Literal["lammps", "liggghts", "reference"] = quantity(
-        "lammps", "Engine that computes the scene.", source=ARGUED
-    )
-    ranks: int = quantity(
-        1, "MPI ranks of one run, or threads of the reference engine.", source=ARGUED, ge=1, le=4096
-    )
 
 
 class Record(Section):

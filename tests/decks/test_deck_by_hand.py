@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from sandmould.engines.choosing import engine_of
 from sandmould.engines.lammps.session import LammpsSession
 from sandmould.engines.liggghts.process import executable
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.program import build_program
+from sandmould.engines.registry import engine_of
 from sandmould.scenario.scenario import Scenario
 from tests.hopper import FLOOR_M, hopper_scene
 from tests.liggghts_scenes import needs_liggghts, open_liggghts

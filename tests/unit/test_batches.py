@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from sandmould.engines.choosing import deck_hash
+from sandmould.engines.registry import deck_hash
 from sandmould.runs.hashing import scenario_hash
 from sandmould.study import batch_job
 from sandmould.study.batch_job import compute_batch, is_current

@@ -9,7 +9,7 @@ import pytest
 from pattern_fe.coupling.interface import with_surface
 from pattern_fe.coupling.schemes import SCHEMES, can_couple
 from sandmould.engines.capabilities import Capabilities
-from sandmould.engines.choosing import engine_module, engines_that
+from sandmould.engines.registry import engine_module, engines_that
 from sandmould.engines.staged_session import StagedSession
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario

@@ -9,20 +9,27 @@ from pathlib import Path
 
 import pytest
 
-from sandmould.engines.choosing import (
-    computed_hash,
-    deck_hash,
-    deck_sources,
-    engine_of,
-    engine_problem,
-)
+from sandmould import ROOT
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import engine
 from sandmould.engines.lammps.engine import open_session
 from sandmould.engines.lammps.render import write_deck
 from sandmould.engines.program import build_program
+from sandmould.engines.registry import (
+    DeckReaderModule,
+    EngineModule,
+    computed_hash,
+    deck_hash,
+    deck_reader,
+    deck_sources,
+    engine_module,
+    engine_of,
+    engine_problem,
+    mpi_ranks,
+)
 from sandmould.engines.session import EngineStop, engine_stop
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.engine import ENGINE_NAMES, ENGINES
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene
 
@@ -34,6 +41,31 @@ def told(scenario: Scenario) -> str:
     problem = engine_problem(scenario)
     assert problem is not None
     return str(problem)
+
+
+def members(protocol: type) -> set[str]:
+    """Names of what a protocol asks for."""
+    return {n for n in (*vars(protocol), *protocol.__annotations__) if not n.startswith("_")}
+
+
+def test_the_registry_lists_all_engines_and_each_offers_what_is_asked() -> None:
+    folders = {path.parent.name for path in (ROOT / "sandmould" / "engines").glob("*/engine.py")}
+    assert set(ENGINE_NAMES) == folders
+    for name in ENGINE_NAMES:
+        assert members(EngineModule) <= set(dir(engine_module(name)))
+        assert (ROOT / "templates" / name / "deck.in.j2").is_file()
+
+
+def test_the_registry_says_which_engines_read_decks_of_users() -> None:
+    folders = {path.parent.name for path in (ROOT / "sandmould" / "engines").glob("*/own_deck.py")}
+    assert {engine.name for engine in ENGINES if engine.reads_decks} == folders
+    for name in folders:
+        assert members(DeckReaderModule) <= set(dir(deck_reader(name)))
+
+
+@pytest.mark.parametrize(("name", "processes"), [("lammps", 4), ("reference", 1), ("liggghts", 1)])
+def test_ranks_are_processes_or_threads(name: str, processes: int) -> None:
+    assert mpi_ranks(tube_scene(engine={"name": name, "ranks": 4})) == processes
 
 
 def test_the_default_engine_takes_the_small_scene() -> None:
@@ -64,7 +96,7 @@ def test_lammps_refuses_what_it_would_only_approximate() -> None:
         assert "engine.ranks = 2 cannot be used: valid is 1 on engine lammps with" in sentence
 
 
-@pytest.mark.parametrize("name", ["lammps", "liggghts", "reference"])
+@pytest.mark.parametrize("name", ENGINE_NAMES)
 def test_hash_of_what_is_computed_sees_commands_alone(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,10 +16,11 @@ from pathlib import Path
 
 from benchmarks.frame import render
 from sandmould import ROOT
-from sandmould.engines.choosing import engine_of
+from sandmould.engines.registry import engine_of
 from sandmould.runs.files import write_text
+from sandmould.scenario.engine import ENGINE_NAMES
 from tests.verification.cases.bench import scene
-from tests.verification.cases.case import ENGINES, Case, RefusedCase, Result
+from tests.verification.cases.case import Case, RefusedCase, Result
 from tests.verification.cases.catalogue import CASES
 
 PAGE = ROOT / "docs" / "verification.md"
@@ -109,7 +110,7 @@ class Family:
         unit = next(iter(of_engine.values())).unit
         exact = shared({e: number(r.exact) for e, r in of_engine.items()})
         cells = [exact if unit == "1" else f"{exact} {unit}"]
-        for engine in ENGINES:
+        for engine in ENGINE_NAMES:
             if engine not in of_engine:
                 cells.append("refused" if engine in self.refusals else "")
                 continue
@@ -137,7 +138,7 @@ def families(cases: Iterable[Case]) -> list[Family]:
 
 def provenance() -> str:
     """Engines and sources that the numbers come from."""
-    versions = {e: engine_of(scene(e, 3)).installed_version() for e in ENGINES}
+    versions = {e: engine_of(scene(e, 3)).installed_version() for e in ENGINE_NAMES}
 
     def git(*words: str) -> str:
         return subprocess.run(
@@ -157,7 +158,7 @@ def page(made: list[Family], mutations: str) -> str:
     """The whole page."""
     return render(Path(__file__).with_name("page.md.j2"), {
         "provenance": provenance(),
-        "engines": ENGINES,
+        "engines": ENGINE_NAMES,
         "families": made,
         "elsewhere": ELSEWHERE.read_text(encoding="utf-8"),
         "begin": BEGIN, "end": END,

@@ -15,8 +15,8 @@ from pattern_fe.coupling.loop_verdict import classify_loop
 from pattern_fe.coupling.opening import open_coupled
 from pattern_fe.pattern import Pattern
 from pattern_fe.scene import pattern_of
-from sandmould.engines.choosing import engine_of
 from sandmould.engines.program import build_program
+from sandmould.engines.registry import engine_of
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import _one_thread  # noqa: F401

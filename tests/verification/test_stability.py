@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.stability.runs import BLOWS_UP, DRIFTS, STABLE, disturb
 from benchmarks.stability.scenes import limits_of, scenario_of
-from sandmould.engines.choosing import engine_problem
+from sandmould.engines.registry import engine_problem
 from tests.liggghts_scenes import needs_liggghts
 
 ENGINES = ["reference", "lammps", pytest.param("liggghts", marks=needs_liggghts)]

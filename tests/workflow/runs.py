@@ -12,9 +12,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from sandmould.engines.choosing import engine_of
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import Program, build_program
+from sandmould.engines.registry import engine_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import RunOutcome

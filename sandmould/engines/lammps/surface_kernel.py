@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from sandmould.dem.addresses import table_of
+from sandmould.dem.contact_law import Law
 from sandmould.dem.surfaces import Surfaces
 from sandmould.dem.vectors import dim_of
-from sandmould.dem.wall_history import new_history
+from sandmould.dem.wall_history import WallHistory, new_history
 from sandmould.engines.box_motion import displacements
-from sandmould.engines.lammps.callback import (
+from sandmould.engines.lammps.bridge import (
+    COUNTS,
     EXTRACT,
     FIRST_MOVED,
     FIRST_SHOWN,
@@ -27,15 +29,17 @@ from sandmould.engines.lammps.callback import (
     ROWS,
     WINDOW,
     Bridge,
-    address_of,
+    Constants,
 )
+from sandmould.engines.lammps.callback import address_of
 from sandmould.engines.program import Program, Stage
-from sandmould.engines.reference.model import add_solids, scene_of
 from sandmould.engines.session import Array
+from sandmould.engines.solid_surfaces import add_solids
 from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.step_mover import StepMover
 
-_KEPT = ("row_ids", "used", "normal", "friction", "rolling")
+_PER_ROW, _PER_SLOT = ("row_ids", "used"), [n for n in WallHistory._fields if n != "used"]
+"""Arrays as long as the rows of the list, or as the slots of all rows; the rest is not in use."""
 _WHOLE = ("vertices", "vertex_velocity", "steps_left", "loads")
 
 
@@ -64,19 +68,19 @@ class SurfaceKernel:
         memory = new_history(dim_of(d), n)
         # The names must live as long as LAMMPS is asked by their addresses.
         self._names = [ctypes.create_string_buffer(name) for name in GRAIN_ARRAYS]
-        law = scene_of(scenario, program.stages[0], self._counts.step_s).wall_law
-        damping = scenario.background_damping
-        numbers = [
-            *map(float, law),
+        contact, damping = scenario.contact, scenario.background_damping
+        law = Law(**contact.parameters(contact.grain_wall, d))
+        constants = Constants(
             damping.nonviscous_translation,
             damping.nonviscous_rotation,
             skin_m,
             self._counts.step_s,
-        ]
+        )
         self._bridge = Bridge(
-            counts=np.zeros(12, dtype=np.int64),
+            counts=np.zeros(COUNTS, dtype=np.int64),
             names=np.array([ctypes.addressof(name) for name in self._names], dtype=np.int64),
-            numbers=np.array(numbers),
+            law=np.array(law, dtype=float),
+            constants=np.array(constants),
             direction=np.zeros((1, d)),
             displacement=np.zeros(2),
             **arrays._asdict(),
@@ -170,18 +174,18 @@ class SurfaceKernel:
         bridge = self._bridge
         rows = bridge.counts[ROWS]
         slots = len(bridge.normal) // max(len(bridge.used), 1)
-        kept = {
-            name: getattr(bridge, name)[: rows * (1 if name in ("row_ids", "used") else slots)]
-            for name in _KEPT
+        arrays = {
+            **{name: getattr(bridge, name)[:rows] for name in _PER_ROW},
+            **{name: getattr(bridge, name)[: rows * slots] for name in _PER_SLOT},
+            **{name: getattr(bridge, name) for name in _WHOLE},
         }
-        arrays = kept | {name: getattr(bridge, name) for name in _WHOLE}
         copies = {name: array.copy() for name, array in arrays.items()}
         return {"last_step": int(bridge.counts[LAST_STEP]), **copies}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from what ``state`` gave."""
         bridge = self._bridge
-        for name in (*_KEPT, *_WHOLE):
+        for name in (*_PER_ROW, *_PER_SLOT, *_WHOLE):
             getattr(bridge, name)[: len(state[name])] = state[name]
         bridge.counts[LAST_STEP] = int(state["last_step"])
         bridge.counts[ROWS] = len(state["row_ids"])

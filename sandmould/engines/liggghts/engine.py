@@ -13,6 +13,7 @@ from sandmould.engines.liggghts.render import render_deck as render_deck
 from sandmould.engines.liggghts.render import write_deck as write_deck
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.program import Program
+from sandmould.engines.ranks import Ranks
 from sandmould.scenario.scenario import Scenario
 
 CAPABILITIES = Capabilities(
@@ -22,6 +23,8 @@ CAPABILITIES = Capabilities(
     calls_movers=False,
     loads_of_every_step=False,
 )
+GRAIN_STEPS_PER_S = 3e6
+RANKS = Ranks.ONE
 
 
 def installed_version() -> int | str:
@@ -32,11 +35,11 @@ def installed_version() -> int | str:
 
 def installation_problem() -> str | None:
     """Say what would be a valid installation where LIGGGHTS is missing or too old."""
-    found = installed_version()
-    if found == 0:
+    version = installed_version()
+    if version == 0:
         return "an installed LIGGGHTS: apt install liggghts"
-    if _numbers(str(found)) < _numbers(OLDEST_VERSION):
-        return f"LIGGGHTS {OLDEST_VERSION} or newer, found {found}"
+    if _numbers(str(version)) < _numbers(OLDEST_VERSION):
+        return f"LIGGGHTS {OLDEST_VERSION} or newer, found {version}"
     return None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sandmould.engines.liggghts.contact_model import refuse_law
 from sandmould.engines.session import RefusedError
 from sandmould.scenario.scenario import Scenario
 
@@ -27,7 +28,7 @@ def refuse(scenario: Scenario) -> None:
         raise RefusedError("record.orientation", True, f"false {_HERE}")
     _refuse_round_solids(scenario)
     _refuse_damping(scenario)
-    _refuse_rolling(scenario)
+    refuse_law(scenario.contact)
 
 
 def _refuse_round_solids(scenario: Scenario) -> None:
@@ -50,15 +51,3 @@ def _refuse_damping(scenario: Scenario) -> None:
             damping.viscous_rotation_per_s,
             f"0 {_HERE}, which damps translation only",
         )
-
-
-def _refuse_rolling(scenario: Scenario) -> None:
-    for name in ("grain_grain", "grain_wall"):
-        law = getattr(scenario.contact, name)
-        spring = law.tangential_stiffness_n_m
-        if law.rolling_arm_fraction > 0 and law.rolling_stiffness_n_m != spring:
-            raise RefusedError(
-                f"contact.{name}.rolling_stiffness_n_m",
-                law.rolling_stiffness_n_m,
-                f"{spring:g}, the tangential stiffness, {_HERE}",
-            )

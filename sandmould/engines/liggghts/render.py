@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
-from sandmould.engines.deck_lines import SKIN, Lines, simulation_box
+from sandmould.engines.deck_lines import Lines, simulation_box
 from sandmould.engines.liggghts import OLDEST_VERSION
+from sandmould.engines.liggghts.contact_model import pair_tables, rolls
 from sandmould.engines.liggghts.mesh_files import (
     largest_motion_m,
     surface_triangles,
     write_stl,
 )
-from sandmould.engines.liggghts.pair_tables import pair_tables, rolls
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.geometry import Array
@@ -45,7 +45,7 @@ def surface_meshes(program: Program) -> dict[str, Array]:
 def _windows(program: Program) -> dict[str, tuple[int, int]]:
     """Of each settling stage, the steps to its first record and its largest number of windows."""
     counts = StepCounts.of(program.scenario)
-    into_window, found = 0, {}
+    into_window, windows = 0, {}
     for stage in program.stages:
         if stage.vibration is not None:
             into_window = (into_window + counts.vibration(stage.vibration)) % counts.window
@@ -53,9 +53,9 @@ def _windows(program: Program) -> dict[str, tuple[int, int]]:
             # A bed comes to rest at a record.
             longest = counts.steps(stage.settling.longest_s)
             first = counts.window - into_window
-            found[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.window)))
+            windows[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.window)))
             into_window = 0
-    return found
+    return windows
 
 
 def render_deck(
@@ -86,9 +86,7 @@ def render_deck(
         "tables": pair_tables(
             scenario.contact, context["classes"], lines, scenario.discharge is not None
         ),
-        "rolling": rolls(scenario.contact),
-        "twist": scenario.contact.rolling_axes == "all",
-        "skin_source": f"{SKIN:g} of the mean diameter",
+        "rolls": rolls(scenario.contact),
         "simulation_box": bounds_m(program),
         "surfaces": list(surface_meshes(program)),
         "wall_names": [wall.name for wall in scenario.scene.walls],

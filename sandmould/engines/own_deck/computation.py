@@ -11,16 +11,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from sandmould.engines.choosing import engine_module
-from sandmould.engines.lammps.session import load_library
 from sandmould.engines.own_deck.deck import (
     RESTART_FILES,
     check_unchanged,
     names_used,
     render,
 )
-from sandmould.engines.own_deck.programs import RUN_ON
 from sandmould.engines.own_deck.thermo import STEP, read_thermo
+from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_bytes
@@ -53,7 +51,8 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         When template or files are no longer those of the plan.
     """
     check_unchanged(scenario)
-    world = load_library()[1] if scenario.engine.name == "lammps" else None
+    engine = deck_reader(scenario.engine.name)
+    world = engine.communicator()
     is_root = world is None or world.rank == 0
     work = folder / "work"
     output = work / OUTPUT
@@ -73,7 +72,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         watch = _Watch(log, Progress(run, work, scenario.steps, "steps"), is_root)
         try:
             with watch:
-                RUN_ON[scenario.engine.name](output, _DECK, log)
+                engine.read_deck(output, _DECK, log)
             break
         except EngineStop as stop:
             if restart and read_thermo([log] if log.exists() else []).table.empty:
@@ -116,9 +115,9 @@ def _restarts(scenario: OwnDeck, work: Path) -> list[str]:
     """Restart files of an earlier attempt as the deck names them, the newest first."""
     if "restart" not in names_used(scenario):
         return []
-    found = [work / name for name in RESTART_FILES if (work / name).is_file()]
-    found.sort(key=lambda path: path.stat().st_mtime, reverse=True)
-    return [f"../{path.name}" for path in found]
+    files = [work / name for name in RESTART_FILES if (work / name).is_file()]
+    files.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    return [f"../{path.name}" for path in files]
 
 
 def _lay_out(scenario: OwnDeck, output: Path, deck: str, goes_on: bool) -> None:
@@ -166,13 +165,13 @@ class _Watch:
 
     def _look(self) -> None:
         first: float | None = None
-        shown = time.monotonic()
+        last_line = time.monotonic()
         libc = ctypes.CDLL(None)
         while not self._over.wait(FLUSH_EVERY_S):
             libc.fflush(None)  # LAMMPS keeps some kilobytes of its log to itself
-            if time.monotonic() - shown < LINE_EVERY_S or not self._log.exists():
+            if time.monotonic() - last_line < LINE_EVERY_S or not self._log.exists():
                 continue
-            shown = time.monotonic()
+            last_line = time.monotonic()
             table = read_thermo([self._log]).table
             if table.empty:
                 continue

@@ -9,6 +9,8 @@ import jinja2
 from jinja2 import meta
 
 from sandmould.digest import file_digest
+from sandmould.engines.ranks import Ranks
+from sandmould.engines.registry import engine_module
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.own_deck import RESERVED, OwnDeck
 
@@ -36,21 +38,22 @@ def problems(scenario: OwnDeck) -> list[Problem]:
     ----------
     scenario : OwnDeck
     """
-    found = [
+    faults = [
         Problem("template" if n == scenario.template else "files", n, "a file that can be read")
         for n, path in scenario.paths.items()
         if not path.is_file()
     ]
     names = [Path(n).name for n in scenario.paths]
     if len(set(names)) < len(names):
-        found.append(Problem("files", list(scenario.files), "files of different names"))
+        faults.append(Problem("files", list(scenario.files), "files of different names"))
     for name in set(RESERVED) & set(scenario.values):
-        found.append(
+        faults.append(
             Problem(f"values.{name}", scenario.values[name], f"another name: {name} is given")
         )
-    if scenario.engine.name == "liggghts" and scenario.engine.ranks > 1:
-        found.append(Problem("engine.ranks", scenario.engine.ranks, "1 on engine liggghts"))
-    return found or [*_template_problems(scenario)]
+    engine = scenario.engine
+    if engine.ranks > 1 and engine_module(engine.name).RANKS is Ranks.ONE:
+        faults.append(Problem("engine.ranks", engine.ranks, f"1 on engine {engine.name}"))
+    return faults or [*_template_problems(scenario)]
 
 
 def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:

@@ -11,21 +11,17 @@ from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
+from sandmould.engines.ranks import Ranks
 from sandmould.engines.reference.model import surfaces_of
 from sandmould.engines.reference.session import ReferenceSession
+from sandmould.scenario.contact import SYMBOLS
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
 
+GRAIN_STEPS_PER_S = 1.5e7
+RANKS = Ranks.THREADS
 _LAWS = (("grain", "contact.grain_grain"), ("wall", "contact.grain_wall"))
-_LAW_KEYS = (
-    ("k_n", "normal_stiffness_n_m"),
-    ("k_t", "tangential_stiffness_n_m"),
-    ("friction", "friction"),
-    ("damping_ratio", "damping_ratio"),
-    ("rolling_arm", "rolling_arm_fraction"),
-    ("k_roll", "rolling_stiffness_n_m"),
-)
 
 CAPABILITIES = Capabilities(
     bends_meshes=(2, 3),
@@ -61,7 +57,9 @@ def render_deck(program: Program, sources: Mapping[str, str], run: str, study: s
     keys = [("gravity", "gravity_m_s2"), ("density", "sand.density_kg_m3")]
     keys += [("disc_thickness", "sand.disc_thickness_m")] if d == 2 else []
     keys += _damping_keys(scenario)
-    keys += [(f"{law}_{name}", f"{key}.{last}") for law, key in _LAWS for name, last in _LAW_KEYS]
+    keys += [
+        (f"{law}_{name}", f"{key}.{last}") for law, key in _LAWS for name, last in SYMBOLS.items()
+    ]
     context = deck_context(program, Lines(scenario, sources), run, study)
     context |= {
         "kernels": source_hash(),

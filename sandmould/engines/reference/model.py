@@ -11,8 +11,8 @@ from sandmould.dem.steps import DemScene
 from sandmould.dem.surfaces import Surfaces
 from sandmould.engines.program import Stage
 from sandmould.engines.reference.moved_solver import MovedSolver
+from sandmould.engines.solid_surfaces import add_solids
 from sandmould.scenario.contact import ContactLaw
-from sandmould.scenario.geometry import Scene
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
@@ -23,16 +23,7 @@ than twice as long at 0.15, one busy machine, two runs each."""
 
 
 def _law(scenario: Scenario, law: ContactLaw) -> Law:
-    return Law(
-        law.normal_stiffness_n_m,
-        law.tangential_stiffness_n_m,
-        law.friction,
-        law.damping_ratio,
-        law.rolling_arm_fraction,
-        law.rolling_stiffness_n_m,
-        scenario.contact.no_tension == "total",
-        scenario.dimension == 3 and scenario.contact.rolling_axes == "all",
-    )
+    return Law(**scenario.contact.parameters(law, scenario.dimension))
 
 
 def _damping(scenario: Scenario) -> Damping:
@@ -59,20 +50,6 @@ def scene_of(scenario: Scenario, stage: Stage, step_s: float) -> DemScene:
         scenario.frame == "box",
         step_s,
     )
-
-
-def add_solids(surfaces: Surfaces, scene: Scene) -> None:
-    """Add outlines, meshes and round solids: all solids but blocks."""
-    for outline in scene.outlines:
-        k = len(outline.vertices_m)
-        ring = np.column_stack([np.arange(k), np.roll(np.arange(k), -1)])
-        surfaces.add_facets(outline.name, outline.vertices_m, ring)
-    for mesh in scene.meshes:
-        surfaces.add_facets(mesh.name, mesh.vertices_m, mesh.triangles)
-    for round_solid in scene.revolved:
-        surfaces.add_revolved(
-            round_solid.name, round_solid.origin_m, round_solid.axis, round_solid.profile_m, True
-        )
 
 
 def surfaces_of(scenario: Scenario) -> Surfaces:

@@ -7,6 +7,7 @@ from typing import Literal
 
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.box import Tube
+from sandmould.scenario.engine import EngineName
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.scenario import Scenario
@@ -37,9 +38,7 @@ class Certificate(Section):
         le=4,
     )
     replicates: int = quantity(3, "Seeds of every control.", source=ARGUED, ge=2, le=100)
-    engine: Literal["lammps", "liggghts", "reference"] = quantity(
-        "lammps", "Engine of the control engine.", source=ARGUED
-    )
+    engine: EngineName = quantity("lammps", "Engine of the control engine.", source=ARGUED)
 
 
 def frequency_key(sweep: Sweep) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field
 
 from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.engine import EngineName
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.calibration.config import Calibration
@@ -20,9 +21,7 @@ from sandmould.study.definition.sweep import Sweep
 class CrossCheck(Section):
     """Runs of one swept point again, on another engine; margins are those of equivalence."""
 
-    engine: Literal["lammps", "liggghts", "reference"] = quantity(
-        ..., "Engine that computes them.", source="user"
-    )
+    engine: EngineName = quantity(..., "Engine that computes them.", source="user")
     at: dict[str, Any] = Field(
         {}, description="The swept point: a value of every swept key, as the sweep has it."
     )

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.choosing import engine_of, engine_problem
 from sandmould.engines.program import build_program
+from sandmould.engines.registry import engine_of, engine_problem
 from sandmould.engines.session import Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.reading import Origin, merge

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-ENGINES = ("lammps", "liggghts", "reference")
+from sandmould.scenario.engine import ENGINE_NAMES
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def case(
     equation: str,
     reason: str,
     dimensions: tuple[int, ...] = (2, 3),
-    engines: tuple[str, ...] = ENGINES,
+    engines: tuple[str, ...] = ENGINE_NAMES,
     **arguments: list[Any],
 ) -> Callable[[Function], Function]:
     """Enter a function into the list of cases, once for each combination of arguments."""

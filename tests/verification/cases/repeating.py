@@ -17,7 +17,7 @@ from sandmould.dem.motion import NONE, Damping
 from sandmould.dem.solver import Solver
 from sandmould.dem.steps import DemScene
 from sandmould.dem.surfaces import Surfaces
-from sandmould.engines.choosing import engine_of
+from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
 from sandmould.scenario.scenario import Scenario
 from tests.verification.cases.bench import RADIUS_M, Array, Bench, law, scene, stiffness

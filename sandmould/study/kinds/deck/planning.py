@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sandmould.digest import SHORT, digest
-from sandmould.engines.choosing import engine_module
 from sandmould.engines.own_deck import deck as own_deck
+from sandmould.engines.registry import engine_module
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.kinds.kind import Planning, SpeedClass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sandmould.engines import choosing, recording
+from sandmould.engines import recording, registry
 from sandmould.engines.cost import cost_before
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.program import build_program
@@ -18,14 +18,14 @@ from sandmould.study.kinds.kind import Execution
 def render(run: Run, folder: Path) -> None:
     """Write the deck and the layers."""
     program = build_program(run.scenario)
-    engine = choosing.engine_of(run.scenario)
+    engine = registry.engine_of(run.scenario)
     engine.write_deck(program, run.sources, folder, run.run, run.study)
 
 
 def compute(run: Run, folder: Path) -> Computed:
     """Take the scenario through its program."""
     program = build_program(run.scenario)
-    opening: Opening = choosing.engine_of(run.scenario).open_session
+    opening: Opening = registry.engine_of(run.scenario).open_session
     if run.scenario.pattern is not None:
         from pattern_fe.coupling.opening import open_coupled
 

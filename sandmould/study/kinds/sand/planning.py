@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pattern_fe
 from sandmould.digest import digest
-from sandmould.engines import choosing
+from sandmould.engines import registry
 from sandmould.engines.program import build_program
 from sandmould.scenario import checks
 from sandmould.scenario.placement import plan_counts
@@ -21,11 +21,8 @@ BASE_MEMORY_MB = 600
 GRAINS_PER_MB = 50
 SLOW_RATE = 1e6
 """Grain-steps per second of a slow core; benchmarks/ has those measured."""
-RATE = {"reference": 1.5e7, "lammps": 2.5e6, "liggghts": 3e6}
-"""Grain-steps per second of one core in 2D that batches are filled by (docs/speed.md); fixed, so
-that a study has the same batches on every machine."""
 IN_3D = 0.4
-"""Share of that in 3D."""
+"""Share in 3D of an engine's speed in 2D."""
 PASSES = 4.0
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
@@ -47,17 +44,17 @@ def resolved(scenario: Scenario) -> Scenario:
 def sources(scenario: Scenario) -> list[Path]:
     """Templates, and our own code where it computes."""
     ours = pattern_fe.source_files() if scenario.pattern else []
-    return choosing.deck_sources(scenario) + ours
+    return registry.deck_sources(scenario) + ours
 
 
 def template_hash(scenario: Scenario) -> str:
     """Hash of all that turns a scenario into a deck, and of our code where it computes."""
-    return choosing.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
+    return registry.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
 
 
 def computed_hash(scenario: Scenario) -> str:
     """Hash of what the engine is told to compute, and of the pattern beside it."""
-    of_engine = choosing.computed_hash(scenario)
+    of_engine = registry.computed_hash(scenario)
     if scenario.pattern is None:
         return of_engine
     return digest(of_engine, scenario.pattern.model_dump_json(), pattern_fe.source_hash())
@@ -74,8 +71,8 @@ def threads(scenario: Scenario) -> int:
 
 
 def ranks(scenario: Scenario) -> int:
-    """MPI ranks; the reference engine's ranks are threads of one process."""
-    return 1 if scenario.engine.name == "reference" else scenario.engine.ranks
+    """MPI ranks; the ranks of some engines are threads of one process."""
+    return registry.mpi_ranks(scenario)
 
 
 def memory_mb(scenario: Scenario) -> int:
@@ -97,7 +94,8 @@ def planned_work(scenario: Scenario) -> float:
 def predicted_s(scenario: Scenario) -> float:
     """Wall time at fixed speeds."""
     in_3d = IN_3D if scenario.dimension == 3 else 1.0
-    return planned_work(scenario) / (RATE[scenario.engine.name] * scenario.engine.ranks * in_3d)
+    of_core = registry.engine_of(scenario).GRAIN_STEPS_PER_S
+    return planned_work(scenario) / (of_core * scenario.engine.ranks * in_3d)
 
 
 def planned_s(scenario: Scenario) -> float:
@@ -129,7 +127,7 @@ PLANNING = Planning[Scenario](
     work_unit="grain-steps",
     resolved=resolved,
     problems=checks.problems,
-    engine_problem=choosing.engine_problem,
+    engine_problem=registry.engine_problem,
     vibration_s=vibration_s,
     sources=sources,
     template_hash=template_hash,

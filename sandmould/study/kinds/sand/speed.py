@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sandmould.engines import choosing
+from sandmould.engines import registry
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop, Session
 from sandmould.scenario.fill import Fill, Layer
@@ -54,7 +54,7 @@ def measured_rate(scenario: Scenario, results: Path) -> float | None:
 
 def _machine(scenario: Scenario) -> str:
     """Machine, engine and dimension as one text."""
-    version = choosing.engine_of(scenario).installed_version()
+    version = registry.engine_of(scenario).installed_version()
     return f"{platform.node()} {scenario.engine.name} {version} {scenario.dimension}D"
 
 
@@ -84,7 +84,7 @@ def _measure_rate(scenario: Scenario) -> float | None:
     program = build_program(trial)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        engine = choosing.engine_of(trial)
+        engine = registry.engine_of(trial)
         engine.write_deck(program, {}, folder, "calibration", "calibration")
         try:
             session = engine.open_session(program, folder, folder / "engine.log")

@@ -1,11 +1,11 @@
-"""Which engine computes a scenario: what it refuses, its deck, its session."""
+"""The engines by their names: what each offers, what it refuses, its deck, its session."""
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 from sandmould import ROOT
 from sandmould.dem import source_hash
@@ -13,15 +13,21 @@ from sandmould.digest import digest
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
 from sandmould.engines.program import Program, build_program
+from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
-from sandmould.scenario.scenario import Engine, Scenario
+from sandmould.scenario.engine import ENGINE_NAMES
+from sandmould.scenario.scenario import Scenario
 
 
 class EngineModule(Protocol):
     """What ``sandmould.engines.<name>.engine`` offers, for each engine."""
 
     CAPABILITIES: Capabilities
+    GRAIN_STEPS_PER_S: float
+    """Speed of one core in 2D that batches are filled by (docs/speed.md); fixed, so that a study
+    has the same batches on every machine."""
+    RANKS: Ranks
 
     @staticmethod
     def installed_version() -> int | str:
@@ -56,13 +62,46 @@ class EngineModule(Protocol):
         """Open a session on a rendered deck, afresh or from a checkpoint."""
 
 
+class DeckReaderModule(Protocol):
+    """What ``sandmould.engines.<name>.own_deck`` offers, of engines that read decks of users."""
+
+    @staticmethod
+    def communicator() -> Any:
+        """Give the MPI communicator of this process, or None where the engine has one process.
+
+        Raises
+        ------
+        EngineStop
+            When the engine cannot be loaded.
+        """
+
+    @staticmethod
+    def read_deck(folder: Path, deck: str, log: Path) -> None:
+        """Have the engine read a deck from its first line to its last; every rank calls this.
+
+        Parameters
+        ----------
+        folder : Path
+            Working folder of the deck.
+        deck : str
+            Its name in there.
+        log : Path
+            The engine's log.
+
+        Raises
+        ------
+        EngineStop
+            When the engine cannot be started, or stops with an error, which is quoted.
+        """
+
+
 def engine_of(scenario: Scenario) -> EngineModule:
     """Import the module of a scenario's engine, and only that one."""
     return engine_module(scenario.engine.name)
 
 
 def engine_module(name: str) -> EngineModule:
-    """Import the module of an engine by its name."""
+    """Import the module of an engine by its name, one of ``ENGINE_NAMES``."""
     return cast(EngineModule, importlib.import_module(f"sandmould.engines.{name}.engine"))
 
 
@@ -74,8 +113,17 @@ def engines_that(can: Callable[[Capabilities], bool]) -> list[str]:
     can : callable
         Whether capabilities are enough.
     """
-    names: list[str] = Engine.model_json_schema()["properties"]["name"]["enum"]
-    return [name for name in names if can(engine_module(name).CAPABILITIES)]
+    return [name for name in ENGINE_NAMES if can(engine_module(name).CAPABILITIES)]
+
+
+def deck_reader(name: str) -> DeckReaderModule:
+    """Import how an engine reads decks of users, by its name."""
+    return cast(DeckReaderModule, importlib.import_module(f"sandmould.engines.{name}.own_deck"))
+
+
+def mpi_ranks(scenario: Scenario) -> int:
+    """Processes that a run is started with: 1 where ranks are threads of one process."""
+    return scenario.engine.ranks if engine_of(scenario).RANKS is Ranks.PROCESSES else 1
 
 
 def deck_hash(scenario: Scenario) -> str:

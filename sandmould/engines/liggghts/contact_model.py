@@ -1,4 +1,4 @@
-"""Coefficients of the contact model for each pair of atom types, from the scenario's laws."""
+"""The contact model of LIGGGHTS: coefficients for each pair of atom types, and what it lacks."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sandmould.engines.deck_lines import Lines
+from sandmould.engines.session import RefusedError
 from sandmould.scenario.contact import Contact, ContactLaw
 
 SizeClass = dict[str, Any]
@@ -120,3 +121,21 @@ def pair_tables(
 def rolls(contact: Contact) -> bool:
     """Whether any contact has a rolling moment."""
     return contact.grain_grain.rolling_arm_fraction + contact.grain_wall.rolling_arm_fraction > 0
+
+
+def refuse_law(contact: Contact) -> None:
+    """Refuse a law that the contact model cannot say.
+
+    Raises
+    ------
+    RefusedError
+    """
+    for name in ("grain_grain", "grain_wall"):
+        law = getattr(contact, name)
+        spring = law.tangential_stiffness_n_m
+        if law.rolling_arm_fraction > 0 and law.rolling_stiffness_n_m != spring:
+            raise RefusedError(
+                f"contact.{name}.rolling_stiffness_n_m",
+                law.rolling_stiffness_n_m,
+                f"{spring:g}, the tangential stiffness, on engine liggghts",
+            )
