@@ -12,8 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from sandmould.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
+from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, finished
 from sandmould.runs.formatting import name_of, number, shown_scale, titled, value_text, with_margin
-from sandmould.runs.outcome import Outcome
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict, finished_values
 from sandmould.study.collect import Collected
@@ -89,11 +89,11 @@ def time_chart(
     """
     if measure not in curves or not curves[measure].notna().any():
         return None
-    shaken = curves[curves["vibration_time_s"] >= 0]
-    clock = "vibration_time_s" if len(shaken) else "time_s"
+    shaken = curves[curves[VIBRATION_TIME_S] >= 0]
+    clock = VIBRATION_TIME_S if len(shaken) else TIME_S
     shown = shaken if len(shaken) else curves
     factor, what = shown_scale(measure)
-    by_run = {str(run): rows for run, rows in shown.groupby("run")}
+    by_run = {str(run): rows for run, rows in shown.groupby(RUN)}
     stride = max(1, len(shown) // _POINTS)
     colour = setting_tints(verdict, keys)
     labelled = _labelled(verdict)
@@ -102,22 +102,22 @@ def time_chart(
     for setting in verdict.settings:
         rows = runs_of(summary, setting)
         tint = colour[setting.label]
-        finished: list[NDArray[np.float64]] = []
-        for run, code, outcome in rows[["run", "outcome_code", "outcome"]].itertuples(index=False):
+        complete: list[NDArray[np.float64]] = []
+        for run, is_complete, outcome in zip(rows[RUN], finished(rows), rows[OUTCOME], strict=True):
             if str(run) not in by_run:
                 continue
             xy = by_run[str(run)][[clock, measure]].to_numpy(dtype=np.float64)
             xy = xy * [1.0, factor]
-            ended = "" if code == int(Outcome.FINISHED) else f", {outcome}"
+            ended = "" if is_complete else f", {outcome}"
             lines.append(Line(_thinned(xy, stride), tint, title=f"{run}: {setting.label}{ended}"))
-            if not ended:
-                finished.append(xy[np.isfinite(xy).all(axis=1)])
-        mean = _mean_curve(finished)
+            if is_complete:
+                complete.append(xy[np.isfinite(xy).all(axis=1)])
+        mean = _mean_curve(complete)
         if mean is not None:
             label = setting.label if setting.label in labelled else ""
-            many = f"{setting.label}, mean of {len(finished)}"
+            many = f"{setting.label}, mean of {len(complete)}"
             means.append(Line(_thinned(mean, stride), tint, True, label, many))
-    when = "time of vibration, s" if clock == "vibration_time_s" else "time, s"
+    when = "time of vibration, s" if clock == VIBRATION_TIME_S else "time, s"
     return Chart(when, what, _alt(what, when, means), tuple(lines + means))
 
 
@@ -196,7 +196,7 @@ def objective_charts(
                     tints(1, False)[0],
                     title=f"{run}: {number(y)}",
                 )
-                for run, x, y in zip(summary["run"], summary[key], values, strict=True)
+                for run, x, y in zip(summary[RUN], summary[key], values, strict=True)
                 if math.isfinite(y)
             ),
         )
@@ -258,7 +258,7 @@ def _run_marks(summary: pd.DataFrame, verdict: Verdict, setting: Setting, tint: 
     values = finished_values(rows, verdict.measure)
     factor = shown_scale(verdict.measure)[0]
     marks = []
-    for run, outcome, value in zip(rows["run"], rows["outcome"], values, strict=True):
+    for run, outcome, value in zip(rows[RUN], rows[OUTCOME], values, strict=True):
         if math.isfinite(value):
             title = f"{run}: {number(value)}"
             marks.append(Mark(math.nan, factor * value, "run", tint, title=title))
@@ -298,12 +298,12 @@ def best_passage(
     if verdict.best is None:
         return None
     rows = runs_of(collected.summary, verdict.best)
-    finished = rows.loc[rows["outcome_code"] == int(Outcome.FINISHED), "run"]
+    complete = rows.loc[finished(rows), RUN]
     curves = collected.curves
-    shaken = curves[curves["run"].isin(finished) & (curves["vibration_time_s"] >= 0)]
+    shaken = curves[curves[RUN].isin(complete) & (curves[VIBRATION_TIME_S] >= 0)]
     found = []
-    for _, run in shaken.groupby("run"):
-        time_s = run["vibration_time_s"].to_numpy(dtype=np.float64)
+    for _, run in shaken.groupby(RUN):
+        time_s = run[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
         value = run[measure].to_numpy(dtype=np.float64)
         if len(time_s) > 3 and np.isfinite(value).all():
             late = float(np.interp(0.75 * time_s[-1], time_s, value))

@@ -14,8 +14,8 @@ from scipy.stats import t as student
 from analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.report.chart import Chart, Line, tints
 from sandmould.report.curves import reported_lines, runs_of
+from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, finished
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
-from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
 from sandmould.statistics.verdict import Verdict
@@ -61,7 +61,7 @@ def filling_pages(
     shaken = _shaken(collected)
     if measure not in shaken or shaken.empty:
         return None
-    curves = {str(run): rows for run, rows in shaken.groupby("run")}
+    curves = {str(run): rows for run, rows in shaken.groupby(RUN)}
     keys = collected.keys
     one_key = len(keys) == 1 and all(
         isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
@@ -79,8 +79,8 @@ def filling_pages(
 def _shaken(collected: Collected) -> pd.DataFrame:
     """Curves of finished runs during vibration."""
     summary, curves = collected.summary, collected.curves
-    finished = summary.loc[summary["outcome_code"] == int(Outcome.FINISHED), "run"]
-    return curves[curves["run"].isin(finished) & (curves["vibration_time_s"] >= 0)]
+    complete = summary.loc[finished(summary), RUN]
+    return curves[curves[RUN].isin(complete) & (curves[VIBRATION_TIME_S] >= 0)]
 
 
 def _drive(scenario: Scenario, best: Setting) -> str:
@@ -98,12 +98,12 @@ def _time_to_fill(
 ) -> str:
     """When the cavity holds nearly what it holds when it is packed as the bed is."""
     times_s, lasts_s, ends = [], [], []
-    for run in runs_of(summary, best)["run"]:
+    for run in runs_of(summary, best)[RUN]:
         rows = curves.get(str(run))
-        if rows is None or "solid_fraction" not in rows:
+        if rows is None or SOLID_FRACTION not in rows:
             continue
-        full = float(rows["solid_fraction"].iloc[-1])
-        time_s = rows["vibration_time_s"].to_numpy(dtype=np.float64)
+        full = float(rows[SOLID_FRACTION].iloc[-1])
+        time_s = rows[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
         value = rows[measure].to_numpy(dtype=np.float64)
         times_s.append(first_reach_s(time_s, value, FULL_SHARE * full))
         lasts_s.append(time_s[-1])
@@ -142,16 +142,16 @@ def _fill_at_times(
     key: str,
     measure: str,
 ) -> _AtTimes:
-    last_s = min(float(rows["vibration_time_s"].max()) for rows in curves.values())
+    last_s = min(float(rows[VIBRATION_TIME_S].max()) for rows in curves.values())
     time_s = last_s * np.array([0.0, *SHARES])
     settings = sorted(known, key=lambda s: float(s.values[key]))
     mean, error = [], []
     for setting in settings:
         runs = []
-        for run in runs_of(summary, setting)["run"]:
+        for run in runs_of(summary, setting)[RUN]:
             rows = curves.get(str(run))
             if rows is not None:
-                runs.append(np.interp(time_s, rows["vibration_time_s"], rows[measure]))
+                runs.append(np.interp(time_s, rows[VIBRATION_TIME_S], rows[measure]))
         values = np.array(runs)
         gained = values - values[:, :1]
         mean.append(values.mean(axis=0))

@@ -26,6 +26,7 @@ from sandmould.report.robustness import certificate_pages
 from sandmould.report.sand import shown_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
+from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import name_of, number, setting_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
@@ -91,7 +92,7 @@ class _Page:
 def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
     objective, keys, summary = study.objective, collected.keys, collected.of_sweep.summary
     seeks_best = study.seeks_best
-    any_scenario = _scenario_of(study_folder, summary["run"])
+    any_scenario = _scenario_of(study_folder, summary[RUN])
     if any_scenario is None:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
     certified = bool(read_ledger(study_folder, study).certified_hz)
@@ -104,7 +105,7 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     by_setting = {}
     for values, rows in group_settings(summary, keys):
         if (label := setting_text(values)) in listed:
-            by_setting[label] = _scenario_of(study_folder, rows["run"])
+            by_setting[label] = _scenario_of(study_folder, rows[RUN])
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [shown] if shown else []) or any_scenario
@@ -153,7 +154,7 @@ def _render(
     charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
         charts = tuple(with_surface(c, optimum.optimum, page.study) for c in charts)
-    provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
+    provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary[RUN]]
     of_kind = kind_pages(
         page.study_folder,
         page.study,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import setting_text
 from sandmould.statistics.settings import Setting, group_settings
 from sandmould.statistics.verdict import Verdict, finished_values
@@ -39,7 +40,7 @@ def drawn_part(collected: Collected, verdict: Verdict) -> tuple[Collected, Verdi
     each = max(1, MOST_RUNS // len(chosen))
     rows = {setting_text(v): found for v, found in group_settings(summary, collected.keys)}
     kept = pd.concat([rows[setting.label].head(each) for setting in chosen])
-    curves = collected.curves[collected.curves["run"].isin(set(kept["run"]))]
+    curves = collected.curves[collected.curves[RUN].isin(set(kept[RUN]))]
     return replace(collected, summary=kept, curves=curves), replace(verdict, settings=chosen)
 
 

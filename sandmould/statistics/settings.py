@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from sandmould.runs.columns import REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
 
 CONFIDENCE = 0.95
@@ -84,8 +85,8 @@ def by_block(
     summary: pd.DataFrame, found: pd.Series[float], over: Sequence[str] = ()
 ) -> pd.Series[float]:
     """Values by replicate, seed and further keys, or by row where replicates are not told apart."""
-    blocks = [c for c in ("replicate", "seed", *over) if c in summary]
-    if "replicate" not in blocks:
+    blocks = [c for c in (REPLICATE, SEED, *over) if c in summary]
+    if REPLICATE not in blocks:
         return found.rename(index=lambda row: ("row", row))
     rows = summary.loc[found.index, blocks]
     return pd.Series(found.to_numpy(), index=[tuple(r) for r in rows.to_numpy().tolist()])

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
+from sandmould.runs.columns import RUN, finished
 from sandmould.runs.formatting import listed, name_of, number, value_text, with_margin
-from sandmould.runs.outcome import Outcome
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.settings import (
     Comparison,
@@ -133,7 +133,7 @@ def finished_values(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
     if measure not in summary:
         return pd.Series(np.nan, index=summary.index)
     values = pd.to_numeric(summary[measure], errors="coerce")
-    return values.where(summary["outcome_code"] == int(Outcome.FINISHED))
+    return values.where(finished(summary))
 
 
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
@@ -155,7 +155,7 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
     first, last = ("highest", "lowest") if better == "neither" else ("best", "worst")
     values = finished_values(summary, measure).dropna()
     values = values.sort_values(ascending=better == "smaller", kind="stable")
-    runs = [str(r) for r in summary.loc[values.index, "run"]]
+    runs = [str(r) for r in summary.loc[values.index, RUN]]
     ranks: dict[str, str] = {}
     for role, place in ((first, 0), (last, -1), ("median", (len(runs) - 1) // 2)):
         if runs and runs[place] not in ranks.values():

@@ -12,6 +12,23 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
+from sandmould.runs.columns import (
+    CROSS_CHECK,
+    DETAIL,
+    GRAINS,
+    LARGEST_OVERLAP_FRACTION,
+    OUTCOME,
+    OUTCOME_CODE,
+    PART,
+    PLANNED_S,
+    REPLICATE,
+    RUN,
+    SEED,
+    SIMULATED_S,
+    STAGE,
+    TIME_S,
+    VIBRATION_TIME_S,
+)
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.agreement import (
@@ -25,11 +42,11 @@ from sandmould.study.plan_files import STUDY_FILE
 from sandmould.study.study import Study, study_model
 
 NO_OUTCOME = "no outcome written"
-_OUTCOME_COLUMNS = ("outcome_code", "outcome", "detail", "simulated_s", "planned_s")
-_PARAMETER_FREE = ("run", "replicate", "seed", "part")
-_CLOCK = ("time_s", "vibration_time_s", "stage")
+_OUTCOME_COLUMNS = (OUTCOME_CODE, OUTCOME, DETAIL, SIMULATED_S, PLANNED_S)
+_PARAMETER_FREE = (RUN, REPLICATE, SEED, PART)
+_CLOCK = (TIME_S, VIBRATION_TIME_S, STAGE)
 # The summary has these of the run; those of the snapshot get a prefix there.
-_OF_SNAPSHOT = (*_CLOCK, "grains", "largest_overlap_fraction")
+_OF_SNAPSHOT = (*_CLOCK, GRAINS, LARGEST_OVERLAP_FRACTION)
 
 T = TypeVar("T")
 
@@ -96,8 +113,8 @@ def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> t
     equivalence = study.equivalence
     swept = sweep_part(summary)
     found = compare_keys(swept, keys, equivalence)
-    if study.cross_check is not None and "part" in summary:
-        checked = summary[summary["part"] == "cross_check"]
+    if study.cross_check is not None and PART in summary:
+        checked = summary[summary[PART] == CROSS_CHECK]
         alike = swept
         for key, value in study.cross_check.at.items():
             alike = alike[alike[key] == value]
@@ -137,23 +154,23 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
     OSError, ValueError
         When ``runs.tsv`` itself cannot be read.
     """
-    runs = pd.read_csv(study_folder / "runs.tsv", sep="\t", dtype={"run": str})
+    runs = pd.read_csv(study_folder / "runs.tsv", sep="\t", dtype={RUN: str})
     keys = swept_keys(runs)
     rows: list[dict[str, Any]] = []
     curves: list[pd.DataFrame] = []
     for planned in runs.to_dict("records"):
-        folder = study_folder / "runs" / str(planned["run"])
+        folder = study_folder / "runs" / str(planned[RUN])
         row, measures = _one_run(folder, at_vibration_s)
         rows.append({**{str(k): v for k, v in planned.items()}, **row})
         if len(measures):
-            known = {k: planned[k] for k in ("run", *keys, "replicate") if k in planned}
+            known = {k: planned[k] for k in (RUN, *keys, REPLICATE) if k in planned}
             for place, (name, value) in enumerate(known.items()):
                 measures.insert(place, name, value)
             curves.append(measures)
     columns = [*map(str, runs.columns), *_OUTCOME_COLUMNS]
     summary = pd.DataFrame(rows)
     summary = summary.reindex(columns=[*columns, *(c for c in summary if c not in columns)])
-    curve_columns = [c for c in ("run", *keys, "replicate") if c in runs.columns]
+    curve_columns = [c for c in (RUN, *keys, REPLICATE) if c in runs.columns]
     together = (
         pd.concat(curves, ignore_index=True)
         if curves
@@ -170,15 +187,15 @@ def _one_run(folder: Path, at_vibration_s: float | None) -> tuple[dict[str, Any]
     measures = _read(folder / "measures.tsv", _measures, broken)
     if measures is None:
         measures = pd.DataFrame()
-    elif unread := int(measures["time_s"].isna().sum()):
+    elif unread := int(measures[TIME_S].isna().sum()):
         broken.append(f"{unread} snapshots cannot be read.")
     detail = [] if outcome is None else [outcome.detail]
     row: dict[str, Any] = {
-        "outcome_code": np.nan if outcome is None else int(outcome.outcome),
-        "outcome": NO_OUTCOME if outcome is None else outcome.outcome.label,
-        "detail": " ".join(s for s in (*detail, *broken) if s),
-        "simulated_s": np.nan if outcome is None else outcome.simulated_s,
-        "planned_s": np.nan if outcome is None else outcome.planned_s,
+        OUTCOME_CODE: np.nan if outcome is None else int(outcome.outcome),
+        OUTCOME: NO_OUTCOME if outcome is None else outcome.outcome.label,
+        DETAIL: " ".join(s for s in (*detail, *broken) if s),
+        SIMULATED_S: np.nan if outcome is None else outcome.simulated_s,
+        PLANNED_S: np.nan if outcome is None else outcome.planned_s,
     }
     costs = {} if cost is None or cost.empty else _named(cost.iloc[-1])
     finished = outcome is not None and outcome.outcome is Outcome.FINISHED
@@ -204,12 +221,12 @@ def _at(
     counts as reached.
     """
     # a snapshot that could not be read has a row without a time
-    measures = measures[measures["vibration_time_s"].notna()] if len(measures) else measures
+    measures = measures[measures[VIBRATION_TIME_S].notna()] if len(measures) else measures
     if measures.empty:
         return None
     if at_vibration_s is None:
         return measures.iloc[-1] if finished else None
-    time_s = measures["vibration_time_s"].to_numpy(dtype=np.float64)
+    time_s = measures[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
     shaken = time_s[time_s >= 0]
     if not len(shaken):
         return None
@@ -230,9 +247,9 @@ def _measures(path: Path) -> pd.DataFrame:
     missing = [c for c in _CLOCK if c not in table.columns]
     if missing:
         raise ValueError(f"no column {', '.join(missing)}")
-    for name in ("time_s", "vibration_time_s"):
+    for name in (TIME_S, VIBRATION_TIME_S):
         table[name] = pd.to_numeric(table[name])
-    return table.sort_values("time_s", ignore_index=True)
+    return table.sort_values(TIME_S, ignore_index=True)
 
 
 def _read(path: Path, reader: Callable[[Path], T], broken: list[str]) -> T | None:

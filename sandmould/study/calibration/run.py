@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from sandmould.runs.columns import RUN
 from sandmould.statistics.calibration.sands import Calibrated, calibrate, write_materials
 from sandmould.study.collect import gather, read_study
 from sandmould.study.plan_files import read_run
@@ -45,7 +46,7 @@ def write_calibration(study_folder: Path, materials: Path) -> list[str]:
     result = read_calibrated(study_folder, study, collected.summary, collected.keys)
     if result is None:
         return []
-    run = str(collected.summary["run"].iloc[0])
+    run = str(collected.summary[RUN].iloc[0])
     scenario = read_run(study_folder / "runs" / run / "scenario.yaml").scenario
     write_materials(result, scenario, study_folder.name, materials)
     return [f"{one.sand.name}: {one.problem}" for one in result.sands if one.problem]
