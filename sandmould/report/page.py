@@ -32,7 +32,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import group_settings
 from sandmould.statistics.verdict import Verdict, judge
-from sandmould.study.collect import Collected, gather, read_provenance, read_study
+from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.plan_files import FIGURES, STUDY_FILE, read_run
 from sandmould.study.rounds.ledger import read_ledger
@@ -50,17 +50,17 @@ def write_report(study_folder: Path, out: Path) -> None:
     Parameters
     ----------
     study_folder : Path
-        ``results/<study>``; runs may be missing, unfinished or broken.
+        ``results/<study>`` with its collected tables; runs may be missing, unfinished or broken.
     out : Path
         The HTML file; links to the data lead from its folder.
 
     Raises
     ------
     OSError, ValueError
-        When ``runs.tsv`` cannot be read, or no run has a readable scenario.
+        When a collected table cannot be read, or no run has a readable scenario.
     """
     study = read_study(study_folder)
-    collected = gather(study_folder, study.objective.at_vibration_s)
+    collected = read_collected(study_folder)
     # made first: the page lists it
     (study_folder / FIGURES).mkdir(exist_ok=True)
     page = _page(study_folder, out.absolute().parent, study, collected)
