@@ -13,8 +13,16 @@ from numpy.typing import NDArray
 
 from sandmould.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
 from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, finished
-from sandmould.runs.formatting import name_of, number, shown_scale, titled, value_text, with_margin
-from sandmould.statistics.settings import Setting
+from sandmould.runs.formatting import (
+    name_of,
+    number,
+    setting_text,
+    shown_scale,
+    titled,
+    value_text,
+    with_margin,
+)
+from sandmould.statistics.settings import Setting, group_settings
 from sandmould.statistics.verdict import Verdict, finished_values
 from sandmould.study.collect import Collected
 from sandmould.study.study import Study
@@ -68,6 +76,11 @@ def runs_of(summary: pd.DataFrame, setting: Setting) -> pd.DataFrame:
     return summary[chosen]
 
 
+def runs_by_setting(summary: pd.DataFrame, keys: Sequence[str]) -> dict[str, pd.DataFrame]:
+    """Rows of the summary at every setting, by its label."""
+    return {setting_text(values): rows for values, rows in group_settings(summary, keys)}
+
+
 def time_chart(
     curves: pd.DataFrame, summary: pd.DataFrame, verdict: Verdict, keys: Sequence[str], measure: str
 ) -> Chart | None:
@@ -93,21 +106,22 @@ def time_chart(
     clock = VIBRATION_TIME_S if len(shaken) else TIME_S
     shown = shaken if len(shaken) else curves
     factor, what = shown_scale(measure)
-    by_run = {str(run): rows for run, rows in shown.groupby(RUN)}
+    xy_all = shown[[clock, measure]].to_numpy(dtype=np.float64) * [1.0, factor]
+    by_run = {str(run): xy_all[rows] for run, rows in shown.groupby(RUN).indices.items()}
     stride = max(1, len(shown) // _POINTS)
     colour = setting_tints(verdict, keys)
     labelled = _labelled(verdict)
     lines: list[Line] = []
     means: list[Line] = []
+    rows_of = runs_by_setting(summary, keys)
     for setting in verdict.settings:
-        rows = runs_of(summary, setting)
+        rows = rows_of[setting.label]
         tint = colour[setting.label]
         complete: list[NDArray[np.float64]] = []
         for run, is_complete, outcome in zip(rows[RUN], finished(rows), rows[OUTCOME], strict=True):
             if str(run) not in by_run:
                 continue
-            xy = by_run[str(run)][[clock, measure]].to_numpy(dtype=np.float64)
-            xy = xy * [1.0, factor]
+            xy = by_run[str(run)]
             ended = "" if is_complete else f", {outcome}"
             lines.append(Line(_thinned(xy, stride), tint, title=f"{run}: {setting.label}{ended}"))
             if is_complete:
@@ -210,9 +224,10 @@ def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
     places = [float(s.values[key]) for s in verdict.settings]
     factor, what = shown_scale(verdict.measure)
     marks: list[Mark] = []
+    rows_of = runs_by_setting(summary, [key])
     for setting, x in zip(verdict.settings, places, strict=True):
         tint = colour[setting.label]
-        for place, mark in enumerate(_run_marks(summary, verdict, setting, tint)):
+        for place, mark in enumerate(_run_marks(rows_of[setting.label], verdict, tint)):
             # side by side to the left of the mean
             shift_px = -9.0 - min(place * 3.5, 21.0)
             marks.append(replace(mark, x=x, shift_px=shift_px))
@@ -234,11 +249,12 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
     factor, what = shown_scale(verdict.measure)
     ranked = sorted(verdict.settings, key=lambda s: -s.mean if s.n else math.inf)
     marks: list[Mark] = []
+    rows_of = runs_by_setting(summary, list(ranked[0].values))
     for row, setting in enumerate(ranked):
         tint = tints(1, False)[0] if setting is verdict.best else PLAIN
         marks += [
             replace(m, x=m.y, y=row)
-            for m in _run_marks(summary, verdict, setting, tint)
+            for m in _run_marks(rows_of[setting.label], verdict, tint)
             if m.kind == "run"
         ]
         if setting.n:
@@ -252,9 +268,8 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
     )
 
 
-def _run_marks(summary: pd.DataFrame, verdict: Verdict, setting: Setting, tint: Tint) -> list[Mark]:
-    """Marks of a setting's runs; x is left to the caller."""
-    rows = runs_of(summary, setting)
+def _run_marks(rows: pd.DataFrame, verdict: Verdict, tint: Tint) -> list[Mark]:
+    """Marks of a setting's runs, given their rows; x is left to the caller."""
     values = finished_values(rows, verdict.measure)
     factor = shown_scale(verdict.measure)[0]
     marks = []

@@ -30,7 +30,7 @@ from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import name_of, number, setting_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.settings import group_settings
+from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, judge
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
 from sandmould.study.kinds.kind import AnyScenario
@@ -103,9 +103,9 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     shown = next(iter(shown_runs(study_folder, summary, verdict).values()), "")
     listed = {setting.label for setting in listed_settings(verdict)}
     by_setting = {}
-    for values, rows in group_settings(summary, keys):
+    for values, rows in setting_rows(summary, keys):
         if (label := setting_text(values)) in listed:
-            by_setting[label] = _scenario_of(study_folder, rows[RUN])
+            by_setting[label] = _scenario_of(study_folder, summary[RUN].iloc[rows])
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [shown] if shown else []) or any_scenario

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy import stats
 
 from sandmould.runs.columns import REPLICATE, SEED
@@ -58,19 +59,27 @@ class Comparison:
         return math.isfinite(self.p)
 
 
-def group_settings(
+def setting_rows(
     summary: pd.DataFrame, keys: Sequence[str]
-) -> list[tuple[dict[str, Any], pd.DataFrame]]:
-    """Rows of each combination of swept values, in rising order where all are numbers."""
+) -> list[tuple[dict[str, Any], NDArray[np.intp]]]:
+    """Each combination of swept values with the places of its rows, in rising order of numbers."""
     if not keys:
-        return [({}, summary)] if len(summary) else []
-    groups = [
-        (dict(zip(keys, values, strict=True)), rows)
-        for values, rows in summary.groupby(list(keys), sort=False, dropna=False)
-    ]
+        return [({}, np.arange(len(summary)))] if len(summary) else []
+    number = summary.groupby(list(keys), sort=False, dropna=False).ngroup().to_numpy()
+    order = np.argsort(number, kind="stable")
+    rows = np.split(order, np.flatnonzero(np.diff(number[order])) + 1)
+    values = summary[list(keys)].iloc[[own[0] for own in rows]].to_dict("records")
+    groups = [({str(k): v for k, v in at.items()}, r) for at, r in zip(values, rows, strict=True)]
     if all(pd.api.types.is_numeric_dtype(summary[k]) for k in keys):
         groups.sort(key=lambda group: tuple(group[0].values()))
     return groups
+
+
+def group_settings(
+    summary: pd.DataFrame, keys: Sequence[str]
+) -> list[tuple[dict[str, Any], pd.DataFrame]]:
+    """Each combination of swept values with its rows; see ``setting_rows``."""
+    return [(values, summary.iloc[rows]) for values, rows in setting_rows(summary, keys)]
 
 
 def setting_of(values: dict[str, Any], planned: int, found: pd.Series[float]) -> Setting:
@@ -80,6 +89,14 @@ def setting_of(values: dict[str, Any], planned: int, found: pd.Series[float]) ->
     half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * sd / math.sqrt(n) if n > 1 else sd
     mean = float(found.mean()) if n else math.nan
     return Setting(values, setting_text(values), planned, n, mean, sd, half)
+
+
+def number_blocks(summary: pd.DataFrame) -> NDArray[np.intp]:
+    """Number of each run's block, (n,): one for a replicate with its seed, else one a row."""
+    blocks = [c for c in (REPLICATE, SEED) if c in summary]
+    if REPLICATE not in blocks:
+        return np.arange(len(summary))
+    return np.asarray(summary.groupby(blocks, sort=False, dropna=False).ngroup(), dtype=np.intp)
 
 
 def by_block(

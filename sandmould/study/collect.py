@@ -281,7 +281,7 @@ def _of_measures_and_costs(
                 columns[name] = cost[name]
             elif name in measured and name not in _OF_SNAPSHOT:
                 # The run's own account counts where both have it.
-                has = [p in last and name in costs.columns[p] for p in every]
+                has = np.array([p in last and name in costs.columns[p] for p in every])
                 columns[name] = cost[name].where(has, measured[name])
     return columns
 
