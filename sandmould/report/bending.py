@@ -20,8 +20,14 @@ from sandmould.report.curves import runs_of, setting_tints, time_chart
 from sandmould.report.ledger_charts import LedgerChart, ledger_charts
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.thinning import drawn_part, listed_runs
+from sandmould.runs.columns import (
+    RUN,
+    SOLID_FRACTION,
+    TIME_S,
+    VIBRATION_TIME_S,
+    finished,
+)
 from sandmould.runs.formatting import number, setting_text
-from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
@@ -76,12 +82,12 @@ def bending_pages(
         Name of that run.
     """
     found: dict[str, LoopVerdict] = {}
-    for run in collected.summary["run"]:
+    for run in collected.summary[RUN]:
         judged = verdict_of(study_folder / "runs" / str(run))
         if judged is not None:
             found[str(run)] = judged
     curves = collected.curves
-    own = curves[curves["run"] == shown] if TIP in curves else curves.iloc[:0]
+    own = curves[curves[RUN] == shown] if TIP in curves else curves.iloc[:0]
     picture, note = draw_outlines(study_folder / "runs" / shown, scenario)
     ledger = ledger_of(study_folder / "runs" / shown)
     return BendingPages(
@@ -98,8 +104,8 @@ def bending_pages(
 
 def _begins_s(rows: pd.DataFrame) -> float:
     """Time at which vibration begins; that of the end of a run without it."""
-    shaken = rows[rows["vibration_time_s"] >= 0.0]
-    times = (shaken if len(shaken) else rows.iloc[::-1])["time_s"]
+    shaken = rows[rows[VIBRATION_TIME_S] >= 0.0]
+    times = (shaken if len(shaken) else rows.iloc[::-1])[TIME_S]
     return float(times.iloc[0]) if len(times) else 0.0
 
 
@@ -110,7 +116,7 @@ def _told(rows: pd.DataFrame, verdict: LoopVerdict | None, scenario: Scenario) -
     said = []
     if verdict is not None:
         said.append(f"The run shown: {verdict.sentence[0].lower()}{verdict.sentence[1:]}")
-    shaken = rows[rows["vibration_time_s"] >= 0.0]
+    shaken = rows[rows[VIBRATION_TIME_S] >= 0.0]
     first = shaken.iloc[0] if len(shaken) else rows.iloc[-1]
     last = rows.iloc[-1]
     said.append(f"Its tip had sunk by {_mm(first[TIP])} mm when the box was filled{_under(first)}.")
@@ -123,7 +129,7 @@ def _told(rows: pd.DataFrame, verdict: LoopVerdict | None, scenario: Scenario) -
         if verdict is None or verdict.state != "holds":
             like = "by a loop that does not hold"
         said.append(
-            f"{last['vibration_time_s']:.3g} s of vibration {way}, {like}: "
+            f"{last[VIBRATION_TIME_S]:.3g} s of vibration {way}, {like}: "
             f"{_mm(last[TIP])} mm at the end{_under(last)}."
         )
     return tuple(said)
@@ -131,7 +137,7 @@ def _told(rows: pd.DataFrame, verdict: LoopVerdict | None, scenario: Scenario) -
 
 def _under(row: pd.Series[Any]) -> str:
     """How full the space under the pattern was."""
-    under, bed = row.get("pattern_under_fraction", math.nan), row["solid_fraction"]
+    under, bed = row.get("pattern_under_fraction", math.nan), row[SOLID_FRACTION]
     if not math.isfinite(under):
         return ""
     return (
@@ -160,9 +166,9 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     if TIP not in drawn.curves:
         return None
     parts = []
-    for _, rows in drawn.curves.groupby("run"):
-        shift_s = _begins_s(rows) if (rows["vibration_time_s"] >= 0.0).any() else 0.0
-        parts.append(rows.assign(time_s=rows["time_s"] - shift_s, vibration_time_s=-1.0))
+    for _, rows in drawn.curves.groupby(RUN):
+        shift_s = _begins_s(rows) if (rows[VIBRATION_TIME_S] >= 0.0).any() else 0.0
+        parts.append(rows.assign(time_s=rows[TIME_S] - shift_s, vibration_time_s=-1.0))
     aligned = pd.concat(parts)
     chart = time_chart(aligned, drawn.summary, part, collected.keys, TIP)
     if chart is None:
@@ -171,14 +177,14 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     areas = []
     for setting in part.settings:
         rows = runs_of(drawn.summary, setting)
-        finished = rows.loc[rows["outcome_code"] == int(Outcome.FINISHED), "run"]
-        area = _area(aligned[aligned["run"].isin(finished)])
+        complete = rows.loc[finished(rows), RUN]
+        area = _area(aligned[aligned[RUN].isin(complete)])
         if area is not None:
-            said = f"{setting.label}: from the least to the greatest of {len(finished)} runs"
+            said = f"{setting.label}: from the least to the greatest of {len(complete)} runs"
             areas.append(replace(area, tint=tint[setting.label], title=said))
     clock = (
         "time since vibration began, s"
-        if (collected.curves["vibration_time_s"] >= 0).any()
+        if (collected.curves[VIBRATION_TIME_S] >= 0).any()
         else "time, s"
     )
     return replace(chart, x_title=clock, y_title="deflection of the tip, mm", areas=tuple(areas))
@@ -186,7 +192,7 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
 
 def _area(curves: pd.DataFrame) -> Area | None:
     """Least and greatest of some runs while all of them go on."""
-    runs = [rows[["time_s", TIP]].dropna().to_numpy() for _, rows in curves.groupby("run")]
+    runs = [rows[[TIME_S, TIP]].dropna().to_numpy() for _, rows in curves.groupby(RUN)]
     runs = [xy for xy in runs if len(xy)]
     if len(runs) < 2:
         return None
@@ -224,10 +230,10 @@ def _runs_table(
         Column("surface", False),
         Column("solid", False),
     )
-    last = {str(run): rows.iloc[-1] for run, rows in collected.curves.groupby("run")}
+    last = {str(run): rows.iloc[-1] for run, rows in collected.curves.groupby(RUN)}
     rows, marked = [], []
     for planned in listed_runs(collected.summary, verdict).to_dict("records"):
-        run = str(planned["run"])
+        run = str(planned[RUN])
         judged, measures = found.get(run), last.get(run, pd.Series(dtype=np.float64))
         setting = setting_text({key: planned[key] for key in collected.keys})
         rows.append(

@@ -17,6 +17,7 @@ from sandmould.report.method import Row, deck_method, sand_method
 from sandmould.report.sand import SandPages, sand_pages
 from sandmould.report.solidification import shown_run, solid_method, solid_pages
 from sandmould.report.time_series import Curve, measure_curves, whole_conclusion
+from sandmould.runs.columns import LARGEST_OVERLAP_FRACTION
 from sandmould.scenario.flow import MetalFlow, StillTank
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
@@ -152,7 +153,7 @@ def _sand_notes(
 
 
 def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
-    column = "largest_overlap_fraction"
+    column = LARGEST_OVERLAP_FRACTION
     found = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
     return float(found) if found > 0 else 0.0
 

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from pattern_fe.coupling.loop_verdict import State
 from sandmould.report.figures import png
+from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import name_of, setting_text
 from sandmould.study.collect import Collected
 
@@ -55,9 +56,9 @@ def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingM
     keys, curves = collected.keys, collected.curves
     if not {MODULUS, FACTOR} <= set(keys) or LIMIT not in curves:
         return None
-    run = collected.summary["run"].astype(str)
+    run = collected.summary[RUN].astype(str)
     # Of the snapshots: the summary has none of a run that was stopped.
-    limit = run.map(curves.groupby(curves["run"].astype(str))[LIMIT].last())
+    limit = run.map(curves.groupby(curves[RUN].astype(str))[LIMIT].last())
     rows = collected.summary.assign(**{"state": run.map(states), LIMIT: limit})
     rows = rows[rows["state"].isin(list(SIGNS)) & limit.notna()]
     if SCHEME in keys:

@@ -12,9 +12,17 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from sandmould.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
-from sandmould.runs.formatting import name_of, number, shown_scale, titled, value_text, with_margin
-from sandmould.runs.outcome import Outcome
-from sandmould.statistics.settings import Setting
+from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, finished
+from sandmould.runs.formatting import (
+    name_of,
+    number,
+    setting_text,
+    shown_scale,
+    titled,
+    value_text,
+    with_margin,
+)
+from sandmould.statistics.settings import Setting, group_settings
 from sandmould.statistics.verdict import Verdict, finished_values
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
@@ -68,6 +76,11 @@ def runs_of(summary: pd.DataFrame, setting: Setting) -> pd.DataFrame:
     return summary[chosen]
 
 
+def runs_by_setting(summary: pd.DataFrame, keys: Sequence[str]) -> dict[str, pd.DataFrame]:
+    """Rows of the summary at every setting, by its label."""
+    return {setting_text(values): rows for values, rows in group_settings(summary, keys)}
+
+
 def time_chart(
     curves: pd.DataFrame, summary: pd.DataFrame, verdict: Verdict, keys: Sequence[str], measure: str
 ) -> Chart | None:
@@ -89,35 +102,36 @@ def time_chart(
     """
     if measure not in curves or not curves[measure].notna().any():
         return None
-    shaken = curves[curves["vibration_time_s"] >= 0]
-    clock = "vibration_time_s" if len(shaken) else "time_s"
+    shaken = curves[curves[VIBRATION_TIME_S] >= 0]
+    clock = VIBRATION_TIME_S if len(shaken) else TIME_S
     shown = shaken if len(shaken) else curves
     factor, what = shown_scale(measure)
-    by_run = {str(run): rows for run, rows in shown.groupby("run")}
+    xy_all = shown[[clock, measure]].to_numpy(dtype=np.float64) * [1.0, factor]
+    by_run = {str(run): xy_all[rows] for run, rows in shown.groupby(RUN).indices.items()}
     stride = max(1, len(shown) // _POINTS)
     colour = setting_tints(verdict, keys)
     labelled = _labelled(verdict)
     lines: list[Line] = []
     means: list[Line] = []
+    rows_of = runs_by_setting(summary, keys)
     for setting in verdict.settings:
-        rows = runs_of(summary, setting)
+        rows = rows_of[setting.label]
         tint = colour[setting.label]
-        finished: list[NDArray[np.float64]] = []
-        for run, code, outcome in rows[["run", "outcome_code", "outcome"]].itertuples(index=False):
+        complete: list[NDArray[np.float64]] = []
+        for run, is_complete, outcome in zip(rows[RUN], finished(rows), rows[OUTCOME], strict=True):
             if str(run) not in by_run:
                 continue
-            xy = by_run[str(run)][[clock, measure]].to_numpy(dtype=np.float64)
-            xy = xy * [1.0, factor]
-            ended = "" if code == int(Outcome.FINISHED) else f", {outcome}"
+            xy = by_run[str(run)]
+            ended = "" if is_complete else f", {outcome}"
             lines.append(Line(_thinned(xy, stride), tint, title=f"{run}: {setting.label}{ended}"))
-            if not ended:
-                finished.append(xy[np.isfinite(xy).all(axis=1)])
-        mean = _mean_curve(finished)
+            if is_complete:
+                complete.append(xy[np.isfinite(xy).all(axis=1)])
+        mean = _mean_curve(complete)
         if mean is not None:
             label = setting.label if setting.label in labelled else ""
-            many = f"{setting.label}, mean of {len(finished)}"
+            many = f"{setting.label}, mean of {len(complete)}"
             means.append(Line(_thinned(mean, stride), tint, True, label, many))
-    when = "time of vibration, s" if clock == "vibration_time_s" else "time, s"
+    when = "time of vibration, s" if clock == VIBRATION_TIME_S else "time, s"
     return Chart(when, what, _alt(what, when, means), tuple(lines + means))
 
 
@@ -196,7 +210,7 @@ def objective_charts(
                     tints(1, False)[0],
                     title=f"{run}: {number(y)}",
                 )
-                for run, x, y in zip(summary["run"], summary[key], values, strict=True)
+                for run, x, y in zip(summary[RUN], summary[key], values, strict=True)
                 if math.isfinite(y)
             ),
         )
@@ -210,9 +224,10 @@ def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
     places = [float(s.values[key]) for s in verdict.settings]
     factor, what = shown_scale(verdict.measure)
     marks: list[Mark] = []
+    rows_of = runs_by_setting(summary, [key])
     for setting, x in zip(verdict.settings, places, strict=True):
         tint = colour[setting.label]
-        for place, mark in enumerate(_run_marks(summary, verdict, setting, tint)):
+        for place, mark in enumerate(_run_marks(rows_of[setting.label], verdict, tint)):
             # side by side to the left of the mean
             shift_px = -9.0 - min(place * 3.5, 21.0)
             marks.append(replace(mark, x=x, shift_px=shift_px))
@@ -234,11 +249,12 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
     factor, what = shown_scale(verdict.measure)
     ranked = sorted(verdict.settings, key=lambda s: -s.mean if s.n else math.inf)
     marks: list[Mark] = []
+    rows_of = runs_by_setting(summary, list(ranked[0].values))
     for row, setting in enumerate(ranked):
         tint = tints(1, False)[0] if setting is verdict.best else PLAIN
         marks += [
             replace(m, x=m.y, y=row)
-            for m in _run_marks(summary, verdict, setting, tint)
+            for m in _run_marks(rows_of[setting.label], verdict, tint)
             if m.kind == "run"
         ]
         if setting.n:
@@ -252,13 +268,12 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
     )
 
 
-def _run_marks(summary: pd.DataFrame, verdict: Verdict, setting: Setting, tint: Tint) -> list[Mark]:
-    """Marks of a setting's runs; x is left to the caller."""
-    rows = runs_of(summary, setting)
+def _run_marks(rows: pd.DataFrame, verdict: Verdict, tint: Tint) -> list[Mark]:
+    """Marks of a setting's runs, given their rows; x is left to the caller."""
     values = finished_values(rows, verdict.measure)
     factor = shown_scale(verdict.measure)[0]
     marks = []
-    for run, outcome, value in zip(rows["run"], rows["outcome"], values, strict=True):
+    for run, outcome, value in zip(rows[RUN], rows[OUTCOME], values, strict=True):
         if math.isfinite(value):
             title = f"{run}: {number(value)}"
             marks.append(Mark(math.nan, factor * value, "run", tint, title=title))
@@ -298,12 +313,12 @@ def best_passage(
     if verdict.best is None:
         return None
     rows = runs_of(collected.summary, verdict.best)
-    finished = rows.loc[rows["outcome_code"] == int(Outcome.FINISHED), "run"]
+    complete = rows.loc[finished(rows), RUN]
     curves = collected.curves
-    shaken = curves[curves["run"].isin(finished) & (curves["vibration_time_s"] >= 0)]
+    shaken = curves[curves[RUN].isin(complete) & (curves[VIBRATION_TIME_S] >= 0)]
     found = []
-    for _, run in shaken.groupby("run"):
-        time_s = run["vibration_time_s"].to_numpy(dtype=np.float64)
+    for _, run in shaken.groupby(RUN):
+        time_s = run[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
         value = run[measure].to_numpy(dtype=np.float64)
         if len(time_s) > 3 and np.isfinite(value).all():
             late = float(np.interp(0.75 * time_s[-1], time_s, value))

@@ -14,6 +14,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.report.figure_files import pictures, strip
 from sandmould.report.repose_figures import draw_heap, draw_map, draw_posterior, shown
 from sandmould.report.tables import Cell, Column, Table
+from sandmould.runs.columns import CPU_S, RUN
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
@@ -148,7 +149,7 @@ def _touching(summary: pd.DataFrame) -> list[str]:
     if leaning.empty:
         return []
     walls = sorted({str(w) for w in leaning["heap_touches"]})
-    names = [str(run) for run in leaning["run"]]
+    names = [str(run) for run in leaning[RUN]]
     return [
         f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and "
         f"so has no angle of repose: {listed(names)}. Widen the box or fill in less sand."
@@ -165,7 +166,7 @@ def _heaps(
     places = np.unique(np.linspace(0, len(values) - 1, SHOWN_HEAPS).round().astype(int))
     found = []
     for index in [values.index[i] for i in places] if len(values) else []:
-        run = str(summary.loc[index, "run"])
+        run = str(summary.loc[index, RUN])
         moments = list_moments(study_folder / "runs" / run)
         if not moments:
             continue
@@ -256,6 +257,6 @@ def _worth_table(calibrated: Calibrated) -> Table:
 
 
 def _cost(summary: pd.DataFrame) -> str:
-    total_s = float(summary["cpu_s"].sum()) if "cpu_s" in summary else math.nan
+    total_s = float(summary[CPU_S].sum()) if CPU_S in summary else math.nan
     runs = "The run" if len(summary) == 1 else f"All {len(summary)} runs"
     return f"{runs} took {seconds(total_s)} of processor time."

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +12,9 @@ from scipy.stats import t as student
 
 from analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.report.chart import Chart, Line, tints
-from sandmould.report.curves import reported_lines, runs_of
+from sandmould.report.curves import reported_lines, runs_by_setting, runs_of
+from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, finished
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
-from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
 from sandmould.statistics.verdict import Verdict
@@ -61,16 +60,15 @@ def filling_pages(
     shaken = _shaken(collected)
     if measure not in shaken or shaken.empty:
         return None
-    curves = {str(run): rows for run, rows in shaken.groupby("run")}
     keys = collected.keys
     one_key = len(keys) == 1 and all(
         isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
     )
     known = [s for s in verdict.settings if s.n]
-    advice = (_drive(scenario, best), _time_to_fill(collected.summary, curves, best, measure))
+    advice = (_drive(scenario, best), _time_to_fill(collected.summary, shaken, best, measure))
     if not one_key or len(known) < 3:
         return FillingPages(advice, None, "")
-    table = _fill_at_times(collected.summary, curves, known, keys[0], measure)
+    table = _fill_at_times(collected.summary, shaken, known, keys[0], measure)
     return FillingPages(
         advice, _chart(table, study, keys[0], measure), _limbs(table, keys[0], measure)
     )
@@ -79,8 +77,8 @@ def filling_pages(
 def _shaken(collected: Collected) -> pd.DataFrame:
     """Curves of finished runs during vibration."""
     summary, curves = collected.summary, collected.curves
-    finished = summary.loc[summary["outcome_code"] == int(Outcome.FINISHED), "run"]
-    return curves[curves["run"].isin(finished) & (curves["vibration_time_s"] >= 0)]
+    complete = summary.loc[finished(summary), RUN]
+    return curves[curves[RUN].isin(complete) & (curves[VIBRATION_TIME_S] >= 0)]
 
 
 def _drive(scenario: Scenario, best: Setting) -> str:
@@ -93,17 +91,16 @@ def _drive(scenario: Scenario, best: Setting) -> str:
     )
 
 
-def _time_to_fill(
-    summary: pd.DataFrame, curves: Mapping[str, pd.DataFrame], best: Setting, measure: str
-) -> str:
+def _time_to_fill(summary: pd.DataFrame, shaken: pd.DataFrame, best: Setting, measure: str) -> str:
     """When the cavity holds nearly what it holds when it is packed as the bed is."""
+    rows_of = shaken.groupby(RUN).indices
     times_s, lasts_s, ends = [], [], []
-    for run in runs_of(summary, best)["run"]:
-        rows = curves.get(str(run))
-        if rows is None or "solid_fraction" not in rows:
+    for run in runs_of(summary, best)[RUN]:
+        if run not in rows_of or SOLID_FRACTION not in shaken:
             continue
-        full = float(rows["solid_fraction"].iloc[-1])
-        time_s = rows["vibration_time_s"].to_numpy(dtype=np.float64)
+        rows = shaken.iloc[rows_of[run]]
+        full = float(rows[SOLID_FRACTION].iloc[-1])
+        time_s = rows[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
         value = rows[measure].to_numpy(dtype=np.float64)
         times_s.append(first_reach_s(time_s, value, FULL_SHARE * full))
         lasts_s.append(time_s[-1])
@@ -137,21 +134,25 @@ class _AtTimes:
 
 def _fill_at_times(
     summary: pd.DataFrame,
-    curves: Mapping[str, pd.DataFrame],
+    shaken: pd.DataFrame,
     known: list[Setting],
     key: str,
     measure: str,
 ) -> _AtTimes:
-    last_s = min(float(rows["vibration_time_s"].max()) for rows in curves.values())
+    clock_s = shaken[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
+    fill = shaken[measure].to_numpy(dtype=np.float64)
+    rows_of = shaken.groupby(RUN).indices
+    runs_at = runs_by_setting(summary[[RUN, key]], [key])
+    last_s = float(shaken.groupby(RUN)[VIBRATION_TIME_S].max().min())
     time_s = last_s * np.array([0.0, *SHARES])
     settings = sorted(known, key=lambda s: float(s.values[key]))
     mean, error = [], []
     for setting in settings:
         runs = []
-        for run in runs_of(summary, setting)["run"]:
-            rows = curves.get(str(run))
-            if rows is not None:
-                runs.append(np.interp(time_s, rows["vibration_time_s"], rows[measure]))
+        for run in runs_at[setting.label][RUN]:
+            if run in rows_of:
+                rows = rows_of[run]
+                runs.append(np.interp(time_s, clock_s[rows], fill[rows]))
         values = np.array(runs)
         gained = values - values[:, :1]
         mean.append(values.mean(axis=0))

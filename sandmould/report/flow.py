@@ -24,6 +24,7 @@ from sandmould.report.flow_map import condition_text, said_of, stability_map
 from sandmould.report.method import Row
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
+from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN, TIME_S
 from sandmould.runs.formatting import listed, name_of, number
 from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.statistics.verdict import Verdict
@@ -114,13 +115,13 @@ def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
     """Runs that ended: excellent, good and failed, the calmest of each first."""
     order = {stability.value: place for place, stability in enumerate(StabilityRating)}
     table = summary.copy()
-    for column in ("classification", f"{scene.deepest(scenario)}_sd_pa"):
+    for column in (CLASSIFICATION, f"{scene.deepest(scenario)}_sd_pa"):
         if column not in table:
             table[column] = np.nan
     # a run that a guard stopped while it poured has no row of measures
-    table["classification"] = table["classification"].fillna(StabilityRating.FAILED.value)
-    table = table[table["outcome_code"].notna()]
-    return table.assign(rank=table["classification"].map(order)).sort_values(
+    table[CLASSIFICATION] = table[CLASSIFICATION].fillna(StabilityRating.FAILED.value)
+    table = table[table[OUTCOME_CODE].notna()]
+    return table.assign(rank=table[CLASSIFICATION].map(order)).sort_values(
         ["rank", f"{scene.deepest(scenario)}_sd_pa"], kind="stable"
     )
 
@@ -129,10 +130,10 @@ def _shown(ranked: pd.DataFrame, keys: Sequence[str], study_folder: Path) -> lis
     """Runs that left fields, evenly from the calmest to the worst."""
     found = []
     for _, row in ranked.iterrows():
-        folder = study_folder / "runs" / str(row["run"])
+        folder = study_folder / "runs" / str(row[RUN])
         if (folder / "fields.npz").is_file():
             label = condition_text({key: row[key] for key in keys})
-            found.append(_Shown(folder.name, label, folder, str(row["classification"])))
+            found.append(_Shown(folder.name, label, folder, str(row[CLASSIFICATION])))
     places = np.linspace(0, len(found) - 1, min(SHOWN, len(found))).round().astype(int)
     return [found[place] for place in np.unique(places).tolist()]
 
@@ -146,7 +147,7 @@ def _sentences(
     scenario: MetalFlow, ranked: pd.DataFrame, ideal_pa: dict[str, float]
 ) -> tuple[str, ...]:
     """How many settings hold, and how far their pressure is from rho g h."""
-    counts = ranked["classification"].value_counts()
+    counts = ranked[CLASSIFICATION].value_counts()
     parts = [f"{counts.get(s.value, 0)} {s.value}" for s in StabilityRating]
     said = [f"By the rule of figure 6 {listed(parts)}, of {len(ranked)}."]
     name = scene.deepest(scenario)
@@ -170,12 +171,12 @@ def _sentences(
 
 def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> tuple[str, ...]:
     """Where metal of a casting hops, and where it does not."""
-    if isinstance(scenario.case, StillTank) or "hops" not in ranked:
+    if isinstance(scenario.case, StillTank) or HOPS not in ranked:
         return ()
-    ended = ranked[ranked["classification"] != StabilityRating.FAILED.value]
+    ended = ranked[ranked[CLASSIFICATION] != StabilityRating.FAILED.value]
     parts = []
     for hops, verb in ((1, "hops"), (0, "does not hop")):
-        own = ended[ended["hops"] == hops]
+        own = ended[ended[HOPS] == hops]
         where = [condition_text({key: row[key] for key in keys}) for _, row in own.iterrows()]
         if where:
             parts.append(f"it {verb} at {listed(where, most=6)}")
@@ -205,15 +206,15 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
     rows = []
     for (_, row), text in zip(ranked.iterrows(), said, strict=True):
         label = condition_text({key: row[key] for key in keys})
-        note = str(row["detail"]) if str(row["detail"]) != "nan" else ""
-        cells = [Cell(label, label), Cell(str(row["classification"]), str(row["rank"]), note=note)]
+        note = str(row[DETAIL]) if str(row[DETAIL]) != "nan" else ""
+        cells = [Cell(label, label), Cell(str(row[CLASSIFICATION]), str(row["rank"]), note=note)]
         values = [float(row.get(column, np.nan)) for column, _ in shown]
         cells += [
             Cell(number(value, digits), str(value))
             for value, (_, digits) in zip(values, shown, strict=True)
         ]
         rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
-    failed = tuple(c == StabilityRating.FAILED.value for c in ranked["classification"])
+    failed = tuple(c == StabilityRating.FAILED.value for c in ranked[CLASSIFICATION])
     return Table(tuple(columns), tuple(rows), failed)
 
 
@@ -226,7 +227,7 @@ def _histories(shown: Sequence[_Shown], ideal_pa: dict[str, float]) -> str:
         table = pd.read_csv(one.folder / "series.tsv", sep="\t")
         for place, (name, ideal) in enumerate(ideal_pa.items()):
             colour = f"C{place}"
-            axes.plot(table["time_s"], table[f"{name}_pa"], lw=0.6, color=colour, label=name)
+            axes.plot(table[TIME_S], table[f"{name}_pa"], lw=0.6, color=colour, label=name)
             axes.axhline(ideal, color=colour, lw=0.8, ls="--")
         axes.set_title(f"{one.label}\n{one.verdict}", fontsize=8)
         highest = 3.0 * max(ideal_pa.values())

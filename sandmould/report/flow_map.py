@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 
 from sandmould.casting.mps.stability import COUNTS, SHARES, STEPS_S, StabilityRating
 from sandmould.report.figures import png
+from sandmould.runs.columns import CLASSIFICATION
 from sandmould.runs.formatting import setting_text
 
 AXES = ("dt_max_s", "relaxations")
@@ -56,7 +57,7 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
         axes.set_axis_off()
     for axes, (title, part) in zip(grid.flat, parts, strict=False):
         for verdict, (marker, colour) in SIGNS.items():
-            own = part[part["classification"] == verdict.value]
+            own = part[part[CLASSIFICATION] == verdict.value]
             # evenly spaced, as the paper's: the values rise by doubling
             axes.plot(
                 [counts.index(n) for n in own[AXES[1]]], [steps.index(dt) for dt in own[AXES[0]]],

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from sandmould.report.chart import Chart, Line, tints
+from sandmould.runs.columns import TIME_S
 
 _POINTS = 400
 """Of a curve; windows between two of them are averaged."""
@@ -39,7 +40,7 @@ def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, .
         When vibration begins: zero of the charts.
     """
     shown = _averaged(ledger)
-    shown["time_s"] -= begins_s
+    shown[TIME_S] -= begins_s
     found = [
         (
             "displacement, mm",
@@ -89,7 +90,7 @@ def _chart(shown: pd.DataFrame, title: str, curves: tuple[_Curve, ...]) -> Chart
         return None
     lines = tuple(
         Line(
-            np.column_stack([shown["time_s"], curve.factor * shown[curve.column]]),
+            np.column_stack([shown[TIME_S], curve.factor * shown[curve.column]]),
             tint,
             curve.thick,
             label=curve.label,

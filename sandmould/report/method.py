@@ -8,6 +8,15 @@ from typing import Any
 
 import pandas as pd
 
+from sandmould.runs.columns import (
+    ENGINE,
+    RANKS,
+    REPLICATE,
+    SEED,
+    TIME_STEP_FRACTION,
+    TIME_STEP_S,
+    VERSION,
+)
 from sandmould.runs.formatting import listed, name_of, number, seconds, value_text
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.own_deck import OwnDeck
@@ -101,9 +110,9 @@ def statistics_method(objective: Objective, ends: str) -> Row:
 
 
 def _engines(summary: pd.DataFrame) -> str:
-    if "engine" not in summary or not summary["engine"].notna().any():
+    if ENGINE not in summary or not summary[ENGINE].notna().any():
         return "no run says which"
-    rows = summary[["engine", "version", "ranks"]].dropna().drop_duplicates()
+    rows = summary[[ENGINE, VERSION, RANKS]].dropna().drop_duplicates()
     return "; ".join(
         f"{engine} {version}, {int(ranks)} rank{'s' if ranks > 1 else ''}"
         for engine, version, ranks in rows.itertuples(index=False)
@@ -175,8 +184,8 @@ def _vibration(stage: VibrationStage, scenario: Scenario, keys: Sequence[str]) -
 
 def _time_step(scenario: Scenario, summary: pd.DataFrame) -> str:
     said = ""
-    if {"time_step_s", "time_step_fraction"} <= set(summary.columns):
-        steps, shares = summary["time_step_s"].dropna(), summary["time_step_fraction"].dropna()
+    if {TIME_STEP_S, TIME_STEP_FRACTION} <= set(summary.columns):
+        steps, shares = summary[TIME_STEP_S].dropna(), summary[TIME_STEP_FRACTION].dropna()
         if len(steps) and len(shares):
             said = f"{_range(1e6 * steps)} µs, {_range(shares)} of the critical one; "
     return f"{said}the critical step is set by the {scenario.critical_step.cause}"
@@ -188,9 +197,9 @@ def _range(values: pd.Series[float]) -> str:
 
 
 def _seeds(summary: pd.DataFrame) -> str:
-    if not {"replicate", "seed"} <= set(summary.columns):
+    if not {REPLICATE, SEED} <= set(summary.columns):
         return "no seeds given"
-    if (summary.groupby("replicate")["seed"].nunique() == 1).all():
+    if (summary.groupby(REPLICATE)[SEED].nunique() == 1).all():
         return (
             "a replicate has the same seed at every setting, so that settings are compared on the "
             "same sand; other replicates have other seeds"

@@ -13,6 +13,7 @@ from scipy.stats import norm
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.curves import reported_lines
 from sandmould.report.robustness import CertificatePages, opening_sentences
+from sandmould.runs.columns import CPU_S
 from sandmould.runs.formatting import (
     listed,
     name_of,
@@ -158,7 +159,7 @@ def _beside(optimum: Optimum, study: Study) -> list[str]:
 def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
     added, swept = len(ledger.runs), study.sweep.number_of_points * study.replicates
     rounds = len(ledger.rounds)
-    spent_h = float(summary["cpu_s"].sum()) / 3600 if "cpu_s" in summary else math.nan
+    spent_h = float(summary[CPU_S].sum()) / 3600 if CPU_S in summary else math.nan
     many = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
     return (
         f"{many} added {added or 'any'} runs to the {swept} of the sweep, "

@@ -26,13 +26,14 @@ from sandmould.report.robustness import certificate_pages
 from sandmould.report.sand import shown_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
+from sandmould.runs.columns import RUN
 from sandmould.runs.files import replaced
 from sandmould.runs.formatting import name_of, number, setting_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.settings import group_settings
+from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, judge
-from sandmould.study.collect import Collected, gather, read_provenance, read_study
+from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, read_run
@@ -50,17 +51,17 @@ def write_report(study_folder: Path, out: Path) -> None:
     Parameters
     ----------
     study_folder : Path
-        ``results/<study>``; runs may be missing, unfinished or broken.
+        ``results/<study>`` with its collected tables; runs may be missing, unfinished or broken.
     out : Path
         The HTML file; links to the data lead from its folder.
 
     Raises
     ------
     OSError, ValueError
-        When ``runs.tsv`` cannot be read, or no run has a readable scenario.
+        When a collected table cannot be read, or no run has a readable scenario.
     """
     study = read_study(study_folder)
-    collected = gather(study_folder, study.objective.at_vibration_s)
+    collected = read_collected(study_folder)
     # made first: the page lists it
     (study_folder / FIGURES).mkdir(exist_ok=True)
     page = _page(study_folder, out.absolute().parent, study, collected)
@@ -91,7 +92,7 @@ class _Page:
 def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
     objective, keys, summary = study.objective, collected.keys, collected.of_sweep.summary
     seeks_best = study.seeks_best
-    any_scenario = _scenario_of(study_folder, summary["run"])
+    any_scenario = _scenario_of(study_folder, summary[RUN])
     if any_scenario is None:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
     certified = bool(read_ledger(study_folder, study).certified_hz)
@@ -102,9 +103,9 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     shown = next(iter(shown_runs(study_folder, summary, verdict).values()), "")
     listed = {setting.label for setting in listed_settings(verdict)}
     by_setting = {}
-    for values, rows in group_settings(summary, keys):
+    for values, rows in setting_rows(summary, keys):
         if (label := setting_text(values)) in listed:
-            by_setting[label] = _scenario_of(study_folder, rows["run"])
+            by_setting[label] = _scenario_of(study_folder, summary[RUN].iloc[rows])
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [shown] if shown else []) or any_scenario
@@ -153,7 +154,7 @@ def _render(
     charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
         charts = tuple(with_surface(c, optimum.optimum, page.study) for c in charts)
-    provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary["run"]]
+    provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary[RUN]]
     of_kind = kind_pages(
         page.study_folder,
         page.study,

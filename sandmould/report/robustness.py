@@ -13,6 +13,7 @@ import pandas as pd
 from analysis.spectrum import column_frequency_hz, first_resonance_hz, transfer
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.tables import Cell, Column, Table
+from sandmould.runs.columns import BED_HEIGHT_M, STAGE, TIME_S
 from sandmould.runs.formatting import name_of, number
 from sandmould.scenario.scenario import FILLING, Scenario
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
@@ -112,21 +113,21 @@ def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
         scenario = read_run(folder / "scenario.yaml").scenario
         loads = pd.read_csv(folder / "loads.tsv", sep="\t")
         upward = [c for c in loads.columns if c.startswith("force_")][-1]
-        total = loads.groupby(["stage", "time_s"], sort=False)[upward].sum().reset_index()
-        filled = total[total["stage"].str.startswith(FILLING)]
+        total = loads.groupby([STAGE, TIME_S], sort=False)[upward].sum().reset_index()
+        filled = total[total[STAGE].str.startswith(FILLING)]
         # Sand presses down on the box; the mean of the last layer's rest is its weight.
         weight_n = -float(filled[upward].iloc[-len(filled) // 20 :].mean())
         rigid_n = weight_n / scenario.gravity_m_s2 * SHAKE_G * STANDARD_GRAVITY_M_S2
         window_s = scenario.record.series_every_s
         shaken, response = [], []
         for place, stage in enumerate(scenario.vibration, start=1):
-            rows = total[total["stage"] == f"vibrate_{place}"]
+            rows = total[total[STAGE] == f"vibrate_{place}"]
             if len(rows) < 4:
                 continue
             shaken.append(stage.frequency_hz)
             response.append(
                 transfer(
-                    rows["time_s"].to_numpy(dtype=np.float64),
+                    rows[TIME_S].to_numpy(dtype=np.float64),
                     rows[upward].to_numpy(dtype=np.float64),
                     stage.frequency_hz,
                     window_s,
@@ -159,7 +160,7 @@ def _column(scenario: Scenario, summary: pd.DataFrame, responses: Sequence[Respo
     shares = np.array([c.mass_fraction for c in classes])
     mean_m = float(shares @ np.array([c.diameter_m for c in classes]))
     mass_kg = scenario.sand.grain_mass_kg(mean_m, scenario.dimension)
-    height_m = float(pd.to_numeric(summary["bed_height_m"], errors="coerce").median())
+    height_m = float(pd.to_numeric(summary[BED_HEIGHT_M], errors="coerce").median())
     estimate_hz = column_frequency_hz(
         mean_m, mass_kg, scenario.contact.grain_grain.normal_stiffness_n_m, height_m
     )

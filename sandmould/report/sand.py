@@ -21,6 +21,7 @@ from sandmould.report.time_series import (
     measure_curves,
     whole_conclusion,
 )
+from sandmould.runs.columns import BED_HEIGHT_M, RUN, SOLID_FRACTION, TIME_S, VIBRATION_TIME_S
 from sandmould.runs.formatting import listed, name_of, number, setting_text
 from sandmould.scenario.geometry import Bore
 from sandmould.scenario.scenario import Scenario
@@ -29,7 +30,7 @@ from sandmould.study.collect import Collected
 from sandmould.study.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 
 _SECONDARY = (
-    "solid_fraction", "apparent_density_corrected_kg_m3", "coordination", "bed_height_m",
+    SOLID_FRACTION, "apparent_density_corrected_kg_m3", "coordination", BED_HEIGHT_M,
 )  # fmt: skip
 
 
@@ -148,7 +149,7 @@ def shown_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> d
     seen = {r: run for r, run in ranks.items() if list_moments(study_folder / "runs" / run)}
     if seen:
         return seen if len(ranks) > 1 else {"only": next(iter(seen.values()))}
-    count = {str(r): len(list_moments(study_folder / "runs" / str(r))) for r in summary["run"]}
+    count = {str(r): len(list_moments(study_folder / "runs" / str(r))) for r in summary[RUN]}
     longest = max(count, key=lambda r: count[r], default="")
     return {"longest": longest} if count.get(longest) else {}
 
@@ -187,10 +188,10 @@ def _shown_height_m(snapshots: Sequence[Snapshot], scenario: Scenario) -> float:
 
 def _bed_height_m(curves: pd.DataFrame, run: str) -> float | None:
     """Height of the filled bed as vibration begins."""
-    if "bed_height_m" not in curves:
+    if BED_HEIGHT_M not in curves:
         return None
-    rows = curves[(curves["run"] == run) & (curves["vibration_time_s"] >= 0)]
-    found = rows["bed_height_m"].dropna()
+    rows = curves[(curves[RUN] == run) & (curves[VIBRATION_TIME_S] >= 0)]
+    found = rows[BED_HEIGHT_M].dropna()
     return float(found.iloc[0]) if len(found) else None
 
 
@@ -203,12 +204,12 @@ def _films(
 ) -> tuple[Film, ...]:
     films = []
     for role, run in roles.items():
-        row = collected.summary[collected.summary["run"] == run].iloc[0]
+        row = collected.summary[collected.summary[RUN] == run].iloc[0]
         setting = setting_text({key: row[key] for key in collected.keys})
-        curve = collected.curves[collected.curves["run"] == run]
+        curve = collected.curves[collected.curves[RUN] == run]
         reading = None
         if verdict.measure in curve:
-            known = curve[["time_s", verdict.measure]].dropna().to_numpy(dtype=np.float64)
+            known = curve[[TIME_S, verdict.measure]].dropna().to_numpy(dtype=np.float64)
             reading = (known[:, 0], known[:, 1])
         label = f"{role}: {setting}"
         film = make_film(study_folder / "runs" / run, label, reading, budget_bytes)

@@ -17,6 +17,7 @@ from sandmould.report.figures import png
 from sandmould.report.method import Row
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
+from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import listed, name_of, number, seconds, setting_text
 from sandmould.scenario.solidification import MouldMaterial, Solidification
 from sandmould.statistics.verdict import Verdict
@@ -110,8 +111,8 @@ def _silent(collected: Collected, verdict: Verdict, measure: str) -> str:
 
 def shown_run(reference: Point, collected: Collected, best: str) -> str:
     """Run whose fields are shown: the best, else the reference, else the first that finished."""
-    done = collected.summary[collected.summary["outcome_code"] == 0]
-    runs = [best, *_of_point(done, reference)["run"].astype(str), *done["run"].astype(str)]
+    done = collected.summary[finished(collected.summary)]
+    runs = [best, *_of_point(done, reference)[RUN].astype(str), *done[RUN].astype(str)]
     return next((run for run in runs if run), "")
 
 
@@ -160,22 +161,22 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
 
 def _errors(point: Point, scenario: Solidification, collected: Collected) -> list[_Error]:
     """Each finished run against the reference; nothing where that did not finish."""
-    done = collected.summary[collected.summary["outcome_code"] == 0]
+    done = collected.summary[finished(collected.summary)]
     reference = _of_point(done, point)
     if reference.empty:
         return []
     base = reference.iloc[0]
-    own = dict(list(collected.curves.groupby("run")))
+    own = dict(list(collected.curves.groupby(RUN)))
     probes = [f"{probe.name}_k" for probe in scenario.probes]
     range_k = scenario.initial_k.casting - scenario.initial_k.mould
     found = []
     for _, row in done.iterrows():
-        if row["run"] == base["run"]:
+        if row[RUN] == base[RUN]:
             continue
-        time_s, base_s = float(row["solidification_time_s"]), float(base["solidification_time_s"])
-        curve = _curve_percent(own[row["run"]], own[base["run"]], probes, range_k)
+        time_s, base_s = float(row[SOLIDIFICATION_TIME_S]), float(base[SOLIDIFICATION_TIME_S])
+        curve = _curve_percent(own[row[RUN]], own[base[RUN]], probes, range_k)
         label = setting_text({key: row[key] for key in collected.keys})
-        found.append(_Error(label, float(row["cpu_s"]), 100.0 * (time_s / base_s - 1.0), curve))
+        found.append(_Error(label, float(row[CPU_S]), 100.0 * (time_s / base_s - 1.0), curve))
     return found
 
 
@@ -183,11 +184,11 @@ def _curve_percent(
     table: pd.DataFrame, base: pd.DataFrame, probes: Sequence[str], range_k: float
 ) -> float:
     """Error (7) of the worst probe over the time that both runs have."""
-    end_s = min(table["time_s"].max(), base["time_s"].max())
-    time_s = base["time_s"].to_numpy()
+    end_s = min(table[TIME_S].max(), base[TIME_S].max())
+    time_s = base[TIME_S].to_numpy()
     time_s = time_s[time_s <= end_s]
     off = [
-        np.abs(np.interp(time_s, table["time_s"], table[p]) - base[p].to_numpy()[: len(time_s)])
+        np.abs(np.interp(time_s, table[TIME_S], table[p]) - base[p].to_numpy()[: len(time_s)])
         for p in probes
     ]
     return max((100.0 * float(np.trapezoid(o, time_s)) / (range_k * end_s) for o in off),

@@ -12,6 +12,23 @@ from urllib.parse import quote
 import pandas as pd
 
 from sandmould.report.thinning import listed_note, listed_runs, listed_settings
+from sandmould.runs.columns import (
+    CPU_S,
+    DETAIL,
+    GRAIN_STEPS_PER_S,
+    GRAINS,
+    LARGEST_OVERLAP_FRACTION,
+    OUTCOME,
+    OUTCOME_CODE,
+    PEAK_MEMORY_BYTES,
+    REPLICATE,
+    RUN,
+    SEED,
+    SIMULATED_S,
+    TIME_STEP_FRACTION,
+    WALL_S,
+    finished,
+)
 from sandmould.runs.formatting import name_of, number, seconds, size, titled, with_margin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
@@ -76,23 +93,23 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
         label = f"{name_of(verdict.measure)}, {best.label}"
         mean = f"mean of {best.n} runs" if best.n > 1 else "one run"
         found.append(KeyNumber(number(best.mean), label, mean))
-    finished = summary[summary["outcome_code"] == int(Outcome.FINISHED)]
-    found.append(KeyNumber(f"{len(finished)} of {len(summary)}", "runs finished"))
+    complete = summary[finished(summary)]
+    found.append(KeyNumber(f"{len(complete)} of {len(summary)}", "runs finished"))
     # a run that failed may have stopped before it had all its grains
-    typical = finished if len(finished) else summary
+    typical = complete if len(complete) else summary
     for what in ("grains", "elements", "particles"):
         count = _total(typical, what, "median")
         if count is not None:
             shown = f"{count:,.0f}".replace(",", "\u202f")
             found.append(KeyNumber(shown, f"{what} in a run"))
-    wall_s, cpu_s = _total(summary, "wall_s", "sum"), _total(summary, "cpu_s", "sum")
+    wall_s, cpu_s = _total(summary, WALL_S, "sum"), _total(summary, CPU_S, "sum")
     if wall_s is not None:
         note = "" if cpu_s is None else f"{seconds(cpu_s)} of processor time"
         found.append(KeyNumber(seconds(wall_s), "computing, all runs added up", note))
-    speed = _total(typical, "grain_steps_per_s", "median")
+    speed = _total(typical, GRAIN_STEPS_PER_S, "median")
     if speed is not None:
         found.append(KeyNumber(f"{number(speed / 1e6)} M", "grain-steps a second, median run"))
-    overlap = _total(summary, "largest_overlap_fraction", "max")
+    overlap = _total(summary, LARGEST_OVERLAP_FRACTION, "max")
     if overlap is not None:
         found.append(KeyNumber(f"{100 * overlap:.1f} %", "largest overlap, of a radius"))
     return tuple(found)
@@ -177,19 +194,19 @@ def _number_cells(*values: tuple[float, int]) -> tuple[Cell, ...]:
 
 
 _COST = (
-    ("grains", "grains", lambda v: f"{v:.0f}"),
+    (GRAINS, "grains", lambda v: f"{v:.0f}"),
     ("elements", "elements", lambda v: f"{v:.0f}"),
     ("particles", "particles", lambda v: f"{v:.0f}"),
-    ("simulated_s", "simulated", seconds),
-    ("wall_s", "wall time", seconds),
-    ("cpu_s", "processor time", seconds),
-    ("grain_steps_per_s", "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
+    (SIMULATED_S, "simulated", seconds),
+    (WALL_S, "wall time", seconds),
+    (CPU_S, "processor time", seconds),
+    (GRAIN_STEPS_PER_S, "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("element_steps_per_s", "element-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("particle_solves_per_s", "particle-solves/s", lambda v: f"{number(v / 1e6)} M"),
     ("solver_fraction", "time in the solver", lambda v: f"{100 * v:.0f} %"),
-    ("peak_memory_bytes", "memory", size),
-    ("time_step_fraction", "step / critical", number),
-    ("largest_overlap_fraction", "largest overlap", lambda v: f"{100 * v:.1f} %"),
+    (PEAK_MEMORY_BYTES, "memory", size),
+    (TIME_STEP_FRACTION, "step / critical", number),
+    (LARGEST_OVERLAP_FRACTION, "largest overlap", lambda v: f"{100 * v:.1f} %"),
 )
 
 
@@ -212,7 +229,7 @@ def runs_table(
         Runs that did not finish are marked and say why.
     """
     cost = [c for c in _COST if c[0] in summary]
-    blocks = [c for c in ("replicate", "seed") if c in summary]
+    blocks = [c for c in (REPLICATE, SEED) if c in summary]
     has_value = verdict.measure in summary
     columns = (
         Column("run", False),
@@ -223,14 +240,15 @@ def runs_table(
         *(Column(title) for _, title, _ in cost),
     )
     rows, marked = [], []
-    for row in listed_runs(summary, verdict).to_dict("records"):
-        failed = row["outcome_code"] != int(Outcome.FINISHED)
+    listed = listed_runs(summary, verdict)
+    for row, is_complete in zip(listed.to_dict("records"), finished(listed), strict=True):
+        failed = not is_complete
         rows.append(
             (
-                Cell(str(row["run"]), str(row["run"]), f"{runs_href}/{quote(str(row['run']))}/"),
+                Cell(str(row[RUN]), str(row[RUN]), f"{runs_href}/{quote(str(row[RUN]))}/"),
                 *(_parameter_cell(row[k]) for k in keys),
                 *(_parameter_cell(row[b]) for b in blocks),
-                Cell(str(row["outcome"]), str(row["outcome"]), note=_why(row, failed)),
+                Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, failed)),
                 *([_number_cells((_float(row[verdict.measure]), 4))[0]] if has_value else []),
                 *(_cost_cell(row[name], show) for name, _, show in cost),
             )
@@ -260,8 +278,8 @@ def _float(value: Any) -> float:
 
 def _why(row: Mapping[Any, Any], failed: bool) -> str:
     """Sentence of an outcome with what the engine or the collection said."""
-    detail = row["detail"] if isinstance(row["detail"], str) else ""
-    code = _float(row["outcome_code"])
+    detail = row[DETAIL] if isinstance(row[DETAIL], str) else ""
+    code = _float(row[OUTCOME_CODE])
     meaning = ""
     if failed and math.isfinite(code):
         meaning = Outcome(int(code)).meaning

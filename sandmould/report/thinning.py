@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import setting_text
-from sandmould.statistics.settings import Setting, group_settings
+from sandmould.statistics.settings import Setting, setting_rows
 from sandmould.statistics.verdict import Verdict, finished_values
 from sandmould.study.collect import Collected
 
@@ -37,10 +38,10 @@ def drawn_part(collected: Collected, verdict: Verdict) -> tuple[Collected, Verdi
         return collected, verdict
     chosen = _evenly(verdict)
     each = max(1, MOST_RUNS // len(chosen))
-    rows = {setting_text(v): found for v, found in group_settings(summary, collected.keys)}
-    kept = pd.concat([rows[setting.label].head(each) for setting in chosen])
-    curves = collected.curves[collected.curves["run"].isin(set(kept["run"]))]
-    return replace(collected, summary=kept, curves=curves), replace(verdict, settings=chosen)
+    rows = {setting_text(at): own[:each] for at, own in setting_rows(summary, collected.keys)}
+    drawn = summary.iloc[np.concatenate([rows[setting.label] for setting in chosen])]
+    curves = collected.curves[collected.curves[RUN].isin(set(drawn[RUN]))]
+    return replace(collected, summary=drawn, curves=curves), replace(verdict, settings=chosen)
 
 
 def _evenly(verdict: Verdict) -> tuple[Setting, ...]:

@@ -9,8 +9,17 @@ from typing import Any
 
 import pandas as pd
 
+from sandmould.runs.columns import (
+    ENGINE,
+    GRAIN_STEPS_PER_S,
+    OUTCOME_CODE,
+    PART,
+    SWEEP,
+    VERSION,
+    WALL_S,
+    finished,
+)
 from sandmould.runs.formatting import listed, name_of, number, setting_text, value_text
-from sandmould.runs.outcome import Outcome
 from sandmould.statistics.config import Equivalence
 from sandmould.statistics.equivalence import Agreement, agree
 from sandmould.statistics.settings import by_block, group_settings
@@ -55,7 +64,7 @@ class Compared:
 
 def sweep_part(summary: pd.DataFrame) -> pd.DataFrame:
     """Runs of the sweep alone, without cross checks and controls."""
-    return summary[summary["part"] == "sweep"] if "part" in summary else summary
+    return summary[summary[PART] == SWEEP] if PART in summary else summary
 
 
 def compare_keys(
@@ -174,18 +183,18 @@ class Speed:
 
 def speeds(summary: pd.DataFrame) -> tuple[Speed, ...]:
     """Speed of each engine that computed runs, the fastest first."""
-    wanted = {"engine", "version", "grain_steps_per_s", "wall_s", "outcome_code"}
+    wanted = {ENGINE, VERSION, GRAIN_STEPS_PER_S, WALL_S, OUTCOME_CODE}
     if not wanted <= set(summary.columns):
         return ()
-    finished = summary[summary["outcome_code"] == int(Outcome.FINISHED)]
+    complete = summary[finished(summary)]
     found = [
         Speed(
             str(engine),
-            listed([str(v) for v in dict.fromkeys(runs["version"])]),
+            listed([str(v) for v in dict.fromkeys(runs[VERSION])]),
             len(runs),
-            float(runs["grain_steps_per_s"].median()),
-            float(runs["wall_s"].median()),
+            float(runs[GRAIN_STEPS_PER_S].median()),
+            float(runs[WALL_S].median()),
         )
-        for engine, runs in finished.groupby("engine")
+        for engine, runs in complete.groupby(ENGINE)
     ]
     return tuple(sorted(found, key=lambda s: -s.grain_steps_per_s))

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from sandmould.statistics.settings import standard_error
+from sandmould.statistics.settings import compare_means
 
 Judged = Literal["equivalent", "different", "not resolved", "not tested"]
 POWER = 0.8
@@ -77,15 +77,16 @@ def agree(
         runs = "pair of finished runs" if len(shared) else "finished run on one side"
         said = f"only one {runs}" if n else "no finished run on one side"
         return Agreement(means, nothing, margin, n, bool(len(shared)), "not tested", said)
-    test = standard_error(first, second)
+    test = compare_means(first, second)
     if test is None:
         return _without_spread(first, means, margin, n)
-    error, freedom, paired = test
-    reach = float(stats.t.ppf(0.5 + confidence / 2, freedom)) * error
-    ci = (difference - reach, difference + reach)
+    result, paired = test
+    low, high = result.confidence_interval(confidence)
+    ci = float(low), float(high)
     judged = judge_interval(ci, margin)
     if judged != "not resolved":
         return Agreement(means, ci, margin, n, paired, judged, "")
+    error = (ci[1] - ci[0]) / 2 / float(stats.t.ppf(0.5 + confidence / 2, result.df))
     more = _more(abs(difference), error * math.sqrt(n), margin, confidence, n, paired)
     said = (
         f"more than {MOST_REPLICATES} replicates would be needed: the difference lies about on "

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
+from sandmould.runs.columns import REPLICATE
 from sandmould.statistics.optimum import Optimum
 
 NEAR = 0.03
@@ -42,7 +43,7 @@ def propose(
     keys = optimum.keys
     rng = np.random.default_rng([seed, runs])
     count: dict[tuple[float, ...], int] = {}
-    for *known, replicate in summary[[*keys, "replicate"]].to_numpy(dtype=np.float64).tolist():
+    for *known, replicate in summary[[*keys, REPLICATE]].to_numpy(dtype=np.float64).tolist():
         place = tuple(known)
         count[place] = max(count.get(place, 0), int(replicate))
     chosen = []

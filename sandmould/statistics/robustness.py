@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
 import pandas as pd
 from scipy import stats
 
+from sandmould.runs.columns import PART, RUN, SWEEP, finished
 from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective
 from sandmould.statistics.settings import CONFIDENCE
@@ -93,26 +93,26 @@ def certify(
     sign = 1.0 if objective.better == "larger" else -1.0
     table = pd.DataFrame(
         {
-            "part": summary.get("part", "sweep"),
+            "part": summary.get(PART, SWEEP),
             "hz": summary[key].astype(float),
             "value": sign * finished_values(summary, measure),
         }
     ).dropna(subset=["value"])
-    groups = table.groupby(["part", "hz"])["value"]
+    groups = table.groupby([PART, "hz"])["value"]
     freedom = int((groups.count() - 1).sum())
     squares = groups.var(ddof=1).fillna(0.0) * (groups.count() - 1)
     sd = math.sqrt(float(squares.sum()) / freedom) if freedom else math.nan
     mean, count = groups.mean().to_dict(), groups.count().to_dict()
-    sweep = tuple(mean.get(("sweep", f), math.nan) for f in certified_hz)
+    sweep = tuple(mean.get((SWEEP, f), math.nan) for f in certified_hz)
     margin = margin or SHARE * abs(sweep[1])
-    parts = [p for p in summary.get("part", pd.Series(dtype=str)).unique()
+    parts = [p for p in summary.get(PART, pd.Series(dtype=str)).unique()
              if str(p).startswith(_PREFIX)]  # fmt: skip
     moves = []
     for part in map(str, parts):
         control, _, value = part.removeprefix(_PREFIX).partition(" ")
         if control == _SPECTRUM:
             continue
-        ends = [(p, f) for p in (part, "sweep") for f in (certified_hz[0], certified_hz[2])]
+        ends = [(p, f) for p in (part, SWEEP) for f in (certified_hz[0], certified_hz[2])]
         known = [mean.get(end, math.nan) for end in ends]
         shift = (known[1] - known[0]) - (known[3] - known[2])
         ci, judged = (math.nan, math.nan), _judged_without(shift)
@@ -199,8 +199,8 @@ def _listed(moves: Sequence[Movement]) -> str:
 
 def shaken_runs(summary: pd.DataFrame) -> list[str]:
     """Runs of the small shake."""
-    if "part" not in summary:
+    if PART not in summary:
         return []
-    chosen = summary[summary["part"].astype(str).str.startswith(f"{_PREFIX}{_SPECTRUM}")]
-    finished = chosen[np.asarray(chosen["outcome_code"] == 0)]
-    return [str(run) for run in finished["run"]]
+    chosen = summary[summary[PART].astype(str).str.startswith(f"{_PREFIX}{_SPECTRUM}")]
+    complete = chosen[finished(chosen)]
+    return [str(run) for run in complete[RUN]]

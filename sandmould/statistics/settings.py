@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy import stats
 
+from sandmould.runs.columns import REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
 
 CONFIDENCE = 0.95
@@ -56,19 +59,27 @@ class Comparison:
         return math.isfinite(self.p)
 
 
-def group_settings(
+def setting_rows(
     summary: pd.DataFrame, keys: Sequence[str]
-) -> list[tuple[dict[str, Any], pd.DataFrame]]:
-    """Rows of each combination of swept values, in rising order where all are numbers."""
+) -> list[tuple[dict[str, Any], NDArray[np.intp]]]:
+    """Each combination of swept values with the places of its rows, in rising order of numbers."""
     if not keys:
-        return [({}, summary)] if len(summary) else []
-    groups = [
-        (dict(zip(keys, values, strict=True)), rows)
-        for values, rows in summary.groupby(list(keys), sort=False, dropna=False)
-    ]
+        return [({}, np.arange(len(summary)))] if len(summary) else []
+    number = summary.groupby(list(keys), sort=False, dropna=False).ngroup().to_numpy()
+    order = np.argsort(number, kind="stable")
+    rows = np.split(order, np.flatnonzero(np.diff(number[order])) + 1)
+    values = summary[list(keys)].iloc[[own[0] for own in rows]].to_dict("records")
+    groups = [({str(k): v for k, v in at.items()}, r) for at, r in zip(values, rows, strict=True)]
     if all(pd.api.types.is_numeric_dtype(summary[k]) for k in keys):
         groups.sort(key=lambda group: tuple(group[0].values()))
     return groups
+
+
+def group_settings(
+    summary: pd.DataFrame, keys: Sequence[str]
+) -> list[tuple[dict[str, Any], pd.DataFrame]]:
+    """Each combination of swept values with its rows; see ``setting_rows``."""
+    return [(values, summary.iloc[rows]) for values, rows in setting_rows(summary, keys)]
 
 
 def setting_of(values: dict[str, Any], planned: int, found: pd.Series[float]) -> Setting:
@@ -80,54 +91,74 @@ def setting_of(values: dict[str, Any], planned: int, found: pd.Series[float]) ->
     return Setting(values, setting_text(values), planned, n, mean, sd, half)
 
 
+def number_blocks(summary: pd.DataFrame) -> NDArray[np.intp]:
+    """Number of each run's block, (n,): one for a replicate with its seed, else one a row."""
+    blocks = [c for c in (REPLICATE, SEED) if c in summary]
+    if REPLICATE not in blocks:
+        return np.arange(len(summary))
+    return np.asarray(summary.groupby(blocks, sort=False, dropna=False).ngroup(), dtype=np.intp)
+
+
 def by_block(
     summary: pd.DataFrame, found: pd.Series[float], over: Sequence[str] = ()
 ) -> pd.Series[float]:
     """Values by replicate, seed and further keys, or by row where replicates are not told apart."""
-    blocks = [c for c in ("replicate", "seed", *over) if c in summary]
-    if "replicate" not in blocks:
+    blocks = [c for c in (REPLICATE, SEED, *over) if c in summary]
+    if REPLICATE not in blocks:
         return found.rename(index=lambda row: ("row", row))
     rows = summary.loc[found.index, blocks]
     return pd.Series(found.to_numpy(), index=[tuple(r) for r in rows.to_numpy().tolist()])
 
 
 def compare(
-    best: Setting, others: Sequence[Setting], found: Mapping[str, pd.Series[float]]
+    best: Setting, others: Sequence[Setting], values: Mapping[str, pd.Series[float]]
 ) -> tuple[Comparison, ...]:
-    """The best minus each other setting, nearest first."""
-    tests = {o.label: standard_error(found[best.label], found[o.label]) for o in others}
-    factor = max(1, sum(t is not None for t in tests.values()))
-    results = []
-    for other in others:
-        difference, test = best.mean - other.mean, tests[other.label]
-        if test is None:
-            nothing = Comparison(other.label, difference, (math.nan, math.nan), math.nan, False)
-            results.append(nothing)
-            continue
-        error, freedom, paired = test
-        reach = float(stats.t.ppf(1 - (1 - CONFIDENCE) / 2 / factor, freedom)) * error
-        p = min(1.0, factor * 2 * float(stats.t.sf(abs(difference) / error, freedom)))
-        ci = (difference - reach, difference + reach)
-        results.append(Comparison(other.label, difference, ci, p, paired))
-    return tuple(results)
+    """The best minus each other setting, nearest first.
 
-
-def standard_error(a: pd.Series[float], b: pd.Series[float]) -> tuple[float, float, bool] | None:
-    """Standard error of the difference of means, degrees of freedom, and whether paired.
-
-    None where a side has fewer than two values, or where no spread is left to judge by.
+    Parameters
+    ----------
+    best : Setting
+    others : sequence of Setting
+    values : mapping of label to Series of float
+        Of each setting, by block.
     """
-    if len(a) < 2 or len(b) < 2:
+    tests = {o.label: compare_means(values[best.label], values[o.label]) for o in others}
+    factor = max(1, sum(test is not None for test in tests.values()))
+    comparisons = []
+    for other in others:
+        ci, p, is_paired = (math.nan, math.nan), math.nan, False
+        if (test := tests[other.label]) is not None:
+            result, is_paired = test
+            ci = result.confidence_interval(1.0 - (1.0 - CONFIDENCE) / factor)
+            p = min(1.0, factor * float(result.pvalue))
+        difference = best.mean - other.mean
+        comparisons.append(
+            Comparison(other.label, difference, (float(ci[0]), float(ci[1])), p, is_paired)
+        )
+    return tuple(comparisons)
+
+
+def compare_means(first: pd.Series[float], second: pd.Series[float]) -> tuple[Any, bool] | None:
+    """Test the difference of two means: in pairs where both have the same blocks, else by Welch.
+
+    Returns
+    -------
+    (TtestResult, bool) or None
+        Result of ``scipy.stats.ttest_rel`` or ``ttest_ind``, and whether it is paired. None where
+        a side has fewer than two values, or where no spread is left to test by.
+    """
+    if len(first) < 2 or len(second) < 2:
         return None
-    paired = a.index.is_unique and b.index.is_unique and set(a.index) == set(b.index)
-    x = np.asarray(a, dtype=np.float64)
-    if paired:
-        apart = x - np.asarray(b.reindex(a.index), dtype=np.float64)
-        error, freedom = float(apart.std(ddof=1)) / math.sqrt(len(apart)), len(apart) - 1.0
-    else:
-        y = np.asarray(b, dtype=np.float64)
-        u, v = float(x.var(ddof=1)) / len(x), float(y.var(ddof=1)) / len(y)
-        error = math.sqrt(u + v)
-        freedom = (u + v) ** 2 / (u**2 / (len(x) - 1) + v**2 / (len(y) - 1)) if error else 1.0
-    round_off = 1e-12 * max(float(np.abs(x).max()), float(b.abs().max()))
-    return (error, freedom, paired) if error > round_off else None
+    index = first.index
+    paired = index.is_unique and second.index.is_unique and set(index) == set(second.index)
+    x = np.asarray(first, dtype=np.float64)
+    y = np.asarray(second.reindex(index) if paired else second, dtype=np.float64)
+    samples = [x - y] if paired else [x, y]
+    error = math.hypot(*(v.std(ddof=1) / math.sqrt(len(v)) for v in samples))
+    if error <= 1e-12 * max(float(np.abs(x).max()), float(np.abs(y).max())):
+        return None
+    with warnings.catch_warnings():
+        # One side may be constant where the other is not.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        result = stats.ttest_rel(x, y) if paired else stats.ttest_ind(x, y, equal_var=False)
+    return result, paired

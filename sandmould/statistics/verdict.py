@@ -10,16 +10,16 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
+from sandmould.runs.columns import RUN, finished
 from sandmould.runs.formatting import listed, name_of, number, value_text, with_margin
-from sandmould.runs.outcome import Outcome
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.settings import (
     Comparison,
     Setting,
-    by_block,
     compare,
-    group_settings,
+    number_blocks,
     setting_of,
+    setting_rows,
 )
 
 Better = Literal["larger", "smaller", "neither"]
@@ -93,23 +93,22 @@ def judge(
     Verdict
     """
     values = finished_values(summary, measure)
-    groups = group_settings(summary, keys)
-    settings = tuple(setting_of(v, len(rows), values[rows.index].dropna()) for v, rows in groups)
-    found = {
-        s.label: by_block(summary, values[rows.index].dropna())
-        for s, (_, rows) in zip(settings, groups, strict=True)
-    }
+    in_blocks = values.set_axis(number_blocks(summary))
+    groups = [(at, len(rows), in_blocks.iloc[rows].dropna())
+              for at, rows in setting_rows(summary, keys)]  # fmt: skip
+    settings = tuple(setting_of(*group) for group in groups)
+    of_setting = {s.label: group[2] for s, group in zip(settings, groups, strict=True)}
     sign = -1 if better == "larger" else 1
     ranked = sorted((s for s in settings if s.n), key=lambda s: sign * s.mean)
     best = ranked[0] if ranked else None
-    comparisons = compare(best, ranked[1:], found) if best else ()
+    comparisons = compare(best, ranked[1:], of_setting) if best else ()
     first = comparisons[0] if comparisons else None
     resolved = first is not None and first.separated
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
     caveats = [
         *_run_caveats(settings, len(summary), int(values.notna().sum()), seeks_best),
         *(_edge_caveats(best, settings, keys) if seeks_best else ()),
-        *_identical([c.other for c in comparisons if _is_identical(c, found, best)]),
+        *_identical([c.other for c in comparisons if _is_identical(c, of_setting, best)]),
         *notes,
     ]
     return Verdict(
@@ -133,7 +132,7 @@ def finished_values(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
     if measure not in summary:
         return pd.Series(np.nan, index=summary.index)
     values = pd.to_numeric(summary[measure], errors="coerce")
-    return values.where(summary["outcome_code"] == int(Outcome.FINISHED))
+    return values.where(finished(summary))
 
 
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
@@ -155,7 +154,7 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
     first, last = ("highest", "lowest") if better == "neither" else ("best", "worst")
     values = finished_values(summary, measure).dropna()
     values = values.sort_values(ascending=better == "smaller", kind="stable")
-    runs = [str(r) for r in summary.loc[values.index, "run"]]
+    runs = [str(r) for r in summary.loc[values.index, RUN]]
     ranks: dict[str, str] = {}
     for role, place in ((first, 0), (last, -1), ("median", (len(runs) - 1) // 2)):
         if runs and runs[place] not in ranks.values():
@@ -204,10 +203,10 @@ def sand_notes(
 
 
 def _is_identical(
-    comparison: Comparison, found: Mapping[str, pd.Series[float]], best: Setting | None
+    comparison: Comparison, values: Mapping[str, pd.Series[float]], best: Setting | None
 ) -> bool:
     """Whether replicates are there but do not differ."""
-    enough = best is not None and min(best.n, len(found[comparison.other])) > 1
+    enough = best is not None and min(best.n, len(values[comparison.other])) > 1
     return enough and not comparison.tested
 
 

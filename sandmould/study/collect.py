@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from sandmould.runs.columns import (
+    CLOCK,
+    CROSS_CHECK,
+    DETAIL,
+    GRAINS,
+    LARGEST_OVERLAP_FRACTION,
+    OUTCOME,
+    OUTCOME_CODE,
+    PART,
+    PLANNED_S,
+    REPLICATE,
+    RUN,
+    SEED,
+    SIMULATED_S,
+    TIME_S,
+    VIBRATION_TIME_S,
+)
 from sandmould.runs.files import replaced
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.reading import Origin, read_planned, validated
@@ -24,15 +43,15 @@ from sandmould.statistics.agreement import (
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
 from sandmould.study.plan.plan_files import STUDY_FILE
+from sandmould.study.run_tables import PLACE, UNREADABLE, RunTables, problem_text, read_tables
 
 NO_OUTCOME = "no outcome written"
-_OUTCOME_COLUMNS = ("outcome_code", "outcome", "detail", "simulated_s", "planned_s")
-_PARAMETER_FREE = ("run", "replicate", "seed", "part")
-_CLOCK = ("time_s", "vibration_time_s", "stage")
+_PARAMETER_FREE = (RUN, REPLICATE, SEED, PART)
 # The summary has these of the run; those of the snapshot get a prefix there.
-_OF_SNAPSHOT = (*_CLOCK, "grains", "largest_overlap_fraction")
-
-T = TypeVar("T")
+_OF_SNAPSHOT = (*CLOCK, GRAINS, LARGEST_OVERLAP_FRACTION)
+_TEXTS = (RUN, PART, OUTCOME, DETAIL)
+_NAN = "nan"
+"""A gap in a table on disk; in ``_TEXTS`` it would be a word."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +71,10 @@ class Collected:
         return replace(self, summary=sweep_part(self.summary))
 
 
-def swept_keys(runs: pd.DataFrame) -> tuple[str, ...]:
-    """Columns of ``runs.tsv`` that are swept parameters."""
-    return tuple(str(c) for c in runs.columns if c not in _PARAMETER_FREE)
+def swept_keys(table: pd.DataFrame) -> tuple[str, ...]:
+    """Columns of ``runs.tsv``, or of ``summary.tsv``, that are swept parameters."""
+    planned = itertools.takewhile(lambda column: column != OUTCOME_CODE, table.columns)
+    return tuple(str(column) for column in planned if column not in _PARAMETER_FREE)
 
 
 def collect(study_folder: Path) -> None:
@@ -69,12 +89,45 @@ def collect(study_folder: Path) -> None:
         When ``runs.tsv`` itself cannot be read; a broken run is told in its row instead.
     """
     study = read_study(study_folder)
-    found = gather(study_folder, study.objective.at_vibration_s)
-    agreement = agreement_table(compare_study(found.summary, found.keys, study))
-    tables = {"summary": found.summary, "curves": found.curves, "agreement": agreement}
+    gathered = gather(study_folder, study.objective.at_vibration_s)
+    compared = compare_study(gathered.summary, gathered.keys, study)
+    tables = {
+        "summary": gathered.summary,
+        "curves": gathered.curves,
+        "agreement": agreement_table(compared),
+    }
     for name, table in tables.items():
         with replaced(study_folder / f"{name}.tsv") as partial:
-            table.to_csv(partial, sep="\t", index=False, na_rep="nan")
+            table.to_csv(partial, sep="\t", index=False, na_rep=_NAN)
+
+
+def read_collected(study_folder: Path) -> Collected:
+    """Read what ``collect`` wrote: to the digit what it gathered, without a look into any run.
+
+    Raises
+    ------
+    OSError, ValueError
+        When a table is missing or cannot be read.
+    """
+    summary = read_summary(study_folder)
+    return Collected(summary, _read_table(study_folder / "curves.tsv"), swept_keys(summary))
+
+
+def read_summary(study_folder: Path) -> pd.DataFrame:
+    """The first table alone; see ``read_collected``."""
+    return _read_table(study_folder / "summary.tsv")
+
+
+def _read_table(path: Path) -> pd.DataFrame:
+    columns = pd.read_csv(path, sep="\t", nrows=0).columns
+    return pd.read_csv(
+        path,
+        sep="\t",
+        dtype=dict.fromkeys(_TEXTS, str),
+        keep_default_na=False,
+        na_values={str(c): [_NAN] for c in columns if c not in _TEXTS},
+        low_memory=False,
+    )
 
 
 def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> tuple[Compared, ...]:
@@ -96,8 +149,8 @@ def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> t
     equivalence = study.equivalence
     swept = sweep_part(summary)
     found = compare_keys(swept, keys, equivalence)
-    if study.cross_check is not None and "part" in summary:
-        checked = summary[summary["part"] == "cross_check"]
+    if study.cross_check is not None and PART in summary:
+        checked = summary[summary[PART] == CROSS_CHECK]
         alike = swept
         for key, value in study.cross_check.at.items():
             alike = alike[alike[key] == value]
@@ -138,66 +191,124 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
     OSError, ValueError
         When ``runs.tsv`` itself cannot be read.
     """
-    runs = pd.read_csv(study_folder / "runs.tsv", sep="\t", dtype={"run": str})
-    keys = swept_keys(runs)
-    rows: list[dict[str, Any]] = []
-    curves: list[pd.DataFrame] = []
-    for planned in runs.to_dict("records"):
-        folder = study_folder / "runs" / str(planned["run"])
-        row, measures = _one_run(folder, at_vibration_s)
-        rows.append({**{str(k): v for k, v in planned.items()}, **row})
-        if len(measures):
-            known = {k: planned[k] for k in ("run", *keys, "replicate") if k in planned}
-            for place, (name, value) in enumerate(known.items()):
-                measures.insert(place, name, value)
-            curves.append(measures)
-    columns = [*map(str, runs.columns), *_OUTCOME_COLUMNS]
-    summary = pd.DataFrame(rows)
-    summary = summary.reindex(columns=[*columns, *(c for c in summary if c not in columns)])
-    curve_columns = [c for c in ("run", *keys, "replicate") if c in runs.columns]
-    together = (
-        pd.concat(curves, ignore_index=True)
-        if curves
-        else pd.DataFrame(columns=[*curve_columns, *_CLOCK])
-    )
-    return Collected(summary, together, keys)
-
-
-def _one_run(folder: Path, at_vibration_s: float | None) -> tuple[dict[str, Any], pd.DataFrame]:
-    """Row of the summary without the planned columns, and the measures of each snapshot."""
-    broken: list[str] = []
-    outcome = _read(folder / "outcome.json", RunOutcome.read, broken)
-    cost = _read(folder / "cost.tsv", _table, broken)
-    measures = _read(folder / "measures.tsv", _measures, broken)
-    if measures is None:
-        measures = pd.DataFrame()
-    elif unread := int(measures["time_s"].isna().sum()):
-        broken.append(f"{unread} snapshots cannot be read.")
-    detail = [] if outcome is None else [outcome.detail]
-    row: dict[str, Any] = {
-        "outcome_code": np.nan if outcome is None else int(outcome.outcome),
-        "outcome": NO_OUTCOME if outcome is None else outcome.outcome.label,
-        "detail": " ".join(s for s in (*detail, *broken) if s),
-        "simulated_s": np.nan if outcome is None else outcome.simulated_s,
-        "planned_s": np.nan if outcome is None else outcome.planned_s,
+    runs = pd.read_csv(study_folder / "runs.tsv", sep="\t", dtype={RUN: str})
+    folders = [study_folder / "runs" / str(run) for run in runs[RUN]]
+    outcomes, problems = _read_outcomes(folders)
+    costs = read_tables([folder / "cost.tsv" for folder in folders])
+    measures = _in_order(read_tables([folder / "measures.tsv" for folder in folders], _with_clock))
+    bounds = measures.bounds(len(folders))
+    details = []
+    for place, outcome in enumerate(outcomes):
+        texts = [outcome.detail if outcome else "", problems.get(place, "")]
+        texts += [costs.problems.get(place, ""), measures.problems.get(place, "")]
+        if bounds[place] < bounds[place + 1]:
+            gaps = measures.rows[TIME_S].iloc[bounds[place] : bounds[place + 1]].isna().sum()
+            texts += [f"{gaps} snapshots cannot be read."] if gaps else []
+        details.append(" ".join(text for text in texts if text))
+    summary = {
+        **{str(c): runs[c] for c in runs.columns},
+        OUTCOME_CODE: [int(o.outcome) if o else np.nan for o in outcomes],
+        OUTCOME: [o.outcome.label if o else NO_OUTCOME for o in outcomes],
+        DETAIL: details,
+        SIMULATED_S: [o.simulated_s if o else np.nan for o in outcomes],
+        PLANNED_S: [o.planned_s if o else np.nan for o in outcomes],
+        **_of_measures_and_costs(outcomes, measures, costs, at_vibration_s),
     }
-    costs = {} if cost is None or cost.empty else _named(cost.iloc[-1])
-    finished = outcome is not None and outcome.outcome is Outcome.FINISHED
-    taken = _at(measures, at_vibration_s, finished)
-    if taken is not None:
-        for name, value in _named(taken).items():
-            row[f"measured_{name}" if name in _OF_SNAPSHOT else name] = value
-    return {**row, **costs}, measures
+    return Collected(
+        pd.DataFrame(summary).infer_objects(), _curves(runs, measures), swept_keys(runs)
+    )
 
 
-def _named(row: pd.Series[Any]) -> dict[str, Any]:
-    return {str(name): value for name, value in row.items()}
+def _read_outcomes(folders: Sequence[Path]) -> tuple[list[RunOutcome | None], dict[int, str]]:
+    """Outcome of each run, None where it has none, and why one cannot be read, by its place."""
+    outcomes: list[RunOutcome | None] = []
+    problems = {}
+    for place, folder in enumerate(folders):
+        outcome = None
+        try:
+            outcome = RunOutcome.read(folder / "outcome.json")
+        except FileNotFoundError:
+            pass
+        except UNREADABLE as error:
+            problems[place] = problem_text("outcome.json", error)
+        outcomes.append(outcome)
+    return outcomes, problems
 
 
-def _at(
-    measures: pd.DataFrame, at_vibration_s: float | None, finished: bool
-) -> pd.Series[Any] | None:
-    """Row of the measures nearest a time of vibration, or at the end of a run that finished.
+def _in_order(measures: RunTables) -> RunTables:
+    """Measures with the snapshots of each run in order of time, those without one last."""
+    if TIME_S not in measures.rows:
+        return measures
+    order = np.lexsort((measures.rows[TIME_S], measures.rows[PLACE]))
+    return replace(measures, rows=measures.rows.take(order).reset_index(drop=True))
+
+
+def _curves(runs: pd.DataFrame, measures: RunTables) -> pd.DataFrame:
+    """Parameters and measures of every snapshot."""
+    names = [c for c in (RUN, *swept_keys(runs), REPLICATE) if c in runs.columns]
+    if measures.rows.empty:
+        return pd.DataFrame(columns=[*names, *CLOCK])
+    own = runs[names].take(measures.rows[PLACE].to_numpy()).reset_index(drop=True)
+    return pd.concat([own, measures.rows.drop(columns=PLACE)], axis=1)
+
+
+def _of_measures_and_costs(
+    outcomes: Sequence[RunOutcome | None],
+    measures: RunTables,
+    costs: RunTables,
+    at_vibration_s: float | None,
+) -> dict[str, pd.Series[Any]]:
+    """Columns of the summary from each run's measures at the objective's time and its cost."""
+    every = range(len(outcomes))
+    taken = _rows_at(outcomes, measures, at_vibration_s)
+    measured = measures.rows.loc[list(taken.values())].set_axis(list(taken)).reindex(every)
+    bounds = costs.bounds(len(outcomes))
+    last = {place: bounds[place + 1] - 1 for place in every if bounds[place] < bounds[place + 1]}
+    cost = costs.rows.loc[list(last.values())].set_axis(list(last)).reindex(every)
+    columns: dict[str, pd.Series[Any]] = {}
+    seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
+    for place in every:
+        names = (
+            measures.columns[place] if place in taken else (),
+            costs.columns[place] if place in last else (),
+        )
+        if names in seen:
+            continue
+        seen.add(names)
+        for name in names[0]:
+            columns.setdefault(f"measured_{name}" if name in _OF_SNAPSHOT else name, measured[name])
+        for name in names[1]:
+            if name not in columns:
+                columns[name] = cost[name]
+            elif name in measured and name not in _OF_SNAPSHOT:
+                # The run's own account counts where both have it.
+                has = np.array([p in last and name in costs.columns[p] for p in every])
+                columns[name] = cost[name].where(has, measured[name])
+    return columns
+
+
+def _rows_at(
+    outcomes: Sequence[RunOutcome | None], measures: RunTables, at_vibration_s: float | None
+) -> dict[int, int]:
+    """Row of the measures that the summary takes of each run that has one, by its place."""
+    if measures.rows.empty:
+        return {}
+    time_s = measures.rows[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
+    bounds = measures.bounds(len(outcomes)).tolist()
+    rows = {}
+    for place, outcome in enumerate(outcomes):
+        is_finished = outcome is not None and outcome.outcome is Outcome.FINISHED
+        own_s = time_s[bounds[place] : bounds[place + 1]]
+        row = _row_at(own_s, at_vibration_s, is_finished)
+        if row is not None:
+            rows[place] = bounds[place] + row
+    return rows
+
+
+def _row_at(
+    time_s: NDArray[np.float64], at_vibration_s: float | None, is_finished: bool
+) -> int | None:
+    """Snapshot nearest a time of vibration, or at the end of a run that finished.
 
     None where the run never got there.
 
@@ -205,12 +316,12 @@ def _at(
     counts as reached.
     """
     # a snapshot that could not be read has a row without a time
-    measures = measures[measures["vibration_time_s"].notna()] if len(measures) else measures
-    if measures.empty:
+    rows = np.flatnonzero(~np.isnan(time_s))
+    if not len(rows):
         return None
     if at_vibration_s is None:
-        return measures.iloc[-1] if finished else None
-    time_s = measures["vibration_time_s"].to_numpy(dtype=np.float64)
+        return int(rows[-1]) if is_finished else None
+    time_s = time_s[rows]
     shaken = time_s[time_s >= 0]
     if not len(shaken):
         return None
@@ -218,37 +329,16 @@ def _at(
     place = int(np.argmin(np.abs(time_s - at_vibration_s)))
     if abs(time_s[place] - at_vibration_s) > 0.5 * interval_s + 1e-9:
         return None
-    return measures.iloc[place]
+    return int(rows[place])
 
 
-def _table(path: Path) -> pd.DataFrame:
-    return pd.read_csv(path, sep="\t")
-
-
-def _measures(path: Path) -> pd.DataFrame:
-    """Measures in order of time, checked to carry their clock."""
-    table = _table(path)
-    missing = [c for c in _CLOCK if c not in table.columns]
+def _with_clock(table: pd.DataFrame) -> pd.DataFrame:
+    """Measures, checked to carry their clock."""
+    missing = [c for c in CLOCK if c not in table.columns]
     if missing:
         raise ValueError(f"no column {', '.join(missing)}")
-    for name in ("time_s", "vibration_time_s"):
-        table[name] = pd.to_numeric(table[name])
-    return table.sort_values("time_s", ignore_index=True)
-
-
-def _read(path: Path, reader: Callable[[Path], T], broken: list[str]) -> T | None:
-    """What a file holds, or None; a file that is there and unreadable is named in ``broken``."""
-    if not path.exists():
-        return None
-    try:
-        return reader(path)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        broken.append(f"{path.name} cannot be read ({type(error).__name__}: {_line(error)}).")
-        return None
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
+    times = {name: pd.to_numeric(table[name]) for name in (TIME_S, VIBRATION_TIME_S)}
+    return table.assign(**times)
 
 
 def read_provenance(folder: Path) -> dict[str, Any]:

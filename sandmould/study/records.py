@@ -19,6 +19,7 @@ import pandas as pd
 
 from sandmould import ROOT
 from sandmould.digest import digest
+from sandmould.runs.columns import ENGINE, OUTCOME, RUN, VERSION, finished
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
@@ -75,7 +76,7 @@ def record(path: Path, results: Path) -> Path:
     if missing or not (folder / "report.html").exists():
         raise SystemExit(f"{folder} is not whole, {len(missing)} runs are missing: run the study.")
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
-    failed = summary[summary["outcome"] != Outcome.FINISHED.label]
+    failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
     names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
     names += [LEDGER] if (folder / LEDGER).exists() else []
     provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
@@ -88,7 +89,7 @@ def record(path: Path, results: Path) -> Path:
         "engines": _engines(summary),
         "machine": provenance["machine"],
         "margins": study.study.equivalence.margins,
-        "failed": dict(zip(failed["run"], failed["outcome"], strict=True)),
+        "failed": dict(zip(failed[RUN], failed[OUTCOME], strict=True)),
         "wall_s_of_all_runs": round(float(summary.wall_s.sum()), 1),
         **_work(kind_of(runs[0].scenario).planning.work_unit.replace("-", "_"), summary),
     }
@@ -108,10 +109,10 @@ def record(path: Path, results: Path) -> Path:
 
 def _engines(summary: pd.DataFrame) -> dict[str, str]:
     """Version of each engine that finished runs."""
-    finished = summary[summary["outcome_code"] == int(Outcome.FINISHED)]
+    complete = summary[finished(summary)]
     return {
-        str(engine): listed([str(v) for v in dict.fromkeys(runs["version"])])
-        for engine, runs in finished.groupby("engine")
+        str(engine): listed([str(v) for v in dict.fromkeys(runs[VERSION])])
+        for engine, runs in complete.groupby(ENGINE)
     }
 
 

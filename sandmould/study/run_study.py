@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sandmould import ROOT
-from sandmould.study.collect import gather
+from sandmould.statistics.agreement import sweep_part
+from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.rounds.decide import next_runs, told
 from sandmould.study.rounds.ledger import read_ledger, write_ledger
@@ -46,8 +47,8 @@ def drive(path: Path, options: Sequence[str]) -> int:
         if _snakemake(path, options, [str(folder / "summary.tsv")]):
             # Stopped, or broken outside the runs: a run that fails by itself leaves its outcome.
             return 1
-        found = gather(folder, study.objective.at_vibration_s).of_sweep
-        ledger = next_runs(read_ledger(folder, study), study, found.summary, list(found.keys))
+        summary = sweep_part(read_summary(folder))
+        ledger = next_runs(read_ledger(folder, study), study, summary, list(swept_keys(summary)))
         write_ledger(ledger, folder)
         print(f"\n{told(ledger, study)}", file=sys.stderr, flush=True)
         if ledger.ended:

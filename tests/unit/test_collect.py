@@ -9,17 +9,19 @@ import pandas as pd
 import pytest
 import yaml
 
-from sandmould.runs.outcome import Outcome
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.check import failed_runs
 from sandmould.study.collect import (
     NO_OUTCOME,
     collect,
     gather,
+    read_collected,
     read_provenance,
     read_study,
 )
 from sandmould.study.definition.study import Objective
 from sandmould.study.kinds.sand.kind import SandStudy
+from sandmould.study.run_tables import PLACE, read_tables
 from tests.unit.report_study import (
     DURATION_S,
     FAILED,
@@ -165,3 +167,57 @@ def test_study_and_provenance_stand_in_without_their_files(study: Path) -> None:
     assert read_study(study).title == "tube"
     assert read_provenance(study / "runs" / "f25_r1")["machine"]["cores"] == 2
     assert read_provenance(study) == {}
+
+
+def test_what_is_read_back_is_what_was_gathered(study: Path) -> None:
+    runs = study / "runs"
+    odd = {
+        "float": [0.1 + 0.2, 1e-310, math.inf, math.nan],
+        "mixed": [True, None, True, None],
+        "flag": [True, False, True, True],
+        "word": ["NA", "none", None, "1.5 or so"],
+        "count": [1, 2, 3, 2**53 + 1],
+    }
+    for run in ("f25_r1", "f25_r2"):
+        path = runs / run / "measures.tsv"
+        table = pd.read_csv(path, sep="\t").iloc[-4:]
+        table.assign(**odd).to_csv(path, sep="\t", index=False)
+    told = {"f25_r1": "nan", "f25_r2": 'a "tab"\tand\nlines', "f25_r3": "12", "f50_r1": "NA"}
+    for run, detail in told.items():
+        RunOutcome(Outcome.FINISHED, detail, 1.0 / 3.0, 2.0).write(runs / run / "outcome.json")
+    (runs / "f50_r2" / "outcome.json").unlink()
+    (runs / "f50_r3" / "cost.tsv").unlink()
+    gathered = gather(study)
+    collect(study)
+    found = read_collected(study)
+    assert found.keys == gathered.keys
+    pd.testing.assert_frame_equal(found.summary, gathered.summary, check_exact=True)
+    pd.testing.assert_frame_equal(found.curves, gathered.curves, check_exact=True)
+    assert found.summary["detail"].iloc[:4].tolist() == list(told.values())
+
+
+def test_tables_read_together_are_those_read_one_by_one(study: Path) -> None:
+    """Other heads, a quoted cell, a row cut short, an empty table and a missing one between."""
+    paths = [run / "measures.tsv" for run in sorted((study / "runs").iterdir())]
+    text = paths[1].read_text()
+    paths[1].write_text(text.replace("\tsettle\t", '\t"settle\tdown"\t'))
+    paths[2].write_text(text.rsplit("\t", 1)[0])
+    paths[3].unlink()
+    paths[4].write_text(text.splitlines()[0])
+    pd.read_csv(paths[5], sep="\t").assign(more=1).to_csv(paths[5], sep="\t", index=False)
+    paths[6].write_text("a\tb\n1\t2\t3\n1\n")
+    paths[7].write_bytes(b"\xff\xfe\x00")
+    found = read_tables(paths)
+    single = {}
+    for place, path in enumerate(paths):
+        try:
+            single[place] = pd.read_csv(path, sep="\t")
+        except (OSError, ValueError):
+            assert place in (3, 7)
+    assert set(found.problems) == {7}
+    expected = pd.concat([table.assign(**{PLACE: p}) for p, table in single.items()])
+    expected = expected.reset_index(drop=True)[found.rows.columns]
+    pd.testing.assert_frame_equal(found.rows, expected, check_dtype=False)
+    assert {p: list(c) for p, c in found.columns.items()} == {
+        place: list(table.columns) for place, table in single.items()
+    }

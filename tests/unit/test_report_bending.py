@@ -18,7 +18,7 @@ from sandmould.report.page import write_report
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict, judge
-from sandmould.study.collect import Collected, gather
+from sandmould.study.collect import Collected, collect, gather
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.sand.measure import write_exports, write_measures
 from sandmould.study.plan.plan_files import read_run, write_plan
@@ -51,6 +51,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def text(study: Path) -> str:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "_PANEL_PX", 60)
+        collect(study)
         write_report(study, study / "report.html")
     return (study / "report.html").read_text()
 

@@ -12,7 +12,7 @@ import pytest
 
 from sandmould.report.page import write_report
 from sandmould.report.robustness import certificate_pages
-from sandmould.study.collect import gather, read_study
+from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.definition.run import Run
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKE_G, SHAKEN_HZ, cases
@@ -86,6 +86,7 @@ def shaken_loads(run: Run) -> pd.DataFrame:
 def test_an_artefact_is_the_first_sentence_of_the_report(tmp_path: Path) -> None:
     moved = {"hold velocity": 75.0, "hold displacement": 110.0}
     folder = write_certified(tmp_path / "held", moved)
+    collect(folder)
     write_report(folder, folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")
     said = re.sub(r"<[^>]+>", "", text[text.index('class="verdict') :][:1500]).replace("\xa0", " ")

@@ -13,7 +13,7 @@ import pytest
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.page import write_report
 from sandmould.statistics.verdict import judge
-from sandmould.study.collect import gather, read_study
+from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.definition.study import Study
 from tests.unit.report_study import DURATION_S, KEY, scenario, write_study
 
@@ -85,6 +85,7 @@ def test_the_chart_has_a_curve_a_time_and_what_others_found(tmp_path: Path) -> N
 @pytest.mark.slow
 def test_the_page_shows_it(tmp_path: Path) -> None:
     folder = write_study(tmp_path / "tube")
+    collect(folder)
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text()
     assert "Filling over what is swept" in page
@@ -94,6 +95,7 @@ def test_the_page_shows_it(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_its_figures_are_files_too(tmp_path: Path) -> None:
     folder = write_study(tmp_path / "tube")
+    collect(folder)
     write_report(folder, folder / "report.html")
     names = {path.name for path in (folder / "figures").iterdir()}
     assert {"objective.svg", "filling.svg", "curves.svg"} <= names

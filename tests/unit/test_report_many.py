@@ -12,7 +12,7 @@ from sandmould.report import figures, thinning
 from sandmould.report.page import write_report
 from sandmould.report.thinning import drawn_note, drawn_part, listed_runs, listed_settings
 from sandmould.statistics.verdict import Verdict, judge
-from sandmould.study.collect import Collected
+from sandmould.study.collect import Collected, collect
 from tests.unit.report_study import FAILED, write_study
 
 SETTINGS, REPLICATES = 2_000, 5
@@ -76,6 +76,7 @@ def test_failed_runs_are_listed_before_the_best(found: tuple[Collected, Verdict]
 def test_page_says_what_it_leaves_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(figures, "_PANEL_PX", 60)
     study = write_study(tmp_path / "tube", grains=60, count=5)
+    collect(study)
     write_report(study, tmp_path / "whole.html")
     whole = (tmp_path / "whole.html").read_text(encoding="utf-8")
     assert "Every run of the plan" in whole

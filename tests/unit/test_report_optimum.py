@@ -12,7 +12,7 @@ import pytest
 from sandmould.report.chart import Chart
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.page import write_report
-from sandmould.study.collect import gather, read_study
+from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.definition.study import Study
 from sandmould.study.rounds.decide import next_round
 from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
@@ -41,6 +41,7 @@ def test_the_report_begins_with_the_optimum(tmp_path: Path) -> None:
     study = read_study(folder)
     ledger = Ledger(basis_of(study), ended="All 2 rounds are done.")
     write_ledger(ledger, folder)
+    collect(folder)
     write_report(folder, folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")
     first = text.index('class="verdict resolved"')

@@ -16,6 +16,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.report import figures
 from sandmould.report.page import LIMIT_BYTES, write_report
 from sandmould.report.sand import _layer_conclusion
+from sandmould.study.collect import collect
 from tests.unit.report_study import (
     ENGINES,
     FAILED,
@@ -66,6 +67,7 @@ class Page(HTMLParser):
 
 def report(folder: Path) -> str:
     out = folder / "report.html"
+    collect(folder)
     write_report(folder, out)
     assert out.stat().st_size < LIMIT_BYTES
     assert not list(folder.glob("*.partial"))

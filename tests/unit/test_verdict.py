@@ -189,3 +189,42 @@ def test_notes_say_what_was_held_and_what_was_not_tested() -> None:
     assert sand_notes(["sand.density_kg_m3"], stage, 0.04) == (NOT_TESTED,)
     assert "overlapped by up to 21 %" in sand_notes([], None, 0.21)[0]
     assert judge(WINNER, [KEY], FILL, notes=notes).caveats[-1] == NOT_TESTED
+
+
+def test_intervals_and_p_values_are_those_of_the_formulae() -> None:
+    """Student's and Welch's tests written out, with Bonferroni's factor, on random tables."""
+    rng = np.random.default_rng(11)
+    for trial in range(60):
+        n, others = int(rng.integers(2, 7)), int(rng.integers(1, 4))
+        rows = {f: rng.normal(0.4 + 0.1 * rng.random(), 0.02, n).tolist()
+                for f in range(25, 26 + others)}  # fmt: skip
+        summary = table(rows)
+        if trial % 2:
+            summary["seed"] = range(len(summary))
+        verdict = judge(summary, [KEY], FILL)
+        best = verdict.best
+        assert best is not None
+        x = np.array(rows[int(best.values[KEY])])
+        for comparison in verdict.comparisons:
+            (y,) = (np.array(v) for f, v in rows.items() if f"{f} Hz" == comparison.other)
+            if trial % 2:
+                u, v = x.var(ddof=1) / n, y.var(ddof=1) / n
+                error, freedom = math.sqrt(u + v), (u + v) ** 2 * (n - 1) / (u**2 + v**2)
+            else:
+                error, freedom = float((x - y).std(ddof=1)) / math.sqrt(n), n - 1
+            reach = stats.t.ppf(1 - 0.025 / others, freedom) * error
+            apart = x.mean() - y.mean()
+            p = min(1.0, others * 2 * stats.t.sf(abs(apart) / error, freedom))
+            assert comparison.paired == (trial % 2 == 0)
+            assert comparison.ci == pytest.approx((apart - reach, apart + reach), rel=1e-9)
+            assert comparison.p == pytest.approx(p, rel=1e-9)
+
+
+def test_one_constant_side_is_compared_with_the_other() -> None:
+    summary = table({25: [0.3, 0.3, 0.3], 50: [0.6, 0.63, 0.62]})
+    summary["seed"] = range(6)
+    (comparison,) = judge(summary, [KEY], FILL).comparisons
+    error = np.std([0.6, 0.63, 0.62], ddof=1) / math.sqrt(3)
+    reach = stats.t.ppf(0.975, 2) * error
+    apart = (0.6 + 0.63 + 0.62) / 3 - 0.3
+    assert comparison.ci == pytest.approx((apart - reach, apart + reach), rel=1e-9)

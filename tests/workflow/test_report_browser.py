@@ -13,6 +13,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 from sandmould.report.page import write_report
+from sandmould.study.collect import collect
 from tests.unit.report_study import write_study
 
 pytestmark = pytest.mark.browser
@@ -60,6 +61,7 @@ def page(
     study = write_study(
         tmp_path_factory.mktemp("results") / "tube", dimension=request.param, count=16
     )
+    collect(study)
     write_report(study, study / "report.html")
     browser.get((study / "report.html").as_uri())
     wait(lambda: text(browser, "film-time") != "")

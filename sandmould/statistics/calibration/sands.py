@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from sandmould.runs.columns import CPU_S
 from sandmould.runs.files import write_text
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.scenario import Scenario
@@ -94,7 +95,7 @@ def calibrate(
     first = next((next(iter(s.sand.targets)) for s in sands if s.found is not None), "")
     # What the runs that give the first measure tell besides costs nothing more.
     cpu_s = {
-        measure: 0.0 if table is tables[first] else float(table["cpu_s"].mean())
+        measure: 0.0 if table is tables[first] else float(table[CPU_S].mean())
         for measure, table in tables.items()
         if first
     }

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pandas as pd
 
+from sandmould.runs.columns import RUN
+from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.calibration.sands import Calibrated, calibrate, write_materials
-from sandmould.study.collect import gather, read_study
+from sandmould.study.collect import read_study, read_summary, swept_keys
 from sandmould.study.definition.study import Study
 from sandmould.study.plan.plan_files import read_run
 
@@ -25,10 +27,7 @@ def read_calibrated(
     """
     if not study.calibration.sands:
         return None
-    others = {
-        name: pd.read_csv(study_folder.parent / name / "summary.tsv", sep="\t")
-        for name in study.calibration.also
-    }
+    others = {name: read_summary(study_folder.parent / name) for name in study.calibration.also}
     return calibrate(study.calibration, summary, (keys[0], keys[1]), others)
 
 
@@ -41,11 +40,11 @@ def write_calibration(study_folder: Path, materials: Path) -> list[str]:
         One sentence a sand that was not found.
     """
     study = read_study(study_folder)
-    collected = gather(study_folder).of_sweep
-    result = read_calibrated(study_folder, study, collected.summary, collected.keys)
+    summary = sweep_part(read_summary(study_folder))
+    result = read_calibrated(study_folder, study, summary, swept_keys(summary))
     if result is None:
         return []
-    run = str(collected.summary["run"].iloc[0])
+    run = str(summary[RUN].iloc[0])
     scenario = read_run(study_folder / "runs" / run / "scenario.yaml").scenario
     write_materials(result, scenario, study_folder.name, materials)
     return [f"{one.sand.name}: {one.problem}" for one in result.sands if one.problem]

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pandas as pd
 
+from sandmould.runs.columns import CPU_S
 from sandmould.runs.formatting import listed, name_of, number, unit_of
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
@@ -44,7 +45,7 @@ def next_runs(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[st
 def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
     """Add a round, or the reason why there is none; parameters as in ``next_runs``."""
     refine, done = study.refine, len(ledger.rounds)
-    spent_h = float(summary["cpu_s"].sum()) / 3600 if "cpu_s" in summary else 0.0
+    spent_h = float(summary[CPU_S].sum()) / 3600 if CPU_S in summary else 0.0
     try:
         optimum = find_optimum(
             summary, keys, study.objective.measure, study.objective.better, seed=done

@@ -1,0 +1,67 @@
+"""Columns of the tables that runs and studies leave, and what their cells mean.
+
+``runs.tsv`` has a row a planned run, ``summary.tsv`` the same with outcome, measures and cost,
+``curves.tsv`` and ``measures.tsv`` one a snapshot. Swept keys are columns too, by their key path.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from sandmould.runs.outcome import Outcome
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RUN: Final = "run"
+REPLICATE: Final = "replicate"
+SEED: Final = "seed"
+PART: Final = "part"
+"""Which part of a study a run belongs to; only studies of several parts have it."""
+
+SWEEP: Final = "sweep"
+CROSS_CHECK: Final = "cross_check"
+CONTROL: Final = "control: "
+"""Cells of ``part``: the sweep with its rounds, its points on another engine, and the beginning of
+the name of a control's case."""
+
+OUTCOME_CODE: Final = "outcome_code"
+OUTCOME: Final = "outcome"
+"""Label of the code."""
+DETAIL: Final = "detail"
+"""What the engine, a guard or the collection said of the run."""
+SIMULATED_S: Final = "simulated_s"
+PLANNED_S: Final = "planned_s"
+
+ENGINE: Final = "engine"
+VERSION: Final = "version"
+RANKS: Final = "ranks"
+WALL_S: Final = "wall_s"
+CPU_S: Final = "cpu_s"
+GRAIN_STEPS_PER_S: Final = "grain_steps_per_s"
+PEAK_MEMORY_BYTES: Final = "peak_memory_bytes"
+TIME_STEP_S: Final = "time_step_s"
+TIME_STEP_FRACTION: Final = "time_step_fraction"
+"""Of the critical one."""
+LARGEST_OVERLAP_FRACTION: Final = "largest_overlap_fraction"
+"""Of a radius; of the whole run in ``summary.tsv``, of one moment in the other tables."""
+
+TIME_S: Final = "time_s"
+VIBRATION_TIME_S: Final = "vibration_time_s"
+"""-1 before the vibration begins."""
+STAGE: Final = "stage"
+GRAINS: Final = "grains"
+SOLID_FRACTION: Final = "solid_fraction"
+BED_HEIGHT_M: Final = "bed_height_m"
+CLASSIFICATION: Final = "classification"
+"""Of a run of flow: excellent, good or failed."""
+HOPS: Final = "hops"
+SOLIDIFICATION_TIME_S: Final = "solidification_time_s"
+
+OF_OUTCOME: Final = (OUTCOME_CODE, OUTCOME, DETAIL, SIMULATED_S, PLANNED_S)
+CLOCK: Final = (TIME_S, VIBRATION_TIME_S, STAGE)
+
+
+def finished(summary: pd.DataFrame) -> pd.Series[bool]:
+    """Which runs of a summary reached their end, by row."""
+    return summary[OUTCOME_CODE] == int(Outcome.FINISHED)
