@@ -6,8 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Floats, Ints
 from sandmould.compiled import njit
 from sandmould.dem.nearest_point import nearest
 from sandmould.dem.surfaces import SurfaceArrays
@@ -17,11 +17,11 @@ from sandmould.dem.vectors import OPTIONS, dot, load, plus, store, times
 class Candidates(NamedTuple):
     """Grains near surfaces and the parts that they are near to."""
 
-    rows: NDArray[np.int64]
+    rows: Ints
     """(m,) int64: grains with at least one part within reach, in increasing order."""
-    start: NDArray[np.int64]
+    start: Ints
     """(m + 1,) int64: where the parts of each row begin."""
-    part: NDArray[np.int64]
+    part: Ints
     """(start[m],) int64: part numbers, see ``SurfaceArrays``."""
 
 
@@ -31,12 +31,12 @@ class _Grid(NamedTuple):
     low: tuple[float, float, float]
     size: float
     cells: tuple[int, int, int]
-    start: NDArray[np.int64]
-    part: NDArray[np.int64]
+    start: Ints
+    part: Ints
 
 
 @njit(**OPTIONS)
-def _span(points: NDArray[np.float64], k: int) -> tuple[float, float]:
+def _span(points: Floats, k: int) -> tuple[float, float]:
     """Smallest and largest of a coordinate."""
     low, high = math.inf, -math.inf
     for i in range(len(points)):
@@ -45,7 +45,7 @@ def _span(points: NDArray[np.float64], k: int) -> tuple[float, float]:
 
 
 @njit(**OPTIONS)
-def _bounds(dim: Any, points: NDArray[np.float64]) -> Any:
+def _bounds(dim: Any, points: Floats) -> Any:
     """Smallest and largest coordinates, three each; in 2D the third is 0."""
     x, y, z = _span(points, 0), _span(points, 1), (0.0, 0.0)
     if len(dim) == 3:
@@ -54,7 +54,7 @@ def _bounds(dim: Any, points: NDArray[np.float64]) -> Any:
 
 
 @njit(**OPTIONS)
-def _flat_normal(dim: Any, vertices: NDArray[np.float64], corner: NDArray[np.int64]) -> Any:
+def _flat_normal(dim: Any, vertices: Floats, corner: Ints) -> Any:
     """Unit normal of a facet, three components."""
     a, b = load(dim, vertices, corner[0]), load(dim, vertices, corner[1])
     ab = plus(b, -1.0, a)
@@ -80,8 +80,8 @@ def _range(low: float, high: float, origin: float, size: float, cells: int) -> t
 @njit(**OPTIONS)
 def _sort_facets(
     dim: Any,
-    vertices: NDArray[np.float64],
-    corner: NDArray[np.int64],
+    vertices: Floats,
+    corner: Ints,
     first_facet: int,
     reach: float,
     low: Any,
@@ -147,7 +147,7 @@ def _sort_facets(
 
 
 @njit(**OPTIONS)
-def _longer(array: NDArray[np.int64], filled: int) -> NDArray[np.int64]:
+def _longer(array: Ints, filled: int) -> Ints:
     longer = np.empty(2 * filled + 16, dtype=np.int64)
     for i in range(filled):
         longer[i] = array[i]
@@ -157,8 +157,8 @@ def _longer(array: NDArray[np.int64], filled: int) -> NDArray[np.int64]:
 @njit(**OPTIONS)
 def find_candidates(
     dim: Any,
-    position: NDArray[np.float64],
-    radius: NDArray[np.float64],
+    position: Floats,
+    radius: Floats,
     skin: float,
     arrays: SurfaceArrays,
     shift: Any,

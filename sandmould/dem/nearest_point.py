@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from sandmould.arrays import Floats, Ints
 from sandmould.compiled import njit
 from sandmould.dem.vectors import INLINED, dot, load, plus, times
 
@@ -143,10 +141,10 @@ def _on_revolved(axis: Any, line: Any, origin: Any, x: Any, reach: float) -> Any
 @njit(**INLINED)
 def nearest(
     dim: Any,
-    vertices: NDArray[np.float64],
+    vertices: Floats,
     planes: int,
-    shape: NDArray[np.float64],
-    corner: NDArray[np.int64],
+    shape: Floats,
+    corner: Ints,
     part: int,
     x: Any,
     reach: float,

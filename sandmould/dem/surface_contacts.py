@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.arrays import Flags, Floats
 from sandmould.compiled import njit
 from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.contact_law import Law, contact, pair_coefficients
@@ -42,9 +43,7 @@ _WAITS, _COVERED, _SEEN = 0, 1, 2
 
 
 @njit(**OPTIONS)
-def _next(
-    distance: NDArray[np.float64], inside: NDArray[np.bool_], state: NDArray[np.int8], found: int
-) -> int:
+def _next(distance: Floats, inside: Flags, state: NDArray[np.int8], found: int) -> int:
     """Give the nearest part still waiting, or -1; of two equally near the one touched inside."""
     best, least = -1, FAR
     for i in range(found):
@@ -58,9 +57,9 @@ def _next(
 @njit(**OPTIONS)
 def _cover(
     dim: Any,
-    distance: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    inside: NDArray[np.bool_],
+    distance: Floats,
+    normal: Floats,
+    inside: Flags,
     state: NDArray[np.int8],
     found: int,
     kept: int,
@@ -82,13 +81,13 @@ def surface_forces(
     first_row: int,
     last_row: int,
     candidates: Candidates,
-    position: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    spin: NDArray[np.float64],
-    radius: NDArray[np.float64],
-    mass: NDArray[np.float64],
-    force: NDArray[np.float64],
-    moment: NDArray[np.float64],
+    position: Floats,
+    velocity: Floats,
+    spin: Floats,
+    radius: Floats,
+    mass: Floats,
+    force: Floats,
+    moment: Floats,
     arrays: SurfaceArrays,
     shift: Any,
     shift_velocity: Any,
@@ -96,7 +95,7 @@ def surface_forces(
     dt: float,
     keep: bool,
     history: WallHistory,
-    loads: NDArray[np.float64],
+    loads: Floats,
 ) -> None:
     """Add the forces of the surfaces to grains, and their reactions to the loads on vertices.
 

@@ -10,8 +10,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Floats, Ints
 from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS, dot, load, load_spin, no_spin, store
 
@@ -22,13 +22,13 @@ SAME_CONTACT = math.cos(math.radians(30.0))
 class WallHistory(NamedTuple):
     """Memory of m grains; slot k of row i lies in row i slots + k of the last three."""
 
-    used: NDArray[np.int64]
+    used: Ints
     """(m,) int64: slots in use."""
-    normal: NDArray[np.float64]
+    normal: Floats
     """(m slots, d) float64: normal from the grain to the surface."""
-    friction: NDArray[np.float64]
+    friction: Floats
     """(m slots, 1 or 3) float64, N: friction on the grain as a tangent."""
-    rolling: NDArray[np.float64]
+    rolling: Floats
     """(m slots, 1 or 3) float64, N m: rolling moment on the grain."""
 
 
@@ -39,7 +39,7 @@ def slots(dim: Any) -> int:
 
 
 @njit(**OPTIONS)
-def recall(dim: Any, normal: NDArray[np.float64], first: int, last: int, n: Any) -> int:
+def recall(dim: Any, normal: Floats, first: int, last: int, n: Any) -> int:
     """Find the slot among first ... last - 1 whose normal is nearest to n, or -1."""
     best, largest = -1, SAME_CONTACT
     for k in range(first, last):
@@ -52,9 +52,9 @@ def recall(dim: Any, normal: NDArray[np.float64], first: int, last: int, n: Any)
 @njit(**OPTIONS)
 def swap(
     dim: Any,
-    normal: NDArray[np.float64],
-    friction: NDArray[np.float64],
-    rolling: NDArray[np.float64],
+    normal: Floats,
+    friction: Floats,
+    rolling: Floats,
     a: int,
     b: int,
 ) -> None:
@@ -81,9 +81,7 @@ def new_history(dim: Any, m: int) -> WallHistory:
 
 
 @njit(**OPTIONS)
-def carry_history(
-    dim: Any, old_ids: NDArray[np.int64], old: WallHistory, new_ids: NDArray[np.int64]
-) -> WallHistory:
+def carry_history(dim: Any, old_ids: Ints, old: WallHistory, new_ids: Ints) -> WallHistory:
     """Memory in the order of new rows.
 
     Parameters

@@ -49,10 +49,14 @@ print(table[0, 0, 0])
 """
 ARPM = """
 import numpy as np
+from sandmould.casting.arpm.marching import HeatSystem
 from sandmould.casting.arpm.super_steps import _stage
+none = np.zeros(0, np.int64)
+rows = np.array([[1.0, 9.0, 9.0, 9.0, 9.0]])
+system = HeatSystem(none, none.astype(np.int32), np.zeros(0), np.zeros(1, np.int64), rows, 1.0)
 temperature = np.zeros(1)
 _stage(np.array([0.0, 0.0, 1.0, 0.0]), 1.0, np.ones(1), np.zeros(1), np.zeros(1), np.zeros(1),
-       np.ones(1), np.zeros(1, np.int64), np.array([[1.0, 9.0, 9.0, 9.0, 9.0]]), 1.0, temperature)
+       np.ones(1), system, temperature)
 print(temperature[0])
 """
 MPS = """

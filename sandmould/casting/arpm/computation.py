@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from sandmould.arrays import Flags
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.solidification import (
@@ -131,7 +131,7 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
 def _write(
     scenario: Solidification,
     elements: Elements,
-    melts: NDArray[np.bool_],
+    melts: Flags,
     result: SolidificationResult,
     work: Path,
 ) -> None:

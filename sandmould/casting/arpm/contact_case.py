@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.exact import contact_temperature_k
@@ -14,7 +13,6 @@ from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster
 
-Array = NDArray[np.float64]
 SMALL_M = 0.005
 HALF_LENGTH_M, WIDTH_M = 0.5, 0.08
 """Stand-ins: Fig. 1's dimensions are lost to us. Error (6) goes as one over the half length."""

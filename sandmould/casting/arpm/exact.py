@@ -5,22 +5,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import erf, erfcx
 
+from sandmould.arrays import Floats
 from sandmould.casting.arpm.material import ThermalMaterial
-
-Array = NDArray[np.float64]
 
 
 def contact_temperature_k(
-    place_m: Array,
+    place_m: Floats,
     time_s: float,
     bodies: tuple[ThermalMaterial, ThermalMaterial],
     initial_k: tuple[float, float],
     resistance_m2k_w: float = 0.0,
-) -> Array:
+) -> Floats:
     """Two half spaces that touch from time 0 on, with a resistance between them.
 
     Carslaw and Jaeger, Conduction of Heat in Solids, 2nd edition, section 2.16.
@@ -73,8 +71,8 @@ def stefan_front(body: ThermalMaterial, melting_k: float, wall_k: float) -> floa
     return float(brentq(lambda x: x * math.exp(x * x) * math.erf(x) - target, 1e-9, 5.0))
 
 
-def stefan_temperature_k(place_m: Array, time_s: float, body: ThermalMaterial, melting_k: float,
-                         wall_k: float) -> Array:  # fmt: skip
+def stefan_temperature_k(place_m: Floats, time_s: float, body: ThermalMaterial, melting_k: float,
+                         wall_k: float) -> Floats:  # fmt: skip
     """Temperature of the one-phase Stefan problem at distances from the wall, (n,) float64, K.
 
     Parameters

@@ -8,12 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Floats, Ints
 from sandmould.compiled import njit
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -72,10 +69,10 @@ class EnthalpyTable:
 
     reference_k: float
     """Where the enthalpy is 0."""
-    rows: Array
+    rows: Floats
     """(m, 5) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K."""
 
-    def enthalpy_j_m3(self, temperature_k: Array, material: Indices) -> Array:
+    def enthalpy_j_m3(self, temperature_k: Floats, material: Ints) -> Floats:
         """Enthalpy of elements; one on an isothermal front (solidus = liquidus) is liquid.
 
         Parameters
@@ -97,7 +94,7 @@ class EnthalpyTable:
             above = liquid + capacity * (temperature_k - liquidus)
         return np.where(liquids, above, np.where(melting, mushy, below))
 
-    def temperature_k(self, enthalpy_j_m3: Array, material: Indices) -> Array:
+    def temperature_k(self, enthalpy_j_m3: Floats, material: Ints) -> Floats:
         """Temperature of elements, (n,) float64, K; the inverse of ``enthalpy_j_m3``."""
         return np.asarray(_temperatures(enthalpy_j_m3, material, self.rows, self.reference_k))
 

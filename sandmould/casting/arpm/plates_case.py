@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sandmould import ROOT
+from sandmould.arrays import Floats
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
@@ -26,7 +26,6 @@ from sandmould.scenario.casting_shapes import FourPlates
 from sandmould.scenario.outline import Outline
 from sandmould.scenario.reading import Origin, merge, read_yaml
 
-Array = NDArray[np.float64]
 MATERIALS = ROOT / "config" / "materials" / "hirata_2019.yaml"
 ALUMINIUM = ROOT / "config" / "materials" / "hirata_2019_aluminium.yaml"
 SCENARIO = ROOT / "config" / "scenarios" / "plates.yaml"
@@ -67,7 +66,7 @@ class Plates:
         return FourPlates(reach_m=self.reach_m, thickness_m=self.thickness_m).solid
 
     @property
-    def probes_m(self) -> dict[str, Array]:
+    def probes_m(self) -> dict[str, Floats]:
         """Points A to D half a thickness from the tips, and E in the centre: a stand-in."""
         up, right, down, left = (self.reach_m - 0.5 * t for t in self.thickness_m)
         places = {"A": (0.0, up), "B": (right, 0.0), "C": (0.0, -down), "D": (-left, 0.0),
@@ -184,6 +183,6 @@ def curve_error_percent(plates: Plates, found: SolidificationResult, reference: 
     }
 
 
-def _differences(found: Mapping[str, Array], reference: Mapping[str, Array], k: int
-                 ) -> dict[str, Array]:  # fmt: skip
+def _differences(found: Mapping[str, Floats], reference: Mapping[str, Floats], k: int
+                 ) -> dict[str, Floats]:  # fmt: skip
     return {name: np.abs(found[name][:k] - reference[name][:k]) for name in found}

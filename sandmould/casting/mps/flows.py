@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Flags, Floats
 from sandmould.casting.mps.flow import Flow
 from sandmould.casting.mps.particles import (
     FLUID,
     WALL_LAYERS,
-    Floats,
     at_rest,
     lattice,
     mould_around,
@@ -49,7 +48,7 @@ def channel(
     """
     size_m = width_m / (rows + 1)
 
-    def is_cavity(place: Floats) -> NDArray[np.bool_]:
+    def is_cavity(place: Floats) -> Flags:
         return np.asarray((place[:, 1] > 0.0) & (place[:, 1] < rows * size_m))
 
     sites = lattice((0, -WALL_LAYERS), (COLUMNS, rows + WALL_LAYERS), size_m)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
+from sandmould.arrays import Floats, Ints
+from sandmould.casting.mps.particles import DUMMY, Kinds
 from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight
 from sandmould.compiled import njit
 
@@ -20,7 +21,7 @@ SKIN = 0.35
 class VerletList(NamedTuple):
     """Particles that may come within the kernel of each other, both ways round."""
 
-    start: NDArray[np.int64]
+    start: Ints
     """(n + 1,) int64: candidates of particle i are start[i] to start[i + 1]."""
     other: NDArray[np.uint32]
     """(p,) uint32: rising within each row, so that no sum depends on when the list was made."""
@@ -31,7 +32,7 @@ class VerletList(NamedTuple):
 class Neighbours(NamedTuple):
     """Particles within the kernel of fluid and walls at given positions; dummies have none."""
 
-    start: NDArray[np.int64]
+    start: Ints
     """(n + 1,) int64: neighbours of particle i are start[i] to start[i + 1]."""
     other: NDArray[np.uint32]
     """(e,) uint32."""
@@ -44,9 +45,7 @@ class Neighbours(NamedTuple):
 
 
 @njit(**OPTIONS)
-def _both_ways(
-    n: int, pair: NDArray[np.int64], kind: Kinds
-) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+def _both_ways(n: int, pair: Ints, kind: Kinds) -> tuple[Ints, NDArray[np.uint32]]:
     """Rows of candidates from pairs, in rising order; dummies need none of each other."""
     start = np.zeros(n + 1, dtype=np.int64)
     for k in range(len(pair)):
@@ -160,7 +159,7 @@ def find_neighbours(
 
 
 @njit(**OPTIONS)
-def _weigh(kernel: Kernel, start: NDArray[np.int64], distance2: Floats) -> tuple[Floats, Floats]:
+def _weigh(kernel: Kernel, start: Ints, distance2: Floats) -> tuple[Floats, Floats]:
     """Weights over squared distances, and their number densities."""
     weights, share = np.empty(len(distance2)), np.empty(len(distance2))
     for k in range(len(distance2)):

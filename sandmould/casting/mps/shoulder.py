@@ -7,13 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Flags, Floats
 from sandmould.casting.mps.flow import Flow, FlowGuard, FlowProgress, RunningCost
 from sandmould.casting.mps.particles import (
     FLUID,
     WALL_LAYERS,
-    Floats,
     at_rest,
     lattice,
     mould_around,
@@ -46,7 +45,7 @@ class Casting:
     """Diameter of the lower half."""
     upper_m: float = 0.025
 
-    def holds(self, place_m: Floats, freeboard_m: float = 0.0) -> NDArray[np.bool_]:
+    def holds(self, place_m: Floats, freeboard_m: float = 0.0) -> Flags:
         """Whether points are inside the mould, (n,) bool; the upper half may reach higher."""
         across_m = np.hypot(place_m[:, 0], place_m[:, 1])
         height_m = place_m[:, 2]

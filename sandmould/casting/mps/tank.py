@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Flags, Floats
 from sandmould.casting.mps.flow import Flow, FlowGuard
 from sandmould.casting.mps.particles import (
     FLUID,
     WALL_LAYERS,
-    Floats,
     Particles,
     at_rest,
     lattice,
@@ -27,7 +26,7 @@ WALL_ROWS = 51
 def still_tank(columns: int = COLUMNS, rows: int = ROWS, spacing_m: float = SPACING_M) -> Particles:
     """Fluid on its lattice in an open box, its walls as far above it as in the paper."""
 
-    def is_cavity(place: Floats) -> NDArray[np.bool_]:
+    def is_cavity(place: Floats) -> Flags:
         inside = (place[:, 0] > 0.0) & (place[:, 0] < columns * spacing_m)
         return inside & (place[:, 1] > 0.0)
 
