@@ -29,7 +29,7 @@ STUDIES = (
 class Level:
     """One value of a factor."""
 
-    shown: str
+    label: str
     runs: int
     mean: float
     sd: float
@@ -80,15 +80,15 @@ def factors_of(recorded: Recorded, summary: pd.DataFrame, keys: tuple[str, ...])
         Those that are compared.
     """
     finished = summary[summary["outcome_code"] == int(Outcome.FINISHED)]
-    found = []
+    factors = []
     for key in keys:
         cost = finished.groupby(key, sort=False)["cpu_s"].mean().sort_values(ascending=False)
         dearest = shown_value(key, cost.index[0])
         levels = []
         for value, cpu_s in cost.items():
             angle = finished.loc[finished[key] == value, MEASURE].dropna()
-            shown = shown_value(key, value)
-            compared = _pair(recorded.compared, key, dearest, shown)
+            label = shown_value(key, value)
+            compared = _pair(recorded.compared, key, dearest, label)
             against, agrees = "–", False
             if compared is not None:
                 test = compared.agreement
@@ -96,10 +96,10 @@ def factors_of(recorded: Recorded, summary: pd.DataFrame, keys: tuple[str, ...])
                 low, high = test.ci if compared.first == dearest else (-test.ci[1], -test.ci[0])
                 against = f"{test.judged}: {number(low, 2)} to {number(high, 2)}"
             levels.append(
-                Level(shown, len(angle), angle.mean(), angle.std(), cpu_s, against, agrees)
+                Level(label, len(angle), angle.mean(), angle.std(), cpu_s, against, agrees)
             )
         record = recorded.record
-        found.append(
+        factors.append(
             Factor(
                 recorded.name,
                 recorded.title,
@@ -110,15 +110,15 @@ def factors_of(recorded: Recorded, summary: pd.DataFrame, keys: tuple[str, ...])
                 record["machine"]["processor"],
             )
         )
-    return found
+    return factors
 
 
-def _pair(compared: tuple[Compared, ...], key: str, one: str, other: str) -> Compared | None:
+def _pair(compared: tuple[Compared, ...], key: str, first: str, second: str) -> Compared | None:
     return next(
         (
             c
             for c in compared
-            if c.measure == MEASURE and c.key == key and {c.first, c.second} == {one, other}
+            if c.measure == MEASURE and c.key == key and {c.first, c.second} == {first, second}
         ),
         None,
     )

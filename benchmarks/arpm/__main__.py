@@ -21,7 +21,7 @@ from sandmould.casting.arpm.computation import source_hash
 from sandmould.casting.arpm.plates_case import read_plates
 
 
-class Sizes(NamedTuple):
+class ElementSizes(NamedTuple):
     """Smallest elements."""
 
     plates_mm: float
@@ -73,8 +73,8 @@ BENCHMARK = Benchmark(
     },
     pages={"solidification.md": page},
     draw=draw,
-    extent=Sizes(1.0, REFERENCE_MM),
-    quick=Sizes(5.0, 2.0),
+    extent=ElementSizes(1.0, REFERENCE_MM),
+    quick=ElementSizes(5.0, 2.0),
 )
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from benchmarks.arpm.ways import FEM, PAPERS
 matplotlib.use("Agg")
 CASES = ("1-1", "1-2", "1-3", "1-4", "1-3A", "1-3B")
 COMPETITORS = ("finite differences", FEM)
-SHOWN_FROM_MM = 2.0
+SMALLEST_COURSE_MM = 2.0
 """Courses of one size are shown from here up, as finer ones lie on the axis."""
 Row = Mapping[str, Any]
 
@@ -67,12 +67,12 @@ def draw_courses(ways: Sequence[Row], path: Path) -> None:
         times.plot([r["size_mm"] for r in own], [r["solidification_time_s"] for r in own],
                    marker="o", label=name)  # fmt: skip
     times.set(xlabel="element size, mm", ylabel="solid after, s")
-    for row in (r for r in ways if r["way"] in PAPERS and r["size_mm"] >= SHOWN_FROM_MM):
+    for row in (r for r in ways if r["way"] in PAPERS and r["size_mm"] >= SMALLEST_COURSE_MM):
         case = "2-1" if row["way"] == PAPERS[0] else str(row["way"]).split(",")[0]
         drawn = {"label": f"{case}, {row['size_mm']:g} mm", "lw": 1.2}
         drawn["ls"] = "--" if case == "2-1" else "-"
         curves.plot(row["course_s"], row["course_error_percent"], **drawn)
-        if case != "2-1" and row["size_mm"] == SHOWN_FROM_MM:
+        if case != "2-1" and row["size_mm"] == SMALLEST_COURSE_MM:
             drifts.plot(row["course_s"], row["course_drift_percent"], **drawn)
     curves.set(xlabel="time, s", ylabel="warmer at A than the reference, % of 1530 K")
     drifts.set(xlabel="time, s", ylabel="change of the total enthalpy, %")

@@ -22,12 +22,12 @@ def contact_rows() -> list[dict[str, Any]]:
         for form, size in ways:
             for case in LAYERS:
                 method = HeatMethod(form, "explicit", size, refuse_ratio=False)  # type: ignore[arg-type]
-                found = run_contact(case, aluminium, resistance, method)
+                contact = run_contact(case, aluminium, resistance, method)
                 rows.append({
                     "case": case, "exchange": form, "resistance_m2k_w": resistance,
                     "kernel_size": None if form == "faces" else size,
-                    "error_percent": found.error_percent, "largest_k": found.largest_k,
-                    "drift_percent": found.drift_percent, "elements": found.elements,
+                    "error_percent": contact.error_percent, "largest_k": contact.largest_k,
+                    "drift_percent": contact.drift_percent, "elements": contact.elements,
                 })  # fmt: skip
             print(f"contact, R = {resistance:g} m2 K/W, {form} {size:g}", flush=True)
     return rows

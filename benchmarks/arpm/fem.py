@@ -45,9 +45,9 @@ def fem_exchange(raster: Raster, filling: Filling) -> tuple[Elements, Exchange]:
     ) * (0.25 * cell**2)  # fmt: skip
     apart = stiffness.row != stiffness.col
     row, column, through = stiffness.row[apart], stiffness.col[apart], -stiffness.data[apart]
-    one, two = _across(raster, [grid for _, grid in parts], parts[0][0].p.shape[1])
-    met = np.full(2 * len(one), 0.5 * cell / filling.resistance_m2k_w)
-    row, column = np.concatenate([row, one, two]), np.concatenate([column, two, one])
+    node, partner = _across(raster, [grid for _, grid in parts], parts[0][0].p.shape[1])
+    met = np.full(2 * len(node), 0.5 * cell / filling.resistance_m2k_w)
+    row, column = np.concatenate([row, node, partner]), np.concatenate([column, partner, node])
     rate = np.concatenate([through, met]) / volume[row]
     high = raster.low_m + cell * np.array(raster.material.shape)
     nodes = Elements(place, np.full(len(place), cell), material, raster.low_m, high)
@@ -79,5 +79,5 @@ def _across(
         for corner in (sides, sides + step):
             x, y = corner.T
             pairs.append((grids[0][x, y], grids[1][x, y] + first_count))
-    one, two = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    return one, two
+    node, partner = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    return node, partner

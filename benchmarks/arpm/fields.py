@@ -15,7 +15,7 @@ matplotlib.use("Agg")
 AT_S = 1000.0
 LAYOUTS = (("2-1", 0.001, "faces"), ("2-2A", 0.002, "corrected"), ("2-3B", 0.002, "corrected"))
 """Case, smallest element in m, and exchange: those the paper shows."""
-SHOWN_M, PANEL_POINTS = 0.3, 240.0
+HALF_WIDTH_M, PANEL_POINTS = 0.3, 240.0
 """Half the width that is shown, and the width of a panel in print."""
 DOT, CLOSED = 0.75, 1.2
 """Width of a dot over that of the smallest element, where there are several sizes and where not."""
@@ -36,14 +36,14 @@ def draw_fields(plates: Plates, least_m: float, path: Path) -> None:
     for panel, (case, size_m, exchange) in zip(panels, LAYOUTS, strict=True):
         method = HeatMethod(exchange, "local")  # type: ignore[arg-type]
         run = run_plates(plates, case, method, max(size_m, least_m), AT_S, AT_S)
-        shown = _draw(panel, run, plates)
+        dots = _draw(panel, run, plates)
         panel.set_title(
             f"{case}, {1e3 * run.elements.size_m.min():g} mm, {exchange}: "
             f"{thousands(len(run.elements.size_m))} elements",
             fontsize=10,
         )
     panels[0].set_ylabel("y, m")
-    figure.colorbar(shown, ax=panels, label=f"temperature after {AT_S:g} s, K")
+    figure.colorbar(dots, ax=panels, label=f"temperature after {AT_S:g} s, K")
     figure.savefig(path, dpi=120)
 
 
@@ -53,11 +53,16 @@ def _draw(panel: matplotlib.axes.Axes, run: PlatesRun, plates: Plates
     x, y = run.elements.position_m.T
     smallest_m, largest_m = run.elements.size_m.min(), run.elements.size_m.max()
     dot = DOT if smallest_m < largest_m else CLOSED
-    width = dot * float(smallest_m) * PANEL_POINTS / (2.0 * SHOWN_M)
+    width = dot * float(smallest_m) * PANEL_POINTS / (2.0 * HALF_WIDTH_M)
     panel.set_facecolor("0.8")
-    shown = panel.scatter(
+    dots = panel.scatter(
         x, y, c=run.found.heat.temperature_k, s=width**2, marker="s", linewidths=0, cmap="inferno",
         vmin=plates.filling.initial_k[0], vmax=plates.filling.initial_k[1], rasterized=True,
     )  # fmt: skip
-    panel.set(xlim=(-SHOWN_M, SHOWN_M), ylim=(-SHOWN_M, SHOWN_M), aspect="equal", xlabel="x, m")
-    return shown
+    panel.set(
+        xlim=(-HALF_WIDTH_M, HALF_WIDTH_M),
+        ylim=(-HALF_WIDTH_M, HALF_WIDTH_M),
+        aspect="equal",
+        xlabel="x, m",
+    )
+    return dots

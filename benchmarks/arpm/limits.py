@@ -47,8 +47,8 @@ def _method(form: str, kernel_size: float = 2.1, share: float = 0.95) -> HeatMet
 def _largest_k(elements: Elements, method: HeatMethod) -> float | None:
     """Largest difference from the exact contact after 100 s; None where it has no bounds."""
     with np.errstate(all="ignore"):
-        found = compare_contact(elements, _filling(), method).largest_k
-    return found if found < LOST_K else None
+        largest_k = compare_contact(elements, _filling(), method).largest_k
+    return largest_k if largest_k < LOST_K else None
 
 
 def _disturbed_k(elements: Elements, method: HeatMethod) -> float | None:
@@ -67,8 +67,8 @@ def _disturbed_k(elements: Elements, method: HeatMethod) -> float | None:
             (HOT_K, COLD_K),
             0.0,
         )
-        found = float(np.abs(heat.temperature_k - exact).max())
-    return found if found < LOST_K else None
+        largest_k = float(np.abs(heat.temperature_k - exact).max())
+    return largest_k if largest_k < LOST_K else None
 
 
 def step_rows() -> list[dict[str, Any]]:

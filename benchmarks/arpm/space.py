@@ -64,12 +64,12 @@ def space_rows(filling: Filling, reference_mm: float = REFERENCE_MM) -> list[dic
         for size_mm in sizes_mm:
             if size_mm < reference_mm:
                 continue
-            elements, found = _solidified(filling, method, layers, size_mm)
-            rows.append(_row(name, size_mm, filling, elements, found, reference))
-            told = rows[-1]
+            elements, solidification = _solidified(filling, method, layers, size_mm)
+            rows.append(_row(name, size_mm, filling, elements, solidification, reference))
+            row = rows[-1]
             print(
-                f"3D, {name}, {size_mm:g} mm: {told['cpu_s']:.2f} s, mean errors "
-                f"{told['mean_error_percent']}, {told['time_error_percent']:+.2f} % in time",
+                f"3D, {name}, {size_mm:g} mm: {row['cpu_s']:.2f} s, mean errors "
+                f"{row['mean_error_percent']}, {row['time_error_percent']:+.2f} % in time",
                 flush=True,
             )
     return rows
@@ -94,24 +94,24 @@ def _raster(cell_m: float) -> Raster:
 
 
 def _row(
-    name: str, size_mm: float, filling: Filling, elements: Elements, found: SolidificationResult,
+    name: str, size_mm: float, filling: Filling, elements: Elements, solidification: SolidificationResult,
     reference: SolidificationResult,
 ) -> dict[str, Any]:  # fmt: skip
-    count = min(len(found.time_s), len(reference.time_s))
+    count = min(len(solidification.time_s), len(reference.time_s))
     span_k = max(filling.initial_k) - min(filling.initial_k)
-    late = found.solidification_time_s / reference.solidification_time_s - 1.0
+    late = solidification.solidification_time_s / reference.solidification_time_s - 1.0
     return {
         "way": name,
         "size_mm": size_mm,
         "elements": len(elements.size_m),
-        "element_steps": found.heat.element_steps,
-        "cpu_s": found.cpu_s,
-        "solidification_time_s": found.solidification_time_s,
+        "element_steps": solidification.heat.element_steps,
+        "cpu_s": solidification.cpu_s,
+        "solidification_time_s": solidification.solidification_time_s,
         "time_error_percent": 100.0 * late,
         "mean_error_percent": {
             probe: 100.0 * float(np.abs(curve[:count] - reference.probe_k[probe][:count]).mean())
             / span_k
-            for probe, curve in found.probe_k.items()
+            for probe, curve in solidification.probe_k.items()
         },
-        "largest_drift_percent": float(abs(found.drift_percent).max()),
+        "largest_drift_percent": float(abs(solidification.drift_percent).max()),
     }  # fmt: skip

@@ -89,12 +89,12 @@ def way_rows(plates: Plates, least_mm: float) -> list[dict[str, Any]]:
                 continue
             run = run_way(way, plates, 1e-3 * size_mm)
             rows.append(_row(name, size_mm, plates, run, reference.found))
-            told = rows[-1]
+            row = rows[-1]
             print(
-                f"{name}, {size_mm:g} mm: {told['cpu_s']:.2f} s, "
-                f"{told['mean_error_percent']['A']:.3f} % at A, solid at "
-                f"{told['solidification_time_s']:.1f} s ({told['time_error_percent']:+.2f} %), "
-                f"drift {told['largest_drift_percent']:.1e} %",
+                f"{name}, {size_mm:g} mm: {row['cpu_s']:.2f} s, "
+                f"{row['mean_error_percent']['A']:.3f} % at A, solid at "
+                f"{row['solidification_time_s']:.1f} s ({row['time_error_percent']:+.2f} %), "
+                f"drift {row['largest_drift_percent']:.1e} %",
                 flush=True,
             )
             if name in PAPERS:
@@ -105,42 +105,42 @@ def way_rows(plates: Plates, least_mm: float) -> list[dict[str, Any]]:
 def run_way(way: Way, plates: Plates, size_m: float, until_s: float = 20_000.0) -> PlatesRun:
     """Solidify the plates in one way."""
     elements, marching = way.made(plates, size_m)
-    found = solidify(elements, plates.filling, marching, plates.probes_m, until_s=until_s)
-    return PlatesRun(elements, found, marching.step_s)
+    solidification = solidify(elements, plates.filling, marching, plates.probes_m, until_s=until_s)
+    return PlatesRun(elements, solidification, marching.step_s)
 
 
 def _row(
     name: str, size_mm: float, plates: Plates, run: PlatesRun, reference: SolidificationResult
 ) -> dict[str, Any]:
-    found = run.found
-    error = curve_error_percent(plates, found, reference)
-    late = found.solidification_time_s / reference.solidification_time_s - 1.0
+    solidification = run.found
+    error = curve_error_percent(plates, solidification, reference)
+    late = solidification.solidification_time_s / reference.solidification_time_s - 1.0
     return {
         "way": name,
         "size_mm": size_mm,
         "elements": len(run.elements.size_m),
         "counts": {f"{1e3 * size:g}": count for size, count in run.elements.counts().items()},
         "step_s": run.steps_s,
-        "element_steps": found.heat.element_steps,
-        "cpu_s": found.cpu_s,
-        "solidification_time_s": found.solidification_time_s,
+        "element_steps": solidification.heat.element_steps,
+        "cpu_s": solidification.cpu_s,
+        "solidification_time_s": solidification.solidification_time_s,
         "time_error_percent": 100.0 * late,
         "mean_error_percent": {probe: mean for probe, (mean, _) in error.items()},
         "largest_error_percent": {probe: most for probe, (_, most) in error.items()},
-        "largest_drift_percent": float(abs(found.drift_percent).max()),
+        "largest_drift_percent": float(abs(solidification.drift_percent).max()),
     }
 
 
 def _courses(
-    plates: Plates, found: SolidificationResult, reference: SolidificationResult
+    plates: Plates, solidification: SolidificationResult, reference: SolidificationResult
 ) -> dict[str, Any]:
     """Error of the cooling curve at A and drift of the enthalpy over time: Figures 9, 11 and 14."""
-    kept = found.time_s[: len(reference.time_s)] % COURSE_S == 0.0
+    recorded = solidification.time_s[: len(reference.time_s)] % COURSE_S == 0.0
     mould_k, pour_k = plates.filling.initial_k
-    count = len(kept)
-    warmer_k = found.probe_k["A"][:count] - reference.probe_k["A"][:count]
+    count = len(recorded)
+    warmer_k = solidification.probe_k["A"][:count] - reference.probe_k["A"][:count]
     return {
-        "course_s": found.time_s[:count][kept].tolist(),
-        "course_error_percent": (100.0 * warmer_k[kept] / (pour_k - mould_k)).round(4).tolist(),
-        "course_drift_percent": found.drift_percent[:count][kept].round(5).tolist(),
+        "course_s": solidification.time_s[:count][recorded].tolist(),
+        "course_error_percent": (100.0 * warmer_k[recorded] / (pour_k - mould_k)).round(4).tolist(),
+        "course_drift_percent": solidification.drift_percent[:count][recorded].round(5).tolist(),
     }

@@ -40,8 +40,8 @@ def step_s(scenario: Scenario) -> float:
 
 def main(folder: Path) -> None:
     """Print the shares of each run and of all together."""
-    kept = json.loads((folder / "record.json").read_text())
-    study = open_study(ROOT / kept["study"])
+    record = json.loads((folder / "record.json").read_text())
+    study = open_study(ROOT / record["study"])
     scenarios = {run.run: run.scenario for run in runs_in(study, folder)}
     summary = pd.read_csv(folder / "summary.tsv", sep="\t").set_index("run")
     shares = pd.DataFrame({"wall_s": summary["wall_s"]})

@@ -91,9 +91,9 @@ def _parts_of(bed: dict[str, Any]) -> dict[str, float]:
 def _limits(ax: Axes, beds: list[dict[str, Any]]) -> None:
     y = np.arange(len(beds))[::-1]
     left = np.zeros(len(beds))
-    shown = [_parts_of(bed) for bed in beds]
+    parts_of_beds = [_parts_of(bed) for bed in beds]
     for name, colour in _PARTS.items():
-        width = np.maximum(0.0, [parts[name] for parts in shown])
+        width = np.maximum(0.0, [parts[name] for parts in parts_of_beds])
         ax.barh(y, width, 0.4, left, color=colour, edgecolor="black", lw=0.4, label=name)
         left += width
     whole = [bed["ns_per_grain_step"]["median"] for bed in beds]
@@ -131,14 +131,14 @@ def _accuracy(ax: Axes, rows: list[dict[str, Any]]) -> None:
     ax.legend(frameon=False)
 
 
-def draw(found: dict[str, Any], path: Path) -> None:
+def draw(results: dict[str, Any], path: Path) -> None:
     """Draw rates, sizes, limits and accuracy."""
     figure = Figure(figsize=(13, 10.5), layout="constrained")
     axes = figure.subplots(2, 2)
-    _rates(axes[0, 0], found["rates"])
-    _sizes(axes[0, 1], found["scale"])
-    _limits(axes[1, 0], [bed for bed in found["roofline"]["beds"] if "parts" in bed])
-    _accuracy(axes[1, 1], found["accuracy"])
+    _rates(axes[0, 0], results["rates"])
+    _sizes(axes[0, 1], results["scale"])
+    _limits(axes[1, 0], [bed for bed in results["roofline"]["beds"] if "parts" in bed])
+    _accuracy(axes[1, 1], results["accuracy"])
     for ax in axes.flat:
         ax.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=110)

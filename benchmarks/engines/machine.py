@@ -19,14 +19,14 @@ _COMPILER = re.compile(rb"GCC: \([^)]*\) [\d.]+")
 
 def _caches() -> str:
     """Sizes of the caches that a core sees."""
-    found = []
+    caches = []
     for index in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
         level, kind, size = (
             (index / name).read_text(encoding="utf-8").strip() for name in ("level", "type", "size")
         )
         if kind != "Instruction":
-            found.append(f"L{level} {size}")
-    return ", ".join(found) or "not stated"
+            caches.append(f"L{level} {size}")
+    return ", ".join(caches) or "not stated"
 
 
 def _multiply_adds(library: Path) -> str:
@@ -67,8 +67,8 @@ def _liggghts() -> str:
     if path is None:
         return "LIGGGHTS is not installed"
     linked = subprocess.run(["ldd", path], capture_output=True, text=True).stdout
-    found = re.search(r"libliggghts\S* => (\S+)", linked)
-    library = Path(found.group(1) if found else path).resolve()
+    match = re.search(r"libliggghts\S* => (\S+)", linked)
+    library = Path(match.group(1) if match else path).resolve()
     return _library(library, f"LIGGGHTS-PUBLIC {version_of(path)}, {_package('liggghts')}")
 
 

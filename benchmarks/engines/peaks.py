@@ -89,15 +89,15 @@ def bandwidth(total_bytes: int, rounds: int, block_s: float = 0.05) -> dict[str,
     _triad(a, b, c, 1)
     times = max(1, round(block_s / max(seconds(lambda: _triad(a, b, c, 1)), 1e-7)))
     times = max(1, round(times * block_s / seconds(lambda: _triad(a, b, c, times))))
-    found = [24e-9 * n * times / seconds(lambda: _triad(a, b, c, times)) for _ in range(rounds)]
-    return spread(found)
+    rates = [24e-9 * n * times / seconds(lambda: _triad(a, b, c, times)) for _ in range(rounds)]
+    return spread(rates)
 
 
 def vector_bits() -> int:
     """Width of the registers in which the compiled polynomials multiply and add."""
     code = "".join(_vector_multiply_add.inspect_asm().values())
-    found = set(re.findall(r"vfn?m(?:add|sub)\d+pd\s.*?%([xyz])mm", code))
-    return max(({"x": 128, "y": 256, "z": 512}[letter] for letter in found), default=64)
+    registers = set(re.findall(r"vfn?m(?:add|sub)\d+pd\s.*?%([xyz])mm", code))
+    return max(({"x": 128, "y": 256, "z": 512}[letter] for letter in registers), default=64)
 
 
 def measure_peaks(rounds: int, times: int) -> dict[str, Any]:
@@ -110,20 +110,20 @@ def measure_peaks(rounds: int, times: int) -> dict[str, Any]:
         Passes over the small array in one block.
     """
     x, y = np.full(_SMALL, 1.25), np.zeros(_SMALL)
-    many = times * _SMALL
+    numbers = times * _SMALL
 
     def block(work: Callable[[], object], operations: int) -> Callable[[], float]:
         work()
         return lambda: 1e9 * seconds(work) / operations
 
     blocks = {
-        "scalar_ns_per_flop": block(lambda: _scalar_multiply_add(0.5, 0.25, many), 24 * many),
+        "scalar_ns_per_flop": block(lambda: _scalar_multiply_add(0.5, 0.25, numbers), 24 * numbers),
         "vector_ns_per_flop": block(
-            lambda: _vector_multiply_add(x, y, 0.25, times), 2 * _DEGREE * many
+            lambda: _vector_multiply_add(x, y, 0.25, times), 2 * _DEGREE * numbers
         ),
-        "ns_per_root": block(lambda: _roots(x, times), many),
-        "ns_per_quotient": block(lambda: _quotients(x, times), many),
-        "ns_per_chained_root_and_quotient": block(lambda: _chain(1.25, many), many),
+        "ns_per_root": block(lambda: _roots(x, times), numbers),
+        "ns_per_quotient": block(lambda: _quotients(x, times), numbers),
+        "ns_per_chained_root_and_quotient": block(lambda: _chain(1.25, numbers), numbers),
     }
-    found = {name: spread(values) for name, values in interleaved(blocks, rounds).items()}
-    return {**found, "vector_bits": vector_bits()}
+    peaks = {name: spread(values) for name, values in interleaved(blocks, rounds).items()}
+    return {**peaks, "vector_bits": vector_bits()}

@@ -49,16 +49,16 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
                 drift(dim, first, last, grains, 0.0)
 
 
-def _some_pairs(pairs: Pairs, keep: np.ndarray) -> Pairs:
+def _some_pairs(pairs: Pairs, chosen: np.ndarray) -> Pairs:
     """Some of the pairs, as a list of their own."""
-    kept = np.concatenate([[0], np.cumsum(keep)])
+    first_slot = np.concatenate([[0], np.cumsum(chosen)])
     fields = (pairs.other, pairs.touching, pairs.friction, pairs.rolling)
-    return Pairs(kept[pairs.start], *(array[keep] for array in fields))
+    return Pairs(first_slot[pairs.start], *(array[chosen] for array in fields))
 
 
-def _with_pairs(moving: Moving, keep: np.ndarray) -> Moving:
+def _with_pairs(moving: Moving, chosen: np.ndarray) -> Moving:
     """Keep some of the pairs; there are slots enough between chunks for all of them."""
-    return moving._replace(pairs=_some_pairs(moving.pairs, keep))
+    return moving._replace(pairs=_some_pairs(moving.pairs, chosen))
 
 
 def _block(solver: Solver, moving: Moving, parts: int, block_s: float) -> Callable[[], float]:

@@ -35,8 +35,8 @@ def _skin_m(scenario: Scenario) -> float:
 def _per_grain(session: Session, gap_m: float) -> float:
     """Pairs of grains nearer than a gap, over grains."""
     state = session.snapshot()
-    found = touching_pairs(state.position_m, state.radius_m, gap_m)
-    return sum(len(first) for first, _, _ in found) / session.grains
+    pairs = touching_pairs(state.position_m, state.radius_m, gap_m)
+    return sum(len(first) for first, _, _ in pairs) / session.grains
 
 
 def _advance(session: Session, steps: int) -> None:
@@ -53,10 +53,10 @@ def _steps_of_turn(sessions: Iterable[Session], block_s: float, shaken: bool) ->
     if shaken:
         steps = [round(PERIOD_S / sessions[0].step_s)]
     else:
-        steps = [steps_lasting(partial(_advance, one), block_s) for one in sessions]
-    begun = max(steps[0] if shaken else one.steps for one in sessions)
-    for one in sessions:
-        _advance(one, begun - one.steps)
+        steps = [steps_lasting(partial(_advance, session), block_s) for session in sessions]
+    begun = max(steps[0] if shaken else session.steps for session in sessions)
+    for session in sessions:
+        _advance(session, begun - session.steps)
     return steps[0] if shaken else round(1.5 * min(steps))
 
 

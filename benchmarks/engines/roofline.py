@@ -92,8 +92,8 @@ def _times(bed: Bed, extent: Extent, phases: bool) -> tuple[Solver, dict[str, An
     block_s /= 10
     step = cost_of(solver, steps_lasting(lambda n: advance(solver, n), block_s))
     listing = measure_listing(still, extent.rounds)
-    found = measure_phases(still, step, 3 * extent.rounds, block_s)
-    return solver, found | {"listing_ns_per_grain": listing}
+    phase_times = measure_phases(still, step, 3 * extent.rounds, block_s)
+    return solver, phase_times | {"listing_ns_per_grain": listing}
 
 
 def _measure_bed(bed: Bed, peaks: dict[str, Any], extent: Extent, phases: bool) -> dict[str, Any]:

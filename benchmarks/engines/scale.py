@@ -74,14 +74,14 @@ def measure_threads(extent: Extent) -> dict[str, Any]:
         return sum(rates.get(timeout=300) for _ in others)
 
     blocks = {"threads": lambda: _rate(solver, steps), "processes": independent}
-    found = interleaved(blocks, extent.rounds)
+    measured = interleaved(blocks, extent.rounds)
     for other in others:
         other.join()
     return {
         "bed": bed.name,
         "steps": steps,
-        "grain_steps_per_s": {name: spread(values) for name, values in found.items()},
-        "threads_over_processes": ratio(found["threads"], found["processes"]),
+        "grain_steps_per_s": {name: spread(values) for name, values in measured.items()},
+        "threads_over_processes": ratio(measured["threads"], measured["processes"]),
     }
 
 
@@ -120,14 +120,14 @@ def _measure_sizes(tile: Bed, sizes: tuple[int, ...], extent: Extent) -> dict[st
     solvers = {str(n): solver_on(tiled(tile, n)) for n in sizes}
     with one_core():
         blocks = {n: cost_of(s, _steps(s, extent.block_s)) for n, s in solvers.items()}
-        found = interleaved(blocks, extent.rounds)
-    costs = [spread(found[str(n)]) for n in sizes]
+        costs_by_size = interleaved(blocks, extent.rounds)
+    costs = [spread(costs_by_size[str(n)]) for n in sizes]
     medians = [cost["median"] for cost in costs]
     return {
         "sizes": list(sizes),
         "ns_per_grain_step": costs,
         "dearest_over_cheapest": max(medians) / min(medians),
-        "largest_over_smallest": ratio(found[str(sizes[-1])], found[str(sizes[0])]),
+        "largest_over_smallest": ratio(costs_by_size[str(sizes[-1])], costs_by_size[str(sizes[0])]),
         "memory": [_memory(solver) for solver in solvers.values()],
     }
 

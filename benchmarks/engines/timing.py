@@ -77,11 +77,11 @@ def steps_lasting(advance: Callable[[int], object], block_s: float) -> int:
 
 def interleaved(blocks: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
     """Measure A B C, A B C, ...: what slows the machine for a while slows all of them."""
-    found: dict[str, list[float]] = {name: [] for name in blocks}
+    values: dict[str, list[float]] = {name: [] for name in blocks}
     for _ in range(rounds):
         for name, block in blocks.items():
-            found[name].append(block())
-    return found
+            values[name].append(block())
+    return values
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:

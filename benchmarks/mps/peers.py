@@ -17,7 +17,7 @@ PROGRAM = Path(__file__).parents[1] / "peers" / "run_pysph.py"
 SCHEMES = ("iisph", "sisph")
 LIMIT_S = 3600.0
 """Wall time after which a peer is stopped."""
-TOLD = 300
+ERROR_CHARACTERS = 300
 """Characters of an error that are kept."""
 
 
@@ -38,20 +38,20 @@ def _row(scheme: str, duration_s: float) -> dict[str, Any]:
     except OSError as error:
         return name | {"stopped": f"{error}: make flow makes its environment"}
     if ran.returncode:
-        return name | {"stopped": ran.stderr.strip()[-TOLD:]}
+        return name | {"stopped": ran.stderr.strip()[-ERROR_CHARACTERS:]}
     return name | measured(json.loads(ran.stdout), duration_s)
 
 
-def measured(told: dict[str, Any], duration_s: float) -> dict[str, Any]:
+def measured(answer: dict[str, Any], duration_s: float) -> dict[str, Any]:
     """Take noise, speed and cost from what a peer tells, over the second half of its run."""
-    time_s = np.array(told["time_s"])
+    time_s = np.array(answer["time_s"])
     later = time_s > 0.5 * duration_s
-    pressure = np.array(told["pressure_pa"])[later]
+    pressure = np.array(answer["pressure_pa"])[later]
     return {
-        "version": told["version"],
+        "version": answer["version"],
         "stopped": "",
-        "cpu_s_per_simulated_s": told["cpu_s"] / float(time_s[-1]),
+        "cpu_s_per_simulated_s": answer["cpu_s"] / float(time_s[-1]),
         "mean_pressure_over_ideal": float(pressure.mean() / ideal_pa()[-1]),
         "pressure_noise_pa": float(pressure.std()),
-        "mean_speed_m_s": float(np.array(told["mean_speed_m_s"])[later].mean()),
+        "mean_speed_m_s": float(np.array(answer["mean_speed_m_s"])[later].mean()),
     }

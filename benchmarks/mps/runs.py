@@ -56,11 +56,11 @@ def _measure(name: str, scheme: Scheme, duration_s: float) -> dict[str, Any]:
     cpu_s = time.process_time() - begin
     past = run.history
     later = past.time_s > 0.5 * duration_s
-    found = {"scheme": name, "verdict": run.verdict.value, "stopped": run.stopped}
+    row = {"scheme": name, "verdict": run.verdict.value, "stopped": run.stopped}
     if not later.any():
-        return found
+        return row
     pressure = past.particle_pressure_pa[later, -1]
-    return found | {
+    return row | {
         "relaxations": scheme.relaxations,
         "source": scheme.source,
         "cpu_s_per_simulated_s": cpu_s / float(past.time_s[-1]),

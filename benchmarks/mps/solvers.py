@@ -76,8 +76,8 @@ def rows_here(poisson: Poisson) -> list[dict[str, Any]]:
 
     def by_scipy() -> tuple[Array, int]:
         seen: list[None] = []
-        found, _ = cg(matrix, right, rtol=tolerance, callback=lambda _: seen.append(None))
-        return found, len(seen)
+        pressure, _ = cg(matrix, right, rtol=tolerance, callback=lambda _: seen.append(None))
+        return pressure, len(seen)
 
     ways: dict[str, Callable[[], tuple[Array, int]]] = {
         "SciPy cg, overrelaxed": lambda: solve(poisson.own, right, zero, tolerance)[:2],
@@ -93,9 +93,9 @@ def _timed(name: str, way: Callable[[], tuple[Array, int]], poisson: Poisson) ->
     spent_s = []
     for _ in range(TIMES):
         begin = time.process_time()
-        found, iterations = way()
+        pressure, iterations = way()
         spent_s.append(time.process_time() - begin)
-    left = np.linalg.norm(poisson.right - poisson.matrix @ found) / np.linalg.norm(poisson.right)
+    left = np.linalg.norm(poisson.right - poisson.matrix @ pressure) / np.linalg.norm(poisson.right)
     return {
         "solver": name, "unknowns": len(poisson.right), "iterations": iterations,
         "residual_fraction": float(left), "cpu_s": float(np.median(spent_s)),
@@ -109,5 +109,5 @@ def _pyamg(poisson: Poisson) -> dict[str, Any]:
         np.save(Path(name) / "right.npy", poisson.right)
         command = [str(PYTHON), str(PROGRAM), name, str(poisson.tolerance), str(TIMES)]
         ran = subprocess.run(command, capture_output=True, text=True, check=True)
-    told: dict[str, Any] = json.loads(ran.stdout)
-    return {"solver": f"PyAMG {told.pop('version')}", "unknowns": len(poisson.right)} | told
+    answer: dict[str, Any] = json.loads(ran.stdout)
+    return {"solver": f"PyAMG {answer.pop('version')}", "unknowns": len(poisson.right)} | answer

@@ -38,8 +38,8 @@ def solve(pipe: JsonlPipe, problem: dict[str, Any]) -> str:
         points = inference.param_data_list[-1]
         system.set_param_data(points)
         values = [pipe.ask(point) for point in points]
-        told = [NO_VALUE if value is None else value for value in values]
-        system.set_sim_data(np.array(told).reshape(SAMPLES, 1, 1))
+        numbers = [NO_VALUE if value is None else value for value in values]
+        system.set_sim_data(np.array(numbers).reshape(SAMPLES, 1, 1))
         # The posterior is known before new points are drawn, and drawing may fail.
         inference.run_inference(system)
         weights = inference.posterior

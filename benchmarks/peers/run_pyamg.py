@@ -27,14 +27,14 @@ def main(folder: Path, tolerance: float, times: int) -> None:
         residuals: list[float] = []
         begin = time.process_time()
         levels = pyamg.smoothed_aggregation_solver(matrix)
-        found = levels.solve(right, tol=tolerance, accel="cg", residuals=residuals)
+        solution = levels.solve(right, tol=tolerance, accel="cg", residuals=residuals)
         spent_s.append(time.process_time() - begin)
-    left = np.linalg.norm(right - matrix @ found) / np.linalg.norm(right)
-    told = {
+    left = np.linalg.norm(right - matrix @ solution) / np.linalg.norm(right)
+    answer = {
         "version": pyamg.__version__, "iterations": len(residuals) - 1,
         "residual_fraction": float(left), "cpu_s": float(np.median(spent_s[1:])),
     }  # fmt: skip
-    print(json.dumps(told))
+    print(json.dumps(answer))
 
 
 if __name__ == "__main__":

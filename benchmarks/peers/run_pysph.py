@@ -117,11 +117,11 @@ def main() -> None:
     tank = Tank(scheme, until_s)
     tank.run(["--disable-output"])
     time_s, pressure_pa, speed_m_s = (list(column) for column in zip(*tank.rows, strict=True))
-    found = {
+    answer = {
         "version": metadata.version("pysph"), "time_s": time_s, "pressure_pa": pressure_pa,
         "mean_speed_m_s": speed_m_s, "cpu_s": time.process_time() - tank.began_s,
     }  # fmt: skip
-    os.write(out, (json.dumps(found) + "\n").encode())
+    os.write(out, (json.dumps(answer) + "\n").encode())
 
 
 if __name__ == "__main__":

@@ -62,11 +62,11 @@ def main() -> None:
     for ratio in DAMPING_RATIOS:
         exact = closed_forms.restitution(ratio, "total")
         for step in STEPS:
-            found = "; ".join(
+            speeds = "; ".join(
                 "{} {:.4f} {:.4f}".format(engine, *rebounds(engine, ratio, step))
                 for engine in ENGINES
             )
-            print(f"zeta {ratio:g}, step {step:g}, exact {exact:.4f}: {found}", flush=True)
+            print(f"zeta {ratio:g}, step {step:g}, exact {exact:.4f}: {speeds}", flush=True)
 
 
 if __name__ == "__main__":

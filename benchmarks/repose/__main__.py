@@ -29,9 +29,9 @@ def main(study: Path) -> None:
     rows = []
     for foot in FEET:
         repose.HEAP_FOOT = foot
-        found = [slopes(scenario, sand)[0] for scenario, sand in heaps]
-        angle = [slope.angle_deg for slope in found]
-        error = np.mean([slope.se_deg for slope in found])
+        fits = [slopes(scenario, sand)[0] for scenario, sand in heaps]
+        angle = [slope.angle_deg for slope in fits]
+        error = np.mean([slope.se_deg for slope in fits])
         rows.append([f"{foot:.0%}", f"{np.mean(angle):.1f}", f"{np.std(angle, ddof=1):.1f}",
                      f"{error:.1f}"])  # fmt: skip
     head = ["fitted from", "angle, degrees", "sd of heaps", "error of one fit, mean"]

@@ -71,27 +71,27 @@ def at_once(number: int, replicates: int) -> Callable[[Curve, float, int], Optim
 
 def main() -> None:
     """Plant, search, print."""
-    many = FIRST * REPLICATES + ROUNDS * RUNS
+    runs = FIRST * REPLICATES + ROUNDS * RUNS
     ways = {
         f"sweep of {FIRST} x {REPLICATES}, {ROUNDS} rounds of {RUNS}": with_rounds,
-        f"sweep of {FIRST} x {many // FIRST}": at_once(FIRST, many // FIRST),
-        f"sweep of {many // REPLICATES} x {REPLICATES}": at_once(many // REPLICATES, REPLICATES),
+        f"sweep of {FIRST} x {runs // FIRST}": at_once(FIRST, runs // FIRST),
+        f"sweep of {runs // REPLICATES} x {REPLICATES}": at_once(runs // REPLICATES, REPLICATES),
     }
     rows = []
     for shape, best_hz in ((even, 45.0), (even, 33.0), (skew, 40.0)):
         for sd in (0.01, 0.03):
             for name, search in ways.items():
-                found = [search(shape(best_hz), sd, seed) for seed in range(SEEDS)]
-                ends = [optimum.interval(KEY) for optimum in found]
+                optima = [search(shape(best_hz), sd, seed) for seed in range(SEEDS)]
+                ends = [optimum.interval(KEY) for optimum in optima]
                 held = sum(low <= best_hz <= high for low, high in ends)
-                off = [abs(optimum.setting[KEY] - best_hz) for optimum in found]
+                off = [abs(optimum.setting[KEY] - best_hz) for optimum in optima]
                 rows.append([
                     f"{shape.__name__}, best at {best_hz:g} Hz", f"{sd:g}", name,
                     f"{held} of {SEEDS}",
                     f"{np.median([high - low for low, high in ends]):.1f}",
                     f"{np.median(off):.1f}",
                 ])  # fmt: skip
-    head = ["planted curve", "sd of a run", f"{many} runs as", "interval holds the optimum",
+    head = ["planted curve", "sd of a run", f"{runs} runs as", "interval holds the optimum",
             "its width, Hz, median", "best setting off by, Hz, median"]  # fmt: skip
     print(table(head, rows))
 

@@ -28,7 +28,7 @@ ALONE_UP_TO = 100
 CORES = 2
 
 
-class Sizes(NamedTuple):
+class StudySizes(NamedTuple):
     """Numbers of runs."""
 
     executed: tuple[int, ...]
@@ -41,7 +41,7 @@ class Sizes(NamedTuple):
 def rows(run: BenchmarkRun) -> dict[str, Any]:
     """Measure studies of all sizes."""
     place = Place(SCRATCH / "scaling")
-    sizes: Sizes = run.extent
+    sizes: StudySizes = run.extent
     if not run.parts.path(f"{sizes.executed[0]} runs").exists():
         place.empty()
     # The machine is calibrated and kernels are compiled once, before anything counts.
@@ -101,8 +101,8 @@ BENCHMARK = Benchmark(
     },
     pages={"scaling.md": page},
     draw=lambda results, folder: draw(results, folder / "scaling.png"),
-    extent=Sizes((10, 100, 1_000), (10_000,), 100),
-    quick=Sizes((3, 10), (30,), 10),
+    extent=StudySizes((10, 100, 1_000), (10_000,), 100),
+    quick=StudySizes((3, 10), (30,), 10),
     arrange=arrange,
 )
 

@@ -25,22 +25,22 @@ RUN_S = {10: "#0072B2", 60: "#D55E00", 600: "#009E73"}
 RUNS = 10_000
 
 
-def draw(found: dict[str, Any], out: Path) -> None:
+def draw(results: dict[str, Any], out: Path) -> None:
     """Draw what grows with the number of runs, and the modelled cluster."""
     figure = Figure(figsize=(10.5, 4.2), dpi=130, layout="constrained")
     left, right = figure.subplots(1, 2)
-    _growth(left, found)
-    _cluster(right, found)
+    _growth(left, results)
+    _cluster(right, results)
     figure.savefig(out)
 
 
-def _growth(ax: Axes, found: dict[str, Any]) -> None:
-    sizes = sorted(map(int, found["rows"]))
+def _growth(ax: Axes, results: dict[str, Any]) -> None:
+    sizes = sorted(map(int, results["rows"]))
     for label, (name, colour, mark) in LINES.items():
-        cpu_s = [found["rows"][str(n)][name]["cpu_s"] for n in sizes]
+        cpu_s = [results["rows"][str(n)][name]["cpu_s"] for n in sizes]
         ax.loglog(sizes, cpu_s, color=colour, marker=mark, label=label)
     plan_s = [
-        sum(found["rows"][str(n)][name] for name in ("validate_s", "batches_s", "write_s"))
+        sum(results["rows"][str(n)][name] for name in ("validate_s", "batches_s", "write_s"))
         for n in sizes
     ]
     ax.loglog(sizes, plan_s, color="#0072B2", marker="x", label="plan")
@@ -49,8 +49,8 @@ def _growth(ax: Axes, found: dict[str, Any]) -> None:
     ax.legend(fontsize=8, frameon=False)
 
 
-def _cluster(ax: Axes, found: dict[str, Any]) -> None:
-    costs, on = WorkflowCosts.of(found), Assumed()
+def _cluster(ax: Axes, results: dict[str, Any]) -> None:
+    costs, on = WorkflowCosts.of(results), Assumed()
     batch_s = np.geomspace(15, 7200, 60)
     for run_s, colour in RUN_S.items():
         for cores, style in ((on.cores, "-"), (1, ":")):

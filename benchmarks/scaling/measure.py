@@ -98,7 +98,7 @@ def files(place: Place, runs: int) -> Row:
     folders = sorted((place.results(runs) / "runs").iterdir())
     own = [[p for p in f.rglob("*") if p.is_file()] for f in folders]
     logs = [p for p in (place.results(runs) / "logs").rglob("*") if p.is_file()]
-    kept = [p for p in (place.folder / ".snakemake").rglob("*") if p.is_file()]
+    snakemakes = [p for p in (place.folder / ".snakemake").rglob("*") if p.is_file()]
     recorded = [[p for p in f if p.parent.name in ("snapshots", "exports")] for f in own]
     return {
         "files": mean(len(f) for f in own),
@@ -106,7 +106,7 @@ def files(place: Place, runs: int) -> Row:
         "bytes": mean(sum(p.stat().st_size for p in f) for f in own),
         "bytes_of_snapshots": mean(sum(p.stat().st_size for p in f) for f in recorded),
         "logs": len(logs) / len(folders),
-        "of_snakemake": len(kept) / len(folders),
+        "of_snakemake": len(snakemakes) / len(folders),
     }
 
 
@@ -116,7 +116,7 @@ def grafted(place: Place, runs: int, source: int) -> Row:
     Its collection, check and report are made by Snakemake; its runs are not computed.
     """
     study = place.study(runs)
-    found = {**planned(place, study), **graphs(place, study)}
-    found["linked_files"] = graft(place, study, place.results(source))
-    found["tables_and_report"] = asdict(place.snakemake(study, "--cores", "2", shared=True))
-    return found
+    row = {**planned(place, study), **graphs(place, study)}
+    row["linked_files"] = graft(place, study, place.results(source))
+    row["tables_and_report"] = asdict(place.snakemake(study, "--cores", "2", shared=True))
+    return row

@@ -50,22 +50,22 @@ class WorkflowCosts:
     """A run, in collection and report."""
 
     @classmethod
-    def of(cls, kept: Mapping[str, Any]) -> WorkflowCosts:
+    def of(cls, results: Mapping[str, Any]) -> WorkflowCosts:
         """Slopes between the smallest and the largest study that was measured."""
-        small, large = (min(kept["rows"], key=int), max(kept["rows"], key=int))
-        few, many = kept["rows"][small], kept["rows"][large]
+        small, large = (min(results["rows"], key=int), max(results["rows"], key=int))
+        smallest, largest = results["rows"][small], results["rows"][large]
         runs = int(large) - int(small)
 
         def slope(*names: str) -> float:
-            return sum(_cpu_s(many[n]) - _cpu_s(few[n]) for n in names) / runs
+            return sum(_cpu_s(largest[n]) - _cpu_s(smallest[n]) for n in names) / runs
 
         plan_s = slope("validate_s", "batches_s", "write_s")
         # three jobs a run
         graph_s = (slope("graph_alone") - slope("validate_s", "write_again_s")) / 3
         start = slope("job_start")
-        parts = kept["parts"]
+        parts = results["parts"]
         return cls(
-            plan_s, graph_s, _cpu_s(few["graph_shared"]), _cpu_s(few["job_start"]), start,
+            plan_s, graph_s, _cpu_s(smallest["graph_shared"]), _cpu_s(smallest["job_start"]), start,
             parts["start of Python"] + parts["imports of a shared job"],
             parts["process of a run"] + parts["rendering"] + parts["measuring"],
             slope("collect", "report"),
@@ -118,10 +118,10 @@ def drain(
     share = math.ceil(batch_wall_s * job_cores / (START_S + engine_s)) if batch_wall_s else 1
     share = min(share, runs)
     job_cores = min(job_cores, share)
-    jobs, one_s = math.ceil(runs / share), engine_s + costs.run_s
+    jobs, each_run_s = math.ceil(runs / share), engine_s + costs.run_s
     # One Snakemake in the allocation and one in its step; the second begins when the first has.
     start_s = 2 * (costs.job_start_s + costs.job_start_s_per_run * runs) + costs.imports_s
-    each_s = start_s + math.ceil(share / job_cores) * one_s
+    each_s = start_s + math.ceil(share / job_cores) * each_run_s
     before_s = costs.snakemake_s + runs * costs.plan_s + jobs * costs.graph_s
     after_s = runs * costs.tables_s
     slots = [0.0] * min(on.jobs, on.nodes * on.cores // job_cores, jobs)

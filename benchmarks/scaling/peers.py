@@ -56,7 +56,7 @@ def tools() -> tuple[Tool, ...]:
     plain = (*SNAKEMAKE, "--keep-going")
     flow = (str(PYTHON), "project.py", "run", "--parallel", "{cores}")
     batch = ("yade-batch", "-j", "{cores}", "runs.table", "sim.py")
-    found = [
+    installed = [
         Tool("sandmould", "sandmould", (), own, (own,), "results/sweep/runs/*/outcome.json"),
         Tool(
             "Snakemake with Paramspace", "paramspace", (sys.executable, "plan.py", "{points}"),
@@ -65,15 +65,15 @@ def tools() -> tuple[Tool, ...]:
     ]  # fmt: skip
     if PYTHON.exists():
         plan = (str(PYTHON), "plan.py", "{points}")
-        found.append(
+        installed.append(
             Tool(
                 "signac with signac-flow", "signac", plan, flow, (flow,), "workspace/*/result.json"
             )
         )
     if shutil.which("yade-batch"):
         plan = (sys.executable, "plan.py", "{points}")
-        found.append(Tool("yade-batch", "yade", plan, batch, (batch,), "results/*.json"))
-    return tuple(found)
+        installed.append(Tool("yade-batch", "yade", plan, batch, (batch,), "results/*.json"))
+    return tuple(installed)
 
 
 def written_lines(tool: Tool) -> int:
@@ -112,8 +112,8 @@ class Trial:
 
     def done(self) -> dict[str, int]:
         """Runs that have ended well, with the time of what they left."""
-        found = [p for p in self.folder.glob(self.tool.outcomes) if _ended_well(p)]
-        return {str(p): p.stat().st_mtime_ns for p in found}
+        outcomes = [p for p in self.folder.glob(self.tool.outcomes) if _ended_well(p)]
+        return {str(p): p.stat().st_mtime_ns for p in outcomes}
 
     def whole(self) -> dict[str, float]:
         """Cost of all runs from nothing to the table."""
@@ -219,22 +219,24 @@ def _job_cpu_s(folder: Path) -> dict[str, float]:
     """What the job alone costs, without a tool, and with the start of Yade."""
     environment = os.environ | {"STARTED": str(folder / "started")}
     plain = [sys.executable, str(HERE / "one_run.py"), "50", "1", "out.json"]
-    found = {"plain": timed(plain, folder, environment).cpu_s}
+    cpu_s = {"plain": timed(plain, folder, environment).cpu_s}
     if yade := shutil.which("yade"):
         shutil.copy(HERE / "one_run.py", folder)
         command = [yade, "-n", "-x", str(HERE / "yade" / "sim.py")]
-        found["yade"] = timed(command, folder, environment).cpu_s
-    return found
+        cpu_s["yade"] = timed(command, folder, environment).cpu_s
+    return cpu_s
 
 
 def versions() -> dict[str, str]:
     """Versions of the peers that are installed."""
-    found = {"Snakemake": metadata.version("snakemake")}
+    installed = {"Snakemake": metadata.version("snakemake")}
     if PYTHON.exists():
-        asked = "from importlib.metadata import version as v; print(v('signac'), v('signac-flow'))"
-        told = subprocess.run([str(PYTHON), "-c", asked], capture_output=True, text=True)
-        found["signac"], found["signac-flow"] = told.stdout.split()
+        question = (
+            "from importlib.metadata import version as v; print(v('signac'), v('signac-flow'))"
+        )
+        answer = subprocess.run([str(PYTHON), "-c", question], capture_output=True, text=True)
+        installed["signac"], installed["signac-flow"] = answer.stdout.split()
     if yade := shutil.which("yade"):
-        told = subprocess.run([yade, "--version"], capture_output=True, text=True)
-        found["Yade"] = " ".join((told.stdout + told.stderr).split()[-1:])
-    return found
+        answer = subprocess.run([yade, "--version"], capture_output=True, text=True)
+        installed["Yade"] = " ".join((answer.stdout + answer.stderr).split()[-1:])
+    return installed

@@ -33,22 +33,22 @@ def parts(place: Place, runs: int) -> dict[str, float]:
     run = min((place.results(runs) / "runs").iterdir())
     copy = place.folder / "one_run"
     start_s = _median([place.python("-c", "pass").cpu_s for _ in range(REPEATS)])
-    found = {"start of Python": start_s}
+    cpu_s_of = {"start of Python": start_s}
     for name, module in IMPORTED.items():
         took = [place.python("-c", f"import {module}").cpu_s for _ in range(REPEATS)]
-        found[name] = _median(took) - start_s
+        cpu_s_of[name] = _median(took) - start_s
     whole = []
     for _ in range(REPEATS):
         shutil.rmtree(copy, ignore_errors=True)
         shutil.copytree(run, copy)
         (copy / "outcome.json").unlink()
         whole.append(place.python("-m", "sandmould.study.simulate", str(copy)).cpu_s)
-    found["process of a run"] = _median(whole)
+    cpu_s_of["process of a run"] = _median(whole)
     with chdir(place.folder):
-        found["rendering"] = _median([cpu_s(lambda: render_run(copy)) for _ in range(REPEATS)])
-        found["measuring"] = _median([cpu_s(lambda: measure_run(copy)) for _ in range(REPEATS)])
+        cpu_s_of["rendering"] = _median([cpu_s(lambda: render_run(copy)) for _ in range(REPEATS)])
+        cpu_s_of["measuring"] = _median([cpu_s(lambda: measure_run(copy)) for _ in range(REPEATS)])
     shutil.rmtree(copy)
-    return found
+    return cpu_s_of
 
 
 def _median(values: list[float]) -> float:

@@ -18,7 +18,7 @@ ENGINES = ("reference", "lammps", "liggghts")
 
 
 @dataclass(frozen=True)
-class Grid:
+class MapGrid:
     """Where the maps are computed."""
 
     damping_ratios: tuple[float, ...]
@@ -30,26 +30,26 @@ class Grid:
     """Steps over the exact limit with which the bed is followed for long."""
 
 
-WHOLE = Grid(
+WHOLE = MapGrid(
     (0.0, 0.1, 0.25, 0.5, 0.75, 1.0),
     (0.05, 0.1, 0.2, 0.3, 0.38, 0.46, 0.55, 0.65, 0.75, 0.85, 0.94, 0.98, 1.02, 1.06, 1.25, 1.5,
      2.0),
     5,
     (1.05, 1.2, 1.5, 2.0),
 )  # fmt: skip
-COARSE = Grid((0.0, 1.0), (0.1, 0.38, 0.94, 1.06, 2.0), 1, (1.2,))
+COARSE = MapGrid((0.0, 1.0), (0.1, 0.38, 0.94, 1.06, 2.0), 1, (1.2,))
 """Enough to see that everything works."""
 SLOPE_DEG = 10.0
 
 
 def engines_here() -> dict[str, str]:
     """Engines that are installed, with their versions; that of the reference is the source's."""
-    found = {}
+    versions = {}
     for name in ENGINES:
         if engine_problem(scenario_of("bed", name, 0.0)) is None:
             version = engine_of(scenario_of("bed", name, 0.0)).installed_version()
-            found[name] = "of this tree" if name == "reference" else str(version)
-    return found
+            versions[name] = "of this tree" if name == "reference" else str(version)
+    return versions
 
 
 def measured_limit(
@@ -59,12 +59,12 @@ def measured_limit(
     critical_s = limits_of(scene, 0.0).whole.undamped_s
     for _ in range(halvings):
         middle = (stable + grown) / 2
-        found = disturb(scene, engine, damping_ratio, middle * critical_s, follow=False)
-        stable, grown = (middle, grown) if found.outcome == STABLE else (stable, middle)
+        disturbed = disturb(scene, engine, damping_ratio, middle * critical_s, follow=False)
+        stable, grown = (middle, grown) if disturbed.outcome == STABLE else (stable, middle)
     return (stable + grown) / 2
 
 
-def map_of(scene: str, engine: str, grid: Grid) -> list[dict[str, Any]]:
+def map_of(scene: str, engine: str, grid: MapGrid) -> list[dict[str, Any]]:
     """Outcomes at all time steps and damping ratios, and the limits between them."""
     critical_s = limits_of(scene, 0.0).whole.undamped_s
     rows, steps = [], grid.steps_over_critical
@@ -139,7 +139,7 @@ def rolling_acceleration_m_s2(inertia: str, disc_inertia: str) -> float:
     return 2 * way / last.time_s**2
 
 
-def rotation(grid: Grid) -> dict[str, Any]:
+def rotation(grid: MapGrid) -> dict[str, Any]:
     """What raised moments of inertia slow, and how much larger the step may be."""
     gravity = scenario_of("contact", "reference", 0.0).gravity_m_s2 * math.sin(
         math.radians(SLOPE_DEG)
@@ -159,17 +159,17 @@ def rotation(grid: Grid) -> dict[str, Any]:
     return {"rolling": rolling, "bed_scaled": scaled_steps}
 
 
-def followed_beds(engines: Iterable[str], grid: Grid) -> list[dict[str, Any]]:
+def followed_beds(engines: Iterable[str], grid: MapGrid) -> list[dict[str, Any]]:
     """What a study's guards see of a bed beyond its limit."""
     rows = []
     for zeta, factor in itertools.product((0.0, 0.5, 1.0), grid.beyond):
         step_s = factor * limits_of("bed", zeta).whole.damped_s
         row: dict[str, Any] = {"damping_ratio": zeta, "step_over_limit": factor}
         for engine in engines:
-            found = follow_bed(engine, zeta, step_s)
-            row[engine] = {"outcome": found.outcome}
-            if found.outcome == "not noticed":
-                row[engine]["rms_speed_m_s"] = float(f"{found.rms_speed_m_s:.2g}")
-                row[engine]["rise"] = float(f"{found.rise:.2g}")
+            followed = follow_bed(engine, zeta, step_s)
+            row[engine] = {"outcome": followed.outcome}
+            if followed.outcome == "not noticed":
+                row[engine]["rms_speed_m_s"] = float(f"{followed.rms_speed_m_s:.2g}")
+                row[engine]["rise"] = float(f"{followed.rise:.2g}")
         rows.append(row)
     return rows

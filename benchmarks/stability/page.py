@@ -111,11 +111,11 @@ def draw(results: dict[str, Any], folder: Path) -> None:
 
 def _first_blow_up(results: dict[str, Any], scene: str) -> str:
     """Smallest step that blew up over the exact limit, over all engines and damping ratios."""
-    found = results["scenes"][scene]
+    of_scene = results["scenes"][scene]
     ratios = [
-        x / (limits["whole_s"] / found["critical_s"])
-        for rows in found["maps"].values()
-        for limits, row in zip(found["limits"], rows, strict=True)
+        x / (limits["whole_s"] / of_scene["critical_s"])
+        for rows in of_scene["maps"].values()
+        for limits, row in zip(of_scene["limits"], rows, strict=True)
         for x, outcome in zip(results["steps_over_critical"], row["outcomes"], strict=True)
         if outcome == BLOWS_UP
     ]

@@ -48,7 +48,7 @@ class Followed:
 
 
 @dataclass(frozen=True)
-class Run:
+class DisturbanceResult:
     """What became of a disturbance."""
 
     outcome: str
@@ -69,7 +69,9 @@ def _disturbance(scene: str, scenario: Scenario) -> Array:
     return velocity * speed_m_s * math.sqrt(start.mass_kg.sum() / energy)
 
 
-def disturb(scene: str, engine: str, damping_ratio: float, step_s: float, follow: bool) -> Run:
+def disturb(
+    scene: str, engine: str, damping_ratio: float, step_s: float, follow: bool
+) -> DisturbanceResult:
     """Disturb a scene at rest, compute up to 2 048 steps, and say what became of it.
 
     Parameters
@@ -109,7 +111,7 @@ def disturb(scene: str, engine: str, damping_ratio: float, step_s: float, follow
             looks.append((session.steps, math.inf))
     highest = max(ratio for _, ratio in looks)
     if not highest < BLOWN:
-        return Run(BLOWS_UP, highest, math.nan)
+        return DisturbanceResult(BLOWS_UP, highest, math.nan)
     early = max(ratio for step, ratio in looks if step <= STEPS // 2)
     late = max((ratio for step, ratio in looks if step > STEPS // 2), default=0.0)
     height = float(start.mass_kg @ start.position_m[:, 1])
@@ -118,7 +120,7 @@ def disturb(scene: str, engine: str, damping_ratio: float, step_s: float, follow
     sag = weight / scenario.contact.grain_wall.normal_stiffness_n_m
     sinks = abs(way) > SAGS * sag * start.mass_kg.sum()
     drifts = highest > GROWN or late > max(1.0, GROWTH * early) or sinks
-    return Run(DRIFTS if drifts else STABLE, highest, way / height)
+    return DisturbanceResult(DRIFTS if drifts else STABLE, highest, way / height)
 
 
 def follow_bed(engine: str, damping_ratio: float, step_s: float) -> Followed:

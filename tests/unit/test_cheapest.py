@@ -42,10 +42,10 @@ def test_the_cheapest_that_agrees_is_found_past_one_that_does_not() -> None:
     found = factor(
         {0.2: 30.0, 0.4: 30.1, 0.8: 29.8, 1.6: 25.0}, {0.2: 80, 0.4: 40, 0.8: 20, 1.6: 10}
     )
-    assert found.dearest.shown == "fraction 0.2"
+    assert found.dearest.label == "fraction 0.2"
     assert (found.dearest.runs, found.failed) == (7, 1)
     assert found.cheapest is not None
-    assert found.cheapest.shown == "fraction 0.8"
+    assert found.cheapest.label == "fraction 0.8"
     assert found.saving == pytest.approx(4.0)
     worst = found.levels[-1]
     assert worst.against.startswith("different: 4.")
@@ -53,7 +53,7 @@ def test_the_cheapest_that_agrees_is_found_past_one_that_does_not() -> None:
 
 def test_where_none_agrees_nothing_is_saved() -> None:
     found = factor({0.2: 30.0, 0.8: 27.0}, {0.2: 10, 0.8: 20})
-    assert found.dearest.shown == "fraction 0.8"
+    assert found.dearest.label == "fraction 0.8"
     assert found.cheapest is None
     assert found.saving == 1.0
     # The dearest minus this one, whichever came first in the sweep.
