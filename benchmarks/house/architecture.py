@@ -50,7 +50,7 @@ def page_text(house: House, before: dict[str, Any], changes: Sequence[Change]) -
     changes : sequence of Change
     """
     environment = Environment(
-        loader=FileSystemLoader(ROOT / "templates" / "docs"),
+        loader=FileSystemLoader(Path(__file__).parent),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
