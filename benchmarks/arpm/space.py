@@ -94,7 +94,8 @@ def _raster(cell_m: float) -> Raster:
 
 
 def _row(
-    name: str, size_mm: float, filling: Filling, elements: Elements, solidification: SolidificationResult,
+    name: str, size_mm: float, filling: Filling, elements: Elements,
+    solidification: SolidificationResult,
     reference: SolidificationResult,
 ) -> dict[str, Any]:  # fmt: skip
     count = min(len(solidification.time_s), len(reference.time_s))
