@@ -73,11 +73,9 @@ def sandmould(
 @app.command()
 def plan(study: StudyFile, cores: Cores = None) -> None:
     """Check a study and print its runs and their price; nothing starts."""
-    from sandmould.study.plan.build_plan import RESULTS, announce, measure_speeds, open_plan
+    from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
 
-    opened, shared_by = open_plan(study), cores or _all_cores()
-    text = announce(opened, RESULTS, shared_by)
-    typer.echo(announce(opened, RESULTS, shared_by) if measure_speeds(opened, RESULTS) else text)
+    typer.echo(announce(open_plan(study), RESULTS, cores or _all_cores(), measure=True))
 
 
 @app.command()

@@ -103,7 +103,7 @@ class Contact(Section):
         return {
             **{symbol: getattr(law, key) for symbol, key in SYMBOLS.items()},
             "clip_total": self.no_tension == "total",
-            "twist": dimension == 3 and self.rolling_axes == "all",
+            "torsion": dimension == 3 and self.rolling_axes == "all",
         }
 
 

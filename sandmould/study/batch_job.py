@@ -60,7 +60,7 @@ def compute_batch(
 
     def work(place_of_next: Callable[[], int]) -> None:
         """Take the next run until none is left or the job is asked to end."""
-        while not stop.asked and (place := place_of_next()) < len(folders):
+        while not stop.requested and (place := place_of_next()) < len(folders):
             folder = folders[place]
             try:
                 _compute(folder, logs / f"simulate_{folder.name}.log", ranks, mpi)
@@ -105,11 +105,11 @@ class _Stop:
     """Hears that the job is asked to end, and tells those that work beside it."""
 
     def __init__(self) -> None:
-        self.asked = False
+        self.requested = False
         self.workers: list[BaseProcess] = []
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        self.asked = True
+        self.requested = True
         for worker in self.workers:
             worker.terminate()
 

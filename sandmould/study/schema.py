@@ -56,8 +56,8 @@ def schema_text() -> str:
 
 def _section(schema: Tree) -> Tree:
     properties = {name: _property(part) for name, part in schema.get("properties", {}).items()}
-    kept: Tree = {k: v for k, v in schema.items() if k != "title"}
-    return {**kept, "properties": properties}
+    section: Tree = {k: v for k, v in schema.items() if k != "title"}
+    return {**section, "properties": properties}
 
 
 def _property(schema: Tree) -> Tree:
@@ -115,10 +115,10 @@ def _entry_keys(entry: type[BaseModel], indent: str, called: str = "") -> Iterat
     yield from _comment(f"Keys of {called or f'a {entry.__name__}'}:", indent)
     for name, field in entry.model_fields.items():
         only = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
-        shown = only[0] if field.is_required() and len(only) == 1 else field.default
-        if isinstance(shown, BaseModel):
-            shown = shown.model_dump(mode="json")
-        default = "" if shown is PydanticUndefined else f" {json.dumps(shown)}"
+        default_value = only[0] if field.is_required() and len(only) == 1 else field.default
+        if isinstance(default_value, BaseModel):
+            default_value = default_value.model_dump(mode="json")
+        default = "" if default_value is PydanticUndefined else f" {json.dumps(default_value)}"
         yield from _comment(f"{name}:{default}  {_meaning(field)}".rstrip(), indent, "  ")
 
 

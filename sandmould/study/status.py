@@ -95,45 +95,45 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
         That share what is left.
     """
     folder = results / plan.study.name
-    found = {run.run: run_status(folder / "runs" / run.run) for run in plan.runs}
-    count = Counter(status.state for status in found.values())
+    statuses = {run.run: run_status(folder / "runs" / run.run) for run in plan.runs}
+    count = Counter(status.state for status in statuses.values())
     parts = [f"{count[state]} {state}" for state in STATES if count[state]]
     lines = [f"{plan.study.name}: {', '.join(parts)} of {len(plan.runs)} runs"]
-    spent_s = sum(status.cpu_s for status in found.values())
-    lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, found, cores)}")
+    spent_s = sum(status.cpu_s for status in statuses.values())
+    lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
     ledger = read_ledger(folder, plan.study.study)
     if plan.study.study.refine.rounds:
         ended = ledger.ended or f"of at most {plan.study.study.refine.rounds}"
         lines.append(f"rounds: {len(ledger.rounds)}, {ended}")
     for state in ("running", "stopped", "failed"):
-        chosen = [status for status in found.values() if status.state == state]
+        chosen = [status for status in statuses.values() if status.state == state]
         lines += [f"  {state}: {s.run}  {s.said}".rstrip() for s in chosen[:SHOWN]]
         if len(chosen) > SHOWN:
             lines.append(f"  {state}: and {len(chosen) - SHOWN} more")
     return "\n".join(lines)
 
 
-def _left(plan: Plan, found: dict[str, RunStatus], cores: int) -> str:
+def _left(plan: Plan, statuses: dict[str, RunStatus], cores: int) -> str:
     """Wall time of what is left, at the speed of the runs like it that are done."""
     planning = plan.kind.planning
     speeds: dict[SpeedClass, list[float]] = {}
     for run in plan.runs:
-        wall_s = found[run.run].wall_s
+        wall_s = statuses[run.run].wall_s
         if math.isfinite(wall_s):
             core_s = wall_s * planning.threads(run.scenario)
             each = core_s / planning.planned_work(run.scenario)
             speeds.setdefault(planning.speed_class(run.scenario), []).append(each)
     left_s, unknown = 0.0, 0
     for run in plan.runs:
-        status = found[run.run]
+        status = statuses[run.run]
         if status.state == "running" and math.isfinite(status.left_s):
             left_s += status.left_s
         elif status.state in ("running", "stopped", "waiting"):
-            known = speeds.get(planning.speed_class(run.scenario))
-            if known is None:
+            costs = speeds.get(planning.speed_class(run.scenario))
+            if costs is None:
                 unknown += 1
             else:
-                typical = sorted(known)[len(known) // 2]
+                typical = sorted(costs)[len(costs) // 2]
                 left_s += planning.planned_work(run.scenario) * typical
     if unknown:
         return f"time left unknown: no run like {unknown} of them is done"

@@ -118,6 +118,7 @@ def test_plan_is_announced_without_an_engine(
     assert measure_speeds(plan, tmp_path)
     assert not measure_speeds(plan, tmp_path)
     assert announce(plan, tmp_path, 1).endswith(f", {MEASURED}\n")
+    assert announce(plan, tmp_path / "anew", 1, measure=True).endswith(f", {MEASURED}\n")
 
 
 def test_results_that_cannot_be_written_are_told(tmp_path: Path) -> None:
@@ -218,6 +219,28 @@ def test_jobs_do_not_wait_for_libraries_of_the_report(module: str, heavy: tuple[
     # Every run pays for what its processes import.
     says = f"import sys, {module}; print([m for m in {heavy} if m in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", says], capture_output=True, text=True, check=True)
+    assert ran.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    ("study", "foreign"),
+    [
+        ("tube_demo", ("sandmould.casting", "sandmould.engines.driver", "skfem", "matplotlib")),
+        ("tank_small", ("sandmould.casting.arpm", "sandmould.engines.driver", "matplotlib")),
+        ("plates_small", ("sandmould.casting.mps", "sandmould.engines.driver", "matplotlib")),
+    ],
+)
+def test_a_plan_imports_no_other_kind_and_nothing_that_computes(
+    study: str, foreign: tuple[str, ...]
+) -> None:
+    says = (
+        "import sys; from pathlib import Path; "
+        "from sandmould.study.plan.build_plan import open_plan; "
+        f"open_plan(Path('config/studies/{study}.yaml')); "
+        f"print([m for m in {foreign} if m in sys.modules])"
+    )
+    command = [sys.executable, "-c", says]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     assert ran.stdout == "[]\n"
 
 

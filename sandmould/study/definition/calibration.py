@@ -22,9 +22,9 @@ def problems(calibration: Calibration, sweep: Sweep) -> Iterator[Problem]:
         return
     for key in keys:
         values = sweep.keys.get(key, ())
-        given = [p[key] for p in sweep.points] if sweep.design == "list" else values
-        numeric = isinstance(given, Range) or all(
-            isinstance(v, int | float) and not isinstance(v, bool) for v in given
+        stated = [p[key] for p in sweep.points] if sweep.design == "list" else values
+        numeric = isinstance(stated, Range) or all(
+            isinstance(v, int | float) and not isinstance(v, bool) for v in stated
         )
         if not (key.startswith(OF_MATERIAL) and numeric):
             valid = f"a number of the material: a key that begins with {' or '.join(OF_MATERIAL)}"

@@ -14,14 +14,14 @@ ENGINE = "engine.name"
 
 def problems(study: Study) -> list[Problem]:
     """List what is wrong with the comparisons of a study whose sweep has no problems."""
-    found = list(_equivalence(study.equivalence, study.sweep))
+    misfits = list(_equivalence(study.equivalence, study.sweep))
     if study.cross_check is not None:
-        found += _cross_check(study.cross_check, study)
+        misfits += _cross_check(study.cross_check, study)
     compares = bool(study.equivalence.keys) or study.cross_check is not None
     if compares and not study.equivalence.margins:
         valid = "at least one measure with its margin, such as solid_fraction: 0.005"
-        found.append(Problem("equivalence.margins", {}, valid))
-    return found
+        misfits.append(Problem("equivalence.margins", {}, valid))
+    return misfits
 
 
 def _equivalence(equivalence: Equivalence, sweep: Sweep) -> Iterator[Problem]:

@@ -198,10 +198,10 @@ def problems(sweep: Sweep, scenario: Section, replicates: int) -> list[Problem]:
     scenario : scenario of any kind
     replicates : int
     """
-    found = [*_design(sweep), *_paths(sweep, scenario)]
-    if not found and (runs := sweep.number_of_points * replicates) > MOST_RUNS:
-        found = [Problem("sweep", f"{runs} runs", f"at most {MOST_RUNS} runs")]
-    return found
+    misfits = [*_design(sweep), *_paths(sweep, scenario)]
+    if not misfits and (runs := sweep.number_of_points * replicates) > MOST_RUNS:
+        misfits = [Problem("sweep", f"{runs} runs", f"at most {MOST_RUNS} runs")]
+    return misfits
 
 
 def _design(sweep: Sweep) -> Iterator[Problem]:
@@ -258,19 +258,19 @@ def _paths(sweep: Sweep, scenario: Section) -> Iterator[Problem]:
     for key in sweep.swept:
         values = sweep.keys.get(key)
         where = f"{above}.{key}"
-        shown = list(values) if isinstance(values, tuple) else key
+        stated = list(values) if isinstance(values, tuple) else key
         if key == "seed":
-            yield Problem(where, shown, "any key but the seed: replicates draw their own")
+            yield Problem(where, stated, "any key but the seed: replicates draw their own")
             continue
         try:
             value_at(base, key)
         except KeyError:
             near = difflib.get_close_matches(key, list(key_paths(base)), n=3, cutoff=0.5)
             keys = f"nearest are {', '.join(near)}" if near else "such as sand.size_scale"
-            yield Problem(where, shown, f"a key of the scenario; {keys}")
+            yield Problem(where, stated, f"a key of the scenario; {keys}")
         inside = [k for k in sweep.swept if k.startswith(key + ".")]
         if inside:
-            yield Problem(where, shown, f"a key that does not hold another swept one, {inside[0]}")
+            yield Problem(where, stated, f"a key that does not hold another swept one, {inside[0]}")
         if isinstance(values, Range) and is_whole(type(scenario), key):
             for name, bound in (("low", values.low), ("high", values.high)):
                 if bound != round(bound):

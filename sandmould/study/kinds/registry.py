@@ -36,7 +36,7 @@ def kind_named(name: object, file: str = "") -> Kind[Any]:
     """
     if isinstance(name, str) and name in KINDS:
         return KINDS[name]
-    *first, last = (repr(known) for known in KINDS)
+    *first, last = (repr(kind) for kind in KINDS)
     raise BadInputError([Problem("kind", name, f"one of {', '.join(first)} or {last}", file)])
 
 

@@ -56,14 +56,14 @@ def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Bat
         run under MPI has a job's cores for itself.
     """
     batches: list[Batch] = []
-    kept: dict[_Alike, list[Run]] = {}
+    waiting: dict[_Alike, list[Run]] = {}
     filled: dict[_Alike, float] = {}
 
     def beside(alike: _Alike) -> int:
         return 1 if alike.ranks > 1 else max(1, cores // alike.threads)
 
     def close(alike: _Alike) -> None:
-        chosen = kept.pop(alike)
+        chosen = waiting.pop(alike)
         filled.pop(alike)
         batches.append(Batch(chosen[0].run, tuple(chosen), min(beside(alike), len(chosen))))
 
@@ -71,11 +71,11 @@ def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Bat
         planning, scenario = kind_of(run.scenario).planning, run.scenario
         engine, _ = planning.speed_class(scenario)
         alike = _Alike(engine, planning.threads(scenario), planning.ranks(scenario))
-        kept.setdefault(alike, []).append(run)
+        waiting.setdefault(alike, []).append(run)
         filled[alike] = filled.get(alike, 0.0) + planned_wall_s(run)
         if filled[alike] >= wall_s * beside(alike):
             close(alike)
-    for alike in list(kept):
+    for alike in list(waiting):
         close(alike)
     return batches
 

@@ -53,8 +53,8 @@ class Plan:
 
         Batches of fewer than ``least`` runs are left out: those runs have jobs of their own.
         """
-        found = plan_batches(self.runs, wall_s, cores) if wall_s > 0 else []
-        return [batch for batch in found if len(batch.runs) >= least]
+        batches = plan_batches(self.runs, wall_s, cores) if wall_s > 0 else []
+        return [batch for batch in batches if len(batch.runs) >= least]
 
     def threads(self, name: str) -> int:
         """Cores that a run keeps busy, as MPI ranks or as threads."""
@@ -127,7 +127,7 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
     study = open_study(path)
     ledger = read_ledger(results / study.name, study.study)
     runs = expand(study, ledger.runs, ledger.certified_hz)
-    found: dict[str, Problem] = {}
+    problems: dict[str, Problem] = {}
     # Controls come hours later, at frequencies that are not known yet: they are tried at others.
     certificate = study.study.certificate
     trial_hz = provisional_hz(certificate, study.study.sweep, study.study.scenario)
@@ -137,11 +137,11 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         problem = planning.engine_problem(run.scenario)
         if problem is not None:
             problem = _at_stated_key(study, run, problem)
-            found[str(problem)] = problem
+            problems[str(problem)] = problem
     for problem in _unfinished(study, results):
-        found[str(problem)] = problem
-    if found:
-        raise BadInputError(list(found.values()))
+        problems[str(problem)] = problem
+    if problems:
+        raise BadInputError(list(problems.values()))
     return Plan(study, tuple(runs))
 
 
@@ -166,8 +166,18 @@ def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:
     return Problem(key, problem.value, problem.valid, file)
 
 
-def announce(plan: Plan, results: Path, cores: int) -> str:
-    """Write the plan to disk and say what it will take; no engine starts.
+def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> str:
+    """Write the plan to disk and say what it will take.
+
+    Parameters
+    ----------
+    plan : Plan
+    results : Path
+    cores : int
+        That share the runs.
+    measure : bool
+        Whether the machine's speed is measured first where it is not known, which takes seconds
+        an engine. Without it no engine starts, and the price is an estimate there.
 
     Raises
     ------
@@ -181,6 +191,8 @@ def announce(plan: Plan, results: Path, cores: int) -> str:
     except OSError as error:
         valid = f"a folder that takes files: {error.filename} does not ({error.strerror})"
         raise BadInputError([Problem("results", str(folder), valid)]) from None
+    if measure:
+        measure_speeds(plan, results)
     title = plan.study.study.title or plan.study.name
     return f"\n{title}\n{price(plan, results, cores)}"
 

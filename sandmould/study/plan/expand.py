@@ -65,7 +65,7 @@ def expand(
         When a point cannot be run; a value that came with the sweep is named at its swept key.
     """
     base = study.study.scenario.model_dump(mode="json")
-    found: dict[str, Problem] = {}
+    problems: dict[str, Problem] = {}
     runs: dict[str, Run] = {}
     every = range(1, study.study.replicates + 1)
     swept = [(point, every) for point in points(study.study.sweep, study.study.scenario)]
@@ -78,10 +78,10 @@ def expand(
     for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point)
         for problem in at_point.problems:
-            found[str(problem)] = problem
-        if len(found) >= MOST_PROBLEMS:
+            problems[str(problem)] = problem
+        if len(problems) >= MOST_PROBLEMS:
             break
-        if found:
+        if problems:
             continue
         checked = at_point.cross_check() if replicates is every else ()
         for run in (*at_point.runs(replicates), *checked):
@@ -89,7 +89,7 @@ def expand(
                 continue  # the sweep has come to hold it
             if run.run in runs:
                 twice = Problem("sweep", point, "points that differ", study.file)
-                found[str(twice)] = twice
+                problems[str(twice)] = twice
                 break
             runs[run.run] = run
     for place, point in enumerate(controlled):
@@ -98,10 +98,10 @@ def expand(
             if place not in case.places:
                 continue
             scenario, wrong = at_point.changed(case)
-            found |= {str(problem): problem for problem in wrong}
+            problems |= {str(problem): problem for problem in wrong}
             runs |= {run.run: run for run in at_point.control(case, scenario, seeds)}
-    if found:
-        raise BadInputError(list(found.values())[:MOST_PROBLEMS])
+    if problems:
+        raise BadInputError(list(problems.values())[:MOST_PROBLEMS])
     return list(runs.values())
 
 
@@ -117,7 +117,7 @@ class _AtPoint:
         except BadInputError as error:
             self.problems = [self._at_swept_key(p) for p in error.problems]
         else:
-            self.problems = [self._told(p) for p in self._misfits(self.scenario)]
+            self.problems = [self._at_changed_key(p) for p in self._misfits(self.scenario)]
 
     def _scenario(self, point: Point, origin: Origin) -> Any:
         tree = self.base
@@ -127,20 +127,22 @@ class _AtPoint:
         try:
             return self.kind.planning.resolved(scenario)
         except BadInputError as error:
-            found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in error.problems]
-            raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found]) from error
+            problems = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in error.problems]
+            raise BadInputError(
+                [replace(p, file=origin.file_of(p.key)) for p in problems]
+            ) from error
 
     def _misfits(self, scenario: AnyScenario) -> list[Problem]:
         """What is wrong with a well-typed scenario of this study, keys from the study's root."""
         planning = self.kind.planning
-        found = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in planning.problems(scenario)]
+        misfits = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in planning.problems(scenario)]
         at, vibration_s = self.study.study.objective.at_vibration_s, planning.vibration_s(scenario)
         if at is not None and at > vibration_s:
             valid = f"at most {vibration_s:g} s, the end of the vibration"
-            found.append(Problem("objective.at_vibration_s", at, valid))
-        return found
+            misfits.append(Problem("objective.at_vibration_s", at, valid))
+        return misfits
 
-    def _told(self, problem: Problem) -> Problem:
+    def _at_changed_key(self, problem: Problem) -> Problem:
         """A misfit told at the key that the user has to change."""
         if not self.point or problem in self._misfits(self.study.study.scenario):
             return replace(problem, file=self.study.origin.file_of(problem.key))

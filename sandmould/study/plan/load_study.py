@@ -53,7 +53,8 @@ class OpenStudy:
 @dataclass(frozen=True)
 class _File:
     path: Path
-    shown: str
+    name: str
+    """In messages."""
     tree: Tree
 
 
@@ -74,32 +75,32 @@ def open_study(path: Path) -> OpenStudy:
     BadInputError
         With one line a problem, each naming the file that holds the bad value.
     """
-    shown = shown_name(path)
+    file_name = shown_name(path)
     if not re.fullmatch(NAME, path.stem):
         valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
-        raise BadInputError([Problem("file name", path.name, valid, shown)])
+        raise BadInputError([Problem("file name", path.name, valid, file_name)])
     files = _files(path)
     kind = _kind(files)
-    found = [p for f in files for p in _wrong_units(kind.study, f)]
-    origin = Origin(file={"": shown})
+    problems = [p for f in files for p in _wrong_units(kind.study, f)]
+    origin = Origin(file={"": file_name})
     tree: Tree = {"scenario": kind.defaults()}
     material = _material(files)
     if material is not None and kind.material is not None:
-        found += _wrong_units(kind.material, material)
+        problems += _wrong_units(kind.material, material)
         # By itself first, so that a message has the key as the material's file has it.
-        alone = Origin(file={"": material.shown})
-        validated(kind.material, merge({}, material.tree, alone, material.shown), alone)
-        tree = merge(tree, {"scenario": material.tree}, origin, material.shown)
+        alone = Origin(file={"": material.name})
+        validated(kind.material, merge({}, material.tree, alone, material.name), alone)
+        tree = merge(tree, {"scenario": material.tree}, origin, material.name)
     for file in files:
         if "sweep" in file.tree:
             for section in _OF_SWEEP:
                 tree.pop(section, None)
-        tree = merge(tree, file.tree, origin, file.shown)
-    found += [replace(p, file=origin.file_of(p.key)) for p in _not_of_its_kind(kind, tree)]
-    if found:
-        raise BadInputError(found)
+        tree = merge(tree, file.tree, origin, file.name)
+    problems += [replace(p, file=origin.file_of(p.key)) for p in _not_of_its_kind(kind, tree)]
+    if problems:
+        raise BadInputError(problems)
     study = validated(kind.study, tree, origin)
-    found = sweep.problems(study.sweep, study.scenario, study.replicates) or [
+    problems = sweep.problems(study.sweep, study.scenario, study.replicates) or [
         *comparing.problems(study),
         *_reported(study),
         *study.problems(),
@@ -109,15 +110,15 @@ def open_study(path: Path) -> OpenStudy:
             study.certificate, study.sweep, study.scenario, study.objective.better
         ),
     ]
-    if found:
-        raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in found])
+    if problems:
+        raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in problems])
     return OpenStudy(path.stem, path, study, tree, origin)
 
 
 def _kind(files: list[_File]) -> Kind[Any]:
     """Kind of the study, by the last file that states it."""
     stated = [f for f in files if "kind" in f.tree]
-    return kind_named(stated[-1].tree["kind"], stated[-1].shown) if stated else DEFAULT_KIND
+    return kind_named(stated[-1].tree["kind"], stated[-1].name) if stated else DEFAULT_KIND
 
 
 def _not_of_its_kind(kind: Kind[Any], tree: Tree) -> Iterator[Problem]:
@@ -132,8 +133,8 @@ def _not_of_its_kind(kind: Kind[Any], tree: Tree) -> Iterator[Problem]:
 def _reported(study: Study) -> Iterator[Problem]:
     """Best values by others need the one key that they are values of."""
     if study.objective.reported_best and len(study.sweep.swept) != 1:
-        shown = [one.value for one in study.objective.reported_best]
-        yield Problem("objective.reported_best", shown, "absent unless one key is swept")
+        values = [best.value for best in study.objective.reported_best]
+        yield Problem("objective.reported_best", values, "absent unless one key is swept")
 
 
 def _files(path: Path) -> list[_File]:
@@ -151,7 +152,7 @@ def _files(path: Path) -> list[_File]:
                 valid = f"a study that does not lead back here ({chain} on {name})"
             else:
                 valid = f"the name of a study or scenario: {_candidates(folders)}"
-            raise BadInputError([Problem("based_on", name, valid, above.shown)])
+            raise BadInputError([Problem("based_on", name, valid, above.name)])
         files.insert(0, _read(new[0]))
     return files
 
@@ -165,13 +166,13 @@ def _material(files: list[_File]) -> _File | None:
     places = _places(name, folders)
     if not places:
         valid = f"the name of a material: {_candidates(MATERIALS)}"
-        raise BadInputError([Problem("material", name, valid, stated[-1].shown)])
+        raise BadInputError([Problem("material", name, valid, stated[-1].name)])
     return _read(places[0])
 
 
 def _read(path: Path) -> _File:
-    shown = shown_name(path)
-    return _File(path, shown, _from_root(read_yaml(path, shown), path.parent))
+    name = shown_name(path)
+    return _File(path, name, _from_root(read_yaml(path, name), path.parent))
 
 
 def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
@@ -205,7 +206,7 @@ def _candidates(folders: tuple[Path, ...]) -> str:
 def _wrong_units(model: type[BaseModel], file: _File) -> list[Problem]:
     """Units that contradict the key's own."""
     return [
-        Problem(f"{key}.unit", unit, f"the unit of the key, {' or '.join(declared)}", file.shown)
+        Problem(f"{key}.unit", unit, f"the unit of the key, {' or '.join(declared)}", file.name)
         for key, unit in _units(file.tree)
         if (declared := _declared_units(model, key)) and str(unit) not in declared
     ]

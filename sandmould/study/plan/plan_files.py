@@ -134,10 +134,10 @@ def read_run(path: Path) -> Run:
     BadInputError
         When the file is missing or was changed into something that is no run.
     """
-    shown = str(path)
-    tree = read_planned(path, shown)
-    kind = kind_named(tree["kind"], shown).name if "kind" in tree else _kind_of_older(tree)
-    file = validated(_file_model(kind), {"kind": kind, **tree}, Origin({"": shown}))
+    file_name = str(path)
+    tree = read_planned(path, file_name)
+    kind = kind_named(tree["kind"], file_name).name if "kind" in tree else _kind_of_older(tree)
+    file = validated(_file_model(kind), {"kind": kind, **tree}, Origin({"": file_name}))
     return Run(**{name: getattr(file, name) for name in _OF_RUN})
 
 

@@ -31,8 +31,8 @@ class BentPattern:
 
     def __init__(self, scenario: Scenario) -> None:
         """Take the pattern of a scenario that has one."""
-        told = scenario.pattern
-        assert told is not None
+        config = scenario.pattern
+        assert config is not None
         self._scenario = scenario
         self.pattern: Pattern = pattern_of(scenario)
         self.drawn: Perimeter = self.pattern.surface.outer
@@ -40,7 +40,7 @@ class BentPattern:
         held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
         self.tip = farthest_corner(self.drawn.vertices_m, held)
         """Its vertex farthest from the supports."""
-        self._body = FoamBody(self.pattern, told.statics == "large")
+        self._body = FoamBody(self.pattern, config.statics == "large")
 
     @property
     def reach_m(self) -> float:
@@ -54,24 +54,24 @@ class BentPattern:
         drawn, now_m = self.drawn, snapshot.pattern_m
         bent = deflection(drawn.vertices_m, now_m, self.tip)
         away = distance_from_drawing(drawn, drawn.moved(now_m - drawn.vertices_m))
-        found = {
+        row = {
             "pattern_tip_deflection_m": bent.tip_m,
             "pattern_largest_displacement_m": bent.largest_m,
             "pattern_distance_largest_m": away.largest_m,
             "pattern_distance_rms_m": away.rms_m,
         }
         if snapshot.pattern_load_n is not None:
-            found["pattern_tip_answered_m"] = self._answered_m(snapshot.pattern_load_n)
-        return found | self._predicted
+            row["pattern_tip_answered_m"] = self._answered_m(snapshot.pattern_load_n)
+        return row | self._predicted
 
     @cached_property
     def _predicted(self) -> Row:
         """What the scenario alone tells of its loop in 2D; nothing of one without windows."""
-        told = self._scenario.pattern
-        assert told is not None
-        if self._scenario.dimension == 3 or not told.loop.has_windows:
+        config = self._scenario.pattern
+        assert config is not None
+        if self._scenario.dimension == 3 or not config.loop.has_windows:
             return {}
-        gain = predicted_gain(self._scenario, self.pattern, told.loop.window_s)
+        gain = predicted_gain(self._scenario, self.pattern, config.loop.window_s)
         return {"pattern_predicted_gain": gain.gain, "pattern_predicted_limit": gain.limit}
 
     def _answered_m(self, load_n: np.ndarray) -> float:
@@ -140,10 +140,10 @@ def _by_snapshot(ledger: pd.DataFrame, time_s: pd.Series[float], reach_m: float)
         rows["force_left"] = ledger["imbalance_n"] / load_n
         rows["moment_left"] = ledger["moment_left_n_m"] / load_n
     by = rows.groupby(np.searchsorted(ends_s, ledger["time_s"]))
-    found = {"pattern_work_j": by["work_j"].last(), "pattern_energy_j": by["energy_j"].mean()}
-    found["pattern_stored_fraction"] = found["pattern_energy_j"] / found["pattern_work_j"]
+    columns = {"pattern_work_j": by["work_j"].last(), "pattern_energy_j": by["energy_j"].mean()}
+    columns["pattern_stored_fraction"] = columns["pattern_energy_j"] / columns["pattern_work_j"]
     if "residual_m" in ledger:
-        found |= {
+        columns |= {
             "pattern_residual_fraction": by["residual_m"].sum() / by["displacement_m"].sum(),
             "pattern_force_left_fraction": by["force_left"].max(),
             "pattern_moment_left_fraction": by["moment_left"].max() / reach_m,
@@ -155,15 +155,17 @@ def _by_snapshot(ledger: pd.DataFrame, time_s: pd.Series[float], reach_m: float)
     at = time_s.dropna().index
     return {
         name: pd.Series(values.reindex(range(len(at))).ffill().to_numpy(), at)
-        for name, values in found.items()
+        for name, values in columns.items()
     }
 
 
 def _filled_m(table: pd.DataFrame) -> float:
     """Deflection of the tip as vibration begins, or at the end of a run without vibration."""
     shaken = table[table["vibration_time_s"] >= 0.0]
-    known = (shaken if len(shaken) else table.iloc[::-1])["pattern_tip_deflection_m"].dropna()
-    return float(known.iloc[0]) if len(known) else np.nan
+    deflections_m = (shaken if len(shaken) else table.iloc[::-1])[
+        "pattern_tip_deflection_m"
+    ].dropna()
+    return float(deflections_m.iloc[0]) if len(deflections_m) else np.nan
 
 
 def _outside_fraction(ledger: pd.DataFrame, folder: Path) -> float:

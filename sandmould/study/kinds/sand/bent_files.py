@@ -14,8 +14,8 @@ from sandmould.study.kinds.sand.moments import Moment, list_moments
 def shape_moments(moments: tuple[Moment, ...]) -> dict[str, Moment]:
     """Snapshots after filling and at the end of a run, as far as it came."""
     shaken = [m for m in moments if m.vibration_time_s >= 0.0]
-    found = {"filled": shaken[0]} if shaken else {}
-    return found | ({"final": moments[-1]} if moments else {})
+    chosen = {"filled": shaken[0]} if shaken else {}
+    return chosen | ({"final": moments[-1]} if moments else {})
 
 
 def write_bent(scenario: Scenario, run_folder: Path, out: Path) -> None:

@@ -26,15 +26,15 @@ def list_moments(run_folder: Path) -> tuple[Moment, ...]:
 
     A file cut short by a killed run is passed over.
     """
-    found = []
+    moments = []
     for path in sorted((run_folder / "snapshots").glob("*.npz")):
         try:
             with np.load(path, allow_pickle=False) as data:
                 times = float(data["time_s"]), float(data["vibration_time_s"])
         except Exception:  # numpy and zipfile raise a dozen kinds on a broken file
             continue
-        found.append(Moment(path, *times))
-    return tuple(sorted(found, key=lambda m: m.time_s))
+        moments.append(Moment(path, *times))
+    return tuple(sorted(moments, key=lambda m: m.time_s))
 
 
 def nearest(moments: Sequence[Moment], vibration_time_s: float) -> Moment:
