@@ -49,7 +49,7 @@ class KindPages:
 
 
 def notes_of(
-    scenario: AnyScenario, collected: Collected, seeks_best: bool, is_certified: bool
+    scenario: AnyScenario, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
     """What the kind of simulation leaves open.
 
@@ -57,7 +57,7 @@ def notes_of(
     ----------
     scenario : scenario of any kind
     collected : Collected
-    seeks_best, is_certified : bool
+    seeks_best, is_controlled : bool
         Whether the study looks for the best setting; whether its controls have been run.
     """
     if isinstance(scenario, OwnDeck):
@@ -69,7 +69,7 @@ def notes_of(
         return _flow_notes(scenario)
     stage = scenario.vibration[0] if scenario.vibration else None
     deepest = _deepest_overlap_fraction(collected.summary)
-    return sand_notes(collected.keys, stage, deepest, seeks_best, is_certified)
+    return sand_notes(collected.keys, stage, deepest, seeks_best, is_controlled)
 
 
 def _flow_notes(scenario: MetalFlow) -> tuple[str, ...]:

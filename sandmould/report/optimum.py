@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.curves import reported_lines
-from sandmould.report.robustness import CertificatePages, opening_sentences
+from sandmould.report.robustness import RobustnessPages, opening_sentences
 from sandmould.runs.columns import CPU_S
 from sandmould.runs.formatting import (
     listed,
@@ -51,9 +51,9 @@ def optimum_pages(
     study_folder: Path,
     study: Study,
     summary: pd.DataFrame,
-    certificate: CertificatePages | None = None,
+    robustness: RobustnessPages | None = None,
 ) -> OptimumPages | None:
-    """Say where the optimum of a study with rounds or a certificate lies; None for others.
+    """Say where the optimum of a study with rounds or controls lies; None for others.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def optimum_pages(
     study : Study
     summary : DataFrame
         One row a run of the sweep and its rounds.
-    certificate : CertificatePages, optional
+    robustness : RobustnessPages, optional
         Its verdict comes first where the optimum is an artefact.
     """
     if not (study.refine.rounds or study.certificate.controls):
@@ -83,11 +83,11 @@ def optimum_pages(
     if study.refine.rounds:
         said.append(_effort(ledger, study, summary))
     sound = not ends and not wide
-    if certificate is not None:
-        opening = opening_sentences(certificate, objective.measure)
-        artefact = certificate.certified.is_artefact
+    if robustness is not None:
+        opening = opening_sentences(robustness, objective.measure)
+        artefact = robustness.assessment.is_artefact
         said = [*opening, *said] if artefact else [said[0], *opening, *said[1:]]
-        sound = sound and certificate.certified.kind == "rearrangement of grains"
+        sound = sound and robustness.assessment.cause == "rearrangement of grains"
     return OptimumPages(tuple(said), sound, optimum)
 
 

@@ -22,7 +22,7 @@ from sandmould.report.estimate_section import known_figures, known_pages
 from sandmould.report.figure_files import numbered, write_figures
 from sandmould.report.method import Row, provenance_rows, statistics_method
 from sandmould.report.optimum import optimum_pages, with_surface
-from sandmould.report.robustness import certificate_pages
+from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import shown_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
@@ -95,8 +95,8 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     any_scenario = _scenario_of(study_folder, summary[RUN])
     if any_scenario is None:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
-    certified = bool(read_ledger(study_folder, study).certified_hz)
-    notes = notes_of(any_scenario, collected, seeks_best, certified)
+    is_controlled = bool(read_ledger(study_folder, study).certified_hz)
+    notes = notes_of(any_scenario, collected, seeks_best, is_controlled)
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
     verdict = judge(summary, keys, objective.measure, objective.better, notes, seeks_best)
@@ -144,12 +144,10 @@ def _render(
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
     known = known_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
-    certificate = None
+    robustness = None
     if isinstance(page.scenario, Scenario):
-        certificate = certificate_pages(
-            page.study_folder, page.study, page.collected, page.scenario
-        )
-    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, certificate)
+        robustness = robustness_pages(page.study_folder, page.study, page.collected, page.scenario)
+    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, robustness)
     drawn, drawn_verdict = drawn_part(of_sweep, verdict)
     charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
@@ -178,7 +176,7 @@ def _render(
         agreement=agreement,
         known=known,
         optimum=optimum,
-        certificate=certificate,
+        robustness=robustness,
         statement=optimum or (agreement if agreement and agreement.is_question else known),
         key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
         objective_charts=[_both_sizes(c) for c in charts],

@@ -15,7 +15,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import MetalAndMould, Solidification
 from sandmould.statistics.calibration.config import Calibration
 from sandmould.statistics.config import Equivalence, Objective
-from sandmould.study.robustness.config import Certificate
+from sandmould.study.robustness.config import RobustnessChecks
 from sandmould.study.rounds.config import Refinement
 from sandmould.study.sweep import Sweep
 
@@ -87,8 +87,8 @@ class Study(Section):
         Refinement(),
         description="Rounds of further runs round the optimum; replaced with the sweep.",
     )
-    certificate: Certificate = Field(
-        Certificate(),
+    certificate: RobustnessChecks = Field(
+        RobustnessChecks(),
         description="Controls round the best frequency; replaced with the sweep.",
     )
     calibration: Calibration = Field(
