@@ -139,7 +139,8 @@ def kind_pages(
             (),
             {"pages": solid},
             {
-                **pictures(fields=solid.fields, error_cost=solid.error_cost),
+                **pictures(fields=solid.fields),
+                **numbered("error_cost", solid.error_cost),
                 **_curve_figures(solid.curves),
             },
         )

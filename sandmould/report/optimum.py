@@ -173,7 +173,7 @@ def with_surface(chart: Chart, optimum: Optimum, study: Study) -> Chart:
     mean, se = optimum.surface
     factor = shown_scale(study.objective.measure)[0]
     x, tint = optimum.points[:, 0], tints(1, False)[0]
-    lines = [Line(np.column_stack([x, factor * mean]), tint, True, title="fitted mean")]
+    lines = [Line(np.column_stack([x, factor * mean]), tint, "mean", title="fitted mean")]
     for sign in (-1.0, 1.0):
         edge = factor * (mean + sign * _TWO_SIDED * se)
         lines.append(Line(np.column_stack([x, edge]), PLAIN, title="95 % of the fitted mean"))

@@ -145,7 +145,7 @@ def _chart(responses: Sequence[Response]) -> Chart:
     lines = [Line(np.column_stack([f, r]), PLAIN, title="one filling") for f, r in responses]
     frequency = responses[0][0]
     mean = np.mean([np.interp(frequency, f, r) for f, r in responses], axis=0)
-    lines.append(Line(np.column_stack([frequency, mean]), tint, True, title="mean"))
+    lines.append(Line(np.column_stack([frequency, mean]), tint, "mean", title="mean"))
     peak = int(np.nanargmax(mean))
     return Chart(
         "frequency, Hz",

@@ -65,7 +65,7 @@ def test_the_band_lies_between_the_least_and_the_greatest_run(study: Path) -> No
     assert chart is not None
     (area,) = chart.areas
     np.testing.assert_allclose(area.x, [-0.02, 0.0, 0.0, 0.02], atol=1e-12)
-    (mean,) = (line for line in chart.lines if line.thick)
+    (mean,) = (line for line in chart.lines if line.style == "mean")
     tip_mm = mean.xy[1, 1]
     assert area.low == pytest.approx(0.8 * tip_mm * np.array([0.0, 1.0, 1.0, 0.5]))
     assert area.high == pytest.approx(1.2 * tip_mm * np.array([0.0, 1.0, 1.0, 0.5]))
