@@ -27,7 +27,7 @@ from sandmould.runs.formatting import (
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.settings import CONFIDENCE
-from sandmould.study.rounds.ledger import Ledger, read_ledger
+from sandmould.study.rounds.round_log import RoundLog, read_rounds
 from sandmould.study.study import Study
 
 WRONG = {"frequency_hz": 10.0}
@@ -66,7 +66,7 @@ def optimum_pages(
     """
     if not (study.refine.rounds or study.certificate.controls):
         return None
-    ledger, objective = read_ledger(study_folder, study), study.objective
+    log, objective = read_rounds(study_folder, study), study.objective
     keys = study.sweep.swept
     try:
         optimum = find_optimum(summary, keys, objective.measure, objective.better)
@@ -81,7 +81,7 @@ def optimum_pages(
     said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
     said += _beside(optimum, study)
     if study.refine.rounds:
-        said.append(_effort(ledger, study, summary))
+        said.append(_effort(log, study, summary))
     sound = not ends and not wide
     if robustness is not None:
         opening = opening_sentences(robustness, objective.measure)
@@ -156,15 +156,15 @@ def _beside(optimum: Optimum, study: Study) -> list[str]:
     ]
 
 
-def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
-    added, swept = len(ledger.runs), study.sweep.number_of_points * study.replicates
-    rounds = len(ledger.rounds)
+def _effort(log: RoundLog, study: Study, summary: pd.DataFrame) -> str:
+    added, swept = len(log.runs), study.sweep.number_of_points * study.replicates
+    rounds = len(log.rounds)
     spent_h = float(summary[CPU_S].sum()) / 3600 if CPU_S in summary else math.nan
     many = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
     return (
         f"{many} added {added or 'any'} runs to the {swept} of the sweep, "
         f"{number(spent_h, 2)} h of processor time in all. "
-        f"{ledger.ended or 'Rounds go on: make study continues them.'}"
+        f"{log.ended or 'Rounds go on: make study continues them.'}"
     )
 
 

@@ -22,7 +22,7 @@ from sandmould.study.collect import Collected
 from sandmould.study.plan_files import read_run
 from sandmould.study.robustness.config import frequency_key
 from sandmould.study.robustness.controls import SHAKE_G, cases
-from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.rounds.round_log import read_rounds
 from sandmould.study.study import Study
 
 _WORDS = {"up": "moves up", "down": "moves down", "held": "stays"}
@@ -54,7 +54,7 @@ def robustness_pages(
         Of any run of the sweep.
     """
     key = frequency_key(study.sweep)
-    certified_hz = read_ledger(study_folder, study).certified_hz
+    certified_hz = read_rounds(study_folder, study).certified_hz
     if not key or not certified_hz:
         return None
     controlled = tuple(cases(study.certificate, scenario, certified_hz[1]))

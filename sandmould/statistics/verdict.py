@@ -58,7 +58,7 @@ class Verdict:
         return next((c for c in self.comparisons if c.other == setting.label), None)
 
 
-def judge(
+def compare_settings(
     summary: pd.DataFrame,
     keys: Sequence[str],
     measure: str,

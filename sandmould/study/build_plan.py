@@ -20,7 +20,7 @@ from sandmould.study.kinds.kind import Kind, kind_named
 from sandmould.study.load_study import OpenStudy, open_study
 from sandmould.study.plan_files import plan_table, write_plan, write_study
 from sandmould.study.robustness.config import provisional_hz
-from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.rounds.round_log import read_rounds
 from sandmould.study.run import Run
 
 RESULTS = Path("results")
@@ -120,7 +120,7 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         With one sentence a problem; a missing engine is one of them.
     """
     study = open_study(path)
-    ledger = read_ledger(results / study.name, study.study)
+    ledger = read_rounds(results / study.name, study.study)
     runs = expand(study, ledger.runs, ledger.certified_hz)
     found: dict[str, Problem] = {}
     # Controls come hours later, at frequencies that are not known yet: they are tried at others.

@@ -22,7 +22,7 @@ from sandmould.runs.progress import duration_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.build_plan import DEFAULT_STUDY, RESULTS, Plan, open_plan
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.rounds.round_log import read_rounds
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
@@ -105,7 +105,7 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
     lines = [f"{plan.study.name}: {', '.join(parts)} of {len(plan.runs)} runs"]
     spent_s = sum(status.cpu_s for status in found.values())
     lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, found, cores)}")
-    ledger = read_ledger(folder, plan.study.study)
+    ledger = read_rounds(folder, plan.study.study)
     if plan.study.study.refine.rounds:
         ended = ledger.ended or f"of at most {plan.study.study.refine.rounds}"
         lines.append(f"rounds: {len(ledger.rounds)}, {ended}")

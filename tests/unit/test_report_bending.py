@@ -16,7 +16,7 @@ from sandmould.report.bending import TIP, bending_pages, deflection_chart
 from sandmould.report.page import write_report
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import Verdict, judge
+from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, collect, gather
 from sandmould.study.measure import write_exports, write_measures
 from sandmould.study.plan_files import read_run, write_plan
@@ -57,7 +57,7 @@ def text(study: Path) -> str:
 
 def gathered(study: Path) -> tuple[Collected, Verdict]:
     collected = gather(study)
-    return collected, judge(collected.summary, (), TIP, "neither")
+    return collected, compare_settings(collected.summary, (), TIP, "neither")
 
 
 def test_the_band_lies_between_the_least_and_the_greatest_run(study: Path) -> None:

@@ -15,7 +15,7 @@ from sandmould.report.robustness import robustness_pages
 from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKE_G, SHAKEN_HZ, cases
-from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
+from sandmould.study.rounds.round_log import RoundLog, basis_of, write_rounds
 from sandmould.study.run import Run
 from tests.unit.report_study import KEY, scenario, write_run
 
@@ -58,7 +58,7 @@ def write_certified(folder: Path, moved: dict[str, float]) -> Path:
         write_run(folder / "runs" / run.run, run, value, False, 60, 8)
         if "spectrum" in run.part:
             shaken_loads(run).to_csv(folder / "runs" / run.run / "loads.tsv", sep="\t", index=False)
-    write_ledger(Ledger(basis_of(study), (), "The sweep is done.", CERTIFIED_HZ), folder)
+    write_rounds(RoundLog(basis_of(study), (), "The sweep is done.", CERTIFIED_HZ), folder)
     return folder
 
 
@@ -122,5 +122,5 @@ def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Pat
 def test_there_is_no_certificate_before_its_frequencies_are_chosen(tmp_path: Path) -> None:
     folder = write_certified(tmp_path / "early", {})
     study = read_study(folder)
-    write_ledger(Ledger(basis_of(study)), folder)
+    write_rounds(RoundLog(basis_of(study)), folder)
     assert robustness_pages(folder, study, gather(folder), scenario(50.0)) is None
