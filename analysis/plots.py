@@ -6,6 +6,8 @@ No window system and no global state is needed: make the axes from ``matplotlib.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -30,6 +32,52 @@ _MANY = 3_000
 _MM = 1e3
 
 
+@dataclass(frozen=True)
+class SceneSection:
+    """A scene in its vertical plane: polygons of (k, 2) float64, m, and walls as their ends."""
+
+    box_m: Array
+    """(k, 2): round the inside of the box."""
+    walls_m: tuple[Array, ...]
+    """(2, 2) each; the box is open at the top."""
+    solids_m: tuple[Array, ...]
+    bores_m: tuple[Array, ...]
+
+
+def scene_section(scene: Scene, height_m: float, cut_m: float | None = None) -> SceneSection:
+    """Outlines of box, solids and bores in the plane shown.
+
+    Parameters
+    ----------
+    scene : Scene
+    height_m : float, m
+        Up to which the box is shown.
+    cut_m : float, m, optional
+        In 3D, y of the plane shown; the middle of the box unless given.
+
+    Returns
+    -------
+    SceneSection
+
+    Raises
+    ------
+    ValueError
+        When the box is open at a side, or a wall of a 3D scene is oblique.
+    """
+    box_m = _box_outline(scene, height_m, cut_m)
+    following_m = np.roll(box_m, -1, axis=0)
+    sides_m = np.stack([box_m, following_m], axis=1)
+    open_top = (box_m[:, 1] >= height_m) & (following_m[:, 1] >= height_m)
+    plane_m = _middle(scene) if cut_m is None else cut_m
+    bores_m = [convex_section(_bore_corners(bore), plane_m) for bore in scene.bores]
+    return SceneSection(
+        box_m,
+        tuple(sides_m[~open_top]),
+        tuple(section for solid in scene.solids for section in solid_sections(solid, plane_m)),
+        tuple(bore_m for bore_m in bores_m if len(bore_m)),
+    )
+
+
 def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = None) -> Axes:
     """Draw the box, open at the top, its solids, and the bores as broken lines.
 
@@ -51,24 +99,16 @@ def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = No
     ValueError
         When the box is open at a side, or a wall of a 3D scene is oblique.
     """
-    box_m = _box_outline(scene, height_m, cut_m)
-    following_m = np.roll(box_m, -1, axis=0)
-    sides = np.stack([box_m, following_m], axis=1)
-    open_top = (box_m[:, 1] >= height_m) & (following_m[:, 1] >= height_m)
-    walls = LineCollection(list(sides[~open_top] * _MM), colors="0.25", linewidths=1.6, zorder=3)
+    section = scene_section(scene, height_m, cut_m)
+    sides = [wall_m * _MM for wall_m in section.walls_m]
+    walls = LineCollection(sides, colors="0.25", linewidths=1.6, zorder=3)
     walls.set_capstyle("projecting")
     ax.add_collection(walls)
-    plane_m = _middle(scene) if cut_m is None else cut_m
-    for solid in scene.solids:
-        for outline_m in solid_sections(solid, plane_m):
-            ax.add_patch(Polygon(outline_m * _MM, facecolor="0.8", edgecolor="0.25", zorder=2.5))
-    for bore in scene.bores:
-        outline_m = convex_section(_bore_corners(bore), plane_m)
-        if len(outline_m):
-            ax.add_patch(
-                Polygon(outline_m * _MM, fill=False, edgecolor="0.1", linestyle="--", zorder=4)
-            )
-    _frame(ax, scene.dimension, box_m)
+    for solid_m in section.solids_m:
+        ax.add_patch(Polygon(solid_m * _MM, facecolor="0.8", edgecolor="0.25", zorder=2.5))
+    for bore_m in section.bores_m:
+        ax.add_patch(Polygon(bore_m * _MM, fill=False, edgecolor="0.1", linestyle="--", zorder=4))
+    _frame(ax, scene.dimension, section.box_m)
     return ax
 
 

@@ -92,9 +92,9 @@ def factors_of(recorded: Recorded, summary: pd.DataFrame, keys: tuple[str, ...])
             against, agrees = "–", False
             if compared is not None:
                 test = compared.agreement
-                agrees = test.judged == "equivalent"
+                agrees = test.verdict == "equivalent"
                 low, high = test.ci if compared.first == dearest else (-test.ci[1], -test.ci[0])
-                against = f"{test.judged}: {number(low, 2)} to {number(high, 2)}"
+                against = f"{test.verdict}: {number(low, 2)} to {number(high, 2)}"
             levels.append(
                 Level(label, len(angle), angle.mean(), angle.std(), cpu_s, against, agrees)
             )

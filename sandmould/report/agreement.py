@@ -68,7 +68,7 @@ def agreement_pages(collected: Collected, study: Study) -> AgreementPages | None
     percent = f"{100 * confidence:g} %"
     return AgreementPages(
         sentences=agreement_sentences(compared, confidence),
-        sound=all(c.agreement.judged == "equivalent" for c in compared),
+        sound=all(c.agreement.verdict == "equivalent" for c in compared),
         is_question=bool(study.equivalence.keys),
         table=_table(compared, percent),
         charts=tuple(_chart([c for c in compared if c.measure == m])
@@ -99,10 +99,10 @@ def _table(compared: Sequence[Compared], percent: str) -> Table:
                 Cell(interval_text(found), str(found.ci[0])),
                 Cell(f"±{found.margin:g}", str(found.margin)),
                 Cell(f"{found.n}{' pairs' if found.paired else ''}", str(found.n)),
-                Cell(found.judged, found.judged, note=found.why),
+                Cell(found.verdict, found.verdict, note=found.note),
             )
         )
-        marked.append(found.judged != "equivalent")
+        marked.append(found.verdict != "equivalent")
     return Table(columns, tuple(rows), tuple(marked))
 
 
@@ -114,16 +114,16 @@ def _chart(compared: Sequence[Compared]) -> Chart:
             c.agreement.difference,
             row,
             "mean",
-            _TINTS.get(c.agreement.judged, PLAIN),
+            _TINTS.get(c.agreement.verdict, PLAIN),
             (c.agreement.ci[1] - c.agreement.ci[0]) / 2,
-            f"{c.pair}: {number(c.agreement.difference, 2)}, {c.agreement.judged}",
+            f"{c.pair}: {number(c.agreement.difference, 2)}, {c.agreement.verdict}",
         )
         for row, c in enumerate(compared)
         if math.isfinite(c.agreement.difference)
     ]
     said = [
         f"{c.pair}{f' at {c.at}' if c.at else ''}: {number(c.agreement.difference, 2)}, "
-        f"{interval_text(c.agreement)}, {c.agreement.judged}"
+        f"{interval_text(c.agreement)}, {c.agreement.verdict}"
         for c in compared
     ]
     what = titled(compared[0].measure)
@@ -143,7 +143,7 @@ def row_name(compared: Compared) -> str:
     if len(name) > _LONGEST and compared.at:
         name = f"{compared.pair}, {compared.at_values}"
     name = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
-    return f"{name}: {compared.agreement.judged}"
+    return f"{name}: {compared.agreement.verdict}"
 
 
 def _speed_table(summary: pd.DataFrame) -> Table | None:

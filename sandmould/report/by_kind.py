@@ -78,7 +78,7 @@ class KindReport(Generic[ScenarioT]):
 
 
 def notes_of(
-    scenario: AnyScenario, collected: Collected, seeks_best: bool, is_certified: bool
+    scenario: AnyScenario, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
     """What the kind of simulation leaves open.
 
@@ -86,10 +86,10 @@ def notes_of(
     ----------
     scenario : scenario of any kind
     collected : Collected
-    seeks_best, is_certified : bool
+    seeks_best, is_controlled : bool
         Whether the study looks for the best setting; whether its controls have been run.
     """
-    return _report_of(scenario).notes(scenario, collected, seeks_best, is_certified)
+    return _report_of(scenario).notes(scenario, collected, seeks_best, is_controlled)
 
 
 def kind_pages(
@@ -116,20 +116,20 @@ def _report_of(scenario: ScenarioT) -> KindReport[ScenarioT]:
 
 
 def _deck_notes(
-    scenario: OwnDeck, collected: Collected, seeks_best: bool, is_certified: bool
+    scenario: OwnDeck, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
     return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
 
 
 def _solidification_notes(
-    scenario: Solidification, collected: Collected, seeks_best: bool, is_certified: bool
+    scenario: Solidification, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
     flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
     return (flat,) if scenario.dimensions == 2 else ()
 
 
 def _flow_notes(
-    scenario: MetalFlow, collected: Collected, seeks_best: bool, is_certified: bool
+    scenario: MetalFlow, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
     """What the paper leaves open."""
     gradient = (
@@ -145,11 +145,11 @@ def _flow_notes(
 
 
 def _sand_notes(
-    scenario: Scenario, collected: Collected, seeks_best: bool, is_certified: bool
+    scenario: Scenario, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
     stage = scenario.vibration[0] if scenario.vibration else None
     deepest = _deepest_overlap_fraction(collected.summary)
-    return sand_notes(collected.keys, stage, deepest, seeks_best, is_certified)
+    return sand_notes(collected.keys, stage, deepest, seeks_best, is_controlled)
 
 
 def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
@@ -185,7 +185,8 @@ def _solidification_pages(findings: Findings[Solidification]) -> KindPages:
         (),
         {"pages": pages},
         {
-            **pictures(fields=pages.fields, error_cost=pages.error_cost),
+            **pictures(fields=pages.fields),
+            **numbered("error_cost", pages.error_cost),
             **_curve_figures(pages.curves),
         },
     )

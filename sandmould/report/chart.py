@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from matplotlib import colormaps
@@ -56,6 +57,10 @@ def tints(n: int, ordered: bool) -> tuple[Tint, ...]:
     )
 
 
+LineStyle = Literal["run", "mean", "joined"]
+"""Thin for one run or edge, thick for a mean, dotted between points that it only joins."""
+
+
 @dataclass(frozen=True)
 class Line:
     """A curve; the label stands at its right end."""
@@ -63,7 +68,7 @@ class Line:
     xy: NDArray[np.float64]
     """(k, 2) float64, in the units of the axes; NaN breaks the curve."""
     tint: Tint = PLAIN
-    thick: bool = False
+    style: LineStyle = "run"
     label: str = ""
     title: str = ""
 
@@ -81,6 +86,8 @@ class Mark:
     title: str = ""
     shift_px: float = 0.0
     """Sideways, to keep points of one setting apart."""
+    label: str = ""
+    """A few characters that stand to the right of it."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +118,8 @@ class Chart:
     band: tuple[float, float] | None = None
     """Values along x between which the chart is shaded."""
     areas: tuple[Area, ...] = ()
+    is_logarithmic: bool = False
+    """Whether both axes are; what is not above zero then has no place."""
 
 
 @dataclass(frozen=True)
@@ -121,10 +130,16 @@ class Axis:
     high: float
     start: float
     end: float
+    is_logarithmic: bool = False
 
     def at(self, value: float) -> float:
-        """Pixel of a value."""
-        return self.start + (value - self.low) / (self.high - self.low) * (self.end - self.start)
+        """Pixel of a value; NaN where a logarithmic axis has none."""
+        low, high = self.low, self.high
+        if self.is_logarithmic:
+            if not value > 0.0:
+                return math.nan
+            low, high, value = math.log10(low), math.log10(high), math.log10(value)
+        return self.start + (value - low) / (high - low) * (self.end - self.start)
 
 
 @dataclass(frozen=True)
@@ -197,18 +212,22 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
     width, height = float(size[0]), float(size[1])
     if chart.rows:
         height = 66.0 + 42.0 * len(chart.rows)
-    y_low, y_high = _range(_ys(chart))
-    y_ticks = () if chart.rows else _round_ticks(y_low, y_high, max(3, int(height / 55)))
-    y_text = [_text(t, y_ticks) for t in y_ticks]
+    log = chart.is_logarithmic
+    y_low, y_high = _log_range(_ys(chart)) if log else _range(_ys(chart))
+    ticks_of = _log_ticks if log else _round_ticks
+    y_ticks = () if chart.rows else ticks_of(y_low, y_high, max(3, int(height / 55)))
+    y_text = [_text(t, y_ticks, log) for t in y_ticks]
     margin = 14.0 if chart.rows else 12.0 + _CHARACTER * max(map(len, y_text), default=1)
     label = max((len(line.label) for line in chart.lines), default=0)
-    x_low, x_high = _range(_xs(chart), tight=not chart.marks)
+    xs = _xs(chart)
+    x_low, x_high = _log_range(xs) if log else _range(xs, tight=not chart.marks)
     beside = 30.0 if any(m.shift_px for m in chart.marks) else 0.0
-    x = Axis(x_low, x_high, margin + beside, width - (12.0 + _BOLD * label if label else 16.0))
+    right = width - (12.0 + _BOLD * label if label else 16.0)
+    x = Axis(x_low, x_high, margin + beside, right, log)
     foot = height - 44.0
     y = Axis(-0.7, len(chart.rows) - 0.3, 10.0, foot) if chart.rows else None
-    y = y or Axis(y_low, y_high, foot, 34.0)
-    x_ticks = chart.x_ticks or _round_ticks(x_low, x_high, max(4, int(width / 80)))
+    y = y or Axis(y_low, y_high, foot, 34.0, log)
+    x_ticks = chart.x_ticks or ticks_of(x_low, x_high, max(4, int(width / 80)))
     return Laid(
         chart=chart,
         width=width,
@@ -216,12 +235,12 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
         left=margin,
         x=x,
         y=y,
-        x_ticks=_not_touching([Tick(x.at(t), _text(t, x_ticks)) for t in x_ticks]),
+        x_ticks=_not_touching([Tick(x.at(t), _text(t, x_ticks, log)) for t in x_ticks]),
         y_ticks=tuple(Tick(y.at(t), s) for t, s in zip(y_ticks, y_text, strict=True)),
         rows=tuple(Tick(y.at(i), name) for i, name in enumerate(chart.rows)),
         areas=tuple(_laid_area(area, x, y) for area in chart.areas),
         lines=_laid_lines(chart.lines, x, y),
-        marks=tuple(_laid_mark(m, x, y, bool(chart.rows)) for m in chart.marks),
+        marks=_laid_marks(chart, x, y),
     )
 
 
@@ -261,8 +280,27 @@ def _round_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
     return tuple(t for t in ticks.tolist() if low - 1e-12 <= t <= high + 1e-12)
 
 
-def _text(value: float, ticks: Sequence[float]) -> str:
+def _log_range(values: Sequence[float]) -> tuple[float, float]:
+    """Ends of a logarithmic axis round its values, with a margin."""
+    low, high = _range([math.log10(v) for v in values if v > 0.0 and math.isfinite(v)])
+    return 10.0**low, 10.0**high
+
+
+def _log_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
+    """Powers of ten, and twice and five times them where that is not too many."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for steps in ((1, 2, 5), (1, 3), (1,)):
+        ticks = [float(f"{step}e{n}") for n in powers for step in steps]
+        ticks = [t for t in ticks if low <= t <= high]
+        if len(ticks) <= most:
+            break
+    return tuple(ticks[:: -(-len(ticks) // most) or 1])
+
+
+def _text(value: float, ticks: Sequence[float], is_logarithmic: bool = False) -> str:
     """A tick's number with the decimals that its neighbours need."""
+    if is_logarithmic:
+        return f"{value:g}"
     largest = max(map(abs, ticks), default=1.0)
     if largest >= 1e5 or 0 < largest < 1e-3:
         return f"{value:.3g}"
@@ -322,6 +360,12 @@ def _spread(
         placed[place] = (i, min(at, limit))
         limit = placed[place][1] - _LINE
     return placed
+
+
+def _laid_marks(chart: Chart, x: Axis, y: Axis) -> tuple[LaidMark, ...]:
+    """All points that have a place."""
+    laid = (_laid_mark(mark, x, y, bool(chart.rows)) for mark in chart.marks)
+    return tuple(mark for mark in laid if math.isfinite(mark.x) and math.isfinite(mark.y))
 
 
 def _laid_mark(mark: Mark, x: Axis, y: Axis, lying: bool) -> LaidMark:

@@ -130,7 +130,7 @@ def time_chart(
         if mean is not None:
             label = setting.label if setting.label in labelled else ""
             many = f"{setting.label}, mean of {len(complete)}"
-            means.append(Line(_thinned(mean, stride), tint, True, label, many))
+            means.append(Line(_thinned(mean, stride), tint, "mean", label, many))
     when = "time of vibration, s" if clock == VIBRATION_TIME_S else "time, s"
     return Chart(when, what, _alt(what, when, means), tuple(lines + means))
 
@@ -238,7 +238,7 @@ def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
         titled(key),
         what,
         _settings_alt(verdict),
-        (Line(np.array(joined), PLAIN, title="means"),),
+        (Line(np.array(joined), PLAIN, "joined", title="means"),),
         tuple(marks),
         x_ticks=tuple(places) if len(places) <= 12 else (),
     )

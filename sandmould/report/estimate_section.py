@@ -40,7 +40,7 @@ class Heap:
 
 
 @dataclass(frozen=True)
-class SandFound:
+class SandEstimate:
     """One calibrated sand."""
 
     name: str
@@ -50,7 +50,7 @@ class SandFound:
 
 
 @dataclass(frozen=True)
-class KnownPages:
+class EstimatePages:
     """What the section shows."""
 
     title: str
@@ -60,14 +60,14 @@ class KnownPages:
     heaps: tuple[Heap, ...]
     map: Table | None
     map_picture: str
-    sands: tuple[SandFound, ...]
+    sands: tuple[SandEstimate, ...]
     worths: Table | None
     cost: str
 
 
-def known_pages(
+def estimate_pages(
     study_folder: Path, study: Study, collected: Collected, verdict: Verdict, scenario: AnyScenario
-) -> KnownPages | None:
+) -> EstimatePages | None:
     """Draw what a study found that asks for a value, not for the best; None for other studies.
 
     Parameters
@@ -82,20 +82,20 @@ def known_pages(
     if study.objective.better != "neither":
         return None
     summary, keys = collected.of_sweep.summary, collected.keys
-    known = [s for s in verdict.settings if s.n]
+    settings = [s for s in verdict.settings if s.n]
     calibrated = read_calibrated(study_folder, study, summary, keys)
     sands = tuple(_sand(one, calibrated) for one in calibrated.sands) if calibrated else ()
-    sentences = [*_value_sentences(known, verdict.measure, study), *_touching(summary)]
+    sentences = [*_value_sentences(settings, verdict.measure, study), *_touching(summary)]
     sentences += [sentence for sand in sands for sentence in sand.sentences[:1]]
     numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
     is_map = len(keys) == 2 and len(numeric) == 2
     what = name_of(verdict.measure)
-    return KnownPages(
+    return EstimatePages(
         title="Angle of repose" if verdict.measure == "heap_angle_deg" else what.capitalize(),
         sentences=tuple(sentences) or (f"No run has a {what} that could be measured.",),
-        sound=bool(known) and all(sand.posterior for sand in sands),
+        sound=bool(settings) and all(sand.posterior for sand in sands),
         heaps=_heaps(study_folder, summary, verdict, scenario),
-        map=_map_table(known, (keys[0], keys[1])) if is_map and known else None,
+        map=_map_table(settings, (keys[0], keys[1])) if is_map and settings else None,
         map_picture=_map_picture(summary, keys, verdict.measure, calibrated) if is_map else "",
         sands=sands,
         worths=_worth_table(calibrated) if calibrated and calibrated.worths else None,
@@ -103,29 +103,29 @@ def known_pages(
     )
 
 
-def known_figures(known: KnownPages) -> dict[str, bytes]:
+def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
     """Heaps side by side, the map, and what is known of each sand, as files."""
     found = pictures(
-        map=known.map_picture, **{f"posterior_{one.name}": one.posterior for one in known.sands}
+        map=pages.map_picture, **{f"posterior_{one.name}": one.posterior for one in pages.sands}
     )
-    if known.heaps:
-        found["heaps"] = strip([(heap.heading, heap.picture) for heap in known.heaps])
+    if pages.heaps:
+        found["heaps"] = strip([(heap.heading, heap.picture) for heap in pages.heaps])
     return found
 
 
-def _value_sentences(known: Sequence[Setting], measure: str, study: Study) -> list[str]:
+def _value_sentences(settings: Sequence[Setting], measure: str, study: Study) -> list[str]:
     """The value at the one setting, or the range over a map; beside what was reported."""
-    if not known:
+    if not settings:
         return []
     what, unit = name_of(measure), unit_of(measure)
     unit = unit if unit in ("", "°") else f" {unit}"
-    if len(known) > 1:
-        low, high = min(known, key=lambda s: s.mean), max(known, key=lambda s: s.mean)
+    if len(settings) > 1:
+        low, high = min(settings, key=lambda s: s.mean), max(settings, key=lambda s: s.mean)
         return [
             f"The {what} goes from {number(low.mean)}{unit} ({low.label}) to {number(high.mean)}"
             f"{unit} ({high.label})."
         ]
-    (one,) = known
+    (one,) = settings
     rests = f"95 % interval of the mean of {one.n} runs" if one.n > 1 else "one run, no interval"
     said = [f"The {what} is {with_margin(one.mean, one.ci_half_width)}{unit} ({rests})."]
     reported = study.objective.reported
@@ -177,11 +177,11 @@ def _heaps(
     return tuple(found)
 
 
-def _map_table(known: Sequence[Setting], keys: tuple[str, str]) -> Table:
+def _map_table(settings: Sequence[Setting], keys: tuple[str, str]) -> Table:
     """The measure over both keys, the second across, as the paper's Figure 11."""
-    rows_of = sorted({s.values[keys[0]] for s in known})
-    columns_of = sorted({s.values[keys[1]] for s in known})
-    at = {(s.values[keys[0]], s.values[keys[1]]): s for s in known}
+    rows_of = sorted({s.values[keys[0]] for s in settings})
+    columns_of = sorted({s.values[keys[1]] for s in settings})
+    at = {(s.values[keys[0]], s.values[keys[1]]): s for s in settings}
 
     def head(key: str, value: float) -> str:
         return number(float(shown(key, np.array(value))))
@@ -214,27 +214,27 @@ def _map_picture(
     return draw_map(emulator, pair, titled(measure), points[np.isfinite(values)], sands)
 
 
-def _sand(one: CalibratedSand, calibrated: Calibrated) -> SandFound:
+def _sand(one: CalibratedSand, calibrated: Calibrated) -> SandEstimate:
     """What is said of a calibrated sand."""
     name = one.sand.name
-    if one.found is None or one.by_first is None:
-        return SandFound(name, (f"{name}: {one.problem}.",), "")
+    if one.posterior is None or one.by_first is None:
+        return SandEstimate(name, (f"{name}: {one.problem}.",), "")
     values = [
         f"{name_of(key)} {with_margin(mode, sd)}"
-        for key, mode, sd in zip(calibrated.keys, one.found.mode, one.found.sd, strict=True)
+        for key, mode, sd in zip(calibrated.keys, one.posterior.mode, one.posterior.sd, strict=True)
     ]
     targets = listed([f"{name_of(m)} {t.value:g} ± {t.sd:g}" for m, t in one.sand.targets.items()])
     taken = [f"{name_of(k)} {t.value:g} ± {t.sd:g}" for k, t in one.sand.assumed.items()]
     granted = f", {listed(taken)} taken for granted" if taken else ""
     said = [
         f"{name}, measured {targets}{granted}: most probable are {listed(values)} (standard "
-        f"deviations), which are correlated by {one.found.correlation:.2f}."
+        f"deviations), which are correlated by {one.posterior.correlation:.2f}."
     ]
     ridge = f"One measured value leaves a ridge, {one.by_first.bits:.1f} bits of the two"
     more = len(one.sand.targets) + len(one.sand.assumed) > 1
-    all_told = f"; all that is known tells {one.found.bits:.1f}" if more else ""
-    said.append(f"{ridge}{all_told}.")
-    return SandFound(name, tuple(said), draw_posterior(one, calibrated.keys))
+    in_all = f"; all that is known tells {one.posterior.bits:.1f}" if more else ""
+    said.append(f"{ridge}{in_all}.")
+    return SandEstimate(name, tuple(said), draw_posterior(one, calibrated.keys))
 
 
 def _worth_table(calibrated: Calibrated) -> Table:

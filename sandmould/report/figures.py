@@ -14,14 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon as Patch
 from numpy.typing import NDArray
 from PIL import Image
 
 from analysis.density import apparent_density
-from analysis.plots import draw_by_layer, draw_grains, draw_scene
+from analysis.plots import SceneSection, draw_by_layer, draw_grains, draw_scene, scene_section
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.scenario.box import Tube
 from sandmould.scenario.geometry import Block
@@ -33,43 +32,6 @@ _INK = "#222222"
 _PANEL_PX = 760
 _COLOURS = 128
 """Colours of a picture's palette: a third of the bytes, and no difference to the eye."""
-
-
-@dataclass(frozen=True)
-class Outline:
-    """The scene in its vertical plane, polygons of (k, 2) float64, m."""
-
-    walls: tuple[Array, ...]
-    solids: tuple[Array, ...]
-    bores: tuple[Array, ...]
-
-
-def scene_outline(scenario: Scenario, height_m: float) -> Outline:
-    """Outlines of box, obstacles and bores, as :func:`analysis.plots.draw_scene` draws them.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    height_m : float, m
-        Up to which the box is shown.
-
-    Returns
-    -------
-    Outline
-    """
-    ax = Figure().add_subplot()
-    _draw_scene(scenario, ax, height_m)
-    polygons = [p for p in ax.patches if isinstance(p, Patch)]
-    return Outline(
-        walls=tuple(
-            np.asarray(s) / _MM
-            for c in ax.collections
-            if isinstance(c, LineCollection)
-            for s in c.get_segments()
-        ),
-        solids=tuple(np.asarray(p.get_xy()) / _MM for p in polygons if p.get_fill()),
-        bores=tuple(np.asarray(p.get_xy()) / _MM for p in polygons if not p.get_fill()),
-    )
 
 
 def cut_m(scenario: Scenario) -> float | None:
@@ -84,6 +46,11 @@ def cut_m(scenario: Scenario) -> float | None:
         y = solids[0].corners()[:, 1]
         return 0.5 * float(y.min() + y.max())
     return scenario.box.depth_m / 2
+
+
+def section_of(scenario: Scenario, height_m: float) -> SceneSection:
+    """Outlines of the last stage's scene, cut where all pictures of the scenario are."""
+    return scene_section(scenario.scene_in(""), height_m, cut_m(scenario))
 
 
 def _draw_scene(scenario: Scenario, ax: Axes, height_m: float, at: Snapshot | str = "") -> None:
@@ -142,8 +109,8 @@ def _draw_bed(scenario: Scenario, ax: Axes, bed: float) -> None:
     width = scenario.box.width_m * _MM
     sand = np.array([[0, 0], [width, 0], [width, bed], [0, bed]])
     ax.add_patch(Patch(sand, facecolor="#F1E5CC", edgecolor="none", zorder=0.5))
-    for bore in scene_outline(scenario, scenario.box.height_m).bores:
-        ax.add_patch(Patch(bore * _MM, facecolor="white", edgecolor="none", zorder=0.6))
+    for bore_m in section_of(scenario, scenario.box.height_m).bores_m:
+        ax.add_patch(Patch(bore_m * _MM, facecolor="white", edgecolor="none", zorder=0.6))
     ax.text(0.03 * width, bed + 0.01 * width, f"sand filled to {bed:.0f}", color="#7A4A00",
             fontsize=11, va="bottom")  # fmt: skip
 

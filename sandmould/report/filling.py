@@ -169,7 +169,7 @@ def _chart(table: _AtTimes, study: Study, key: str, measure: str) -> Chart:
         Line(
             np.column_stack([table.x, table.mean[:, i]]),
             colours[i],
-            True,
+            "mean",
             f"{number(time_s, 2)} s",
             f"after {number(time_s, 2)} s of vibration",
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from sandmould.report.chart import Chart, Line, tints
+from sandmould.report.chart import Chart, Line, LineStyle, tints
 from sandmould.runs.columns import TIME_S
 
 _POINTS = 400
@@ -27,7 +27,7 @@ class _Curve:
     column: str
     label: str
     factor: float = 1.0
-    thick: bool = False
+    style: LineStyle = "run"
 
 
 def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, ...]:
@@ -44,14 +44,14 @@ def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, .
     found = [
         (
             "displacement, mm",
-            (_Curve("displacement_m", "shown", 1e3, True), _Curve("residual_m", "residual", 1e3)),
+            (_Curve("displacement_m", "shown", 1e3, "mean"), _Curve("residual_m", "residual", 1e3)),
             "Root mean square over the surface's vertices of the displacement that the sand saw, "
             "and of the one that its loads give less that.",
         ),
         (
             "energy, J",
             (
-                _Curve("work_j", "work of sand", thick=True),
+                _Curve("work_j", "work of sand", style="mean"),
                 _Curve("energy_j", "stored"),
                 _Curve("elastic_j", "stored"),
                 _Curve("kinetic_j", "kinetic"),
@@ -92,7 +92,7 @@ def _chart(shown: pd.DataFrame, title: str, curves: tuple[_Curve, ...]) -> Chart
         Line(
             np.column_stack([shown[TIME_S], curve.factor * shown[curve.column]]),
             tint,
-            curve.thick,
+            curve.style,
             label=curve.label,
             title=curve.label,
         )

@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.curves import reported_lines
-from sandmould.report.robustness import CertificatePages, opening_sentences
+from sandmould.report.robustness import RobustnessPages, opening_sentences
 from sandmould.runs.columns import CPU_S
 from sandmould.runs.formatting import (
     listed,
@@ -28,7 +28,7 @@ from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.settings import CONFIDENCE
 from sandmould.study.definition.study import Study
-from sandmould.study.rounds.ledger import Ledger, read_ledger
+from sandmould.study.rounds.round_log import RoundLog, read_rounds
 
 WRONG = {"frequency_hz": 10.0}
 """By how much a key may be set wrong in a foundry; others by a tenth of their range."""
@@ -51,9 +51,9 @@ def optimum_pages(
     study_folder: Path,
     study: Study,
     summary: pd.DataFrame,
-    certificate: CertificatePages | None = None,
+    robustness: RobustnessPages | None = None,
 ) -> OptimumPages | None:
-    """Say where the optimum of a study with rounds or a certificate lies; None for others.
+    """Say where the optimum of a study with rounds or controls lies; None for others.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ def optimum_pages(
     study : Study
     summary : DataFrame
         One row a run of the sweep and its rounds.
-    certificate : CertificatePages, optional
+    robustness : RobustnessPages, optional
         Its verdict comes first where the optimum is an artefact.
     """
     if not (study.refine.rounds or study.certificate.controls):
         return None
-    ledger, objective = read_ledger(study_folder, study), study.objective
+    log, objective = read_rounds(study_folder, study), study.objective
     keys = study.sweep.swept
     try:
         optimum = find_optimum(summary, keys, objective.measure, objective.better)
@@ -81,13 +81,13 @@ def optimum_pages(
     said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
     said += _beside(optimum, study)
     if study.refine.rounds:
-        said.append(_effort(ledger, study, summary))
+        said.append(_effort(log, study, summary))
     sound = not ends and not wide
-    if certificate is not None:
-        opening = opening_sentences(certificate, objective.measure)
-        artefact = certificate.certified.is_artefact
+    if robustness is not None:
+        opening = opening_sentences(robustness, objective.measure)
+        artefact = robustness.assessment.is_artefact
         said = [*opening, *said] if artefact else [said[0], *opening, *said[1:]]
-        sound = sound and certificate.certified.kind == "rearrangement of grains"
+        sound = sound and robustness.assessment.cause == "rearrangement of grains"
     return OptimumPages(tuple(said), sound, optimum)
 
 
@@ -156,15 +156,15 @@ def _beside(optimum: Optimum, study: Study) -> list[str]:
     ]
 
 
-def _effort(ledger: Ledger, study: Study, summary: pd.DataFrame) -> str:
-    added, swept = len(ledger.runs), study.sweep.number_of_points * study.replicates
-    rounds = len(ledger.rounds)
+def _effort(log: RoundLog, study: Study, summary: pd.DataFrame) -> str:
+    added, swept = len(log.runs), study.sweep.number_of_points * study.replicates
+    rounds = len(log.rounds)
     spent_h = float(summary[CPU_S].sum()) / 3600 if CPU_S in summary else math.nan
     many = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
     return (
         f"{many} added {added or 'any'} runs to the {swept} of the sweep, "
         f"{number(spent_h, 2)} h of processor time in all. "
-        f"{ledger.ended or 'Rounds go on: sandmould run continues them.'}"
+        f"{log.ended or 'Rounds go on: sandmould run continues them.'}"
     )
 
 
@@ -173,7 +173,7 @@ def with_surface(chart: Chart, optimum: Optimum, study: Study) -> Chart:
     mean, se = optimum.surface
     factor = shown_scale(study.objective.measure)[0]
     x, tint = optimum.points[:, 0], tints(1, False)[0]
-    lines = [Line(np.column_stack([x, factor * mean]), tint, True, title="fitted mean")]
+    lines = [Line(np.column_stack([x, factor * mean]), tint, "mean", title="fitted mean")]
     for sign in (-1.0, 1.0):
         edge = factor * (mean + sign * _TWO_SIDED * se)
         lines.append(Line(np.column_stack([x, edge]), PLAIN, title="95 % of the fitted mean"))

@@ -18,11 +18,11 @@ from sandmould.report.animation import BUDGET_BYTES
 from sandmould.report.by_kind import drives_of, kind_pages, notes_of
 from sandmould.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.report.curves import objective_charts
-from sandmould.report.estimate_section import known_figures, known_pages
+from sandmould.report.estimate_section import estimate_figures, estimate_pages
 from sandmould.report.figure_files import numbered, write_figures
 from sandmould.report.method import Row, provenance_rows, statistics_method
 from sandmould.report.optimum import optimum_pages, with_surface
-from sandmould.report.robustness import certificate_pages
+from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import shown_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
@@ -32,12 +32,12 @@ from sandmould.runs.formatting import name_of, number, setting_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import setting_rows
-from sandmould.statistics.verdict import Verdict, judge
+from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, read_run
-from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.rounds.round_log import read_rounds
 
 TEMPLATES = ROOT / "templates" / "report"
 LIMIT_BYTES = 15_000_000
@@ -95,11 +95,13 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     any_scenario = _scenario_of(study_folder, summary[RUN])
     if any_scenario is None:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
-    certified = bool(read_ledger(study_folder, study).certified_hz)
-    notes = notes_of(any_scenario, collected, seeks_best, certified)
+    is_controlled = bool(read_rounds(study_folder, study).certified_hz)
+    notes = notes_of(any_scenario, collected, seeks_best, is_controlled)
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
-    verdict = judge(summary, keys, objective.measure, objective.better, notes, seeks_best)
+    verdict = compare_settings(
+        summary, keys, objective.measure, objective.better, notes, seeks_best
+    )
     shown = next(iter(shown_runs(study_folder, summary, verdict).values()), "")
     listed = {setting.label for setting in listed_settings(verdict)}
     by_setting = {}
@@ -143,13 +145,11 @@ def _render(
     summary = page.collected.summary
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
-    known = known_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
-    certificate = None
+    estimate = estimate_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
+    robustness = None
     if isinstance(page.scenario, Scenario):
-        certificate = certificate_pages(
-            page.study_folder, page.study, page.collected, page.scenario
-        )
-    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, certificate)
+        robustness = robustness_pages(page.study_folder, page.study, page.collected, page.scenario)
+    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, robustness)
     drawn, drawn_verdict = drawn_part(of_sweep, verdict)
     charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
@@ -176,10 +176,10 @@ def _render(
         keys=keys,
         seeks_best=seeks_best,
         agreement=agreement,
-        known=known,
+        estimate=estimate,
         optimum=optimum,
-        certificate=certificate,
-        statement=optimum or (agreement if agreement and agreement.is_question else known),
+        robustness=robustness,
+        statement=optimum or (agreement if agreement and agreement.is_question else estimate),
         key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
         objective_charts=[_both_sizes(c) for c in charts],
         drawn_note=drawn_note(of_sweep, verdict),
@@ -194,8 +194,8 @@ def _render(
         reported_best=page.study.objective.reported_best,
         **of_kind.context,
     )
-    of_known = known_figures(known) if known else {}
-    return text, {**numbered("objective", charts), **of_known, **of_kind.figures}
+    of_estimate = estimate_figures(estimate) if estimate else {}
+    return text, {**numbered("objective", charts), **of_estimate, **of_kind.figures}
 
 
 def _both_sizes(chart: Any) -> tuple[Any, Any]:

@@ -101,17 +101,17 @@ def draw_map(
     ax.clabel(lines, fmt="%g", fontsize=8)
     figure.colorbar(filled, ax=ax, label=title)
     ax.plot(shown(keys[1], points[:, 1]), shown(keys[0], points[:, 0]), "k.", ms=4)
-    for number, one in enumerate(sands):
-        line = one.lines.get(emulator.measure)
+    for number, sand in enumerate(sands):
+        line = sand.lines.get(emulator.measure)
         if line is None or np.isnan(line.first).all():
             continue
         colour = _BANDS[number % len(_BANDS)]
         x_line = shown(keys[1], line.second)
         ax.fill_between(x_line, shown(keys[0], line.low), shown(keys[0], line.high),
                         color=colour, alpha=0.35, lw=0)  # fmt: skip
-        value = one.sand.targets[emulator.measure].value
+        value = sand.sand.targets[emulator.measure].value
         ax.plot(x_line, shown(keys[0], line.first), color=colour, lw=2.2,
-                label=f"{one.sand.name.replace('_', ' ')}: {value:g}")  # fmt: skip
+                label=f"{sand.sand.name.replace('_', ' ')}: {value:g}")  # fmt: skip
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="upper right", fontsize=9)
     ax.set_xlabel(axis_title(keys[1]))
@@ -119,22 +119,21 @@ def draw_map(
     return png(figure)
 
 
-def draw_posterior(one: CalibratedSand, keys: tuple[str, str]) -> str:
+def draw_posterior(sand: CalibratedSand, keys: tuple[str, str]) -> str:
     """Draw what all targets together leave probable, and what the first alone leaves."""
-    assert one.found is not None
-    assert one.by_first is not None
+    assert sand.posterior is not None
+    assert sand.by_first is not None
     figure = Figure(figsize=(5.6, 4.6), dpi=110, layout="constrained")
     ax = figure.add_subplot()
-    found = one.found
-    x, y = shown(keys[1], found.second), shown(keys[0], found.first)
-    ax.contourf(x, y, found.share / found.share.max(), levels=np.linspace(0.02, 1.0, 12),
-                cmap="Blues")  # fmt: skip
-    more = len(one.sand.targets) + len(one.sand.assumed) > 1
-    first = [(one.by_first, "0.45", "first value alone")] if more else []
-    for posterior, colour, label in (*first, (found, "#0b5cad", "all that is known")):
+    share = sand.posterior.share
+    x, y = shown(keys[1], sand.posterior.second), shown(keys[0], sand.posterior.first)
+    ax.contourf(x, y, share / share.max(), levels=np.linspace(0.02, 1.0, 12), cmap="Blues")
+    more = len(sand.sand.targets) + len(sand.sand.assumed) > 1
+    first = [(sand.by_first, "0.45", "first value alone")] if more else []
+    for posterior, colour, label in (*first, (sand.posterior, "#0b5cad", "all that is known")):
         ax.contour(x, y, posterior.region().astype(float), levels=[0.5], colors=colour)
         ax.plot([], [], color=colour, label=f"95 %, {label}")
-    mode = found.mode
+    mode = sand.posterior.mode
     ax.plot(shown(keys[1], np.array(mode[1])), shown(keys[0], np.array(mode[0])), "x",
             color=_LINE, ms=9, mew=2.5, label="most probable")  # fmt: skip
     ax.set_xlabel(axis_title(keys[1]))

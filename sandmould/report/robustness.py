@@ -1,4 +1,4 @@
-"""The report's certificate: what the controls say, their table, and the bed's own spectrum."""
+"""The report's robustness checks: what the controls say, their table, the bed's own spectrum."""
 
 from __future__ import annotations
 
@@ -17,30 +17,32 @@ from sandmould.runs.columns import BED_HEIGHT_M, STAGE, TIME_S
 from sandmould.runs.formatting import name_of, number
 from sandmould.scenario.scenario import FILLING, Scenario
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
-from sandmould.statistics.robustness import Certified, certify, shaken_runs
+from sandmould.statistics.robustness import Robustness, assess_robustness, shaken_runs
 from sandmould.study.collect import Collected
 from sandmould.study.definition.certificate import frequency_key
 from sandmould.study.definition.study import Study
 from sandmould.study.plan.plan_files import read_run
-from sandmould.study.robustness.controls import SHAKE_G
-from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.robustness.controls import SHAKE_G, cases
+from sandmould.study.rounds.round_log import read_rounds
+
+_WORDS = {"up": "moves up", "down": "moves down", "held": "stays"}
 
 
 @dataclass(frozen=True)
-class CertificatePages:
+class RobustnessPages:
     """What the section shows."""
 
-    certified: Certified
+    assessment: Robustness
     table: Table
     spectrum: Chart | None
     column: str
     """What a column of springs would do, as a sentence."""
 
 
-def certificate_pages(
+def robustness_pages(
     study_folder: Path, study: Study, collected: Collected, scenario: Scenario
-) -> CertificatePages | None:
-    """Judge and draw the controls of a study; None before they are chosen, or without any.
+) -> RobustnessPages | None:
+    """Assess and draw the controls of a study; None before they are chosen, or without any.
 
     Parameters
     ----------
@@ -52,26 +54,28 @@ def certificate_pages(
         Of any run of the sweep.
     """
     key = frequency_key(study.sweep)
-    certified_hz = read_ledger(study_folder, study).certified_hz
+    certified_hz = read_rounds(study_folder, study).certified_hz
     if not key or not certified_hz:
         return None
-    certified = certify(
+    controlled = tuple(cases(study.certificate, scenario, certified_hz[1]))
+    robustness = assess_robustness(
         collected.summary,
         key,
         certified_hz,
         study.objective,
         study.equivalence.margins.get(study.objective.measure),
+        controlled,
     )
-    responses = _responses(study_folder, shaken_runs(collected.summary))
-    return CertificatePages(
-        certified,
-        _table(certified, certified_hz),
+    responses = _responses(study_folder, shaken_runs(collected.summary, controlled))
+    return RobustnessPages(
+        robustness,
+        _table(robustness, certified_hz),
         _chart(responses) if responses else None,
         _column(scenario, collected.summary, responses),
     )
 
 
-def _table(certified: Certified, certified_hz: Sequence[float]) -> Table:
+def _table(robustness: Robustness, certified_hz: Sequence[float]) -> Table:
     columns = (
         Column("control", False),
         *(Column(f"{f:g} Hz") for f in certified_hz),
@@ -79,25 +83,23 @@ def _table(certified: Certified, certified_hz: Sequence[float]) -> Table:
         Column("95 % interval"),
         Column("the optimum", False),
     )
-    rows = [("the sweep itself", certified.sweep, math.nan, "–", "–")]
-    for move in certified.movements:
-        low, high = move.ci
+    rows = [("the sweep itself", robustness.sweep, math.nan, "–", "–")]
+    for shift in robustness.shifts:
+        low, high = shift.ci
         interval = "–" if math.isnan(low) else f"{number(low, 2)} to {number(high, 2)}"
-        words = {"up": "moves up", "down": "moves down", "held": "stays"}
-        rows.append(
-            (move.name, move.means, move.shift, interval, words.get(move.judged, move.judged))
-        )
+        verdict = _WORDS.get(shift.verdict, shift.verdict)
+        rows.append((shift.name, shift.means, shift.shift, interval, verdict))
     cells = tuple(
         (
             Cell(name, name),
             *(Cell(number(v), repr(v)) for v in means),
-            Cell(number(shift, 2), repr(shift)),
+            Cell(number(gain, 2), repr(gain)),
             Cell(interval, interval),
-            Cell(judged, judged),
+            Cell(verdict, verdict),
         )
-        for name, means, shift, interval, judged in rows
+        for name, means, gain, interval, verdict in rows
     )
-    marked = tuple(judged.startswith("moves") for *_, judged in rows)
+    marked = tuple(verdict.startswith("moves") for *_, verdict in rows)
     return Table(columns, cells, marked)
 
 
@@ -143,7 +145,7 @@ def _chart(responses: Sequence[Response]) -> Chart:
     lines = [Line(np.column_stack([f, r]), PLAIN, title="one filling") for f, r in responses]
     frequency = responses[0][0]
     mean = np.mean([np.interp(frequency, f, r) for f, r in responses], axis=0)
-    lines.append(Line(np.column_stack([frequency, mean]), tint, True, title="mean"))
+    lines.append(Line(np.column_stack([frequency, mean]), tint, "mean", title="mean"))
     peak = int(np.nanargmax(mean))
     return Chart(
         "frequency, Hz",
@@ -179,9 +181,9 @@ def _column(scenario: Scenario, summary: pd.DataFrame, responses: Sequence[Respo
     )
 
 
-def opening_sentences(pages: CertificatePages, measure: str) -> tuple[str, ...]:
-    """What the head of the report says of the certificate."""
-    first = pages.certified.sentences[0]
-    if pages.certified.is_artefact:
+def opening_sentences(pages: RobustnessPages, measure: str) -> tuple[str, ...]:
+    """What the head of the report says of the controls."""
+    first = pages.assessment.sentences[0]
+    if pages.assessment.is_artefact:
         return (f"{first} Do not take it for a property of the sand's {name_of(measure)}.",)
     return (first,)

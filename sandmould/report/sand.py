@@ -222,14 +222,14 @@ def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
     """The scene for the page's canvas, in m; a pattern is drawn as it bends, with the film."""
     obstacles = [o for o in scenario.obstacles if o.name != _bending_name(scenario)]
     still = scenario.model_copy(update={"obstacles": tuple(obstacles), "pattern": None})
-    outline = figures.scene_outline(still, height_m)
+    section = figures.section_of(still, height_m)
     return {
         "width_m": scenario.box.width_m,
         "height_m": height_m,
         "cut_m": figures.cut_m(scenario),
-        "walls": [np.round(w, 6).tolist() for w in outline.walls],
-        "solids": [np.round(s, 6).tolist() for s in outline.solids],
-        "bores": [np.round(b, 6).tolist() for b in outline.bores],
+        "walls": [np.round(w, 6).tolist() for w in section.walls_m],
+        "solids": [np.round(s, 6).tolist() for s in section.solids_m],
+        "bores": [np.round(b, 6).tolist() for b in section.bores_m],
         "tubes": [_round(bore) for bore in scenario.scene.bores] if scenario.dimension == 3 else [],
         "layer_colours": list(LAYER_COLOURS),
         "bent_m": BENT_M,

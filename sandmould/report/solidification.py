@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from analysis.freezing import freezing
 from analysis.freezing_plots import draw_freezing, draw_temperature
+from sandmould.report.chart import Chart, Mark, tints
 from sandmould.report.figures import png
 from sandmould.report.method import Row
 from sandmould.report.tables import Cell, Column, Table
@@ -25,7 +26,6 @@ from sandmould.study.collect import Collected
 from sandmould.study.definition.sweep import Point
 from sandmould.study.plan.plan_files import read_run
 
-MARKERS = "osD^vP*X<>"
 STAND_IN = "stand-in"
 """How the source of a value begins that is not what it stands for."""
 
@@ -42,7 +42,8 @@ class SolidPages:
     curves: tuple[Curve, ...]
     reference: str
     """Setting that the others are compared with; empty without one."""
-    error_cost: str
+    error_cost: tuple[Chart, ...]
+    """Empty where nothing can be compared."""
     errors: Table | None
 
 
@@ -90,7 +91,7 @@ def solid_pages(
         reference=setting_text(reference)
         if reference
         else "",
-        error_cost=_error_cost(errors) if errors else "",
+        error_cost=_error_charts(errors),
         errors=_error_table(errors) if errors else None,
     )  # fmt: skip
 
@@ -177,7 +178,7 @@ def _errors(point: Point, scenario: Solidification, collected: Collected) -> lis
         curve = _curve_percent(own[row[RUN]], own[base[RUN]], probes, range_k)
         label = setting_text({key: row[key] for key in collected.keys})
         found.append(_Error(label, float(row[CPU_S]), 100.0 * (time_s / base_s - 1.0), curve))
-    return found
+    return sorted(found, key=lambda error: error.cpu_s)
 
 
 def _curve_percent(
@@ -195,38 +196,41 @@ def _curve_percent(
                default=math.nan)  # fmt: skip
 
 
-def _error_cost(errors: Sequence[_Error]) -> str:
-    """Errors over the processor's time, both on logarithmic axes."""
-    figure = Figure(figsize=(11, 5.2), dpi=110, layout="constrained")
-    panels = figure.subplots(1, 2)
-    for place, one in enumerate(errors):
-        marker = MARKERS[place % len(MARKERS)]
-        for panel, value in zip(panels, (abs(one.time_percent), one.curve_percent), strict=True):
-            panel.loglog(one.cpu_s, value, marker, ms=8, label=one.label)
-    for panel, what in zip(
-        panels, ("error of the solidification time, %", "mean error of the worst cooling curve, %"),
-        strict=True,
-    ):  # fmt: skip
-        panel.set_xlabel("processor time, s")
-        panel.set_ylabel(what)
-        panel.grid(alpha=0.3, which="both")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3,
-                  fontsize=8)  # fmt: skip
-    return png(figure)
+def _error_charts(errors: Sequence[_Error]) -> tuple[Chart, ...]:
+    """Both errors over the processor's time on logarithmic axes, settings by their number."""
+    colours = tints(len(errors), False)
+    charts = []
+    for what, values in (
+        ("error of the solidification time, %", [abs(e.time_percent) for e in errors]),
+        ("mean error of the worst cooling curve, %", [e.curve_percent for e in errors]),
+    ):
+        marks = tuple(
+            Mark(error.cpu_s, value, "mean", tint, title=f"{error.label}: {number(value)} %",
+                 label=str(place))
+            for place, (error, value, tint) in enumerate(
+                zip(errors, values, colours, strict=True), start=1)
+            if value > 0.0
+        )  # fmt: skip
+        if marks:
+            texts = "; ".join(f"{mark.label}: {mark.title}" for mark in marks)
+            alt = f"{what} over processor time by setting. {texts}."
+            charts.append(Chart("processor time, s", what, alt, marks=marks, is_logarithmic=True))
+    return tuple(charts)
 
 
 def _error_table(errors: Sequence[_Error]) -> Table:
     columns = (
-        Column("setting", False), Column("processor time"), Column("solidification time, %"),
-        Column("worst cooling curve, %"),
+        Column("no."), Column("setting", False), Column("processor time"),
+        Column("solidification time, %"), Column("worst cooling curve, %"),
     )  # fmt: skip
     rows = tuple(
         (
-            Cell(one.label, one.label),
-            Cell(seconds(one.cpu_s), str(one.cpu_s)),
-            *(Cell(number(v), str(v)) for v in (one.time_percent, one.curve_percent)),
+            Cell(str(place), str(place)),
+            Cell(error.label, error.label),
+            Cell(seconds(error.cpu_s), str(error.cpu_s)),
+            *(Cell(number(v), str(v)) for v in (error.time_percent, error.curve_percent)),
         )
-        for one in sorted(errors, key=lambda one: one.cpu_s)
+        for place, error in enumerate(errors, start=1)
     )
     return Table(columns, rows, (False,) * len(rows))
 

@@ -53,11 +53,11 @@ class Compared:
 
     def row(self) -> dict[str, Any]:
         """One row of ``agreement.tsv``."""
-        found = self.agreement
+        agreement = self.agreement
         values = (
-            self.at, self.key, self.first, self.second, self.measure, *found.means,
-            found.difference, *found.ci, found.margin, found.n, found.paired, found.judged,
-            found.why,
+            self.at, self.key, self.first, self.second, self.measure, *agreement.means,
+            agreement.difference, *agreement.ci, agreement.margin, agreement.n, agreement.paired,
+            agreement.verdict, agreement.note,
         )  # fmt: skip
         return dict(zip(COLUMNS, values, strict=True))
 
@@ -105,8 +105,8 @@ def compare_pair(
     for measure, margin in equivalence.margins.items():
         values = [finished_values(r, measure).dropna() for r in rows]
         first, second = (by_block(r, v, over) for r, v in zip(rows, values, strict=True))
-        judged = agree(first, second, margin, equivalence.confidence)
-        found.append(Compared(measure, key, *pair, where, at_values, judged))
+        agreement = agree(first, second, margin, equivalence.confidence)
+        found.append(Compared(measure, key, *pair, where, at_values, agreement))
     return tuple(found)
 
 
@@ -126,7 +126,7 @@ def agreement_sentences(compared: Sequence[Compared], confidence: float) -> tupl
         Of the intervals.
     """
     by_verdict: Mapping[str, list[Compared]] = {
-        verdict: [c for c in compared if c.agreement.judged == verdict]
+        verdict: [c for c in compared if c.agreement.verdict == verdict]
         for verdict in ("equivalent", "different", "not resolved", "not tested")
     }
     different, open_ = by_verdict["different"], by_verdict["not resolved"]

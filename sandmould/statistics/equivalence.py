@@ -12,7 +12,7 @@ from scipy import stats
 
 from sandmould.statistics.settings import compare_means
 
-Judged = Literal["equivalent", "different", "not resolved", "not tested"]
+EquivalenceVerdict = Literal["equivalent", "different", "not resolved", "not tested"]
 POWER = 0.8
 """Chance of a verdict that the estimate of further replicates is made for."""
 MOST_REPLICATES = 1000
@@ -31,8 +31,8 @@ class Agreement:
     n: int
     """Pairs, or runs of the smaller group."""
     paired: bool
-    judged: Judged
-    why: str
+    verdict: EquivalenceVerdict
+    note: str
     """What the verdict rests on, where that needs words."""
     more: int | None = None
     """Further replicates that would probably resolve it, where that is not too many."""
@@ -83,9 +83,9 @@ def agree(
     result, paired = test
     low, high = result.confidence_interval(confidence)
     ci = float(low), float(high)
-    judged = judge_interval(ci, margin)
-    if judged != "not resolved":
-        return Agreement(means, ci, margin, n, paired, judged, "")
+    verdict = classify_interval(ci, margin)
+    if verdict != "not resolved":
+        return Agreement(means, ci, margin, n, paired, verdict, "")
     error = (ci[1] - ci[0]) / 2 / float(stats.t.ppf(0.5 + confidence / 2, result.df))
     more = _more(abs(difference), error * math.sqrt(n), margin, confidence, n, paired)
     said = (
@@ -94,10 +94,10 @@ def agree(
         if more is None
         else f"about {more} more replicates would be needed at this spread"
     )
-    return Agreement(means, ci, margin, n, paired, judged, said, more)
+    return Agreement(means, ci, margin, n, paired, verdict, said, more)
 
 
-def judge_interval(ci: tuple[float, float], margin: float) -> Judged:
+def classify_interval(ci: tuple[float, float], margin: float) -> EquivalenceVerdict:
     """Verdict on an interval: inside the margin, wholly outside, or neither."""
     low, high = ci
     if -margin < low and high < margin:
@@ -115,7 +115,7 @@ def _without_spread(
     difference = means[0] - means[1]
     ci = (difference, difference)
     said = "the same to round-off in every pair" if abs(difference) < 1e-9 * margin else ""
-    return Agreement(means, ci, margin, n, True, judge_interval(ci, margin), said)
+    return Agreement(means, ci, margin, n, True, classify_interval(ci, margin), said)
 
 
 def _more(

@@ -1,4 +1,4 @@
-"""What the controls say together: whether the optimum is of the sand or of the model."""
+"""Robustness of an optimum: whether its controls show it to be of the sand or of the model."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Literal
 import pandas as pd
 from scipy import stats
 
-from sandmould.runs.columns import PART, RUN, SWEEP, finished
+from sandmould.runs.columns import CONTROL, PART, RUN, SWEEP, finished
 from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective
 from sandmould.statistics.settings import CONFIDENCE
 from sandmould.statistics.verdict import finished_values
 
-Moved = Literal["up", "down", "held", "unclear", "no result"]
-Kind = Literal[
+ShiftVerdict = Literal["up", "down", "held", "unclear", "no result"]
+Cause = Literal[
     "rearrangement of grains", "column resonance of the springs",
     "artefact of what is held constant", "artefact of the numerics", "unresolved",
 ]  # fmt: skip
@@ -25,22 +25,23 @@ SHARE = 0.05
 """Of the measure at the optimum, the margin where the study sets none."""
 MUST_HOLD = ("hold", "stiffness", "time_step", "engine")
 """Controls that move nothing where the optimum belongs to the sand."""
-_PREFIX = "control: "
 _SPECTRUM = "spectrum"
 
 
 @dataclass(frozen=True)
-class Movement:
-    """Where the optimum goes under one case of a control."""
+class ControlCase:
+    """One case of a control: what is changed, and to what."""
 
     control: str
     value: str
-    means: tuple[float, ...]
-    """Of the measure at the three frequencies; NaN where none was run."""
-    shift: float
-    """Gain of the upper over the lower frequency, less that of the sweep, better being positive."""
-    ci: tuple[float, float]
-    judged: Moved
+    """In words."""
+    factor: float | None
+    """What the property is multiplied by; None where a control does not multiply."""
+
+    @property
+    def part(self) -> str:
+        """What it is called in ``runs.tsv``."""
+        return f"{CONTROL}{self.control} {self.value}"
 
     @property
     def name(self) -> str:
@@ -50,30 +51,58 @@ class Movement:
 
 
 @dataclass(frozen=True)
-class Certified:
-    """The judgement of a certificate."""
+class OptimumShift:
+    """Where the optimum goes under one case of a control."""
 
-    kind: Kind
+    case: ControlCase
+    means: tuple[float, ...]
+    """Of the measure at the three frequencies; NaN where none was run."""
+    shift: float
+    """Gain of the upper over the lower frequency, less that of the sweep, better being positive."""
+    ci: tuple[float, float]
+    verdict: ShiftVerdict
+
+    @property
+    def name(self) -> str:
+        """As sentences name it."""
+        return self.case.name
+
+    @property
+    def follows_springs(self) -> bool:
+        """Whether it goes as the resonance of a column of springs, sqrt(k)/H: up with stiffness."""
+        factor = self.case.factor
+        if factor is None or self.case.control not in ("stiffness", "bed_depth"):
+            return False
+        rises = (factor > 1.0) == (self.case.control == "stiffness")
+        return self.verdict == ("up" if rises else "down")
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """What the controls of an optimum say together."""
+
+    cause: Cause
     sentences: tuple[str, ...]
     sweep: tuple[float, ...]
     """Means of the sweep's own runs at the three frequencies."""
-    movements: tuple[Movement, ...]
+    shifts: tuple[OptimumShift, ...]
     margin: float
 
     @property
     def is_artefact(self) -> bool:
         """Whether the optimum is none of the sand's."""
-        return self.kind not in ("rearrangement of grains", "unresolved")
+        return self.cause not in ("rearrangement of grains", "unresolved")
 
 
-def certify(
+def assess_robustness(
     summary: pd.DataFrame,
     key: str,
     certified_hz: Sequence[float],
     objective: Objective,
     margin: float | None,
-) -> Certified:
-    """Judge the controls of a study.
+    cases: Sequence[ControlCase],
+) -> Robustness:
+    """Classify an optimum by its controls.
 
     The noise of a run is pooled over all points, whose replicates count as independent.
 
@@ -88,12 +117,14 @@ def certify(
     margin : float or None
         Shift that counts as none, in the unit of the measure; None for ``SHARE`` of its mean at
         the optimum.
+    cases : sequence of ControlCase
+        Of all controls; those without runs in the summary are left out.
     """
     measure = objective.measure
     sign = 1.0 if objective.better == "larger" else -1.0
     table = pd.DataFrame(
         {
-            "part": summary.get(PART, SWEEP),
+            PART: summary.get(PART, SWEEP),
             "hz": summary[key].astype(float),
             "value": sign * finished_values(summary, measure),
         }
@@ -105,33 +136,30 @@ def certify(
     mean, count = groups.mean().to_dict(), groups.count().to_dict()
     sweep = tuple(mean.get((SWEEP, f), math.nan) for f in certified_hz)
     margin = margin or SHARE * abs(sweep[1])
-    parts = [p for p in summary.get(PART, pd.Series(dtype=str)).unique()
-             if str(p).startswith(_PREFIX)]  # fmt: skip
-    moves = []
-    for part in map(str, parts):
-        control, _, value = part.removeprefix(_PREFIX).partition(" ")
-        if control == _SPECTRUM:
-            continue
+    by_part = {case.part: case for case in cases if case.control != _SPECTRUM}
+    planned = summary[PART].astype(str).unique() if PART in summary else ()
+    shifts = []
+    for part in (p for p in planned if p in by_part):
         ends = [(p, f) for p in (part, SWEEP) for f in (certified_hz[0], certified_hz[2])]
-        known = [mean.get(end, math.nan) for end in ends]
-        shift = (known[1] - known[0]) - (known[3] - known[2])
-        ci, judged = (math.nan, math.nan), _judged_without(shift)
+        lower, upper, sweep_lower, sweep_upper = (mean.get(end, math.nan) for end in ends)
+        shift = (upper - lower) - (sweep_upper - sweep_lower)
+        ci, verdict = (math.nan, math.nan), _without_interval(shift)
         if math.isfinite(shift) and freedom:
             error = sd * math.sqrt(sum(1.0 / count[end] for end in ends))
             reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * error
             ci = (shift - reach, shift + reach)
-            judged = _judged(ci, margin)
+            verdict = _of_interval(ci, margin)
         means = tuple(sign * mean.get((part, f), math.nan) for f in certified_hz)
-        moves.append(Movement(control, value, means, shift, ci, judged))
-    kind, said = _together(moves, certified_hz[1])
-    return Certified(kind, said, tuple(sign * v for v in sweep), tuple(moves), margin)
+        shifts.append(OptimumShift(by_part[part], means, shift, ci, verdict))
+    cause, sentences = _together(shifts, certified_hz[1])
+    return Robustness(cause, sentences, tuple(sign * v for v in sweep), tuple(shifts), margin)
 
 
-def _judged_without(shift: float) -> Moved:
+def _without_interval(shift: float) -> ShiftVerdict:
     return "no result" if math.isnan(shift) else "unclear"
 
 
-def _judged(ci: tuple[float, float], margin: float) -> Moved:
+def _of_interval(ci: tuple[float, float], margin: float) -> ShiftVerdict:
     """Held where the interval lies inside the margin, moved where zero lies outside it.
 
     A shift that is there but smaller than the margin is held: it does not matter.
@@ -144,17 +172,17 @@ def _judged(ci: tuple[float, float], margin: float) -> Moved:
     return "down" if high < 0.0 else "unclear"
 
 
-def _together(moves: Sequence[Movement], best_hz: float) -> tuple[Kind, tuple[str, ...]]:
+def _together(shifts: Sequence[OptimumShift], best_hz: float) -> tuple[Cause, tuple[str, ...]]:
     """The verdict, and the reasons for it."""
     at = f"The optimum at {number(best_hz)} Hz"
-    moved = [m for m in moves if m.judged in ("up", "down")]
-    open_ = [m for m in moves if m.judged in ("unclear", "no result")]
+    moved = [m for m in shifts if m.verdict in ("up", "down")]
+    open_ = [m for m in shifts if m.verdict in ("unclear", "no result")]
     said = [f"{_listed(moved)}."] if moved else []
     said += [f"Not told: {listed([m.name for m in open_])}."] if open_ else []
-    numerics = [m for m in moved if m.control in ("time_step", "engine")]
-    as_springs = [m for m in moved if _as_springs(m, "stiffness", {"x10": "up", "x0.1": "down"})]
-    as_column = [m for m in moved if _as_springs(m, "bed_depth", {"x2": "down", "x0.5": "up"})]
-    held = [m for m in moved if m.control == "hold"]
+    numerics = [m for m in moved if m.case.control in ("time_step", "engine")]
+    as_springs = [m for m in moved if m.case.control == "stiffness" and m.follows_springs]
+    as_column = [m for m in moved if m.case.control == "bed_depth" and m.follows_springs]
+    held = [m for m in moved if m.case.control == "hold"]
     if numerics:
         first = f"{at} is an artefact of the numerics: it moves with {_names(numerics)}."
         return "artefact of the numerics", (first, *said)
@@ -167,40 +195,36 @@ def _together(moves: Sequence[Movement], best_hz: float) -> tuple[Kind, tuple[st
     if held:
         first = f"{at} is an artefact of what is held constant: it moves with {_names(held)}."
         return "artefact of what is held constant", (first, *said)
-    wanted = [m for m in moves if m.control in MUST_HOLD]
-    asked = {m.control for m in wanted}
-    missing = [c.replace("_", " ") for c in MUST_HOLD if c not in asked]
-    if not missing and all(m.judged == "held" for m in wanted):
+    wanted = [m for m in shifts if m.case.control in MUST_HOLD]
+    missing = [c.replace("_", " ") for c in MUST_HOLD
+               if c not in {m.case.control for m in wanted}]  # fmt: skip
+    if not missing and all(m.verdict == "held" for m in wanted):
         first = (
             f"{at} belongs to the sand: neither what is held constant nor stiffness, time step or "
             "engine moves it by more than the margin."
         )
         return "rearrangement of grains", (first, *said)
     why = [f"{m.name} {'moves it' if m in moved else 'does not tell'}" for m in wanted
-           if m.judged != "held"]  # fmt: skip
+           if m.verdict != "held"]  # fmt: skip
     why += [f"{c} was not asked" for c in missing]
     first = f"Whether the optimum at {number(best_hz)} Hz belongs to the sand is unresolved: "
     return "unresolved", (f"{first}{listed(why)}.", *said)
 
 
-def _as_springs(move: Movement, control: str, direction: dict[str, str]) -> bool:
-    return move.control == control and direction.get(move.value) == move.judged
+def _names(shifts: Sequence[OptimumShift]) -> str:
+    return listed([m.name for m in shifts])
 
 
-def _names(moves: Sequence[Movement]) -> str:
-    return listed([m.name for m in moves])
-
-
-def _listed(moves: Sequence[Movement]) -> str:
-    up, down = ([m for m in moves if m.judged == way] for way in ("up", "down"))
+def _listed(shifts: Sequence[OptimumShift]) -> str:
+    up, down = ([m for m in shifts if m.verdict == way] for way in ("up", "down"))
     said = [f"{way} with {_names(some)}" for way, some in (("up", up), ("down", down)) if some]
     return f"It moves {' and '.join(said)}"
 
 
-def shaken_runs(summary: pd.DataFrame) -> list[str]:
-    """Runs of the small shake."""
+def shaken_runs(summary: pd.DataFrame, cases: Sequence[ControlCase]) -> list[str]:
+    """Finished runs of the small shake."""
     if PART not in summary:
         return []
-    chosen = summary[summary[PART].astype(str).str.startswith(f"{_PREFIX}{_SPECTRUM}")]
-    complete = chosen[finished(chosen)]
-    return [str(run) for run in complete[RUN]]
+    parts = [case.part for case in cases if case.control == _SPECTRUM]
+    shaken = summary[summary[PART].isin(parts) & finished(summary)]
+    return [str(run) for run in shaken[RUN]]

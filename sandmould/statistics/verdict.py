@@ -58,7 +58,7 @@ class Verdict:
         return next((c for c in self.comparisons if c.other == setting.label), None)
 
 
-def judge(
+def compare_settings(
     summary: pd.DataFrame,
     keys: Sequence[str],
     measure: str,
@@ -167,7 +167,7 @@ def sand_notes(
     stage: VibrationStage | None,
     largest_overlap_fraction: float = 0.0,
     seeks_best: bool = True,
-    is_certified: bool = False,
+    is_controlled: bool = False,
 ) -> tuple[str, ...]:
     """What a sweep over sand leaves open: what the vibration held constant, and the springs.
 
@@ -180,7 +180,7 @@ def sand_notes(
         Of all runs, over the smaller radius.
     seeks_best : bool
         Whether the study looks for the best setting.
-    is_certified : bool
+    is_controlled : bool
         Whether its controls have been run.
 
     Returns
@@ -199,7 +199,7 @@ def sand_notes(
             f"The amplitude of {stage.hold} was held constant while the frequency changed; with "
             f"{' or '.join(others)} held instead, another frequency may be best."
         )
-    return (*notes, NOT_TESTED) if seeks_best and not is_certified else tuple(notes)
+    return (*notes, NOT_TESTED) if seeks_best and not is_controlled else tuple(notes)
 
 
 def _is_identical(

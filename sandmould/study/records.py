@@ -29,7 +29,7 @@ from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.plan_files import FIGURES
-from sandmould.study.rounds.ledger import LEDGER, read_ledger
+from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
 
 RECORDS = ROOT / "docs" / "results"
 COPIED = ("runs.tsv", "summary.tsv")
@@ -55,7 +55,7 @@ def _computed_hash(run: Run) -> str:
 
 def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
     """All runs of a study, with those of the rounds that a folder keeps."""
-    ledger = read_ledger(folder, study.study)
+    ledger = read_rounds(folder, study.study)
     return expand(study, ledger.runs, ledger.certified_hz)
 
 
@@ -78,7 +78,7 @@ def record(path: Path, results: Path) -> Path:
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
     failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
     names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
-    names += [LEDGER] if (folder / LEDGER).exists() else []
+    names += [ROUNDS_FILE] if (folder / ROUNDS_FILE).exists() else []
     provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
     kept: dict[str, Any] = {
         "study": str(path),
@@ -177,9 +177,9 @@ def _recompute(name: str, study: str, results: Path) -> list[str]:
     """Run one study again; see ``recompute_smallest``."""
     print(f"computing {name} again", flush=True)
     shutil.rmtree(results / name, ignore_errors=True)
-    if (RECORDS / name / LEDGER).exists():
+    if (RECORDS / name / ROUNDS_FILE).exists():
         (results / name).mkdir(parents=True)
-        shutil.copy(RECORDS / name / LEDGER, results / name / LEDGER)
+        shutil.copy(RECORDS / name / ROUNDS_FILE, results / name / ROUNDS_FILE)
     snakemake = Path(sys.executable).parent / "snakemake"
     command = [str(snakemake), "--cores", "all", "--configfile", study, "--quiet", "rules"]
     subprocess.run(command, cwd=ROOT, check=True)

@@ -17,8 +17,8 @@ from sandmould import ROOT
 from sandmould.statistics.agreement import sweep_part
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.build_plan import RESULTS, open_plan
-from sandmould.study.rounds.decide import next_runs, told
-from sandmould.study.rounds.ledger import read_ledger, write_ledger
+from sandmould.study.rounds.decide import decision_text, next_runs
+from sandmould.study.rounds.round_log import read_rounds, write_rounds
 
 
 def drive(path: Path, options: Sequence[str]) -> int:
@@ -48,10 +48,10 @@ def drive(path: Path, options: Sequence[str]) -> int:
             # Stopped, or broken outside the runs: a run that fails by itself leaves its outcome.
             return 1
         summary = sweep_part(read_summary(folder))
-        ledger = next_runs(read_ledger(folder, study), study, summary, list(swept_keys(summary)))
-        write_ledger(ledger, folder)
-        print(f"\n{told(ledger, study)}", file=sys.stderr, flush=True)
-        if ledger.ended:
+        log = next_runs(read_rounds(folder, study), study, summary, list(swept_keys(summary)))
+        write_rounds(log, folder)
+        print(f"\n{decision_text(log, study)}", file=sys.stderr, flush=True)
+        if log.ended:
             break
     status = _snakemake(path, options, [])
     report = folder / "report.html"

@@ -18,7 +18,7 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.plan.build_plan import Plan
-from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.rounds.round_log import read_rounds
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
@@ -101,7 +101,7 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
     lines = [f"{plan.study.name}: {', '.join(parts)} of {len(plan.runs)} runs"]
     spent_s = sum(status.cpu_s for status in statuses.values())
     lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
-    ledger = read_ledger(folder, plan.study.study)
+    ledger = read_rounds(folder, plan.study.study)
     if plan.study.study.refine.rounds:
         ended = ledger.ended or f"of at most {plan.study.study.refine.rounds}"
         lines.append(f"rounds: {len(ledger.rounds)}, {ended}")

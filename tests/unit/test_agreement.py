@@ -55,7 +55,7 @@ def test_settings_that_differ_in_one_chosen_key_are_compared() -> None:
     found = compare_keys(table, [FORM, "engine.name"], both)
     assert [c.key for c in found].count("engine.name") == 2
     assert len(found) == 4
-    assert {c.agreement.judged for c in found} == {"equivalent"}
+    assert {c.agreement.verdict for c in found} == {"equivalent"}
 
 
 def test_main_effect_compares_at_equal_values_of_what_it_is_averaged_over() -> None:
@@ -69,7 +69,7 @@ def test_main_effect_compares_at_equal_values_of_what_it_is_averaged_over() -> N
     assert (one.first, one.second, one.at) == ("none", "viscous", "")
     assert one.agreement.paired
     assert one.agreement.n == 8
-    assert one.agreement.judged == "equivalent"
+    assert one.agreement.verdict == "equivalent"
     assert one.agreement.difference == pytest.approx(-0.01, abs=0.005)
 
 
@@ -97,7 +97,7 @@ def test_planted_difference_between_engines_is_found(tmp_path: Path) -> None:
     folder = write_twins(tmp_path / "twins", {**EQUAL, "reference": 0.6}, DENSE)
     collected = gather(folder)
     found = compare_study(collected.summary, collected.keys, read_study(folder))
-    judged = {(c.measure, c.first, c.second): c.agreement.judged for c in found}
+    judged = {(c.measure, c.first, c.second): c.agreement.verdict for c in found}
     assert judged[FILL, "lammps", "liggghts"] == "equivalent"
     assert judged[FILL, "lammps", "reference"] == "different"
     assert judged[FILL, "liggghts", "reference"] == "different"
@@ -116,7 +116,7 @@ def test_engine_without_finished_runs_is_not_tested(tmp_path: Path) -> None:
     collected = gather(folder)
     found = compare_study(collected.summary, collected.keys, read_study(folder))
     untested = [c for c in found if "liggghts" in (c.first, c.second)]
-    assert {c.agreement.judged for c in untested} == {"not tested"}
+    assert {c.agreement.verdict for c in untested} == {"not tested"}
     said = agreement_sentences(found, 0.9)
     assert any(s.startswith("Not tested: solid fraction (lammps – liggghts") for s in said)
 
@@ -139,7 +139,7 @@ def test_cross_check_is_compared_at_its_point_alone(tmp_path: Path) -> None:
     assert (fill.first, fill.second, fill.at) == ("reference", "lammps", "50 Hz")
     assert fill.agreement.n == packing.agreement.n == 3
     assert fill.agreement.means == pytest.approx((0.55, 0.85), abs=0.02)
-    assert fill.agreement.judged == "different"
+    assert fill.agreement.verdict == "different"
 
 
 def test_table_is_written_and_reads_back(tmp_path: Path) -> None:

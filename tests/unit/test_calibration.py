@@ -95,12 +95,12 @@ def test_a_second_measure_breaks_the_ridge() -> None:
     asked = Calibration.model_validate({"sands": [{"name": "planted", "targets": targets}]})
     result = calibrate(asked, table, KEYS)
     (one,) = result.sands
-    assert one.found is not None
+    assert one.posterior is not None
     assert one.by_first is not None
     assert one.by_first.correlation < -0.8  # along the ridge
-    assert one.found.sd[0] < 0.5 * one.by_first.sd[0]
-    assert one.found.bits > one.by_first.bits + 1.0
-    assert np.abs(np.array(one.found.mode) - truth[0]).max() < 0.08
+    assert one.posterior.sd[0] < 0.5 * one.by_first.sd[0]
+    assert one.posterior.bits > one.by_first.bits + 1.0
+    assert np.abs(np.array(one.posterior.mode) - truth[0]).max() < 0.08
     assert result.worths[0].measure == "outflow_time_s"
     assert result.worths[0].bits_added > 1.0
 

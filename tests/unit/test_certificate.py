@@ -17,15 +17,15 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.robustness import Certified, certify
-from sandmould.study.definition.certificate import Certificate, frequency_key
+from sandmould.statistics.robustness import Robustness, assess_robustness
+from sandmould.study.definition.certificate import RobustnessChecks, frequency_key
 from sandmould.study.definition.study import Study
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
-from sandmould.study.robustness.controls import SHAKEN_HZ, Case, cases
+from sandmould.study.robustness.controls import BY_FACTOR, SHAKEN_HZ, Case, cases
 from sandmould.study.rounds.decide import choose_certified, next_round
-from sandmould.study.rounds.ledger import Ledger, basis_of, read_ledger, write_ledger
+from sandmould.study.rounds.round_log import RoundLog, basis_of, read_rounds, write_rounds
 
 FREQUENCY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"
@@ -208,23 +208,26 @@ PARTS = ["hold velocity", "hold displacement", "stiffness x0.1", "stiffness x10"
          "bed_depth x2", "time_step x0.5", "engine lammps"]  # fmt: skip
 
 
-def certify_study(table: pd.DataFrame, study: Study) -> Certified:
-    """Judge the controls of a study by its own objective and margin."""
+def assess_study(table: pd.DataFrame, study: Study) -> Robustness:
+    """Assess the controls of a study by its own objective and margin."""
     margin = study.equivalence.margins.get(study.objective.measure)
-    return certify(table, FREQUENCY, CERTIFIED_HZ, study.objective, margin)
+    controlled = tuple(cases(study.certificate, study.scenario, CERTIFIED_HZ[1]))
+    return assess_robustness(table, FREQUENCY, CERTIFIED_HZ, study.objective, margin, controlled)
 
 
-def judged(tmp_path: Path, moved: dict[str, float], sd: float = 0.004) -> Certified:
-    """Judge controls of which some move the optimum to another frequency."""
-    table = planted(lambda part, f: hill(f, moved.get(part, BEST_HZ)), PARTS, sd)
-    return certify_study(table, opened(tmp_path).study)
+def assessed(
+    tmp_path: Path, moved: dict[str, float], sd: float = 0.004, parts: list[str] = PARTS
+) -> Robustness:
+    """Assess controls of which some move the optimum to another frequency."""
+    table = planted(lambda part, f: hill(f, moved.get(part, BEST_HZ)), parts, sd)
+    return assess_study(table, opened(tmp_path).study)
 
 
 def test_an_optimum_that_nothing_moves_belongs_to_the_sand(tmp_path: Path) -> None:
-    found = judged(tmp_path, {})
-    assert found.kind == "rearrangement of grains"
+    found = assessed(tmp_path, {})
+    assert found.cause == "rearrangement of grains"
     assert not found.is_artefact
-    assert {m.judged for m in found.movements} == {"held"}
+    assert {m.verdict for m in found.shifts} == {"held"}
     assert found.sentences[0].startswith("The optimum at 50 Hz belongs to the sand: neither")
 
 
@@ -232,31 +235,46 @@ def test_an_optimum_that_goes_with_the_springs_is_theirs(tmp_path: Path) -> None
     root = 10**0.5
     moved = {"stiffness x0.1": 50 / root, "stiffness x10": 50 * root,
              "bed_depth x0.5": 100.0, "bed_depth x2": 25.0}  # fmt: skip
-    found = judged(tmp_path, moved)
-    assert found.kind == "column resonance of the springs"
+    found = assessed(tmp_path, moved)
+    assert found.cause == "column resonance of the springs"
     assert found.is_artefact
-    way = {m.name: m.judged for m in found.movements}
+    way = {m.name: m.verdict for m in found.shifts}
     assert (way["stiffness x10"], way["stiffness x0.1"]) == ("up", "down")
     # Stiffness alone is not enough to call it a column.
-    alone = judged(tmp_path, {k: v for k, v in moved.items() if "stiffness" in k})
-    assert alone.kind == "unresolved"
+    alone = assessed(tmp_path, {k: v for k, v in moved.items() if "stiffness" in k})
+    assert alone.cause == "unresolved"
     assert "stiffness x0.1 moves it and stiffness x10 moves it" in alone.sentences[0]
 
 
+def test_other_factors_of_the_controls_reach_the_same_verdict(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a control multiplies by is passed on as a number: 8 stands for 10, and 3 for 2."""
+    for control, factors in (("stiffness", (0.125, 8.0)), ("bed_depth", (0.5, 3.0))):
+        monkeypatch.setitem(BY_FACTOR, control, (factors, BY_FACTOR[control][1]))
+    moved = {"stiffness x0.125": 50 / 8**0.5, "stiffness x8": 50 * 8**0.5,
+             "bed_depth x0.5": 100.0, "bed_depth x3": 50 / 3}  # fmt: skip
+    found = assessed(tmp_path, moved, parts=["hold velocity", *moved])
+    assert found.cause == "column resonance of the springs"
+    assert all(s.follows_springs for s in found.shifts if s.case.factor is not None)
+    against = assessed(tmp_path, moved | {"stiffness x8": 50 / 8**0.5}, parts=list(moved))
+    assert [s.follows_springs for s in against.shifts] == [True, False, True, True]
+
+
 def test_what_is_held_and_the_numerics_are_told_apart(tmp_path: Path) -> None:
-    held = judged(tmp_path, {"hold velocity": 70.0, "hold displacement": 100.0})
-    assert held.kind == "artefact of what is held constant"
+    held = assessed(tmp_path, {"hold velocity": 70.0, "hold displacement": 100.0})
+    assert held.cause == "artefact of what is held constant"
     assert "velocity held and displacement held" in held.sentences[0]
-    step = judged(tmp_path, {"hold velocity": 70.0, "time_step x0.5": 75.0})
-    assert step.kind == "artefact of the numerics"
+    step = assessed(tmp_path, {"hold velocity": 70.0, "time_step x0.5": 75.0})
+    assert step.cause == "artefact of the numerics"
     assert "It moves up with velocity held and time step x0.5." in step.sentences[1]
-    both = judged(tmp_path, {"hold velocity": 30.0, "time_step x0.5": 75.0})
+    both = assessed(tmp_path, {"hold velocity": 30.0, "time_step x0.5": 75.0})
     assert both.sentences[1] == "It moves up with time step x0.5 and down with velocity held."
 
 
 def test_noise_leaves_it_unresolved(tmp_path: Path) -> None:
-    found = judged(tmp_path, {}, sd=0.1)
-    assert found.kind == "unresolved"
+    found = assessed(tmp_path, {}, sd=0.1)
+    assert found.cause == "unresolved"
     assert "does not tell" in found.sentences[0]
     assert any(s.startswith("Not told: ") for s in found.sentences)
 
@@ -264,8 +282,8 @@ def test_noise_leaves_it_unresolved(tmp_path: Path) -> None:
 def test_controls_that_were_not_asked_or_failed_keep_it_unresolved(tmp_path: Path) -> None:
     table = planted(lambda part, f: hill(f, BEST_HZ), PARTS[2:6], 0.004)
     table.loc[table["part"] == "control: stiffness x10", "outcome_code"] = 311
-    found = certify_study(table, opened(tmp_path).study)
-    assert found.kind == "unresolved"
+    found = assess_study(table, opened(tmp_path).study)
+    assert found.cause == "unresolved"
     for words in ("stiffness x10 does not tell", "hold was not asked", "engine was not asked"):
         assert words in found.sentences[0]
 
@@ -275,19 +293,19 @@ def test_frequencies_are_chosen_round_the_optimum_and_anew_after_more_rounds(
 ) -> None:
     study = opened(tmp_path, refine={"rounds": 2, "runs": 3}).study
     table = planted(lambda part, f: hill(f, BEST_HZ), [], 0.002)
-    ledger = choose_certified(Ledger(basis_of(study)), study, table, [FREQUENCY])
+    ledger = choose_certified(RoundLog(basis_of(study)), study, table, [FREQUENCY])
     low, best, high = ledger.certified_hz
     assert best == pytest.approx(BEST_HZ, rel=0.06)
     assert (low, high) == pytest.approx((best / 1.4, best * 1.4), rel=0.01)
-    write_ledger(ledger, tmp_path)
-    assert read_ledger(tmp_path, study) == ledger
+    write_rounds(ledger, tmp_path)
+    assert read_rounds(tmp_path, study) == ledger
     assert next_round(ledger, study, table, [FREQUENCY]).certified_hz == ()
 
 
 def test_a_swept_frequency_is_found() -> None:
     sweep = open_study(ROOT / "config" / "studies" / "tube_demo.yaml").study.sweep
     assert frequency_key(sweep) == FREQUENCY
-    assert Certificate().controls == ()
+    assert RobustnessChecks().controls == ()
 
 
 def shaken_mass(frequency_hz: float, own_hz: float, damping: float) -> float:

@@ -23,7 +23,7 @@ from sandmould.study.kinds.sand.measure import (
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import read_run, write_plan
-from sandmould.study.rounds.ledger import LEDGER, Ledger, Round, basis_of, write_ledger
+from sandmould.study.rounds.round_log import ROUNDS_FILE, Round, RoundLog, basis_of, write_rounds
 from tests.scenes import tube_scene
 
 R = 0.002
@@ -117,15 +117,15 @@ def test_record_of_a_study_with_rounds_rests_on_the_runs_they_added(
     folder = tmp_path / "tube_certified"
     folder.mkdir()
     one = Round((({"vibration.0.frequency_hz": 62.0}, 1),), {}, {}, 0.1)
-    ledger = Ledger(basis_of(opened.study), (one,), "All is done.", (43.0, 60.0, 84.0))
-    write_ledger(ledger, folder)
+    ledger = RoundLog(basis_of(opened.study), (one,), "All is done.", (43.0, 60.0, 84.0))
+    write_rounds(ledger, folder)
     runs = records.runs_in(opened, folder)
     assert len(runs) > len(expand(opened)) + 1
     kept = {"study": study, "study_sha256": records.study_hash(runs)}
     (folder / "record.json").write_text(json.dumps(kept))
     monkeypatch.setattr(records, "RECORDS", tmp_path)
     assert records.stale_records() == [("tube_certified", "")]
-    (folder / LEDGER).unlink()
+    (folder / ROUNDS_FILE).unlink()
     assert "changed" in records.stale_records()[0][1]
 
 

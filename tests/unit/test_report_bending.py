@@ -17,7 +17,7 @@ from sandmould.report.bending import TIP, bending_pages, deflection_chart
 from sandmould.report.page import write_report
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import Verdict, judge
+from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, collect, gather
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.sand.measure import write_exports, write_measures
@@ -58,7 +58,7 @@ def text(study: Path) -> str:
 
 def gathered(study: Path) -> tuple[Collected, Verdict]:
     collected = gather(study)
-    return collected, judge(collected.summary, (), TIP, "neither")
+    return collected, compare_settings(collected.summary, (), TIP, "neither")
 
 
 def test_the_band_lies_between_the_least_and_the_greatest_run(study: Path) -> None:
@@ -66,7 +66,7 @@ def test_the_band_lies_between_the_least_and_the_greatest_run(study: Path) -> No
     assert chart is not None
     (area,) = chart.areas
     np.testing.assert_allclose(area.x, [-0.02, 0.0, 0.0, 0.02], atol=1e-12)
-    (mean,) = (line for line in chart.lines if line.thick)
+    (mean,) = (line for line in chart.lines if line.style == "mean")
     tip_mm = mean.xy[1, 1]
     assert area.low == pytest.approx(0.8 * tip_mm * np.array([0.0, 1.0, 1.0, 0.5]))
     assert area.high == pytest.approx(1.2 * tip_mm * np.array([0.0, 1.0, 1.0, 0.5]))

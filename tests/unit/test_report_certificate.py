@@ -11,12 +11,12 @@ import pandas as pd
 import pytest
 
 from sandmould.report.page import write_report
-from sandmould.report.robustness import certificate_pages
+from sandmould.report.robustness import robustness_pages
 from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.definition.run import Run
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKE_G, SHAKEN_HZ, cases
-from sandmould.study.rounds.ledger import Ledger, basis_of, write_ledger
+from sandmould.study.rounds.round_log import RoundLog, basis_of, write_rounds
 from tests.unit.report_study import KEY, scenario, write_run
 
 CERTIFIED_HZ = (35.7, 50.0, 70.0)
@@ -58,7 +58,7 @@ def write_certified(folder: Path, moved: dict[str, float]) -> Path:
         write_run(folder / "runs" / run.run, run, value, False, 60, 8)
         if "spectrum" in run.part:
             shaken_loads(run).to_csv(folder / "runs" / run.run / "loads.tsv", sep="\t", index=False)
-    write_ledger(Ledger(basis_of(study), (), "The sweep is done.", CERTIFIED_HZ), folder)
+    write_rounds(RoundLog(basis_of(study), (), "The sweep is done.", CERTIFIED_HZ), folder)
     return folder
 
 
@@ -102,9 +102,9 @@ def test_an_artefact_is_the_first_sentence_of_the_report(tmp_path: Path) -> None
 def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Path) -> None:
     folder = write_certified(tmp_path / "sound", {})
     collected = gather(folder)
-    pages = certificate_pages(folder, read_study(folder), collected, scenario(50.0))
+    pages = robustness_pages(folder, read_study(folder), collected, scenario(50.0))
     assert pages is not None
-    assert pages.certified.kind == "rearrangement of grains"
+    assert pages.assessment.cause == "rearrangement of grains"
     names = [row[0].text for row in pages.table.rows]
     assert names == [
         "the sweep itself", "displacement held", "velocity held", "stiffness x0.1", "stiffness x10",
@@ -123,5 +123,5 @@ def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Pat
 def test_there_is_no_certificate_before_its_frequencies_are_chosen(tmp_path: Path) -> None:
     folder = write_certified(tmp_path / "early", {})
     study = read_study(folder)
-    write_ledger(Ledger(basis_of(study)), folder)
-    assert certificate_pages(folder, study, gather(folder), scenario(50.0)) is None
+    write_rounds(RoundLog(basis_of(study)), folder)
+    assert robustness_pages(folder, study, gather(folder), scenario(50.0)) is None

@@ -154,3 +154,26 @@ def test_means_have_the_digits_of_their_margin() -> None:
     assert with_margin(0.54217, 0.0131) == "0.542 ± 0.013"
     assert with_margin(0.54217, math.nan) == "0.542"
     assert with_margin(1830.4, 12.3) == "1830 ± 12"
+
+
+@pytest.mark.parametrize("drawing", [WIDE, NARROW])
+def test_logarithmic_axes_have_decades_of_one_length(drawing: tuple[int, int]) -> None:
+    marks = tuple(Mark(x, y, "mean", label=f"{x:g}") for x, y in ((1, 0.01), (10, 1), (100, 100)))
+    none = Mark(10.0, 0.0, "mean")
+    laid = lay_out(
+        Chart("time, s", "error, %", "alt", marks=(*marks, none), is_logarithmic=True), drawing
+    )
+    assert [mark.mark for mark in laid.marks] == list(marks)
+    for places in ([m.x for m in laid.marks], [m.y for m in laid.marks]):
+        assert np.diff(places, 2) == pytest.approx([0.0])
+    assert [t.text for t in laid.x_ticks if t.text in ("1", "10", "100")] == ["1", "10", "100"]
+    assert {"0.01", "1", "100"} <= {t.text for t in laid.y_ticks}
+    assert laid.x.start < laid.marks[0].x < laid.marks[-1].x < laid.x.end
+    assert math.isnan(laid.y.at(0.0))
+
+
+def test_one_value_on_logarithmic_axes_has_ticks_beside_it() -> None:
+    one = Chart("x", "y", "alt", marks=(Mark(0.2, 3e-4, "mean"),), is_logarithmic=True)
+    laid = lay_out(one, WIDE)
+    assert laid.x.low < 0.2 < laid.x.high
+    assert laid.y_ticks or laid.x_ticks

@@ -12,7 +12,7 @@ import pytest
 
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.page import write_report
-from sandmould.statistics.verdict import judge
+from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.definition.study import Study
 from tests.unit.report_study import DURATION_S, KEY, scenario, write_study
@@ -36,7 +36,9 @@ def pages(folder: Path, height: float, spread: float, **objective: object) -> Fi
     tree["sweep"]["keys"] = {KEY: list(HZ)}
     study = Study.model_validate(tree)
     collected = gather(folder)
-    verdict = judge(collected.summary, collected.keys, "tube_fill_fraction", "larger", ())
+    verdict = compare_settings(
+        collected.summary, collected.keys, "tube_fill_fraction", "larger", ()
+    )
     found = filling_pages(study, collected, verdict, scenario(BEST_HZ))
     assert found is not None
     return found
@@ -108,5 +110,5 @@ def test_its_figures_are_files_too(tmp_path: Path) -> None:
 def test_other_measures_have_no_filling(tmp_path: Path) -> None:
     folder = write_study(tmp_path / "tube")
     collected = gather(folder)
-    verdict = judge(collected.summary, collected.keys, "solid_fraction", "larger", ())
+    verdict = compare_settings(collected.summary, collected.keys, "solid_fraction", "larger", ())
     assert filling_pages(read_study(folder), collected, verdict, scenario(50.0)) is None

@@ -13,7 +13,7 @@ import pytest
 from sandmould import ROOT
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.animation import ABSENT, Film, make_film
-from sandmould.report.figures import cut_m, scene_outline
+from sandmould.report.figures import cut_m, section_of
 from sandmould.study.kinds.sand.moments import list_moments, nearest
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -38,11 +38,11 @@ def unpack(film: Film) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_page_shows_the_section_of_a_mesh_where_it_is_cut_open() -> None:
     (run,) = expand(open_study(ROOT / "config" / "studies" / "bracket_small.yaml"))
     assert cut_m(run.scenario) == pytest.approx(0.05)
-    outline = scene_outline(run.scenario, 0.12)
-    (solid,) = outline.solids
+    section = section_of(run.scenario, 0.12)
+    (solid,) = section.solids_m
     assert solid.min(axis=0) == pytest.approx([0.03, 0.037], abs=1e-4)
     assert solid.max(axis=0) == pytest.approx([0.11, 0.053], abs=1e-4)
-    assert outline.bores == ()
+    assert section.bores_m == ()
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

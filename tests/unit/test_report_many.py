@@ -11,7 +11,7 @@ import pytest
 from sandmould.report import figures, thinning
 from sandmould.report.page import write_report
 from sandmould.report.thinning import drawn_note, drawn_part, listed_runs, listed_settings
-from sandmould.statistics.verdict import Verdict, judge
+from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, collect
 from tests.unit.report_study import FAILED, write_study
 
@@ -37,7 +37,7 @@ def found() -> tuple[Collected, Verdict]:
     summary.loc[list(FAILED_ROWS), "outcome_code"] = 3
     curves = summary[["run", "fill"]].assign(vibration_time_s=0.0, time_s=0.0)
     collected = Collected(summary, curves, ("frequency_hz",))
-    return collected, judge(summary, collected.keys, "fill")
+    return collected, compare_settings(summary, collected.keys, "fill")
 
 
 def test_settings_are_drawn_over_the_whole_sweep_with_the_best(

@@ -21,8 +21,14 @@ from sandmould.study.collect import collect
 from sandmould.study.plan.build_plan import announce, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.rounds.decide import next_round, told, why_enough
-from sandmould.study.rounds.ledger import LEDGER, Ledger, basis_of, read_ledger, write_ledger
+from sandmould.study.rounds.decide import decision_text, next_round, why_enough
+from sandmould.study.rounds.round_log import (
+    ROUNDS_FILE,
+    RoundLog,
+    basis_of,
+    read_rounds,
+    write_rounds,
+)
 
 FREQUENCY, GRAVITY = "vibration.0.frequency_hz", "vibration.0.acceleration_g"
 FILL = "tube_fill_fraction"
@@ -173,23 +179,25 @@ def test_rounds_are_appended_to_the_runs_and_redo_none(tmp_path: Path) -> None:
 def test_a_ledger_is_read_back_and_another_studys_is_kept_aside(tmp_path: Path) -> None:
     study = opened(tmp_path).study
     runs = table(list(COARSE), 2, 0.01)
-    ledger = next_round(Ledger(basis_of(study)), study, runs, [FREQUENCY])
+    ledger = next_round(RoundLog(basis_of(study)), study, runs, [FREQUENCY])
     assert len(ledger.runs) == 4
-    assert told(ledger, study).startswith("Round 1 of at most 3: best so far is frequency ")
-    write_ledger(ledger, tmp_path)
-    assert read_ledger(tmp_path, study) == ledger
+    assert decision_text(ledger, study).startswith(
+        "Round 1 of at most 3: best so far is frequency "
+    )
+    write_rounds(ledger, tmp_path)
+    assert read_rounds(tmp_path, study) == ledger
     # More rounds go on with those that are there; another scene begins anew and loses nothing.
     for more in ({"refine": {"rounds": 9}}, {"replicates": 4}):
-        assert read_ledger(tmp_path, opened(tmp_path, **more).study) == ledger
+        assert read_rounds(tmp_path, opened(tmp_path, **more).study) == ledger
     other = opened(tmp_path, scenario={"sand": {"size_scale": 9}}).study
-    fresh = read_ledger(tmp_path, other)
+    fresh = read_rounds(tmp_path, other)
     assert fresh.rounds == ()
-    write_ledger(fresh, tmp_path)
+    write_rounds(fresh, tmp_path)
     kept = json.loads((tmp_path / f"rounds_{ledger.basis[:6]}.json").read_text())
     assert len(kept["rounds"]) == 1
-    (tmp_path / LEDGER).write_text('{"basis": 1}')
+    (tmp_path / ROUNDS_FILE).write_text('{"basis": 1}')
     with pytest.raises(BadInputError, match=r"rounds.json: rounds = .* as the study wrote it"):
-        read_ledger(tmp_path, study)
+        read_rounds(tmp_path, study)
 
 
 @pytest.mark.parametrize(
@@ -252,7 +260,7 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
     # Three rounds of four runs after the ten of the sweep, then the controls, each computed once.
     assert calls == [["results/trial/summary.tsv"]] * 4 + [[]]
     assert len(computed) == len(set(computed))
-    ledger = json.loads((tmp_path / "results" / "trial" / LEDGER).read_text())
+    ledger = json.loads((tmp_path / "results" / "trial" / ROUNDS_FILE).read_text())
     assert ledger["ended"] == "All 3 rounds are done."
     low, best, high = ledger["certified_hz"]
     rows = pd.read_csv("results/trial/runs.tsv", sep="\t")

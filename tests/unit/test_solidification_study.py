@@ -151,7 +151,7 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     assert "Stand-ins by their sources" in page
     assert "casting.solidus_k" in page
     names = {path.name for path in (folder / "figures").iterdir()}
-    assert {"fields.png", "error_cost.png", "curves.svg"} <= names
+    assert {"fields.png", "error_cost.svg", "curves.svg"} <= names
     assert Image.open(folder / "figures" / "fields.png").width > 200
 
 

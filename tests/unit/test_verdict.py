@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.statistics.verdict import NOT_TESTED, judge, rank_runs, sand_notes
+from sandmould.statistics.verdict import NOT_TESTED, compare_settings, rank_runs, sand_notes
 
 KEY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"
@@ -39,7 +39,7 @@ WINNER = table({25: [0.30, 0.32, 0.31], 50: [0.60, 0.63, 0.61], 100: [0.40, 0.43
 
 
 def test_planted_winner_is_resolved() -> None:
-    verdict = judge(WINNER, [KEY], FILL)
+    verdict = compare_settings(WINNER, [KEY], FILL)
     assert verdict.resolved
     assert verdict.best is not None
     assert verdict.runner_up is not None
@@ -50,7 +50,7 @@ def test_planted_winner_is_resolved() -> None:
 
 
 def test_paired_interval_by_hand() -> None:
-    verdict = judge(WINNER, [KEY], FILL)
+    verdict = compare_settings(WINNER, [KEY], FILL)
     apart = np.array([0.60 - 0.40, 0.63 - 0.43, 0.61 - 0.395])
     # 95 % over two comparisons: 0.05 / 2 in both tails together
     reach = stats.t.ppf(1 - 0.0125, 2) * apart.std(ddof=1) / math.sqrt(3)
@@ -64,16 +64,16 @@ def test_spread_that_replicates_share_is_taken_out() -> None:
     paired = table(
         {25: shared, 50: [v + d for v, d in zip(shared, (0.04, 0.05, 0.06), strict=True)]}
     )
-    assert judge(paired, [KEY], FILL).resolved
+    assert compare_settings(paired, [KEY], FILL).resolved
     unlike = paired.assign(seed=range(6))
-    verdict = judge(unlike, [KEY], FILL)
+    verdict = compare_settings(unlike, [KEY], FILL)
     assert not verdict.resolved
     assert not verdict.comparisons[0].paired
 
 
 def test_unpaired_settings_are_compared_by_welch() -> None:
     summary = table({25: [0.30, 0.32, 0.31, None], 50: [0.40, None, 0.45, 0.41]})
-    verdict = judge(summary, [KEY], FILL)
+    verdict = compare_settings(summary, [KEY], FILL)
     expected = stats.ttest_ind([0.40, 0.45, 0.41], [0.30, 0.32, 0.31], equal_var=False)
     assert not verdict.comparisons[0].paired
     assert verdict.p == pytest.approx(expected.pvalue)
@@ -83,7 +83,7 @@ def test_unpaired_settings_are_compared_by_welch() -> None:
 
 def test_tie_is_not_resolved() -> None:
     summary = table({25: [0.50, 0.53, 0.48], 50: [0.51, 0.50, 0.52], 100: [0.1, 0.2, 0.15]})
-    verdict = judge(summary, [KEY], FILL)
+    verdict = compare_settings(summary, [KEY], FILL)
     assert not verdict.resolved
     assert verdict.sentences[0].startswith("Not resolved:")
     assert "cannot be told apart from 25 Hz at 95 %" in verdict.sentences[0]
@@ -93,14 +93,16 @@ def test_tie_is_not_resolved() -> None:
 def test_noise_alone_is_seldom_resolved() -> None:
     rng = np.random.default_rng(3)
     tries = [
-        judge(table({f: rng.normal(0.5, 0.02, 4).tolist() for f in (25, 50, 75, 100)}), [KEY], FILL)
+        compare_settings(
+            table({f: rng.normal(0.5, 0.02, 4).tolist() for f in (25, 50, 75, 100)}), [KEY], FILL
+        )
         for _ in range(80)
     ]
     assert sum(v.resolved for v in tries) <= 6
 
 
 def test_single_replicates_are_not_resolved() -> None:
-    verdict = judge(table({25: [0.1], 50: [0.9]}), [KEY], FILL)
+    verdict = compare_settings(table({25: [0.1], 50: [0.9]}), [KEY], FILL)
     assert not verdict.resolved
     assert verdict.best is not None
     assert math.isnan(verdict.best.sd)
@@ -110,7 +112,7 @@ def test_single_replicates_are_not_resolved() -> None:
 
 
 def test_identical_replicates_are_no_replicates() -> None:
-    verdict = judge(table({25: [0.1, 0.1, 0.1], 50: [0.9, 0.9, 0.9]}), [KEY], FILL)
+    verdict = compare_settings(table({25: [0.1, 0.1, 0.1], 50: [0.9, 0.9, 0.9]}), [KEY], FILL)
     assert not verdict.resolved
     assert any("check that the seed reaches the sand" in c for c in verdict.caveats)
 
@@ -118,15 +120,15 @@ def test_identical_replicates_are_no_replicates() -> None:
 def test_setting_too_thin_to_test_does_not_block_but_is_told() -> None:
     summary = pd.concat([WINNER, table({75: [0.59]})], ignore_index=True)
     # its mean is the second highest: nothing is resolved against it
-    assert not judge(summary, [KEY], FILL).resolved
+    assert not compare_settings(summary, [KEY], FILL).resolved
     low = pd.concat([WINNER, table({75: [0.2]})], ignore_index=True)
-    verdict = judge(low, [KEY], FILL)
+    verdict = compare_settings(low, [KEY], FILL)
     assert verdict.resolved
     assert any("75 Hz" in c for c in verdict.caveats)
 
 
 def test_all_failed() -> None:
-    verdict = judge(table({25: [None, None], 50: [None, None]}), [KEY], FILL)
+    verdict = compare_settings(table({25: [None, None], 50: [None, None]}), [KEY], FILL)
     assert verdict.sentences == (
         "Not resolved: no run finished with a value of the fill of the tube.",
     )
@@ -136,12 +138,12 @@ def test_all_failed() -> None:
 
 
 def test_measure_that_no_run_has() -> None:
-    assert judge(WINNER, [KEY], "pipe_fill_fraction").best is None
+    assert compare_settings(WINNER, [KEY], "pipe_fill_fraction").best is None
 
 
 def test_one_setting_has_nothing_to_compare_with() -> None:
     summary = table({50: [0.4, 0.41, 0.42]}).drop(columns=KEY)
-    verdict = judge(summary, [], FILL)
+    verdict = compare_settings(summary, [], FILL)
     assert verdict.sentences[0].startswith("Not resolved: nothing to compare with.")
     assert verdict.settings[0].n == 3
     assert verdict.settings[0].ci_half_width == pytest.approx(
@@ -150,13 +152,13 @@ def test_one_setting_has_nothing_to_compare_with() -> None:
 
 
 def test_best_at_the_edge_is_told() -> None:
-    caveats = judge(table({25: [0.9, 0.91], 50: [0.1, 0.12]}), [KEY], FILL).caveats
+    caveats = compare_settings(table({25: [0.9, 0.91], 50: [0.1, 0.12]}), [KEY], FILL).caveats
     assert any("25 Hz, is the lowest one swept" in c for c in caveats)
-    assert not any("swept" in c for c in judge(WINNER, [KEY], FILL).caveats)
+    assert not any("swept" in c for c in compare_settings(WINNER, [KEY], FILL).caveats)
 
 
 def test_smaller_can_be_better() -> None:
-    verdict = judge(WINNER, [KEY], FILL, "smaller")
+    verdict = compare_settings(WINNER, [KEY], FILL, "smaller")
     assert verdict.resolved
     assert verdict.best is not None
     assert verdict.best.label == "25 Hz"
@@ -169,7 +171,7 @@ def test_smaller_can_be_better() -> None:
 def test_settings_of_several_keys_and_of_words() -> None:
     second = WINNER.assign(**{"vibration.0.hold": "velocity"})
     both = pd.concat([WINNER.assign(**{"vibration.0.hold": "acceleration"}), second])
-    verdict = judge(both.reset_index(drop=True), [KEY, "vibration.0.hold"], FILL)
+    verdict = compare_settings(both.reset_index(drop=True), [KEY, "vibration.0.hold"], FILL)
     assert len(verdict.settings) == 6
     assert verdict.settings[0].label == "frequency 25 Hz, hold acceleration"
     assert not verdict.resolved
@@ -188,7 +190,7 @@ def test_notes_say_what_was_held_and_what_was_not_tested() -> None:
     assert notes[-1] == NOT_TESTED
     assert sand_notes(["sand.density_kg_m3"], stage, 0.04) == (NOT_TESTED,)
     assert "overlapped by up to 21 %" in sand_notes([], None, 0.21)[0]
-    assert judge(WINNER, [KEY], FILL, notes=notes).caveats[-1] == NOT_TESTED
+    assert compare_settings(WINNER, [KEY], FILL, notes=notes).caveats[-1] == NOT_TESTED
 
 
 def test_intervals_and_p_values_are_those_of_the_formulae() -> None:
@@ -201,7 +203,7 @@ def test_intervals_and_p_values_are_those_of_the_formulae() -> None:
         summary = table(rows)
         if trial % 2:
             summary["seed"] = range(len(summary))
-        verdict = judge(summary, [KEY], FILL)
+        verdict = compare_settings(summary, [KEY], FILL)
         best = verdict.best
         assert best is not None
         x = np.array(rows[int(best.values[KEY])])
@@ -223,7 +225,7 @@ def test_intervals_and_p_values_are_those_of_the_formulae() -> None:
 def test_one_constant_side_is_compared_with_the_other() -> None:
     summary = table({25: [0.3, 0.3, 0.3], 50: [0.6, 0.63, 0.62]})
     summary["seed"] = range(6)
-    (comparison,) = judge(summary, [KEY], FILL).comparisons
+    (comparison,) = compare_settings(summary, [KEY], FILL).comparisons
     error = np.std([0.6, 0.63, 0.62], ddof=1) / math.sqrt(3)
     reach = stats.t.ppf(0.975, 2) * error
     apart = (0.6 + 0.63 + 0.62) / 3 - 0.3

@@ -19,7 +19,7 @@ class Target(Section):
     )  # fmt: skip
 
 
-class Sand(Section):
+class TargetSand(Section):
     """One real sand: what was measured on it, and the material that is made of that."""
 
     name: str = quantity(..., "Name of the material that is written.", source="user", pattern=NAME)
@@ -36,7 +36,9 @@ class Sand(Section):
 class Calibration(Section):
     """Sands whose two swept keys are found from what was measured on them."""
 
-    sands: tuple[Sand, ...] = Field((), description="The sands; none asks for no calibration.")
+    sands: tuple[TargetSand, ...] = Field(
+        (), description="The sands; none asks for no calibration."
+    )
     also: tuple[Annotated[str, Field(pattern=NAME)], ...] = Field(
         (),
         description="Finished studies that sweep the same two keys over another scene; their "

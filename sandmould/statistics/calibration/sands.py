@@ -15,7 +15,7 @@ from sandmould.runs.columns import CPU_S
 from sandmould.runs.files import write_text
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.calibration.config import Calibration, Sand
+from sandmould.statistics.calibration.config import Calibration, TargetSand
 from sandmould.statistics.calibration.information import Worth, worths
 from sandmould.statistics.calibration.posterior import (
     IsoLine,
@@ -38,8 +38,8 @@ CANDIDATES = (
 class CalibratedSand:
     """What is known of one sand."""
 
-    sand: Sand
-    found: Posterior | None
+    sand: TargetSand
+    posterior: Posterior | None
     """None where ``problem`` says why."""
     by_first: Posterior | None
     """From the first target alone."""
@@ -91,8 +91,8 @@ def calibrate(
             left_out.append(str(error))
             continue
         tables[measure] = table
-    sands = tuple(_one(sand, emulators, keys) for sand in calibration.sands)
-    first = next((next(iter(s.sand.targets)) for s in sands if s.found is not None), "")
+    sands = tuple(_calibrate_one(sand, emulators, keys) for sand in calibration.sands)
+    first = next((next(iter(s.sand.targets)) for s in sands if s.posterior is not None), "")
     # What the runs that give the first measure tell besides costs nothing more.
     cpu_s = {
         measure: 0.0 if table is tables[first] else float(table[CPU_S].mean())
@@ -115,7 +115,9 @@ def _measures(
                 yield prefix + column, table, column
 
 
-def _one(sand: Sand, emulators: Mapping[str, Emulator], keys: tuple[str, str]) -> CalibratedSand:
+def _calibrate_one(
+    sand: TargetSand, emulators: Mapping[str, Emulator], keys: tuple[str, str]
+) -> CalibratedSand:
     missing = [measure for measure in sand.targets if measure not in emulators]
     if missing:
         valid = f"valid is one of {', '.join(emulators) or 'none'}, what the runs tell"
@@ -133,25 +135,27 @@ def _one(sand: Sand, emulators: Mapping[str, Emulator], keys: tuple[str, str]) -
 
 
 def material_text(
-    one: CalibratedSand, keys: tuple[str, str], scenario: Scenario, study: str
+    calibrated: CalibratedSand, keys: tuple[str, str], scenario: Scenario, study: str
 ) -> str:
     """A calibrated sand as a material file: the study's sand with two values found.
 
     Parameters
     ----------
-    one : CalibratedSand
+    calibrated : CalibratedSand
         With a posterior.
     keys : tuple of str
     scenario : Scenario
         Of any run: all but the swept keys is the same.
     study : str
     """
-    assert one.found is not None
+    assert calibrated.posterior is not None
     parts = {"sand", "contact", "background_damping"}
     tree: dict[str, Any] = scenario.model_dump(mode="json", include=parts, exclude_none=True)
-    known = [*one.sand.targets.items(), *one.sand.assumed.items()]
+    known = [*calibrated.sand.targets.items(), *calibrated.sand.assumed.items()]
     measured = ", ".join(f"{m} {t.value:g} with sd {t.sd:g}" for m, t in known)
-    for key, value, sd in zip(keys, one.found.mode, one.found.sd, strict=True):
+    for key, value, sd in zip(
+        keys, calibrated.posterior.mode, calibrated.posterior.sd, strict=True
+    ):
         *path, last = key.split(".")
         section = tree
         for name in path:
@@ -164,7 +168,7 @@ def material_text(
         }
     head = (
         f"# Written by the study {study}: the sand whose {measured}.\n"
-        f"# Correlation of the two calibrated values: {one.found.correlation:.2f}.\n"
+        f"# Correlation of the two calibrated values: {calibrated.posterior.correlation:.2f}.\n"
     )
     return head + yaml.safe_dump(tree, sort_keys=False, allow_unicode=True, width=100)
 
@@ -173,10 +177,10 @@ def write_materials(result: Calibrated, scenario: Scenario, study: str, folder: 
     """Write the material of every sand that was found, each moved into place last."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for one in result.sands:
-        if one.found is None:
+    for calibrated in result.sands:
+        if calibrated.posterior is None:
             continue
-        path = folder / f"{one.sand.name}.yaml"
-        write_text(path, material_text(one, result.keys, scenario, study))
+        path = folder / f"{calibrated.sand.name}.yaml"
+        write_text(path, material_text(calibrated, result.keys, scenario, study))
         written.append(path)
     return written

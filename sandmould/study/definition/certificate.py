@@ -20,7 +20,7 @@ Control = Literal[
 ]  # fmt: skip
 
 
-class Certificate(Section):
+class RobustnessChecks(Section):
     """Controls at three frequencies round the optimum, which tell the sand from the model."""
 
     controls: tuple[Control, ...] = quantity(
@@ -48,23 +48,23 @@ def frequency_key(sweep: Sweep) -> str:
 
 
 def round_best_hz(best_hz: float, ratio: float) -> tuple[float, ...]:
-    """Frequencies of a certificate: the best in the middle."""
+    """Frequencies of the controls: the best in the middle."""
     return tuple(float(f"{best_hz * by:.3g}") for by in (1 / ratio, 1.0, ratio))
 
 
-def provisional_hz(certificate: Certificate, sweep: Sweep, scenario: Section) -> tuple[float, ...]:
+def provisional_hz(checks: RobustnessChecks, sweep: Sweep, scenario: Section) -> tuple[float, ...]:
     """Frequencies for a trial of the controls before the best is known; none without controls."""
-    if not certificate.controls:
+    if not checks.controls:
         return ()
     swept = sorted(float(p[frequency_key(sweep)]) for p in points(sweep, scenario))
-    return round_best_hz(swept[len(swept) // 2], certificate.ratio)
+    return round_best_hz(swept[len(swept) // 2], checks.ratio)
 
 
 def problems(
-    certificate: Certificate, sweep: Sweep, scenario: Scenario, better: str
+    checks: RobustnessChecks, sweep: Sweep, scenario: Scenario, better: str
 ) -> Iterator[Problem]:
-    """List what is wrong with the certificate of a study whose sweep has no problems."""
-    if not certificate.controls:
+    """List what is wrong with the robustness checks of a study whose sweep has no problems."""
+    if not checks.controls:
         return
     if not frequency_key(sweep):
         valid = "one swept key, a frequency such as vibration.0.frequency_hz"
@@ -74,14 +74,14 @@ def problems(
         yield Problem("sweep", f"{sweep.number_of_points} points", valid)
     if better == "neither":
         yield Problem(
-            "certificate.controls", list(certificate.controls), "absent: nothing is to be best"
+            "certificate.controls", list(checks.controls), "absent: nothing is to be best"
         )
-    for i, control in enumerate(certificate.controls):
+    for i, control in enumerate(checks.controls):
         where = f"certificate.controls.{i}"
-        if control in certificate.controls[:i]:
+        if control in checks.controls[:i]:
             yield Problem(where, control, "each control once")
-        if control == "engine" and certificate.engine == scenario.engine.name:
+        if control == "engine" and checks.engine == scenario.engine.name:
             valid = f"another engine than the study's own, {scenario.engine.name}"
-            yield Problem("certificate.engine", certificate.engine, valid)
+            yield Problem("certificate.engine", checks.engine, valid)
         if control == "tube_length" and not any(isinstance(o, Tube) for o in scenario.obstacles):
             yield Problem(where, control, "a control of what the scene has: there is no tube")

@@ -13,7 +13,7 @@ from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.calibration.config import Calibration
 from sandmould.statistics.config import Equivalence, Objective
-from sandmould.study.definition.certificate import Certificate
+from sandmould.study.definition.certificate import RobustnessChecks
 from sandmould.study.definition.refinement import Refinement
 from sandmould.study.definition.sweep import Sweep
 
@@ -79,8 +79,8 @@ class Study(Section):
         Refinement(),
         description="Rounds of further runs round the optimum; replaced with the sweep.",
     )
-    certificate: Certificate = Field(
-        Certificate(),
+    certificate: RobustnessChecks = Field(
+        RobustnessChecks(),
         description="Controls round the best frequency; replaced with the sweep.",
     )
     calibration: Calibration = Field(

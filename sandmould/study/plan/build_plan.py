@@ -21,7 +21,7 @@ from sandmould.study.plan.batches import Batch, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.plan_files import plan_table, write_plan, write_study
-from sandmould.study.rounds.ledger import read_ledger
+from sandmould.study.rounds.round_log import read_rounds
 
 RESULTS = Path("results")
 DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
@@ -125,7 +125,7 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         With one sentence a problem; a missing engine is one of them.
     """
     study = open_study(path)
-    ledger = read_ledger(results / study.name, study.study)
+    ledger = read_rounds(results / study.name, study.study)
     runs = expand(study, ledger.runs, ledger.certified_hz)
     problems: dict[str, Problem] = {}
     # Controls come hours later, at frequencies that are not known yet: they are tried at others.

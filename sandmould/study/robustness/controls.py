@@ -12,7 +12,8 @@ from sandmould.scenario.box import Tube
 from sandmould.scenario.contact import Contact
 from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.definition.certificate import Certificate, Control
+from sandmould.statistics.robustness import ControlCase
+from sandmould.study.definition.certificate import RobustnessChecks
 
 SHAKEN_HZ = tuple(float(f"{f:.3g}") for f in np.geomspace(12.0, 400.0, 16))
 """Frequencies of the small shake."""
@@ -24,46 +25,39 @@ Change = Callable[[Scenario], Scenario]
 
 
 @dataclass(frozen=True)
-class Case:
-    """One value of a control."""
+class Case(ControlCase):
+    """One case of a control with what it changes in the scene."""
 
-    control: Control
-    value: str
     change: Change
     places: tuple[int, ...] = (0, 1, 2)
     """Which of the three frequencies are run."""
 
-    @property
-    def part(self) -> str:
-        """What it is called in ``runs.tsv``."""
-        return f"control: {self.control} {self.value}"
 
-
-def cases(certificate: Certificate, scenario: Scenario, best_hz: float) -> Iterator[Case]:
-    """Cases of all controls of a certificate.
+def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Iterator[Case]:
+    """Cases of all controls of a study.
 
     Parameters
     ----------
-    certificate : Certificate
+    checks : RobustnessChecks
     scenario : Scenario
         Of the study.
     best_hz : float, Hz
         The middle frequency, where every amplitude that is held is that of the sweep.
     """
-    for control in certificate.controls:
+    for control in checks.controls:
         if control == "hold":
             # At the middle frequency nothing differs from the sweep.
             others = {"acceleration", "velocity", "displacement"} - {scenario.vibration[0].hold}
             for hold in sorted(others):
-                yield Case(control, hold, _holding(hold, best_hz), (0, 2))
+                yield Case(control, hold, None, _holding(hold, best_hz), (0, 2))
         elif control in BY_FACTOR:
             factors, changed = BY_FACTOR[control]
             for factor in factors:
-                yield Case(control, f"x{factor:g}", changed(factor))
+                yield Case(control, f"x{factor:g}", factor, changed(factor))
         elif control == "engine":
-            yield Case(control, certificate.engine, _on(certificate.engine))
+            yield Case(control, checks.engine, None, _on(checks.engine))
         else:
-            yield Case(control, "small shake", _shaken, (1,))
+            yield Case(control, "small shake", None, _shaken, (1,))
 
 
 def _holding(hold: str, best_hz: float) -> Change:

@@ -15,15 +15,15 @@ from sandmould.study.definition.certificate import round_best_hz
 from sandmould.study.definition.refinement import Refinement
 from sandmould.study.definition.study import Study
 from sandmould.study.definition.sweep import is_whole
-from sandmould.study.rounds.ledger import Ledger, Round
+from sandmould.study.rounds.round_log import Round, RoundLog
 
 
-def next_runs(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
+def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> RoundLog:
     """Add what comes next: a round, or, once they have ended, the certificate.
 
     Parameters
     ----------
-    ledger : Ledger
+    log : RoundLog
     study : Study
     summary : DataFrame
         One row a run of the sweep and of all rounds so far.
@@ -31,30 +31,30 @@ def next_runs(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[st
         Swept keys.
     """
     if study.refine.rounds:
-        ledger = next_round(ledger, study, summary, keys)
+        log = next_round(log, study, summary, keys)
     else:
-        ledger = replace(ledger, ended="The sweep is done.")
-    if not ledger.ended or not study.certificate.controls or ledger.certified_hz:
-        return ledger
+        log = replace(log, ended="The sweep is done.")
+    if not log.ended or not study.certificate.controls or log.certified_hz:
+        return log
     try:
-        return choose_certified(ledger, study, summary, keys)
+        return choose_certified(log, study, summary, keys)
     except TooFewRunsError as error:
-        return replace(ledger, ended=f"No certificate: {error}.")
+        return replace(log, ended=f"No certificate: {error}.")
 
 
-def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]) -> Ledger:
+def next_round(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> RoundLog:
     """Add a round, or the reason why there is none; parameters as in ``next_runs``."""
-    refine, done = study.refine, len(ledger.rounds)
+    refine, done = study.refine, len(log.rounds)
     spent_h = float(summary[CPU_S].sum()) / 3600 if CPU_S in summary else 0.0
     try:
         optimum = find_optimum(
             summary, keys, study.objective.measure, study.objective.better, seed=done
         )
     except TooFewRunsError as error:
-        return replace(ledger, ended=f"Too few runs finished: {error}.")
+        return replace(log, ended=f"Too few runs finished: {error}.")
     ended = why_enough(refine, optimum, done, spent_h, spent_h / max(len(summary), 1))
     if ended:
-        return replace(ledger, ended=ended)
+        return replace(log, ended=ended)
     whole = [key for key in keys if is_whole(type(study.scenario), key)]
     one = Round(
         tuple(propose(optimum, summary, refine.runs, done, whole)),
@@ -63,12 +63,12 @@ def next_round(ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[s
         spent_h,
     )
     # A certificate is of the optimum that was best then: with more runs it is chosen anew.
-    return replace(ledger, rounds=(*ledger.rounds, one), ended="", certified_hz=())
+    return replace(log, rounds=(*log.rounds, one), ended="", certified_hz=())
 
 
 def choose_certified(
-    ledger: Ledger, study: Study, summary: pd.DataFrame, keys: list[str]
-) -> Ledger:
+    log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]
+) -> RoundLog:
     """Choose the frequencies of the certificate: the best, one below and one above.
 
     Raises
@@ -78,7 +78,7 @@ def choose_certified(
     objective = study.objective
     optimum = find_optimum(summary, keys, objective.measure, objective.better)
     best_hz = optimum.setting[keys[0]]
-    return replace(ledger, certified_hz=round_best_hz(best_hz, study.certificate.ratio))
+    return replace(log, certified_hz=round_best_hz(best_hz, study.certificate.ratio))
 
 
 def why_enough(
@@ -121,15 +121,15 @@ def _intervals(optimum: Optimum, keys: list[str]) -> str:
     return listed(said)
 
 
-def told(ledger: Ledger, study: Study) -> str:
+def decision_text(log: RoundLog, study: Study) -> str:
     """One line on the last decision, for the terminal."""
-    if ledger.ended and ledger.certified_hz:
-        shown = listed([number(f) for f in ledger.certified_hz])
+    if log.ended and log.certified_hz:
+        shown = listed([number(f) for f in log.certified_hz])
         controls = listed([c.replace("_", " ") for c in study.certificate.controls], most=8)
-        return f"{ledger.ended} The certificate's controls at {shown} Hz: {controls}."
-    if ledger.ended:
-        return ledger.ended
-    last = ledger.rounds[-1]
+        return f"{log.ended} The certificate's controls at {shown} Hz: {controls}."
+    if log.ended:
+        return log.ended
+    last = log.rounds[-1]
     where = listed(
         [
             f"{name_of(key)} {number(value)} ({number(last.interval[key][0])} to "
@@ -139,6 +139,6 @@ def told(ledger: Ledger, study: Study) -> str:
     )
     fresh = sum(replicate == 1 for _, replicate in last.runs)
     return (
-        f"Round {len(ledger.rounds)} of at most {study.refine.rounds}: best so far is {where}; "
+        f"Round {len(log.rounds)} of at most {study.refine.rounds}: best so far is {where}; "
         f"{fresh} new points and {len(last.runs) - fresh} more replicates."
     )

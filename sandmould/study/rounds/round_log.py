@@ -15,7 +15,7 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.definition.study import Study
 from sandmould.study.definition.sweep import Point
 
-LEDGER = "rounds.json"
+ROUNDS_FILE = "rounds.json"
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Round:
 
 
 @dataclass(frozen=True)
-class Ledger:
+class RoundLog:
     """All rounds so far."""
 
     basis: str
@@ -56,7 +56,7 @@ def basis_of(study: Study) -> str:
     return digest(text)
 
 
-def read_ledger(folder: Path, study: Study) -> Ledger:
+def read_rounds(folder: Path, study: Study) -> RoundLog:
     """Read the rounds of a study; none where it has none or they are those of another one.
 
     Raises
@@ -64,12 +64,12 @@ def read_ledger(folder: Path, study: Study) -> Ledger:
     BadInputError
         When the file was changed into something that is no list of rounds.
     """
-    path, basis = folder / LEDGER, basis_of(study)
+    path, basis = folder / ROUNDS_FILE, basis_of(study)
     if not (study.refine.rounds or study.certificate.controls) or not path.is_file():
-        return Ledger(basis)
+        return RoundLog(basis)
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
-        found = Ledger(
+        found = RoundLog(
             tree["basis"],
             tuple(_round(one) for one in tree["rounds"]),
             tree["ended"],
@@ -78,7 +78,7 @@ def read_ledger(folder: Path, study: Study) -> Ledger:
     except (ValueError, KeyError, TypeError, AttributeError):
         valid = "a list of rounds as the study wrote it, or no such file: they then begin anew"
         raise BadInputError([Problem("rounds", "as it is", valid, str(path))]) from None
-    return found if found.basis == basis else Ledger(basis)
+    return found if found.basis == basis else RoundLog(basis)
 
 
 def _round(tree: dict[str, Any]) -> Round:
@@ -87,11 +87,11 @@ def _round(tree: dict[str, Any]) -> Round:
     return Round(runs, dict(tree["setting"]), interval, float(tree["spent_core_h"]))
 
 
-def write_ledger(ledger: Ledger, folder: Path) -> None:
+def write_rounds(log: RoundLog, folder: Path) -> None:
     """Write the rounds; those of another study's past are kept beside under their own name."""
-    path = folder / LEDGER
+    path = folder / ROUNDS_FILE
     if path.is_file():
         earlier = json.loads(path.read_text(encoding="utf-8"))
-        if earlier["basis"] != ledger.basis:
+        if earlier["basis"] != log.basis:
             os.replace(path, folder / f"rounds_{earlier['basis'][:6]}.json")
-    write_text(path, json.dumps(asdict(ledger), indent=1) + "\n")
+    write_text(path, json.dumps(asdict(log), indent=1) + "\n")
