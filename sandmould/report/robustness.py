@@ -14,7 +14,8 @@ from analysis.spectrum import column_frequency_hz, first_resonance_hz, transfer
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.formatting import name_of, number
-from sandmould.scenario.scenario import FILLING, Scenario
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind, is_filling
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.robustness import Certified, certify, shaken_runs
 from sandmould.study.collect import Collected
@@ -113,14 +114,14 @@ def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
         loads = pd.read_csv(folder / "loads.tsv", sep="\t")
         upward = [c for c in loads.columns if c.startswith("force_")][-1]
         total = loads.groupby(["stage", "time_s"], sort=False)[upward].sum().reset_index()
-        filled = total[total["stage"].str.startswith(FILLING)]
+        filled = total[total["stage"].map(is_filling).astype(bool)]
         # Sand presses down on the box; the mean of the last layer's rest is its weight.
         weight_n = -float(filled[upward].iloc[-len(filled) // 20 :].mean())
         rigid_n = weight_n / scenario.gravity_m_s2 * SHAKE_G * STANDARD_GRAVITY_M_S2
         window_s = scenario.record.series_every_s
         shaken, response = [], []
         for place, stage in enumerate(scenario.vibration, start=1):
-            rows = total[total["stage"] == f"vibrate_{place}"]
+            rows = total[total["stage"] == StageKind.VIBRATE.numbered(place)]
             if len(rows) < 4:
                 continue
             shaken.append(stage.frequency_hz)

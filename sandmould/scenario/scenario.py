@@ -19,11 +19,9 @@ from sandmould.scenario.geometry import Scene
 from sandmould.scenario.pattern import Pattern
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
+from sandmould.scenario.stages import is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
 from sandmould.scenario.vibration import VibrationStage
-
-FILLING = ("settle_", "between_")
-"""How the names of those stages of a run begin in which sand is filled in."""
 
 
 class Record(Section):
@@ -131,7 +129,7 @@ class Scenario(Section):
 
     def scene_in(self, stage: str) -> Scene:
         """Geometry in a stage of the run: from the discharge on without its gate."""
-        if self.discharge is None or stage.startswith(FILLING):
+        if self.discharge is None or is_filling(stage):
             return self.scene
         return self.scene.without(self.discharge.gate)
 
