@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from skfem.mapping import MappingIsoparametric
 
 Array = NDArray[np.float64]
-_SHOWN = 5
+_NAMED = 5
 """Elements named in a message."""
 
 
@@ -38,7 +38,7 @@ def check_mesh(mesh: Any) -> None:
         )
     bad = np.flatnonzero(_inverted(mesh))
     if len(bad):
-        named = ", ".join(map(str, bad[:_SHOWN])) + (", ..." if len(bad) > _SHOWN else "")
+        named = ", ".join(map(str, bad[:_NAMED])) + (", ..." if len(bad) > _NAMED else "")
         raise ValueError(
             f"mesh of the pattern has {len(bad)} inverted or degenerate elements of "
             f"{mesh.nelements} ({named}, counted from 0), valid is none"
@@ -91,12 +91,14 @@ def _inverted(mesh: Any) -> NDArray[np.bool_]:
     least, most = corner_volume.min(axis=1), corner_volume.max(axis=1)
     folded = (least <= 1e-9 * extent) & (most >= -1e-9 * extent)
     shared = np.flatnonzero(mesh.f2t[1] >= 0)
-    one, two = mesh.f2t[:, shared]
+    first_side, second_side = mesh.f2t[:, shared]
     same = _same_side(mesh, shared)
     # every element stands here once for either way it may be turned, n apart
     n = mesh.nelements
-    first = np.concatenate([one, one + n])
-    second = np.concatenate([np.where(same, two + n, two), np.where(same, two, two + n)])
+    first = np.concatenate([first_side, first_side + n])
+    second = np.concatenate(
+        [np.where(same, second_side + n, second_side), np.where(same, second_side, second_side + n)]
+    )
     links = coo_array((np.ones(len(first)), (first, second)), shape=(2 * n, 2 * n))
     _, group = connected_components(links, directed=False)
     piece = np.minimum(group[:n], group[n:])
@@ -120,6 +122,6 @@ def _same_side(mesh: Any, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _pieces(mesh: Any) -> int:
-    one, two = mesh.f2t[:, mesh.f2t[1] >= 0]
-    links = coo_array((np.ones(len(one)), (one, two)), shape=(mesh.nelements,) * 2)
+    first, second = mesh.f2t[:, mesh.f2t[1] >= 0]
+    links = coo_array((np.ones(len(first)), (first, second)), shape=(mesh.nelements,) * 2)
     return int(connected_components(links, directed=False)[0])

@@ -62,9 +62,9 @@ def condensed_surface(
     stiffness : (N d, N d) sparse float64, N/m
         Of all nodes.
     mass_kg : (n,) float64, kg
-        Of the nodes kept.
+        Of the retained nodes.
     nodes : (n,) int64
-        Kept, all those with a support among them.
+        Retained, all those with a support among them.
     fixed : (N, d) bool
 
     Returns
@@ -73,15 +73,15 @@ def condensed_surface(
         Of n d components; memory for (n d)^2 numbers is needed a few times over.
     """
     d = fixed.shape[1]
-    kept = (nodes[:, None] * d + np.arange(d)).ravel()
-    inner = np.setdiff1d(np.arange(fixed.size), kept)
-    schur = stiffness[kept][:, kept].toarray()
+    retained = (nodes[:, None] * d + np.arange(d)).ravel()
+    inner = np.setdiff1d(np.arange(fixed.size), retained)
+    schur = stiffness[retained][:, retained].toarray()
     if len(inner):
         factor = factorised(stiffness[inner][:, inner])
-        coupling = stiffness[inner][:, kept]
-        for first in range(0, len(kept), _COLUMNS):
+        coupling = stiffness[inner][:, retained]
+        for first in range(0, len(retained), _COLUMNS):
             columns = slice(first, first + _COLUMNS)
             schur[:, columns] -= coupling.T @ factor.solve(coupling[:, columns].toarray())
-    held = fixed.ravel()[kept]
+    held = fixed.ravel()[retained]
     mass = np.where(held, np.inf, np.repeat(mass_kg, d))
     return CondensedSurface(0.5 * (schur + schur.T), mass)

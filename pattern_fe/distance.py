@@ -44,11 +44,11 @@ def distance_from_drawing(drawn: Perimeter, deformed: Perimeter) -> Distance:
 
 def _from_lines_m(drawn: Perimeter, place_m: Array) -> Array:
     """Signed distance from closed lines; the solid lies left of them, so holes run clockwise."""
-    found = []
+    distances_m = []
     for loop in drawn.loops:
         vertices_m = drawn.vertices_m[loop]
         x, y = vertices_m.T
         is_outer = np.dot(x, np.roll(y, -1)) > np.dot(y, np.roll(x, -1))
         away_m = Outline("drawn", vertices_m).distance_m(place_m)
-        found.append(away_m if is_outer else -away_m)
-    return np.asarray(np.max(found, axis=0))
+        distances_m.append(away_m if is_outer else -away_m)
+    return np.asarray(np.max(distances_m, axis=0))

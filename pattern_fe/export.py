@@ -1,4 +1,4 @@
-"""A deformed pattern in files: fields for ParaView, the surface as STL."""
+"""The surface of a deformed pattern in files: fields for ParaView, and STL."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 import meshio
 import numpy as np
 from numpy.typing import NDArray
-from skfem.io.meshio import to_meshio
 
 from pattern_fe.distance import distance_from_drawing
 from pattern_fe.loads import vertex_pressure_pa
@@ -16,30 +15,6 @@ from pattern_fe.space import Space
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-
-def write_body(path: Path, space: Space, displacement_m: Array, von_mises_pa: Array) -> None:
-    """Write the elements with displacement and equivalent stress, for ParaView (.vtu).
-
-    Corners alone are written, at their places on the drawing; ParaView's filter 'warp by vector'
-    shows the deformed state. Points of 2D lie at z = 0.
-
-    Parameters
-    ----------
-    path : Path
-    space : Space
-    displacement_m : (n, d) float64, m
-    von_mises_pa : (ne,) float64, Pa
-        Mean of each element.
-    """
-    mesh = to_meshio(space.mesh, encode_cell_data=False)
-    moved = _in_space(displacement_m[: mesh.points.shape[0]])
-    meshio.Mesh(
-        _in_space(mesh.points),
-        mesh.cells,
-        point_data={"displacement_m": moved},
-        cell_data={"von_mises_pa": [von_mises_pa]},
-    ).write(path, file_format="vtu")
 
 
 def write_surface(
@@ -106,8 +81,8 @@ def _plate(space: Space, perimeter: Perimeter, place_m: Array) -> tuple[Array, I
         edges = [len(corners) + sides.index(sorted((i, (i + 1) % len(corners)))) for i in corners]
         parts = split_face(corners, edges, 8 if len(corners) == 4 else None)
     flat = space.cells[:, np.array(parts)].reshape(-1, 3)
-    one, two = (space.node_m[flat[:, i]] - space.node_m[flat[:, 0]] for i in (1, 2))
-    turned = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] < 0.0
+    edge, next_edge = (space.node_m[flat[:, i]] - space.node_m[flat[:, 0]] for i in (1, 2))
+    turned = edge[:, 0] * next_edge[:, 1] - edge[:, 1] * next_edge[:, 0] < 0.0
     flat = np.where(turned[:, None], flat[:, ::-1], flat)
     a, b = perimeter.nodes[perimeter.facets].T
     wall = np.concatenate([np.stack([a, b, b + n], axis=1), np.stack([a, b + n, a + n], axis=1)])

@@ -89,10 +89,10 @@ class _Equilibrium:
             except RuntimeError:
                 # the tangent is singular: a limit point
                 return None
-            found = self._searched(displacement_m, step)
-            if found is None:
+            searched = self._searched(displacement_m, step)
+            if searched is None:
                 return None
-            displacement_m = found
+            displacement_m = searched
             residual, largest = self.residual_n(displacement_m, load_n)
         return None
 
@@ -147,12 +147,12 @@ def solve_large(
         target = min(1.0, reached + step)
         # a last sliver from round-off joins the step
         target = 1.0 if target > 1.0 - 1e-9 else target
-        found = equilibrium.solve(displacement, target * load_n, settings)
-        if found is None:
+        equilibrium_m = equilibrium.solve(displacement, target * load_n, settings)
+        if equilibrium_m is None:
             step /= 2.0
             if step < settings.smallest_step:
                 raise LoadNotReachedError(reached)
         else:
-            displacement, reached = found, target
+            displacement, reached = equilibrium_m, target
             step = min(2.0 * step, 1.0 / settings.load_steps)
     return displacement

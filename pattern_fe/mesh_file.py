@@ -48,32 +48,32 @@ def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
     """
     if not 0.0 < unit_m < np.inf:
         raise ValueError(f"unit of the mesh file {path.name} is {unit_m} m, valid is above 0")
-    found = _parsed(path)
-    kinds = [block.type for block in found.cells]
+    content = _parsed(path)
+    kinds = [block.type for block in content.cells]
     solid = sorted({kind for kind in kinds if kind in _SOLID})
     plane = sorted({kind for kind in kinds if kind in _PLANE})
     own = solid or plane
     if len(own) != 1:
-        shown = ", ".join(sorted(set(kinds))) or "none"
+        present = ", ".join(sorted(set(kinds))) or "none"
         valid = "one kind among triangles, quadrilaterals, tetrahedra and hexahedra"
-        raise ValueError(f"mesh file {path.name} has elements {shown}, valid is {valid}")
-    points = np.asarray(found.points, dtype=np.float64)
+        raise ValueError(f"mesh file {path.name} has elements {present}, valid is {valid}")
+    points = np.asarray(content.points, dtype=np.float64)
     if not solid and points.shape[1] == 3 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points):
         raise ValueError(
             f"mesh file {path.name} has a surface in space, not closed round a solid; valid are "
             "tetrahedra or hexahedra, or triangles or quadrilaterals in a plane of constant z"
         )
-    mesh = _straight(_with_groups(found), unit_m)
+    mesh = _straight(_with_groups(content), unit_m)
     check_mesh(mesh)
     return with_sides(mesh)
 
 
 def _parsed(path: Path) -> meshio.Mesh:
-    said = io.StringIO()
+    printed = io.StringIO()
     try:
         # meshio prints and ends the process at a file that it cannot read; of a text file it takes
         # some bytes for a number of triangles, which may overflow
-        hushed = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
+        hushed = contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed)
         with hushed[0], hushed[1], np.errstate(over="ignore"):
             return meshio.read(path)
     except (Exception, SystemExit) as error:
@@ -82,13 +82,13 @@ def _parsed(path: Path) -> meshio.Mesh:
         raise ValueError(f"mesh file {path} cannot be read ({reason}), valid is {valid}") from error
 
 
-def _with_groups(found: meshio.Mesh) -> Any:
+def _with_groups(content: meshio.Mesh) -> Any:
     """Mesh of scikit-fem with the file's groups; it only warns of groups that it cannot place."""
     log = logging.getLogger("skfem.io.meshio")
     level = log.level
     log.setLevel(logging.ERROR)
     try:
-        return from_meshio(found, ignore_orientation=True)
+        return from_meshio(content, ignore_orientation=True)
     finally:
         log.setLevel(level)
 

@@ -1,4 +1,4 @@
-"""The foam pattern as an elastic body: what a coupling loop, an engine or a judge asks of it."""
+"""The foam pattern as an elastic body: statics, modes and explicit motion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from pattern_fe.elasticity import (
 from pattern_fe.factor import factorised
 from pattern_fe.large_displacement import NewtonSettings, solve_large
 from pattern_fe.material import Foam
-from pattern_fe.motion import CentralDifferences, Newmark
+from pattern_fe.motion import CentralDifferences
 from pattern_fe.perimeter import perimeter_of
 from pattern_fe.space import space_of
 from pattern_fe.supports import Supports, check_held, fixed_components
@@ -239,10 +239,6 @@ class Pattern:
         area = self.surface.vertex_area_m2
         mass = self.mass_kg.sum() * area / area.sum()
         return condensed_surface(self.stiffness, mass, self.surface.nodes, self.fixed)
-
-    def newmark(self, step_s: float, damping_1_s: float = 0.0, lumped: bool = False) -> Newmark:
-        """Small motion with any step, at rest on the drawing."""
-        return Newmark(self.stiffness, self.mass_matrix(lumped), self.fixed, step_s, damping_1_s)
 
     def critical_step_s(self, mass_scale: float = 1.0) -> float:
         """Largest stable step of ``central_differences``, of the stiffest element and bedding."""

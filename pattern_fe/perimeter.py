@@ -2,8 +2,9 @@
 
 Every node on the boundary is a vertex, those inside edges and faces too, so an edge of second
 order becomes two segments. A contact force shared among the corners of a facet by linear shape
-functions is then a set of nodal forces of the pattern as it stands: force and moment are exact,
-the motion of the surface under the grain is that of the nodes, and no mapping lies in between.
+functions is then a set of nodal forces of the pattern as it stands: loads are conservative, force
+and moment exact; displacements are consistent, the motion of the surface under the grain is that of
+the nodes; and no mapping lies in between.
 Corners alone would be half as many but would not see the pattern bend inside an element. What
 differs from the integrals of the quadratic shape functions are local shares: an even pressure on
 an edge loads its nodes 1:2:1, not 1:4:1, with the same force and moment.

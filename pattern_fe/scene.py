@@ -1,4 +1,4 @@
-"""A scenario's pattern: as an elastic body, and as the obstacle that the sand meets."""
+"""A scenario's pattern as an elastic body."""
 
 from __future__ import annotations
 
@@ -12,18 +12,14 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from pattern_fe.checks import check_inside
-from pattern_fe.coupling.schemes import refuse_scheme
 from pattern_fe.material import Foam
 from pattern_fe.mesh_file import read_mesh
 from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
 from pattern_fe.supports import Supports
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.box import Polygon
-from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile
-from sandmould.scenario.pattern import Pattern as PatternSection
+from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import Triangles
 
 Array = NDArray[np.float64]
 
@@ -36,25 +32,25 @@ def pattern_of(scenario: Scenario) -> Pattern:
     BadInputError
         With one sentence on what keeps it from being computed.
     """
-    told = scenario.pattern
-    assert told is not None
+    config = scenario.pattern
+    assert config is not None
     box, d = scenario.box, scenario.dimension
-    if len(told.position_m) != d:
+    if len(config.position_m) != d:
         valid = f"{d} numbers, one a dimension"
-        raise BadInputError([Problem("pattern.position_m", list(told.position_m), valid)])
-    if told.depth_m is not None and (d == 2 or isinstance(told.shape, MeshFile)):
+        raise BadInputError([Problem("pattern.position_m", list(config.position_m), valid)])
+    if config.depth_m is not None and (d == 2 or isinstance(config.shape, MeshFile)):
         valid = "null in 2D and for a mesh file, which has its own"
-        raise BadInputError([Problem("pattern.depth_m", told.depth_m, valid)])
+        raise BadInputError([Problem("pattern.depth_m", config.depth_m, valid)])
     # what is shared by all runs of a study that differ in their sand or their loop
-    body = told.model_copy(update={"loop": Loop()})
+    body = config.model_copy(update={"loop": Loop()})
     size_m = (box.width_m, box.height_m) if d == 2 else (box.width_m, box.depth_m, box.height_m)
     thickness_m = scenario.sand.disc_thickness_m if d == 2 else None
-    return _computed(body, size_m, thickness_m, _changed_ns(told))
+    return _computed(body, size_m, thickness_m, _changed_ns(config))
 
 
-def _changed_ns(told: PatternSection) -> int:
+def _changed_ns(config: PatternConfig) -> int:
     """When the mesh file of a pattern was last changed, 0 without one."""
-    shape = told.shape
+    shape = config.shape
     if isinstance(shape, MeshFile) and shape.path.is_file():
         return shape.path.stat().st_mtime_ns
     return 0
@@ -62,31 +58,31 @@ def _changed_ns(told: PatternSection) -> int:
 
 @lru_cache(maxsize=8)
 def _computed(
-    told: PatternSection, size_m: tuple[float, ...], thickness_m: float | None, changed_ns: int
+    config: PatternConfig, size_m: tuple[float, ...], thickness_m: float | None, changed_ns: int
 ) -> Pattern:
     """The pattern of a section in a box; its matrices stay with it."""
-    with _blaming("pattern.shape", told.shape.model_dump(mode="json")):
-        mesh = _mesh(told, size_m).translated(np.array(told.position_m))
-    with _blaming("pattern.position_m", list(told.position_m)):
+    with _blaming("pattern.shape", config.shape.model_dump(mode="json")):
+        mesh = _mesh(config, size_m).translated(np.array(config.position_m))
+    with _blaming("pattern.position_m", list(config.position_m)):
         check_inside(mesh, np.zeros(len(size_m)), np.array(size_m))
     # Threads of small matrices wait for one another, longest beside other runs.
     with (
         threadpool_limits(1),
-        _blaming("pattern.supports", told.supports.model_dump(mode="json")),
+        _blaming("pattern.supports", config.supports.model_dump(mode="json")),
     ):
         pattern = Pattern(
             mesh,
-            Supports(told.supports.clamped, told.supports.resting),
-            Foam(told.young_modulus_pa, told.poisson_ratio, told.density_kg_m3),
-            told.order,
+            Supports(config.supports.clamped, config.supports.resting),
+            Foam(config.young_modulus_pa, config.poisson_ratio, config.density_kg_m3),
+            config.order,
             thickness_m,
         )
         pattern.solve_linear(np.zeros_like(pattern.space.node_m))
     return pattern
 
 
-def _mesh(told: PatternSection, size_m: tuple[float, ...]) -> Any:
-    shape = told.shape
+def _mesh(config: PatternConfig, size_m: tuple[float, ...]) -> Any:
+    shape = config.shape
     if isinstance(shape, MeshFile):
         mesh = read_mesh(shape.path, shape.unit_m)
         if mesh.dim() != len(size_m):
@@ -95,15 +91,15 @@ def _mesh(told: PatternSection, size_m: tuple[float, ...]) -> Any:
         return mesh
     depth_m = None
     if len(size_m) == 3:
-        depth_m = size_m[1] - told.position_m[1] if told.depth_m is None else told.depth_m
+        depth_m = size_m[1] - config.position_m[1] if config.depth_m is None else config.depth_m
     if isinstance(shape, Bar):
-        return mesh_of(bar(shape.width_m, shape.height_m), told.element_m, depth_m)
+        return mesh_of(bar(shape.width_m, shape.height_m), config.element_m, depth_m)
     across_m = shape.reach_m if isinstance(shape, LShape) else shape.width_m
     if shape.thickness_m >= min(shape.height_m, across_m):
         valid = "below its height and its reach or width"
         raise ValueError(f"thickness is {shape.thickness_m:g} m, valid is {valid}")
     make = l_shape if isinstance(shape, LShape) else t_shape
-    return mesh_of(make(shape.thickness_m, shape.height_m, across_m), told.element_m, depth_m)
+    return mesh_of(make(shape.thickness_m, shape.height_m, across_m), config.element_m, depth_m)
 
 
 @contextmanager
@@ -114,29 +110,3 @@ def _blaming(key: str, value: Any) -> Iterator[None]:
     except ValueError as fault:
         valid = f"one that can be computed: {fault}"
         raise BadInputError([Problem(key, value, valid)]) from fault
-
-
-def with_surface(scenario: Scenario) -> Scenario:
-    """The scenario with its pattern among the obstacles, vertex for vertex.
-
-    Raises
-    ------
-    BadInputError
-    """
-    told = scenario.pattern
-    if told is None:
-        return scenario
-    pattern = pattern_of(scenario)
-    refuse_scheme(scenario, pattern)
-    outer = pattern.surface.outer
-    vertices_m = [tuple(v) for v in outer.vertices_m.tolist()]
-    solid: Polygon | Triangles
-    if scenario.dimension == 2:
-        solid = Polygon(kind="polygon", name=told.name, vertices_m=vertices_m)
-    else:
-        triangles = [tuple(t) for t in outer.facets.tolist()]
-        solid = Triangles(
-            kind="triangles", name=told.name, vertices_m=vertices_m, triangles=triangles
-        )
-    others = tuple(o for o in scenario.obstacles if o.name != told.name)
-    return scenario.model_copy(update={"obstacles": (*others, solid)})

@@ -120,7 +120,7 @@ def with_sides(mesh: Any) -> Any:
     """Name the boundary at either end of each axis; names the mesh already has are kept."""
     low, high = mesh.p.min(axis=1), mesh.p.max(axis=1)
     near_m = 1e-9 * float((high - low).max())
-    kept = mesh.boundaries or {}
+    named = mesh.boundaries or {}
     sides = {
         name: mesh.facets_satisfying(
             lambda x, axis=axis, place=place: np.abs(x[axis] - place) <= near_m, True
@@ -129,5 +129,5 @@ def with_sides(mesh: Any) -> Any:
         for name, place in zip(names, (low[axis], high[axis]), strict=True)
     }
     return mesh.with_boundaries(
-        {name: facets for name, facets in sides.items() if name not in kept and len(facets)}
+        {name: facets for name, facets in sides.items() if name not in named and len(facets)}
     )

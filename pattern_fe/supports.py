@@ -46,10 +46,10 @@ def fixed_components(space: Space, supports: Supports) -> Mask:
     """
     if not 0.0 <= supports.bedding_n_m3 < np.inf:
         raise ValueError(f"bedding is {supports.bedding_n_m3:g} N/m3, valid is 0 or above")
-    known = sorted(space.mesh.boundaries or {})
+    boundaries = sorted(space.mesh.boundaries or {})
     for name in (*supports.clamped, *supports.resting):
-        if name not in known:
-            valid = ", ".join(known) or "none, for the mesh names no boundary"
+        if name not in boundaries:
+            valid = ", ".join(boundaries) or "none, for the mesh names no boundary"
             raise ValueError(f"support on the boundary '{name}', which is not there: valid {valid}")
     fixed = np.zeros(space.node_m.shape, dtype=bool)
     for name in supports.clamped:
@@ -84,9 +84,9 @@ def rigid_motions(node_m: Array) -> Array:
     n, d = node_m.shape
     arm = (node_m - node_m.mean(axis=0)) / np.ptp(node_m, axis=0).max()
     motions = [np.tile(np.eye(d)[axis], (n, 1)) for axis in range(d)]
-    for one, two in ((0, 1),) if d == 2 else ((1, 2), (2, 0), (0, 1)):
+    for i, j in ((0, 1),) if d == 2 else ((1, 2), (2, 0), (0, 1)):
         turn = np.zeros((n, d))
-        turn[:, one], turn[:, two] = -arm[:, two], arm[:, one]
+        turn[:, i], turn[:, j] = -arm[:, j], arm[:, i]
         motions.append(turn)
     return np.stack([m.ravel() for m in motions], axis=1)
 

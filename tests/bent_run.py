@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
 from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.ledger import LEDGER
 from sandmould.engines.snapshot import Snapshot
 
 FORCE_N = -0.2
@@ -49,7 +49,7 @@ def write_bent_run(folder: Path, body: FoamBody, share: float = 1.0) -> None:
 def tip_load(body: FoamBody) -> tuple[np.ndarray, np.ndarray]:
     load = np.zeros_like(body.vertices_m)
     load[np.argmax(body.vertices_m @ [1.0, 1.0]), 1] = FORCE_N
-    return load, body.answer(load).displacement_m
+    return load, body.solve(load).displacement_m
 
 
 def write_ledger(folder: Path) -> None:
@@ -62,4 +62,4 @@ def write_ledger(folder: Path) -> None:
             "work_j": 0.01 * time_s, "energy_j": 0.005 * time_s, "solve_s": 0.01,
         }
     )  # fmt: skip
-    rows.to_csv(folder / LEDGER, sep="\t", index=False)
+    rows.to_csv(folder / CONVERGENCE_LOG, sep="\t", index=False)

@@ -9,8 +9,8 @@ from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.in_step import InStepSession
 from pattern_fe.coupling.in_step_foam import InStepFoam
+from pattern_fe.coupling.interface import with_surface
 from pattern_fe.pattern import Pattern
-from pattern_fe.scene import with_surface
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_engine
 

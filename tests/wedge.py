@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.monolithic_session import JudgeSession
+from pattern_fe.coupling.monolithic_session import MonolithicSession
 from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.material import Foam
 from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, mesh_of
 from pattern_fe.supports import Supports
-from sandmould.engines.program import build_program
 from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
@@ -71,12 +70,13 @@ def wedge_scene(pattern: Pattern, damping_ratio: float = 0.95, **changes: Any) -
     return one_grain_scene(**(scene | changes))
 
 
-def judge(
+def monolithic(
     pattern: Pattern, scenario: Scenario, folder: Path, checkpoint: Path | None = None, **foam: Any
-) -> JudgeSession:
-    """The judge of a scene; see ``ExplicitFoam`` for the settings of the foam."""
+) -> MonolithicSession:
+    """The monolithic scheme of a scene; see ``ExplicitFoam`` for the settings of the foam."""
     body = ExplicitFoam(pattern, scenario.step_s, ContactBound.of(scenario, pattern), **foam)
-    return JudgeSession(build_program(scenario), body, "pattern", 0.01, folder, checkpoint)
+    sand, counts = open_engine(scenario, folder, checkpoint), StepCounts.of(scenario)
+    return MonolithicSession(sand, body, "pattern", 0.01, counts, folder, checkpoint)
 
 
 def staggered(pattern: Pattern, scenario: Scenario, folder: Path, **changes: Any) -> CoupledSession:

@@ -1,4 +1,4 @@
-"""What the staggered loop asks of a pattern."""
+"""What a coupled session asks of the pattern's participant."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Answer:
+class StaticSolution:
     """The pattern at rest under given loads."""
 
     displacement_m: Array
@@ -22,15 +22,15 @@ class Answer:
     reaction_n: Array
     """(d,) float64, N: force of the supports on the pattern."""
     moment_left_n_m: float = np.nan
-    """Size of the moment about the origin that loads and reactions leave; none unless told."""
+    """Size of the moment about the origin that loads and reactions leave; NaN where unknown."""
 
 
 class ElasticBody(Protocol):
-    """A pattern behind the surface that the sand sees."""
+    """A pattern behind the surface that the sand meets."""
 
     @property
     def vertices_m(self) -> Array:
         """Vertices of the surface at rest, (nv, d) float64, m."""
 
-    def answer(self, load_n: Array) -> Answer:
+    def solve(self, load_n: Array) -> StaticSolution:
         """Find the pattern at rest under loads on its vertices, (nv, d) float64, N."""

@@ -1,4 +1,4 @@
-"""Pattern, loads and answers in files: what two programs need that couple without meeting.
+"""Pattern, loads and displacements in files: what two programs need that couple without meeting.
 
 ``pattern.yaml`` names the foam, its supports and its mesh, ``pattern.vtu``. Each ``loads_*.tsv``
 holds the sand's mean forces of a window, ``answer_*.tsv`` of the same name the surface that they
@@ -15,7 +15,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import Answer
+from pattern_fe.coupling.body import StaticSolution
 from pattern_fe.loads import vertex_pressure_pa
 from pattern_fe.material import Foam
 from pattern_fe.mesh_file import read_mesh, write_mesh
@@ -28,7 +28,7 @@ Values = Mapping[str, float]
 PATTERN = "pattern.yaml"
 MESH = "pattern.vtu"
 LOADS = "loads_"
-ANSWER = "answer_"
+SOLUTION = "answer_"
 _PLACE = ("x_m", "y_m")
 _FORCE = ("force_x_n", "force_y_n", "pressure_pa")
 _MOVED = ("displacement_x_m", "displacement_y_m")
@@ -50,7 +50,7 @@ def write_pattern(folder: Path, pattern: Pattern, large: bool) -> None:
     folder.mkdir(exist_ok=True)
     write_mesh(folder / MESH, pattern.space.mesh)
     foam, supports = pattern.foam, pattern.supports
-    told = {
+    section = {
         "mesh": MESH,
         "order": pattern.space.order,
         "thickness_m": pattern.space.thickness_m,
@@ -61,7 +61,7 @@ def write_pattern(folder: Path, pattern: Pattern, large: bool) -> None:
         "resting": list(supports.resting),
         "statics": "large" if large else "linear",
     }
-    (folder / PATTERN).write_text(yaml.safe_dump(told, sort_keys=False), encoding="utf-8")
+    (folder / PATTERN).write_text(yaml.safe_dump(section, sort_keys=False), encoding="utf-8")
 
 
 def read_pattern(folder: Path) -> tuple[Pattern, bool]:
@@ -74,11 +74,15 @@ def read_pattern(folder: Path) -> tuple[Pattern, bool]:
     """
     path = folder / PATTERN
     try:
-        told = yaml.safe_load(path.read_text(encoding="utf-8"))
-        foam = Foam(told["young_modulus_pa"], told["poisson_ratio"], told["density_kg_m3"])
-        supports = Supports(tuple(told["clamped"]), tuple(told["resting"]))
-        mesh, order, thickness_m = folder / told["mesh"], told["order"], told["thickness_m"]
-        large = told["statics"] == "large"
+        section = yaml.safe_load(path.read_text(encoding="utf-8"))
+        foam = Foam(section["young_modulus_pa"], section["poisson_ratio"], section["density_kg_m3"])
+        supports = Supports(tuple(section["clamped"]), tuple(section["resting"]))
+        mesh, order, thickness_m = (
+            folder / section["mesh"],
+            section["order"],
+            section["thickness_m"],
+        )
+        large = section["statics"] == "large"
     except OSError as error:
         raise ValueError(f"{path} cannot be read: {error.strerror}") from error
     except KeyError as error:
@@ -119,19 +123,19 @@ def read_loads(path: Path, outer: Perimeter) -> tuple[Array, float]:
     return rows[:, 2:4], whole["time_s"]
 
 
-def write_answer(path: Path, outer: Perimeter, answer: Answer, time_s: float) -> None:
+def write_solution(path: Path, outer: Perimeter, solution: StaticSolution, time_s: float) -> None:
     """Write where loads bend the line; arguments as ``write_loads``."""
-    energetic = (answer.energy_j, *answer.reaction_n, answer.moment_left_n_m)
+    energetic = (solution.energy_j, *solution.reaction_n, solution.moment_left_n_m)
     whole = {"time_s": time_s} | dict(zip(_WHOLE, energetic, strict=True))
-    rows = np.column_stack([outer.vertices_m, answer.displacement_m])
+    rows = np.column_stack([outer.vertices_m, solution.displacement_m])
     _write(path, whole, (*_PLACE, *_MOVED), rows)
 
 
-def read_answer(path: Path, outer: Perimeter) -> Answer:
-    """Read what ``write_answer`` or another program wrote; errors as ``read_loads``."""
+def read_solution(path: Path, outer: Perimeter) -> StaticSolution:
+    """Read what ``write_solution`` or another program wrote; errors as ``read_loads``."""
     whole, rows = _read(path, _WHOLE, (*_PLACE, *_MOVED), outer)
     reaction_n = np.array([whole["reaction_x_n"], whole["reaction_y_n"]])
-    return Answer(rows[:, 2:], whole["energy_j"], reaction_n, whole["moment_left_n_m"])
+    return StaticSolution(rows[:, 2:], whole["energy_j"], reaction_n, whole["moment_left_n_m"])
 
 
 def _write(path: Path, whole: Values, columns: tuple[str, ...], rows: Array) -> None:

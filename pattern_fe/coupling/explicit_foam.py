@@ -35,11 +35,11 @@ class ContactBound:
     def of(cls, scenario: Scenario, pattern: Pattern) -> ContactBound:
         """Contacts of the largest grains, as many as find room on a facet."""
         classes = scenario.sand.classes(scenario.dimension)
-        one = cls.of_grain(scenario, classes[-1].diameter_m)
+        largest = cls.of_grain(scenario, classes[-1].diameter_m)
         corner = pattern.surface.vertices_m[pattern.surface.facets]
         longest_m = float(np.linalg.norm(corner[:, 1] - corner[:, 0], axis=1).max())
         contacts = 1 + math.floor(longest_m / classes[0].diameter_m)
-        return cls(contacts * one.stiffness_n_m, contacts * one.damping_n_s_m)
+        return cls(contacts * largest.stiffness_n_m, contacts * largest.damping_n_s_m)
 
     def mass_kg(self, step_s: float) -> float:
         """Least mass of a vertex that such contacts do not throw.

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import Answer
+from pattern_fe.coupling.body import StaticSolution
 from pattern_fe.coupling.exchange import (
-    ANSWER,
     LOADS,
-    read_answer,
+    SOLUTION,
     read_loads,
+    read_solution,
     write_loads,
     write_pattern,
 )
@@ -23,15 +23,15 @@ from sandmould.runs.outcome import Outcome
 Array = NDArray[np.float64]
 EXCHANGE = "exchange"
 _SAME = 1e-6
-"""Share of the largest force up to which loads are those that were answered: a run that goes on
+"""Share of the largest force up to which loads are those that were solution: a run that goes on
 from a checkpoint repeats windows, on LAMMPS to some digits."""
 
 
 class FilesBody:
     """An ``ElasticBody`` behind a folder of files; see ``exchange``.
 
-    An answer that is not there stops the run. Continued, it repeats the windows since its
-    checkpoint, finds their answers, and comes to the one that it waited for.
+    A solution that is not there stops the run. Continued, it repeats the windows since its
+    checkpoint, finds their solutions, and comes to the one that it waited for.
     """
 
     def __init__(self, pattern: Pattern, large: bool, folder: Path, session: Session) -> None:
@@ -57,8 +57,8 @@ class FilesBody:
         """Vertices of the outer line as drawn, (nv, 2) float64, m."""
         return self._outer.vertices_m
 
-    def answer(self, load_n: Array) -> Answer:
-        """Write the loads and read the answer to them.
+    def solve(self, load_n: Array) -> StaticSolution:
+        """Write the loads and read the solution under them.
 
         Raises
         ------
@@ -66,23 +66,23 @@ class FilesBody:
             Where there is none yet, or none that can be used.
         """
         name = self._name()
-        loads, answered = (self._folder / f"{head}{name}.tsv" for head in (LOADS, ANSWER))
+        loads, solution = (self._folder / f"{head}{name}.tsv" for head in (LOADS, SOLUTION))
         if not self._is_written(loads, load_n):
-            answered.unlink(missing_ok=True)
+            solution.unlink(missing_ok=True)
             write_loads(loads, self._outer, load_n, self._session.time_s)
-        if not answered.exists():
+        if not solution.exists():
             detail = (
-                f"{loads} has the loads up to {self._session.time_s:.4g} s, and {answered.name} is "
+                f"{loads} has the loads up to {self._session.time_s:.4g} s, and {solution.name} is "
                 f"not there: python -m pattern_fe.coupling.from_files {self._folder} writes it"
             )
             raise EngineStop(Outcome.AWAITS_PATTERN, detail)
         try:
-            return read_answer(answered, self._outer)
+            return read_solution(solution, self._outer)
         except ValueError as fault:
             raise EngineStop(Outcome.AWAITS_PATTERN, str(fault)) from fault
 
     def _name(self) -> str:
-        """The step, and how often it was asked about before: a window may be repeated."""
+        """The step, and the number of its iteration: a window may be repeated."""
         step, before = self._session.steps, self._last
         self._last = (step, before[1] + 1 if step == before[0] else 0)
         return f"{step:09d}_{self._last[1]}"

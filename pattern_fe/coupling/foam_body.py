@@ -1,11 +1,11 @@
-"""The foam pattern as the staggered loop asks it."""
+"""The foam pattern as a participant of the coupling."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import Answer
+from pattern_fe.coupling.body import StaticSolution
 from pattern_fe.elasticity import internal_force_n
 from pattern_fe.pattern import Pattern
 
@@ -40,7 +40,7 @@ class FoamBody:
         """Vertices of the outer surface as drawn, (nv, d) float64, m."""
         return self._pattern.surface.vertices_m[self._line]
 
-    def answer(self, load_n: Array) -> Answer:
+    def solve(self, load_n: Array) -> StaticSolution:
         """Find the pattern at rest under loads on the outer surface, (nv, d) float64, N."""
         pattern = self._pattern
         on_surface = np.zeros_like(pattern.surface.vertices_m)
@@ -53,7 +53,7 @@ class FoamBody:
         place_m = pattern.space.node_m + (moved if self._large else 0.0)
         outer = load + reaction
         moment = cross(place_m, outer).sum(axis=0)
-        return Answer(
+        return StaticSolution(
             pattern.on_surface(moved)[self._line],
             pattern.energy_j(moved, self._large),
             np.asarray(reaction.sum(axis=0)),

@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from pattern_fe.coupling.exchange import ANSWER, LOADS, read_loads, read_pattern, write_answer
+from pattern_fe.coupling.exchange import LOADS, SOLUTION, read_loads, read_pattern, write_solution
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.large_displacement import LoadNotReachedError
 
 
-def answer_all(folder: Path) -> list[Path]:
-    """Bend the pattern of a folder under every file of loads that has no answer yet.
+def solve_all(folder: Path) -> list[Path]:
+    """Bend the pattern of a folder under every file of loads that has no solution yet.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def answer_all(folder: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        Answers that were written.
+        Solutions that were written.
 
     Raises
     ------
@@ -33,19 +33,19 @@ def answer_all(folder: Path) -> list[Path]:
     pattern, large = read_pattern(folder)
     body, outer, written = FoamBody(pattern, large), pattern.surface.outer, []
     for loads in sorted(folder.glob(f"{LOADS}*.tsv")):
-        path = folder / loads.name.replace(LOADS, ANSWER)
+        path = folder / loads.name.replace(LOADS, SOLUTION)
         if path.exists():
             continue
         load_n, time_s = read_loads(loads, outer)
-        write_answer(path, outer, body.answer(load_n), time_s)
+        write_solution(path, outer, body.solve(load_n), time_s)
         written.append(path)
     return written
 
 
 def main(folder: Path) -> None:
-    """Answer, and say which files are new."""
+    """StaticSolution, and say which files are new."""
     try:
-        written = answer_all(folder)
+        written = solve_all(folder)
     except (ValueError, LoadNotReachedError) as fault:
         raise SystemExit(str(fault)) from fault
     print(f"{folder}: {len(written)} answers written")

@@ -1,4 +1,4 @@
-"""How strongly the sand answers a pattern that moves: the gain of the staggered loop, measured."""
+"""The gain of the staggered loop, measured: how stiff the sand is beside the pattern."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.coupling.body import ElasticBody
-from pattern_fe.coupling.ledger import rms_m
+from pattern_fe.coupling.convergence_log import rms_m
 from sandmould.engines.session import Session
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ MOVED_M = 1e-6
 
 @dataclass(frozen=True)
 class Gain:
-    """Change of the answered displacement, taken negative, over the change of what was shown."""
+    """Change of the pattern's solution, taken negative, over that of the interface displacement."""
 
     gain: float
 
@@ -37,21 +37,21 @@ def measure_gain(
     session: Session,
     body: ElasticBody,
     surface: str,
-    shown_m: Array,
+    displacement_m: Array,
     window_s: float,
     moved_m: float = MOVED_M,
 ) -> Gain | None:
-    """Compute a window twice, once led a little farther along the answer; the session stays.
+    """Compute a window twice, once led a little farther along the solution; the session stays.
 
     Parameters
     ----------
     session : Session
-        Of an engine that can keep a state and go back.
+        Of an engine that repeats windows.
     body : ElasticBody
     surface : str
         Its name in the engine.
-    shown_m : (nv, d) float64, m
-        Displacement that the window leads to.
+    displacement_m : (nv, d) float64, m
+        Displacement at the interface that the window leads to.
     window_s : float
     moved_m : float
         Perturbation, root of the mean square over the vertices.
@@ -64,22 +64,22 @@ def measure_gain(
     Raises
     ------
     RefusedError
-        On an engine that cannot go back.
+        On an engine that does not.
     """
-    kept = session.keep()
+    checkpoint = session.save_checkpoint()
 
-    def answered(target_m: Array) -> Array | None:
+    def solved(target_m: Array) -> Array | None:
         session.move_surface(surface, body.vertices_m + target_m, window_s)
         session.advance(window_s)
         load = session.vertex_loads(surface)
-        session.go_back(kept)
-        return None if load is None else body.answer(load).displacement_m
+        session.restore_checkpoint(checkpoint)
+        return None if load is None else body.solve(load).displacement_m
 
-    plain = answered(shown_m)
+    plain = solved(displacement_m)
     if plain is None or not plain.any():
         return None
     way = plain * (moved_m / rms_m(plain))
-    led = answered(shown_m + way)
+    led = solved(displacement_m + way)
     assert led is not None
     # the surface moves evenly: in the mean over the window the sand sees half of the way
     return Gain(-float(np.vdot(led - plain, way) / (0.5 * np.vdot(way, way))))

@@ -11,8 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.coupling.body import ElasticBody
+from pattern_fe.coupling.convergence_log import (
+    CONVERGENCE_LOG,
+    ConvergenceLog,
+    WindowEntry,
+    imbalance_n,
+    rms_m,
+)
+from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.in_step_foam import InStepFoam
-from pattern_fe.coupling.ledger import LEDGER, Entry, Ledger, imbalance_n, rms_m
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
@@ -23,7 +30,7 @@ CHECKPOINT = "pattern.npz"
 
 
 @dataclass(frozen=True)
-class InStepEntry(Entry):
+class InStepEntry(WindowEntry):
     """One record of the in-step scheme; the columns of all schemes and its own balance of energy.
 
     Load and residual are those of the mean load over the record, work and energies those of all
@@ -38,12 +45,12 @@ class InStepEntry(Entry):
     """Work less all three energies: round-off."""
 
 
-class InStepSession:
+class InStepSession(DelegatingSession):
     """A session whose pattern gives way in every step; else the engine's own."""
 
     def __init__(
         self,
-        inner: Session,
+        sand: Session,
         foam: InStepFoam,
         body: ElasticBody,
         surface: str,
@@ -54,7 +61,7 @@ class InStepSession:
 
         Parameters
         ----------
-        inner : Session
+        sand : Session
             Of any engine that calls a mover in its steps.
         foam : InStepFoam
         body : ElasticBody
@@ -66,21 +73,18 @@ class InStepSession:
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
         """
-        self._inner, self._foam, self._body = inner, foam, body
+        super().__init__(sand)
+        self._foam, self._body = foam, body
         self._load = np.zeros_like(foam.vertices_m)
-        ledger_bytes, rows = None, 0
+        log_bytes, rows = None, 0
         if checkpoint is not None:
-            with np.load(checkpoint / CHECKPOINT) as kept:
-                foam.restore({name: kept[name] for name in kept.files})
-                self._load = kept["mean_load"]
-                ledger_bytes, rows = (int(number) for number in kept["trusted"])
-        inner.attach_mover(surface, foam.mover)
-        self._ledger = Ledger(work / LEDGER, ledger_bytes, InStepEntry)
+            with np.load(checkpoint / CHECKPOINT) as saved:
+                foam.restore({name: saved[name] for name in saved.files})
+                self._load = saved["mean_load"]
+                log_bytes, rows = (int(number) for number in saved["trusted"])
+        sand.attach_mover(surface, foam.mover)
+        self._log = ConvergenceLog(work / CONVERGENCE_LOG, log_bytes, InStepEntry)
         self._shapes = ShapesFile(work / SHAPES, rows, *foam.vertices_m.shape)
-
-    def __getattr__(self, name: str) -> Any:
-        """All else is the engine's own."""
-        return getattr(self._inner, name)
 
     @property
     def displacement_m(self) -> Array:
@@ -95,36 +99,36 @@ class InStepSession:
         EngineStop
             Also where the pattern runs away.
         """
-        before = self._inner.steps
-        self._inner.advance(duration_s)
+        before = self.sand.steps
+        self.sand.advance(duration_s)
         if self._foam.ran_away:
             largest_m = np.abs(self.displacement_m).max()
             raise EngineStop(
                 Outcome.COUPLING_DIVERGED,
                 f"the pattern has moved by {largest_m:.3g} m, more than pattern.loop."
-                f"largest_displacement_m allows, before {self._inner.time_s:.4g} s",
+                f"largest_displacement_m allows, before {self.sand.time_s:.4g} s",
             )
-        self._write(self._inner.steps - before)
+        self._write(self.sand.steps - before)
 
     def _write(self, steps: int) -> None:
         foam, moved_m = self._foam, self.displacement_m
         load = self._load = foam.take_mean_load_n()
         begun = time.perf_counter()
-        answer = self._body.answer(load)
+        solution = self._body.solve(load)
         elastic_j, kinetic_j = foam.elastic_j, foam.kinetic_j
-        self._ledger.write(
+        self._log.write(
             InStepEntry(
-                time_s=self._inner.time_s,
-                window_s=steps * self._inner.step_s,
+                time_s=self.sand.time_s,
+                window_s=steps * self.sand.step_s,
                 passes=1,
                 factor=1.0,
                 gain=np.nan,
-                residual_m=rms_m(answer.displacement_m - moved_m),
+                residual_m=rms_m(solution.displacement_m - moved_m),
                 displacement_m=rms_m(moved_m),
                 largest_m=float(np.linalg.norm(moved_m, axis=1).max()),
                 load_n=float(np.linalg.norm(load.sum(axis=0))),
-                imbalance_n=imbalance_n(load, answer),
-                moment_left_n_m=answer.moment_left_n_m,
+                imbalance_n=imbalance_n(load, solution),
+                moment_left_n_m=solution.moment_left_n_m,
                 work_j=foam.work_j,
                 energy_j=elastic_j,
                 solve_s=time.perf_counter() - begun,
@@ -133,28 +137,28 @@ class InStepSession:
                 balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j,
             )
         )
-        self._shapes.write(self._inner.time_s, moved_m)
+        self._shapes.write(self.sand.time_s, moved_m)
 
     def snapshot(self) -> Snapshot:
         """State of all grains relative to the box, and the pattern among them."""
         moved = self._foam.vertices_m + self.displacement_m
-        return replace(self._inner.snapshot(), pattern_m=moved, pattern_load_n=self._load)
+        return replace(self.sand.snapshot(), pattern_m=moved, pattern_load_n=self._load)
 
-    def keep(self) -> Any:
+    def save_checkpoint(self) -> Any:
         """Copies of what grains and pattern are; the tables go on."""
-        return self._inner.keep(), self._foam.state()
+        return self.sand.save_checkpoint(), self._foam.state()
 
-    def go_back(self, kept: Any) -> None:
-        """Compute on from what ``keep`` gave."""
-        grains, foam = kept
-        self._inner.go_back(grains)
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Compute on from what ``save_checkpoint`` gave."""
+        grains, foam = checkpoint
+        self.sand.restore_checkpoint(grains)
         self._foam.restore(foam)
 
     def write_checkpoint(self, folder: Path) -> None:
         """Write the engine's state and the pattern's."""
-        self._inner.write_checkpoint(folder)
+        self.sand.write_checkpoint(folder)
         self._shapes.flush()
-        trusted = np.array([self._ledger.size(), self._shapes.rows])
+        trusted = np.array([self._log.size(), self._shapes.rows])
         np.savez(
             folder / CHECKPOINT,
             trusted=trusted,
@@ -164,6 +168,6 @@ class InStepSession:
 
     def close(self) -> None:
         """Close the tables and free the engine."""
-        self._ledger.close()
+        self._log.close()
         self._shapes.close()
-        self._inner.close()
+        self.sand.close()

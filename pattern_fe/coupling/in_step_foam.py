@@ -34,7 +34,7 @@ class InStepFoam:
     in the other schemes.
     """
 
-    _KEPT: ClassVar[tuple[str, ...]] = (
+    _STATE: ClassVar[tuple[str, ...]] = (
         "load", "speed", "load_sum", "momentum", "moved_mass", "displacement", "before",
         "velocity", "sums",
     )  # fmt: skip
@@ -132,11 +132,11 @@ class InStepFoam:
 
     def state(self) -> dict[str, Array]:
         """All that moves, by name."""
-        return {name: getattr(self._arrays, name).copy() for name in self._KEPT}
+        return {name: getattr(self._arrays, name).copy() for name in self._STATE}
 
     def restore(self, arrays: dict[str, Array]) -> None:
         """Go on from what ``state`` gave."""
-        for name in self._KEPT:
+        for name in self._STATE:
             getattr(self._arrays, name)[:] = arrays[name]
 
 

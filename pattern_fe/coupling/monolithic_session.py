@@ -1,4 +1,4 @@
-"""The judge of the staggered loop: grains and pattern in one loop of central differences.
+"""Grains and pattern in one loop of central differences, what other schemes are compared with.
 
 The paper's own way (section 4.3): explicit DEM and explicit FEM share the time step. It takes
 nothing from the staggered loop: neither its loads, which are means over windows, nor its motion.
@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog, rms_m
+from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.explicit_foam import ExplicitFoam
-from pattern_fe.coupling.ledger import LEDGER, Ledger, rms_m
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
-from sandmould.engines.program import Program
-from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.session import EngineStop
+from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ CHECKPOINT = "pattern.npz"
 
 
 @dataclass(frozen=True)
-class JudgeEntry:
+class MonolithicEntry:
     """The pattern at a record, and what became of the work of the sand since the run began."""
 
     time_s: float
@@ -48,8 +48,8 @@ class JudgeEntry:
     """Work less all three energies: round-off."""
 
 
-class JudgeSession(ReferenceSession):
-    """The reference engine with an explicit pattern stepped after every step of the grains.
+class MonolithicSession(DelegatingSession):
+    """A session with an explicit pattern stepped after every step of the grains.
 
     Positions of grains and nodes belong to a step, their velocities to half a step before it; the
     contact forces of a step, found where both are, drive both over the next one.
@@ -57,10 +57,11 @@ class JudgeSession(ReferenceSession):
 
     def __init__(
         self,
-        program: Program,
+        sand: Session,
         foam: ExplicitFoam,
         surface: str,
         largest_m: float,
+        counts: StepCounts,
         work: Path,
         checkpoint: Path | None = None,
     ) -> None:
@@ -68,23 +69,32 @@ class JudgeSession(ReferenceSession):
 
         Parameters
         ----------
-        program : Program
+        sand : Session
+            Of any engine that gives the loads of every step.
         foam : ExplicitFoam
         surface : str
             Its name in the engine, vertex for vertex that of the foam.
         largest_m : float
             Displacement beyond which the pattern has run away.
+        counts : StepCounts
+            Of the scenario.
         work : Path
             Folder of the tables.
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
         """
+        super().__init__(sand)
         self._foam, self._surface, self._largest_m = foam, surface, largest_m
+        self._counts = counts
         self._load = np.zeros_like(foam.vertices_m)
-        self._trusted: tuple[int | None, int] = (None, 0)
-        super().__init__(program, checkpoint)
-        self._ledger = Ledger(work / LEDGER, self._trusted[0], JudgeEntry)
-        self._shapes = ShapesFile(work / SHAPES, self._trusted[1], *foam.vertices_m.shape)
+        log_bytes, rows = None, 0
+        if checkpoint is not None:
+            with np.load(checkpoint / CHECKPOINT) as saved:
+                foam.restore({name: saved[name] for name in saved.files})
+                self._load = saved["load"]
+                log_bytes, rows = (int(number) for number in saved["trusted"])
+        self._log = ConvergenceLog(work / CONVERGENCE_LOG, log_bytes, MonolithicEntry)
+        self._shapes = ShapesFile(work / SHAPES, rows, *foam.vertices_m.shape)
 
     @property
     def displacement_m(self) -> Array:
@@ -92,25 +102,33 @@ class JudgeSession(ReferenceSession):
         return self._foam.displacement_m
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record; see ``Session``."""
-        super().advance(duration_s)
+        """Compute for a duration, or up to the next record; see ``Session``.
+
+        Raises
+        ------
+        EngineStop
+            Also where the pattern runs away.
+        """
+        record, now = self._counts.window, self.sand.steps
+        ahead = record - now % record if duration_s is None else self._counts.steps(duration_s)
+        while self.sand.steps < now + ahead and not self.sand.stage_over:
+            self._step()
         self._write()
 
-    def _compute_to(self, target: int) -> None:
-        """Step pattern and grains in turn; raises EngineStop where the pattern runs away."""
-        while self.steps < target:
-            self._foam.advance(self._load)
-            moved_m = self.displacement_m
-            self._check(moved_m)
-            self.move_surface(self._surface, self._foam.vertices_m + moved_m, self.step_s)
-            rows = self._vertices_of(self._surface)
-            before = self.solver.moving.walls.loads[:, rows].sum(axis=0)
-            super()._compute_to(self.steps + 1)
-            # the engine's sums, for it clears the solver's where a record ends
-            self._load = self._record_sums[rows] - before
+    def _step(self) -> None:
+        """Step the pattern under the loads of the last step, then the grains."""
+        self._foam.advance(self._load)
+        displacement = self.displacement_m
+        self._check(displacement)
+        vertices_m = self._foam.vertices_m + displacement
+        self.sand.move_surface(self._surface, vertices_m, self.sand.step_s)
+        self.sand.advance(self.sand.step_s)
+        load = self.sand.vertex_loads(self._surface)
+        assert load is not None, "an engine that gives the loads of every step has one"
+        self._load = load
 
-    def _check(self, moved_m: Array) -> None:
-        largest_m = float(np.abs(moved_m).max())
+    def _check(self, displacement: Array) -> None:
+        largest_m = float(np.abs(displacement).max())
         if not largest_m <= self._largest_m:
             raise EngineStop(
                 Outcome.COUPLING_DIVERGED,
@@ -119,13 +137,13 @@ class JudgeSession(ReferenceSession):
             )
 
     def _write(self) -> None:
-        foam, moved_m = self._foam, self.displacement_m
+        foam, displacement = self._foam, self.displacement_m
         elastic_j, kinetic_j = foam.elastic_j, foam.kinetic_j
-        self._ledger.write(
-            JudgeEntry(
+        self._log.write(
+            MonolithicEntry(
                 time_s=self.time_s,
-                displacement_m=rms_m(moved_m),
-                largest_m=float(np.linalg.norm(moved_m, axis=1).max()),
+                displacement_m=rms_m(displacement),
+                largest_m=float(np.linalg.norm(displacement, axis=1).max()),
                 load_n=float(np.linalg.norm(self._load.sum(axis=0))),
                 work_j=foam.work_j,
                 elastic_j=elastic_j,
@@ -134,27 +152,28 @@ class JudgeSession(ReferenceSession):
                 balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j,
             )
         )
-        self._shapes.write(self.time_s, moved_m)
+        self._shapes.write(self.time_s, displacement)
 
     def snapshot(self) -> Snapshot:
         """State of all grains relative to the box, and the pattern among them."""
-        moved = self._foam.vertices_m + self.displacement_m
-        return replace(super().snapshot(), pattern_m=moved, pattern_load_n=self._load)
+        moved_m = self._foam.vertices_m + self.displacement_m
+        return replace(self.sand.snapshot(), pattern_m=moved_m, pattern_load_n=self._load)
 
-    def keep(self) -> Any:
+    def save_checkpoint(self) -> Any:
         """Copies of what grains and pattern are; the tables go on."""
-        return super().keep(), self._foam.state(), self._load
+        return self.sand.save_checkpoint(), self._foam.state(), self._load
 
-    def go_back(self, kept: Any) -> None:
-        """Compute on from what ``keep`` gave."""
-        grains, foam, self._load = kept
-        super().go_back(grains)
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Compute on from what ``save_checkpoint`` gave."""
+        grains, foam, self._load = checkpoint
+        self.sand.restore_checkpoint(grains)
         self._foam.restore(foam)
 
-    def _save(self, folder: Path) -> None:
-        super()._save(folder)
+    def write_checkpoint(self, folder: Path) -> None:
+        """Write the engine's state and the pattern's."""
+        self.sand.write_checkpoint(folder)
         self._shapes.flush()
-        trusted = np.array([self._ledger.size(), self._shapes.rows])
+        trusted = np.array([self._log.size(), self._shapes.rows])
         np.savez(
             folder / CHECKPOINT,
             load=self._load,
@@ -162,15 +181,8 @@ class JudgeSession(ReferenceSession):
             **self._foam.state(),  # type: ignore[arg-type]
         )
 
-    def _restore(self, checkpoint: Path) -> None:
-        super()._restore(checkpoint)
-        with np.load(checkpoint / CHECKPOINT) as kept:
-            self._foam.restore({name: kept[name] for name in kept.files})
-            self._load = kept["load"]
-            self._trusted = int(kept["trusted"][0]), int(kept["trusted"][1])
-
     def close(self) -> None:
-        """Close the tables."""
-        self._ledger.close()
+        """Close the tables and free the engine."""
+        self._log.close()
         self._shapes.close()
-        super().close()
+        self.sand.close()

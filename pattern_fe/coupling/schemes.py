@@ -1,6 +1,8 @@
-"""What each scheme of the coupling asks of a scenario, told before anything starts."""
+"""What each scheme of the coupling asks of an engine and of a scenario, before anything starts."""
 
 from __future__ import annotations
+
+from typing import get_args
 
 from threadpoolctl import threadpool_limits
 
@@ -8,16 +10,28 @@ from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.pattern import Pattern
+from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.registry import engine_of, engines_that
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.pattern import Loop
+from sandmould.scenario.pattern import Loop, Scheme
 from sandmould.scenario.scenario import Scenario
 
-WITH_LIGGGHTS = ("one_way", "per_layer", "fixed", "aitken", "quasi_newton")
-"""Schemes whose windows need a mesh to be exchanged and its loads read, no more."""
+SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 ABOVE_VIBRATION = 5.0
-"""Least ratio of the pattern's first frequency to that of the box, for an answer as if at rest."""
+"""Least ratio of the pattern's first frequency to that of the box, for a solution as if at rest."""
 LIKE_FOAM = 0.9
 """Ratio of the pattern's first frequency to the foam's own from which on it moves like the foam."""
+
+
+def can_couple(scheme: Scheme, engine: Capabilities) -> bool:
+    """Whether an engine has what a scheme asks for; others need a mesh that bends, no more."""
+    if scheme == "measured":
+        return engine.repeats_windows
+    if scheme == "in_step":
+        return engine.calls_movers
+    if scheme == "monolithic":
+        return engine.loads_of_every_step
+    return True
 
 
 def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
@@ -28,24 +42,24 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
     BadInputError
     """
     assert scenario.pattern is not None
-    loop, engine = scenario.pattern.loop, scenario.engine.name
-    scheme = loop.scheme
+    loop, scheme = scenario.pattern.loop, scenario.pattern.loop.scheme
+    name, engine = scenario.engine.name, engine_of(scenario).CAPABILITIES
+    if scenario.dimension not in engine.bends_meshes:
+        raise BadInputError([Problem("engine.name", name, _engines_in(scenario.dimension))])
     if scenario.dimension == 3:
-        _refuse_in_space(loop, engine)
-    if engine == "liggghts" and scheme not in WITH_LIGGGHTS:
-        raise _bad("scheme", scheme, f"{', '.join(WITH_LIGGGHTS)} on engine liggghts")
-    if engine == "liggghts" and scenario.frame == "laboratory":
-        # A mesh that moves with the box cannot be exchanged.
-        valid = "box in a scene with a pattern on engine liggghts"
+        _refuse_in_space(loop)
+    if not can_couple(scheme, engine):
+        raise _bad("scheme", scheme, _schemes_on(name, engine, scheme))
+    if scenario.frame not in engine.bends_in_frames:
+        frames = " or ".join(engine.bends_in_frames)
+        valid = f"{frames} in a scene with a pattern on engine {name}"
         raise BadInputError([Problem("frame", scenario.frame, valid)])
     if scenario.discharge is not None:
         # Loads on vertices are forgotten when a gate is taken away.
         valid = "absent in a scene with a pattern"
         raise BadInputError([Problem("discharge.gate", scenario.discharge.gate, valid)])
-    if loop.most_passes > 1 and engine == "liggghts":
-        raise _bad("repeats", loop.repeats, "0 on engine liggghts, which cannot go back")
-    if scheme == "monolithic" and engine != "reference":
-        raise _bad("scheme", scheme, f"another scheme on engine {engine}, or engine reference")
+    if loop.most_passes > 1 and not engine.repeats_windows:
+        raise _bad("repeats", loop.repeats, f"0 on engine {name}, which cannot go back")
     if loop.exchange == "files" and not loop.has_windows:
         raise _bad(
             "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"
@@ -56,11 +70,23 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         in_step_foam(scenario, pattern)
 
 
-def _refuse_in_space(loop: Loop, engine: str) -> None:
+def _engines_in(dimension: int) -> str:
+    """Engines that can couple a pattern in a dimension, as a valid value."""
+    names = engines_that(lambda engine: dimension in engine.bends_meshes)
+    return f"{' or '.join(names)} in a scene in {dimension}D with a pattern"
+
+
+def _schemes_on(name: str, engine: Capabilities, refused: Scheme) -> str:
+    """Schemes on an engine, as a valid value; engines too where one scheme alone is missing."""
+    schemes = [scheme for scheme in SCHEMES if can_couple(scheme, engine)]
+    if len(schemes) < len(SCHEMES) - 1:
+        return f"{', '.join(schemes)} on engine {name}"
+    others = " or ".join(engines_that(lambda other: can_couple(refused, other)))
+    return f"another scheme on engine {name}, or engine {others}"
+
+
+def _refuse_in_space(loop: Loop) -> None:
     """Refuse what is coupled in the plane alone."""
-    if engine == "liggghts":
-        valid = "reference or lammps in a scene in 3D with a pattern"
-        raise BadInputError([Problem("engine.name", engine, valid)])
     if not loop.has_windows:
         raise _bad("scheme", loop.scheme, "a scheme with windows in 3D")
     if loop.exchange == "files":
@@ -132,7 +158,7 @@ def _shaken_hz(scenario: Scenario) -> float:
 
 
 def _swings(scale: float, first_hz: float, shaken_hz: float, also: str = "") -> BadInputError:
-    """What is told where scaled masses let the pattern swing with the box."""
+    """Problem of scaled masses that let the pattern swing with the box."""
     valid = (
         f"a scale or a time step at which the pattern's first frequency, now {first_hz:.3g} Hz, "
         f"is {ABOVE_VIBRATION:g} times the box's {shaken_hz:g} Hz{also}"

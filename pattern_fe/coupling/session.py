@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import Answer, ElasticBody
-from pattern_fe.coupling.choosing import relaxation_of
+from pattern_fe.coupling.body import ElasticBody, StaticSolution
+from pattern_fe.coupling.convergence_log import (
+    CONVERGENCE_LOG,
+    ConvergenceLog,
+    WindowEntry,
+    imbalance_n,
+    rms_m,
+    work_of,
+)
+from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.gain import measure_gain
-from pattern_fe.coupling.ledger import LEDGER, Entry, Ledger, imbalance_n, rms_m, work_of
-from pattern_fe.coupling.relaxation import Measured
+from pattern_fe.coupling.relaxation import MeasuredRelaxation, relaxation_of
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
-from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.session import EngineStop, RefusedError, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
@@ -26,19 +33,32 @@ Array = NDArray[np.float64]
 CHECKPOINT = "pattern.npz"
 
 
-class CoupledSession:
+@dataclass(frozen=True)
+class _Iteration:
+    """What an iteration of a window found."""
+
+    load_n: Array
+    """(nv, d) float64, N: mean of the sand on the vertices."""
+    solution: StaticSolution
+    next_m: Array
+    """(nv, d) float64, m: displacement of the next iteration, or towards the next window."""
+
+
+class CoupledSession(DelegatingSession):
     """A session whose sand presses on a pattern that gives way; else the engine's own.
 
-    In a window the surface moves evenly to a displacement, the sand's mean load on its vertices is
-    taken, the pattern answers with the displacement at rest under it, and the next window moves
-    part of the way there. A window may be computed again from the state at its beginning until
-    the answer is what was shown. Loads of one way move no surface; with one solve a layer it goes
-    to where the loads at the end of the last stage bent the pattern.
+    Two participants, sand and pattern, are coupled in windows. In a window the surface between
+    them, the interface, moves evenly to a displacement, the sand's mean load on its vertices is
+    taken (conservative: force and moment are kept), the pattern is solved at rest under it, and the
+    next window moves part of the way to that displacement (consistent: vertex for vertex). A window
+    may be iterated, computed again from its checkpoint, until the solution is the displacement at
+    the interface. Loads of one way move no surface; with one solve a layer it goes to where the
+    loads at the end of the last stage bent the pattern.
     """
 
     def __init__(
         self,
-        inner: Session,
+        sand: Session,
         body: ElasticBody,
         surface: str,
         loop: Loop,
@@ -50,9 +70,10 @@ class CoupledSession:
 
         Parameters
         ----------
-        inner : Session
+        sand : Session
             Of any engine that can move the surface.
         body : ElasticBody
+            The pattern.
         surface : str
             Its name in the engine, vertex for vertex that of the body.
         loop : Loop
@@ -64,7 +85,7 @@ class CoupledSession:
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
         """
-        self._inner = inner
+        super().__init__(sand)
         self._body = body
         self._surface = surface
         self._loop = loop
@@ -72,48 +93,47 @@ class CoupledSession:
         self._ends = window_ends(loop.window_s, counts)
         self._relaxation = relaxation_of(loop)
         rest = body.vertices_m
-        self._shown = np.zeros_like(rest)
+        self._interface = np.zeros_like(rest)
+        """Displacement at the interface, which the sand meets, m."""
         self._next = np.zeros_like(rest)
-        self._answered = np.zeros_like(rest)
+        """Displacement to which the next window leads, m."""
+        self._solved = np.zeros_like(rest)
+        """Displacement of the pattern's last solution that counts, m."""
         self._load = np.zeros_like(rest)
         self._load_sum, self._load_steps = np.zeros_like(rest), 0
         self._work_j = self._solve_s = 0.0
         self._gain = np.nan
-        ledger_bytes, rows = None, 0
+        log_bytes, rows = None, 0
         if checkpoint is not None:
-            ledger_bytes, rows = self._take_up(checkpoint)
-        self._ledger = Ledger(work / LEDGER, ledger_bytes)
+            log_bytes, rows = self._take_up(checkpoint)
+        self._log = ConvergenceLog(work / CONVERGENCE_LOG, log_bytes)
         self._shapes = ShapesFile(work / SHAPES, rows, *rest.shape)
-
-    def __getattr__(self, name: str) -> Any:
-        """All else is the engine's own."""
-        return getattr(self._inner, name)
 
     @property
     def displacement_m(self) -> Array:
-        """Displacement of the surface that the sand sees, (nv, d) float64, m.
+        """Displacement at the interface, (nv, d) float64, m.
 
-        Of loads of one way, which it never sees, where they bend the pattern.
+        Of loads of one way, which move no interface, where they bend the pattern.
         """
-        return self._answered if self._loop.scheme == "one_way" else self._shown
+        return self._solved if self._loop.scheme == "one_way" else self._interface
 
     def advance(self, duration_s: float | None = None) -> None:
         """Compute for a duration, or up to the next record, in windows of the loop."""
-        inner = self._inner
-        now, record = inner.steps, self._counts.window
+        sand = self.sand
+        now, record = sand.steps, self._counts.window
         ahead = record - now % record
         if duration_s is not None:
             ahead = self._counts.steps(duration_s)
         end = now + ahead
-        while inner.steps < end and not inner.stage_over:
-            within = inner.steps % record
+        while sand.steps < end and not sand.stage_over:
+            within = sand.steps % record
             window = int(self._ends[np.searchsorted(self._ends, within, side="right")]) - within
             if within == 0:
                 self._load_sum, self._load_steps = np.zeros_like(self._load), 0
-                self._measure(window * inner.step_s)
-            self._window(min(window, end - inner.steps))
-        if inner.is_root:
-            self._shapes.write(inner.time_s, self.displacement_m)
+                self._measure(window * sand.step_s)
+            self._window(min(window, end - sand.steps))
+        if sand.is_root:
+            self._shapes.write(sand.time_s, self.displacement_m)
 
     def _measure(self, window_s: float) -> None:
         """Measure the gain anew, at every record: sand that falls, settles or is shaken changes it.
@@ -121,77 +141,78 @@ class CoupledSession:
         Without a load the factor stays.
         """
         relaxation = self._relaxation
-        if isinstance(relaxation, Measured):
-            found = measure_gain(self._inner, self._body, self._surface, self._next, window_s)
-            if found is not None:
-                self._gain = found.gain
-                relaxation.learn(found.limit)
+        if isinstance(relaxation, MeasuredRelaxation):
+            measured = measure_gain(self.sand, self._body, self._surface, self._next, window_s)
+            if measured is not None:
+                self._gain = measured.gain
+                relaxation.set_limit(measured.limit)
 
     def _window(self, steps: int) -> None:
-        """Compute one window, as often as is asked."""
+        """Compute one window, in as many iterations as its residual needs."""
         loop = self._loop
-        kept = self._inner.keep() if loop.most_passes > 1 else None
-        start, shown, passes = self._shown, self._next, 0
+        checkpoint = self.sand.save_checkpoint() if loop.most_passes > 1 else None
+        start, displacement, iterations = self._interface, self._next, 0
         self._solve_s = 0.0
         while True:
-            told = self._pass(shown, steps * self._inner.step_s)
-            passes += 1
-            if told is None:  # too short a window for a sample: its load counts in the next
-                self._shown = shown
+            iteration = self._iterate(displacement, steps * self.sand.step_s)
+            iterations += 1
+            if iteration is None:  # too short a window for a sample: its load counts in the next
+                self._interface = displacement
                 return
-            load, answer, target = told
-            residual_m = rms_m(answer.displacement_m - shown)
-            if passes == loop.most_passes or residual_m <= loop.tolerance * rms_m(shown):
+            residual_m = rms_m(iteration.solution.displacement_m - displacement)
+            converged = residual_m <= loop.tolerance * rms_m(displacement)
+            if iterations == loop.most_passes or converged:
                 break
-            self._inner.go_back(kept)
-            shown = target
+            self.sand.restore_checkpoint(checkpoint)
+            displacement = iteration.next_m
+        load = iteration.load_n
         self._load_sum, self._load_steps = self._load_sum + steps * load, self._load_steps + steps
         self._load = self._load_sum / self._load_steps
-        self._work_j += work_of(load, shown - start)
-        self._shown = shown
-        self._next = self._predicted(start, shown, target)
-        self._write(steps, passes, load, answer)
+        self._work_j += work_of(load, displacement - start)
+        self._interface = displacement
+        self._next = self._predicted(start, displacement, iteration.next_m)
+        self._write(steps, iterations, iteration)
         self._check()
 
-    def _pass(self, shown: Array, window_s: float) -> tuple[Array, Answer, Array] | None:
-        """Move the surface through a window; give load, answer and what to show next."""
-        inner = self._inner
-        inner.move_surface(self._surface, self._body.vertices_m + shown, window_s)
-        inner.advance(window_s)
-        load = inner.vertex_loads(self._surface)
+    def _iterate(self, displacement: Array, window_s: float) -> _Iteration | None:
+        """Move the interface through a window, and solve the pattern; None without a load."""
+        sand = self.sand
+        sand.move_surface(self._surface, self._body.vertices_m + displacement, window_s)
+        sand.advance(window_s)
+        load = sand.vertex_loads(self._surface)
         if load is None:
             return None
         begun = time.perf_counter()
-        answer = self._body.answer(load)
-        if self._loop.scheme != "per_layer" or inner.stage_over:
-            self._answered = answer.displacement_m
-        target = self._relaxation.next(shown.ravel(), self._answered.ravel())
+        solution = self._body.solve(load)
+        if self._loop.scheme != "per_layer" or sand.stage_over:
+            self._solved = solution.displacement_m
+        relaxed = self._relaxation.next(displacement.ravel(), self._solved.ravel())
         self._solve_s += time.perf_counter() - begun
-        return load, answer, target.reshape(shown.shape)
+        return _Iteration(load, solution, relaxed.reshape(displacement.shape))
 
-    def _predicted(self, start: Array, shown: Array, target: Array) -> Array:
-        """Where the next window leads: part of the way to the answer, or on as in this one."""
+    def _predicted(self, start: Array, displacement: Array, relaxed: Array) -> Array:
+        """Where the next window leads: part of the way to the solution, or on as in this one."""
         if self._loop.predicts:
-            return np.asarray(target + (shown - start))
-        return target
+            return np.asarray(relaxed + (displacement - start))
+        return relaxed
 
-    def _write(self, steps: int, passes: int, load: Array, answer: Answer) -> None:
-        shown = self._shown
-        self._ledger.write(
-            Entry(
-                time_s=self._inner.time_s,
-                window_s=steps * self._inner.step_s,
-                passes=passes,
+    def _write(self, steps: int, iterations: int, iteration: _Iteration) -> None:
+        displacement, load, solution = self._interface, iteration.load_n, iteration.solution
+        self._log.write(
+            WindowEntry(
+                time_s=self.sand.time_s,
+                window_s=steps * self.sand.step_s,
+                passes=iterations,
                 factor=self._relaxation.factor,
                 gain=self._gain,
-                residual_m=rms_m(answer.displacement_m - shown),
-                displacement_m=rms_m(shown),
-                largest_m=float(np.linalg.norm(shown, axis=1).max()),
+                residual_m=rms_m(solution.displacement_m - displacement),
+                displacement_m=rms_m(displacement),
+                largest_m=float(np.linalg.norm(displacement, axis=1).max()),
                 load_n=float(np.linalg.norm(load.sum(axis=0))),
-                imbalance_n=imbalance_n(load, answer),
-                moment_left_n_m=answer.moment_left_n_m,
+                imbalance_n=imbalance_n(load, solution),
+                moment_left_n_m=solution.moment_left_n_m,
                 work_j=self._work_j,
-                energy_j=answer.energy_j,
+                energy_j=solution.energy_j,
                 solve_s=self._solve_s,
             )
         )
@@ -209,49 +230,63 @@ class CoupledSession:
                 Outcome.COUPLING_DIVERGED,
                 f"the pattern is to move by {largest_m:.3g} m, more than pattern.loop."
                 f"largest_displacement_m = {self._loop.largest_displacement_m:g}, after "
-                f"{self._inner.time_s:.4g} s: a smaller factor or another scheme may hold",
+                f"{self.sand.time_s:.4g} s: a smaller factor or another scheme may hold",
             )
 
     def snapshot(self) -> Snapshot:
         """State of all grains relative to the box, and the pattern among them."""
         moved_m = self._body.vertices_m + self.displacement_m
-        return replace(self._inner.snapshot(), pattern_m=moved_m, pattern_load_n=self._load)
+        return replace(self.sand.snapshot(), pattern_m=moved_m, pattern_load_n=self._load)
+
+    def save_checkpoint(self) -> Any:
+        """Refuse: the loop repeats its windows itself.
+
+        Raises
+        ------
+        RefusedError
+        """
+        valid = "a scheme without windows, where windows are repeated from outside"
+        raise RefusedError("pattern.loop.scheme", self._loop.scheme, valid)
+
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Refuse as ``save_checkpoint`` does."""
+        self.save_checkpoint()
 
     def write_checkpoint(self, folder: Path) -> None:
         """Write the engine's state and the loop's."""
-        self._inner.write_checkpoint(folder)
-        size = self._ledger.size()
+        self.sand.write_checkpoint(folder)
+        log_bytes = self._log.size()
         self._shapes.flush()
-        arrays: dict[str, Any] = {
-            "shown": self._shown,
+        arrays: dict[str, Any] = {  # names on disk: paused runs of an earlier version go on
+            "shown": self._interface,
             "next": self._next,
-            "answered": self._answered,
+            "answered": self._solved,
             "load": self._load,
             "work_j": self._work_j,
             "gain": self._gain,
-            "ledger_bytes": size,
+            "ledger_bytes": log_bytes,
             "rows": self._shapes.rows,
         }
         arrays |= {f"relaxation_{name}": a for name, a in self._relaxation.state().items()}
         np.savez(folder / CHECKPOINT, **arrays)
 
-    def _take_up(self, checkpoint: Path) -> tuple[int, int]:
+    def _take_up(self, folder: Path) -> tuple[int, int]:
         """Read what ``write_checkpoint`` wrote; give the trusted parts of the tables."""
-        with np.load(checkpoint / CHECKPOINT) as kept:
-            self._shown, self._next, self._load = kept["shown"], kept["next"], kept["load"]
-            self._answered = kept["answered"]
-            self._work_j = float(kept["work_j"])
-            self._gain = float(kept["gain"])
+        with np.load(folder / CHECKPOINT) as saved:
+            self._interface, self._next, self._load = saved["shown"], saved["next"], saved["load"]
+            self._solved = saved["answered"]
+            self._work_j = float(saved["work_j"])
+            self._gain = float(saved["gain"])
             start = "relaxation_"
-            memory = {k.removeprefix(start): kept[k] for k in kept.files if k.startswith(start)}
+            memory = {k.removeprefix(start): saved[k] for k in saved.files if k.startswith(start)}
             self._relaxation.restore(memory)
-            return int(kept["ledger_bytes"]), int(kept["rows"])
+            return int(saved["ledger_bytes"]), int(saved["rows"])
 
     def close(self) -> None:
         """Close the tables and free the engine."""
-        self._ledger.close()
+        self._log.close()
         self._shapes.close()
-        self._inner.close()
+        self.sand.close()
 
 
 def window_ends(window_s: float, counts: StepCounts) -> NDArray[np.int64]:

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol, cast
 
 from sandmould import ROOT
 from sandmould.dem import source_hash
+from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.scenario import Scenario
 
 
 class EngineModule(Protocol):
     """What ``sandmould.engines.<name>.engine`` offers, for each engine."""
 
+    CAPABILITIES: Capabilities
     GRAIN_STEPS_PER_S: float
     """Speed of one core in 2D that batches are filled by (docs/speed.md); fixed, so that a study
     has the same batches on every machine."""
@@ -110,6 +113,17 @@ def deck_reader(name: str) -> DeckReaderModule:
 def mpi_ranks(scenario: Scenario) -> int:
     """Processes that a run is started with: 1 where ranks are threads of one process."""
     return scenario.engine.ranks if engine_of(scenario).RANKS is Ranks.PROCESSES else 1
+
+
+def engines_that(can: Callable[[Capabilities], bool]) -> list[str]:
+    """Names of the engines whose sessions can do something, in the order of the registry.
+
+    Parameters
+    ----------
+    can : callable
+        Whether capabilities are enough.
+    """
+    return [name for name in ENGINE_NAMES if can(engine_module(name).CAPABILITIES)]
 
 
 def deck_hash(scenario: Scenario) -> str:

@@ -55,15 +55,29 @@ class RefusedError(Exception):
 class Session(Protocol):
     """One scenario being computed by one engine."""
 
-    version: str
-    grains: int
-    """Grains now in the box."""
-    step_s: float
-    stage: Stage
-    stage_over: bool
-    """Whether the stage's time is up or its rest rule met."""
-    at_rest: bool
-    """Whether the settling rule of the stage was met."""
+    @property
+    def version(self) -> str:
+        """Version of the engine."""
+
+    @property
+    def grains(self) -> int:
+        """Grains now in the box."""
+
+    @property
+    def step_s(self) -> float:
+        """Time step."""
+
+    @property
+    def stage(self) -> Stage:
+        """Stage that is being computed."""
+
+    @property
+    def stage_over(self) -> bool:
+        """Whether the stage's time is up or its rest rule met."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the settling rule of the stage was met."""
 
     @property
     def steps(self) -> int:
@@ -149,16 +163,18 @@ class Session(Protocol):
         RefusedError
         """
 
-    def keep(self) -> Any:
-        """Give all that is needed to compute on from here, or refuse.
+    def save_checkpoint(self) -> Any:
+        """Give all that is needed to compute on from here, in memory, or refuse.
+
+        For another iteration of a window; ``write_checkpoint`` is for another process.
 
         Raises
         ------
         RefusedError
         """
 
-    def go_back(self, kept: Any) -> None:
-        """Compute on from a kept state, which may be gone back to again."""
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Compute on from what ``save_checkpoint`` gave, which may be restored again."""
 
     def attach_mover(self, name: str, mover: StepMover) -> None:
         """Let a surface be moved in every step by the loads on it, or refuse.

@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 
-from pattern_fe.coupling.verdict import LoopVerdict, study_sentence
+from pattern_fe.coupling.loop_verdict import LoopVerdict, study_sentence
 from sandmould.report.bending_figure import draw_outlines
 from sandmould.report.chart import Area, Chart
 from sandmould.report.coupling_map import CouplingMap, coupling_map

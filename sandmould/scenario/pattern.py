@@ -70,13 +70,25 @@ class MeshFile(Section):
 Shape = Annotated[Bar | LShape | TShape | MeshFile, Field(discriminator="kind")]
 
 
-class Supports(Section):
+class SupportsConfig(Section):
     """What holds the pattern: left, right, bottom, top, front, back, or groups of a mesh file."""
 
     clamped: tuple[str, ...] = quantity(("bottom",), "Boundaries that do not move.", source=ARGUED)
     resting: tuple[str, ...] = quantity(
         (), "Flat boundaries that slide without friction and do not lift.", source=ARGUED
     )
+
+
+Scheme = Literal[
+    "one_way",
+    "per_layer",
+    "fixed",
+    "measured",
+    "aitken",
+    "quasi_newton",
+    "in_step",
+    "monolithic",
+]
 
 
 class Loop(Section):
@@ -86,16 +98,7 @@ class Loop(Section):
         0.002, "Length of a window; rounded so that a record holds whole ones.", unit="s",
         source=ARGUED, gt=0, le=1,
     )  # fmt: skip
-    scheme: Literal[
-        "one_way",
-        "per_layer",
-        "fixed",
-        "measured",
-        "aitken",
-        "quasi_newton",
-        "in_step",
-        "monolithic",
-    ] = quantity(
+    scheme: Scheme = quantity(
         "aitken",
         "How far the surface is moved to where the last loads bend the pattern: not at all, a "
         "fixed share to where those at the end of the last layer or stage bend it, or to where "
@@ -103,8 +106,8 @@ class Loop(Section):
         "LIGGGHTS), Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no "
         "windows: "
         "in_step steps the pattern, condensed on its surface, inside every step of the engine; "
-        "monolithic steps all of it after every step of the grains, slow, the judge of the "
-        "others, reference engine.",
+        "monolithic steps all of it after every step of the grains, slow, what the others are "
+        "compared with, reference engine.",
         source=ARGUED,
     )
     factor: float = quantity(
@@ -162,7 +165,7 @@ class Loop(Section):
         return 1 + self.repeats if feeds_back else 1
 
 
-class Pattern(Section):
+class PatternConfig(Section):
     """A foam pattern that bends under the sand."""
 
     name: str = quantity("pattern", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
@@ -187,7 +190,7 @@ class Pattern(Section):
     )
     poisson_ratio: float = quantity(0.35, "Poisson's ratio.", source=ROJEK, gt=-1, lt=0.5)
     density_kg_m3: float = quantity(12.0, "Density.", unit="kg/m3", source=ROJEK, gt=0, le=3e4)
-    supports: Supports = Field(Supports(), description="How it is held.")
+    supports: SupportsConfig = Field(SupportsConfig(), description="How it is held.")
     statics: Literal["linear", "large"] = quantity(
         "linear", "Small displacements, or large ones (total Lagrangian).", source=ARGUED
     )

@@ -16,7 +16,7 @@ from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.engine import Engine
 from sandmould.scenario.fill import Fill
 from sandmould.scenario.geometry import Scene
-from sandmould.scenario.pattern import Pattern
+from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.stages import is_filling
@@ -96,7 +96,7 @@ class Scenario(Section):
     obstacles: tuple[Obstacle, ...] = Field(
         (), description="Plates, tubes, polygons, cylinders and meshes in the box."
     )
-    pattern: Pattern | None = Field(
+    pattern: PatternConfig | None = Field(
         None, description="A foam pattern that bends under the sand, coupled with it."
     )
     sand: Sand = Field(Sand(), description="The sand.")

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from analysis.deflection import deflection, farthest_corner
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
-from pattern_fe.coupling.predicted import predicted_gain
-from pattern_fe.coupling.verdict import LoopVerdict, judge_loop, stored_energy_j
+from pattern_fe.coupling.gain_prediction import predicted_gain
+from pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop, stored_energy_j
 from pattern_fe.distance import distance_from_drawing
 from pattern_fe.large_displacement import LoadNotReachedError
 from pattern_fe.pattern import Pattern
@@ -77,7 +77,7 @@ class BentPattern:
     def _answered_m(self, load_n: np.ndarray) -> float:
         """Deflection of the tip at rest under a load; NaN where there is no rest."""
         try:
-            return -float(self._body.answer(load_n).displacement_m[self.tip, -1])
+            return -float(self._body.solve(load_n).displacement_m[self.tip, -1])
         except LoadNotReachedError:
             return np.nan
 
@@ -115,8 +115,8 @@ def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
 
 def ledger_of(folder: Path) -> pd.DataFrame | None:
     """The ledger of a run; None where it has none."""
-    path = folder / LEDGER
-    ledger = read_ledger(path) if path.is_file() else None
+    path = folder / CONVERGENCE_LOG
+    ledger = read_convergence_log(path) if path.is_file() else None
     return None if ledger is None or ledger.empty else ledger
 
 
@@ -128,7 +128,7 @@ def verdict_of(folder: Path, until_s: float = np.inf) -> LoopVerdict | None:
     stopped = np.isinf(until_s) and outcome.is_file() and (
         RunOutcome.read(outcome).outcome is Outcome.COUPLING_DIVERGED
     )  # fmt: skip
-    return judge_loop(ledger[ledger["time_s"] <= until_s], stopped)
+    return classify_loop(ledger[ledger["time_s"] <= until_s], stopped)
 
 
 def _by_snapshot(ledger: pd.DataFrame, time_s: pd.Series[float], reach_m: float) -> dict[str, Any]:

@@ -37,7 +37,7 @@ def schema_text() -> str:
         definitions = other["$defs"] | definitions
         schema["properties"] = other["properties"] | schema["properties"]
     # The material states a part of it, and what the study is based on another.
-    for name in ("Solidification", "MetalFlow", "Pattern"):
+    for name in ("Solidification", "MetalFlow", "PatternConfig"):
         definitions[name].pop("required")
     # The kind may be that of the study which this one is based on.
     schema["properties"]["scenario"] = {

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
 from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.ledger import LEDGER
-from pattern_fe.scene import pattern_of, with_surface
+from pattern_fe.coupling.interface import with_surface
+from pattern_fe.scene import pattern_of
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.bending import verdict_of
@@ -83,7 +84,7 @@ def test_a_run_stopped_by_its_loop_diverged(folder: Path) -> None:
 
 
 def test_a_run_without_a_ledger_has_its_shape_alone(folder: Path) -> None:
-    (folder / LEDGER).unlink()
+    (folder / CONVERGENCE_LOG).unlink()
     table = measured(folder)
     assert "pattern_tip_deflection_m" in table
     assert "pattern_residual_fraction" not in table

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.scene import pattern_of, with_surface
+from pattern_fe.coupling.interface import with_surface
+from pattern_fe.scene import pattern_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.animation import make_film
 from sandmould.report.bending_figure import _lines_m, draw_outlines
@@ -41,7 +42,7 @@ def bar_run(folder: Path) -> tuple[Scenario, Snapshot]:
     place_m = np.array([[0.05, 0.02, 0.044]])
     snapshot = Snapshot(
         0.1, -1.0, "settle_1", one, one, place_m, none, none, np.array([0.002]),
-        pattern_m=body.vertices_m + body.answer(load).displacement_m, pattern_load_n=load,
+        pattern_m=body.vertices_m + body.solve(load).displacement_m, pattern_load_n=load,
     )  # fmt: skip
     (folder / "snapshots").mkdir()
     snapshot.save(folder / "snapshots" / "000000.npz")

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.relaxation import Aitken, Array, Fixed, QuasiNewton, Relaxation
+from pattern_fe.coupling.relaxation import (
+    AitkenRelaxation,
+    Array,
+    FixedRelaxation,
+    QuasiNewtonRelaxation,
+    Relaxation,
+)
 
 RNG = np.random.default_rng(5)
 
@@ -30,30 +36,30 @@ def gone(relaxation: Relaxation, stiffness_ratio: Array, windows: int) -> list[f
 def test_a_fixed_share_holds_below_the_limit_and_diverges_above(gain: float) -> None:
     limit = 2.0 / (1.0 + gain)
     ratio = np.array([gain, 0.1 * gain])
-    below, above = (gone(Fixed(f * limit), ratio, 300) for f in (0.97, 1.03))
+    below, above = (gone(FixedRelaxation(f * limit), ratio, 300) for f in (0.97, 1.03))
     assert below[-1] < 1e-3 * below[0]
     assert above[-1] > 1e3 * above[0]
 
 
 def test_the_residual_shrinks_by_the_exact_factor() -> None:
-    norms = gone(Fixed(0.1), np.array([4.0]), 10)
+    norms = gone(FixedRelaxation(0.1), np.array([4.0]), 10)
     assert norms[1:] == pytest.approx([n * (1 - 0.1 * 5.0) for n in norms[:-1]])
 
 
 def test_one_unknown_takes_two_windows_by_secants() -> None:
-    for relaxation in (Aitken(0.1, -1.0, 1.0), QuasiNewton(0.1, 10, 1e-8)):
+    for relaxation in (AitkenRelaxation(0.1, -1.0, 1.0), QuasiNewtonRelaxation(0.1, 10, 1e-8)):
         norms = gone(relaxation, np.array([30.0]), 3)
         assert norms[2] < 1e-12 * norms[0]
 
 
 def test_aitken_holds_where_the_plain_loop_diverges() -> None:
     ratio = np.array([30.0, 10.0, 1.0])
-    assert gone(Fixed(1.0), ratio, 60)[-1] > 1e10
-    assert gone(Aitken(0.1, 0.005, 1.0), ratio, 60)[-1] < 1e-3
+    assert gone(FixedRelaxation(1.0), ratio, 60)[-1] > 1e10
+    assert gone(AitkenRelaxation(0.1, 0.005, 1.0), ratio, 60)[-1] < 1e-3
 
 
 def test_aitken_stays_in_its_bounds() -> None:
-    relaxation = Aitken(0.1, 0.02, 0.3)
+    relaxation = AitkenRelaxation(0.1, 0.02, 0.3)
     for _ in range(30):
         relaxation.next(RNG.normal(size=4), RNG.normal(size=4))
         assert 0.02 <= relaxation.factor <= 0.3
@@ -62,13 +68,13 @@ def test_aitken_stays_in_its_bounds() -> None:
 @pytest.mark.parametrize("n", [2, 5])
 def test_quasi_newton_ends_once_it_has_seen_every_direction(n: int) -> None:
     ratio = np.linspace(1.0, 50.0, n)
-    norms = gone(QuasiNewton(0.02, n + 1, 1e-10), ratio, n + 2)
+    norms = gone(QuasiNewtonRelaxation(0.02, n + 1, 1e-10), ratio, n + 2)
     assert norms[n + 1] < 1e-8 * norms[0]
     assert norms[n - 1] > 1e-6 * norms[0]
 
 
 def test_quasi_newton_leaves_out_what_newer_windows_have_said() -> None:
-    relaxation = QuasiNewton(0.1, 10, 1e-6)
+    relaxation = QuasiNewtonRelaxation(0.1, 10, 1e-6)
     x = np.zeros(3)
     for _ in range(5):  # the residual changes along one direction alone
         x = relaxation.next(x, np.array([1.0, 0.0, 0.0]) - 20.0 * x)
@@ -78,7 +84,11 @@ def test_quasi_newton_leaves_out_what_newer_windows_have_said() -> None:
 
 @pytest.mark.parametrize(
     "fresh",
-    [lambda: Fixed(0.2), lambda: Aitken(0.1, 0.0, 1.0), lambda: QuasiNewton(0.1, 3, 1e-6)],
+    [
+        lambda: FixedRelaxation(0.2),
+        lambda: AitkenRelaxation(0.1, 0.0, 1.0),
+        lambda: QuasiNewtonRelaxation(0.1, 3, 1e-6),
+    ],
     ids=["fixed", "aitken", "quasi_newton"],
 )
 def test_memory_is_taken_up(fresh: type[Relaxation]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pattern_fe.coupling.verdict import LoopVerdict, judge_loop, study_sentence
+from pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop, study_sentence
 
 WINDOWS = 200
 
@@ -24,7 +24,7 @@ def ledger(**columns: object) -> pd.DataFrame:
 
 
 def judged(**columns: object) -> LoopVerdict:
-    found = judge_loop(ledger(**columns))
+    found = classify_loop(ledger(**columns))
     assert found is not None
     return found
 
@@ -81,12 +81,12 @@ def test_a_loop_far_from_its_answer_lags_and_gives_nothing() -> None:
 
 
 def test_a_run_that_was_stopped_diverged() -> None:
-    found = judge_loop(ledger(), stopped=True)
+    found = classify_loop(ledger(), stopped=True)
     assert found is not None
     assert found.state == "diverged"
     broken = ledger()
     broken.loc[WINDOWS - 1, "displacement_m"] = np.inf
-    found = judge_loop(broken)
+    found = classify_loop(broken)
     assert found is not None
     assert found.state == "diverged"
 
@@ -99,15 +99,15 @@ def test_one_way_loads_are_no_loop() -> None:
 
 def test_a_pattern_stepped_with_the_grains_has_no_residual() -> None:
     told = ledger().rename(columns={"energy_j": "elastic_j"}).drop(columns=["residual_m", "factor"])
-    found = judge_loop(told.assign(work_j=0.025))
+    found = classify_loop(told.assign(work_j=0.025))
     assert found is not None
     assert found.state == "holds"
     assert found.sentence == "Holds: the sand saw the pattern where its loads bend it."
 
 
 def test_without_sand_on_it_nothing_is_told() -> None:
-    assert judge_loop(ledger(load_n=0.0)) is None
-    assert judge_loop(ledger().iloc[:0]) is None
+    assert classify_loop(ledger(load_n=0.0)) is None
+    assert classify_loop(ledger().iloc[:0]) is None
 
 
 def test_a_study_counts_its_runs() -> None:
@@ -118,4 +118,4 @@ def test_a_study_counts_its_runs() -> None:
         "shape an answer."
     )
     assert study_sentence([lags]).startswith("The loop lags in the one run: only where")
-    assert study_sentence([]) == "No run has a ledger that tells of its loop."
+    assert study_sentence([]) == "No run has a convergence log that tells of its loop."

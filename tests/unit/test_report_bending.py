@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
 from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.ledger import LEDGER
-from pattern_fe.scene import pattern_of, with_surface
+from pattern_fe.coupling.interface import with_surface
+from pattern_fe.scene import pattern_of
 from sandmould.report import figures
 from sandmould.report.bending import TIP, bending_pages, deflection_chart
 from sandmould.report.page import write_report
@@ -86,7 +87,7 @@ def test_the_page_tells_what_became_of_the_pattern(study: Path, text: str) -> No
 
 def test_a_loop_that_does_not_hold_is_not_held_against_the_paper(study: Path) -> None:
     collected, verdict = gathered(study)
-    ledger = study / "runs" / "one" / LEDGER
+    ledger = study / "runs" / "one" / CONVERGENCE_LOG
     told = ledger.read_text()
     # All of the energy is from the loop itself: the sand's work is taken away.
     table = pd.read_csv(ledger, sep="\t").assign(work_j=-1.0)

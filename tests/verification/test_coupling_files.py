@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.exchange import PATTERN, read_answer, read_loads, read_pattern
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from pattern_fe.coupling.exchange import PATTERN, read_loads, read_pattern, read_solution
 from pattern_fe.coupling.files_body import EXCHANGE
-from pattern_fe.coupling.from_files import answer_all
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.from_files import solve_all
+from pattern_fe.coupling.interface import with_surface
 from pattern_fe.coupling.opening import open_coupled
 from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
-from pattern_fe.scene import pattern_of, with_surface
+from pattern_fe.scene import pattern_of
 from sandmould.engines.driver import Driver
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
@@ -62,7 +63,7 @@ def by_files(folder: Path, statics: str = "linear") -> tuple[RunOutcome, int]:
         outcome = drive(plank_scene("files", statics), folder, driver)
         if outcome.outcome is not Outcome.AWAITS_PATTERN:
             return outcome, stops
-        assert len(answer_all(folder / EXCHANGE)) == 1
+        assert len(solve_all(folder / EXCHANGE)) == 1
     raise AssertionError("it does not end")
 
 
@@ -74,7 +75,7 @@ def test_loop_by_files_is_the_loop_in_memory(statics: str, tmp_path: Path) -> No
     assert drive(plank_scene("memory", statics), memory, driver).outcome is Outcome.FINISHED
     outcome, stops = by_files(files, statics)
     assert outcome.outcome is Outcome.FINISHED
-    one, two = (read_ledger(folder / LEDGER) for folder in (memory, files))
+    one, two = (read_convergence_log(folder / CONVERGENCE_LOG) for folder in (memory, files))
     assert stops == one["passes"].sum()
     assert one.displacement_m.iloc[-1] > 1e-6
     # Mesh, loads and answers are written digit by digit.
@@ -95,7 +96,7 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pattern, _ = read_pattern(folder / EXCHANGE)
         if read_loads(loads, pattern.surface.outer)[0].any():
             return folder
-        answer_all(folder / EXCHANGE)
+        solve_all(folder / EXCHANGE)
     raise AssertionError("no sand fell on the plank")
 
 
@@ -113,7 +114,7 @@ def test_command_answers_from_the_folder_alone(asked: Path, tmp_path: Path) -> N
     assert "1 answers written" in said
     pattern, _ = read_pattern(alone)
     outer = pattern.surface.outer
-    answer = read_answer(sorted(alone.glob("answer_*.tsv"))[-1], outer)
+    answer = read_solution(sorted(alone.glob("answer_*.tsv"))[-1], outer)
     loads = sorted(alone.glob("loads_*.tsv"))[-1]
     load_n, _ = read_loads(loads, outer)
     np.testing.assert_allclose(answer.reaction_n, -load_n.sum(axis=0), rtol=1e-9)
@@ -141,21 +142,21 @@ def test_damaged_loads_are_told(was: str, now: str, says: str, asked: Path) -> N
     assert damaged != told
     loads.write_text(damaged)
     with pytest.raises(ValueError, match=says):
-        answer_all(asked)
+        solve_all(asked)
 
 
 def test_pattern_file_without_a_key_is_told(asked: Path) -> None:
     path = asked / PATTERN
     path.write_text(path.read_text().replace("young_modulus_pa", "young"))
     with pytest.raises(ValueError, match="has no key 'young_modulus_pa'"):
-        answer_all(asked)
+        solve_all(asked)
     path.unlink()
     with pytest.raises(ValueError, match=r"pattern\.yaml cannot be read: No such file"):
-        answer_all(asked)
+        solve_all(asked)
 
 
 def test_run_goes_on_once_a_damaged_answer_is_replaced(asked: Path) -> None:
-    (answer,) = answer_all(asked)
+    (answer,) = solve_all(asked)
     told = answer.read_text()
     answer.write_text(told.replace("energy_j", "energy"))
     stopped = drive(plank_scene("files"), asked.parent, driver)
@@ -166,7 +167,7 @@ def test_run_goes_on_once_a_damaged_answer_is_replaced(asked: Path) -> None:
 
 
 def test_loads_of_another_run_are_asked_anew(asked: Path) -> None:
-    (answer,) = answer_all(asked)
+    (answer,) = solve_all(asked)
     loads = sorted(asked.glob("loads_*.tsv"))[-1]
     fresh = loads.read_text()
     loads.write_text(re.sub(r"\n(\S+\t\S+)\t\S+", r"\n\1\t1.0", fresh, count=2))

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from pattern_fe.coupling.gain import Gain, measure_gain
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
 from tests.patterns import _one_thread  # noqa: F401
 from tests.verification.one_grain import RADIUS_M
 from tests.wedge import (
@@ -66,7 +66,7 @@ def test_gain_is_that_of_two_contacts_in_series(
 ) -> None:
     session, _ = squeezed(tmp_path, young_pa, damping_ratio, 3, scheme="fixed", factor=1e-3)
     shown = session.displacement_m.copy()
-    found = measure_gain(session._inner, session._body, "pattern", shown, WINDOW_S)
+    found = measure_gain(session.sand, session._body, "pattern", shown, WINDOW_S)
     a, b = shares(young_pa, damping_ratio)
     assert found is not None
     # the disc itself lags by about a thirtieth of the window
@@ -94,7 +94,7 @@ def test_measured_scheme_finds_its_factor_and_comes_to_rest(engine: str, tmp_pat
     session.close()
     assert left < 1e-4
     a, b = shares(5e4, 0.95)
-    ledger = read_ledger(tmp_path / LEDGER)
+    ledger = read_convergence_log(tmp_path / CONVERGENCE_LOG)
     assert ledger.gain.iloc[-1] == pytest.approx(a + 2.0 * b, rel=0.05)
     np.testing.assert_allclose(ledger.factor, 0.5 * 2.0 / (1.0 + ledger.gain), rtol=1e-6)
 
@@ -104,7 +104,7 @@ def test_engines_measure_the_same_gain(tmp_path: Path) -> None:
     for engine in ENGINES:
         session, _ = squeezed(tmp_path, 2e5, 0.3, 3, engine, scheme="fixed", factor=1e-3)
         shown = session.displacement_m.copy()
-        found = measure_gain(session._inner, session._body, "pattern", shown, WINDOW_S)
+        found = measure_gain(session.sand, session._body, "pattern", shown, WINDOW_S)
         session.close()
         assert found is not None
         gains.append(found.gain)
@@ -120,7 +120,7 @@ def test_engines_repeat_windows_alike(tmp_path: Path) -> None:
         session, _ = squeezed(folder, 2e5, 0.95, 3, engine, **loop)
         session.close()
         ends.append(session.displacement_m)
-        passes.append(read_ledger(folder / LEDGER).passes.tolist())
+        passes.append(read_convergence_log(folder / CONVERGENCE_LOG).passes.tolist())
     assert max(passes[0]) > 2
     assert passes[1] == passes[0]
     np.testing.assert_allclose(ends[1], ends[0], atol=BAND * np.abs(ends[0]).max())
@@ -131,7 +131,7 @@ def test_measuring_leaves_the_session_as_it_was(tmp_path: Path) -> None:
     for times in (0, 1):
         session, _ = squeezed(tmp_path, 2e5, 0.95, 2, scheme="fixed", factor=0.1)
         for _ in range(times):
-            measure_gain(session._inner, session._body, "pattern", session.displacement_m, WINDOW_S)
+            measure_gain(session.sand, session._body, "pattern", session.displacement_m, WINDOW_S)
         for _ in range(2):  # what a window finds is shown in the next one
             session.advance()
         ends.append(session.displacement_m)
@@ -144,5 +144,5 @@ def test_without_sand_there_is_no_gain(tmp_path: Path) -> None:
     session = staggered(pattern, wedge_scene(pattern), tmp_path, window_s=WINDOW_S)
     put_disc(session, 0.04)
     rest = np.zeros_like(session.displacement_m)
-    assert measure_gain(session._inner, session._body, "pattern", rest, WINDOW_S) is None
+    assert measure_gain(session.sand, session._body, "pattern", rest, WINDOW_S) is None
     session.close()

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from pattern_fe.coupling.foam_body import cross
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.interface import with_surface
+from pattern_fe.coupling.loop_verdict import classify_loop
 from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.coupling.verdict import judge_loop
 from pattern_fe.pattern import Pattern
-from pattern_fe.scene import pattern_of, with_surface
+from pattern_fe.scene import pattern_of
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
 from sandmould.scenario.reading import Origin, merge
@@ -76,7 +77,7 @@ def test_vertices_carry_force_and_moment_of_contacts(tmp_path: Path) -> None:
         background_damping={"form": "none"},
         fill={"layers": [{"count": 1}]},
     )
-    session = opened(scenario, tmp_path)._inner
+    session = opened(scenario, tmp_path).sand
     # over the edge between two triangles of the upper face, sliding and pressed in
     put_sphere(session, [0.0312, 0.0093, TOP_M + RADIUS_M - 1e-4], [0.05, -0.02, -0.01])
     vertices_m = scenario.scene.meshes[0].vertices_m
@@ -112,7 +113,7 @@ def test_a_grain_on_a_cantilever_bends_it_as_a_point_load_does(engine: str, tmp_
     largest_m = np.abs(exact_m).max()
     np.testing.assert_allclose(session.displacement_m, exact_m, rtol=0.0, atol=1e-4 * largest_m)
     assert largest_m > 1e-7
-    last = read_ledger(tmp_path / LEDGER).iloc[-1]
+    last = read_convergence_log(tmp_path / CONVERGENCE_LOG).iloc[-1]
     assert last.load_n == pytest.approx(weight_n, rel=1e-4)
     assert last.imbalance_n < 1e-9 * weight_n
     assert last.moment_left_n_m < 1e-9 * weight_n * 0.05
@@ -167,7 +168,7 @@ def test_the_balances_of_a_bed_on_a_plank(engine: str, tmp_path: Path) -> None:
         session.advance()
     snapshot, walls = session.snapshot(), session.surface_loads()
     session.close()
-    ledger = read_ledger(tmp_path / LEDGER)
+    ledger = read_convergence_log(tmp_path / CONVERGENCE_LOG)
     last = ledger[ledger.time_s > 0.25]
     masses = [scenario.sand.grain_mass_kg(2 * r, 3) for r in snapshot.radius_m]
     weight_n = scenario.gravity_m_s2 * sum(masses)
@@ -179,7 +180,7 @@ def test_the_balances_of_a_bed_on_a_plank(engine: str, tmp_path: Path) -> None:
     assert (last.imbalance_n < 1e-9 * last.load_n).all()
     assert (last.moment_left_n_m < 1e-9 * last.load_n * 0.06).all()
     assert (last.residual_m / last.displacement_m).median() < 0.1
-    verdict = judge_loop(ledger)
+    verdict = classify_loop(ledger)
     assert verdict is not None
     assert verdict.state == "holds"
     assert last.largest_m.iloc[-1] > 1e-5

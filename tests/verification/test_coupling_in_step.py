@@ -1,4 +1,4 @@
-"""The in-step scheme against exact rests and oscillations, its own energies, FE and the judge."""
+"""The in-step scheme against exact rests and oscillations, energies, FE and the monolithic one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pattern_fe.coupling.contact_rows import ContactRows, shares_along
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from pattern_fe.coupling.opening import open_coupled
 from pattern_fe.coupling.selective_mass import selective_mass
 from pattern_fe.material import Foam
@@ -31,7 +31,7 @@ from tests.wedge import (
     WALL_N_M,
     end_moved_m,
     end_stiffness_n_m,
-    judge,
+    monolithic,
     plate_pattern,
     plate_scene,
     put_disc,
@@ -113,7 +113,7 @@ def test_a_disc_on_a_plank_bends_it_as_finite_elements_do(engine: str, tmp_path:
     for _ in range(80):
         session.advance()
     session.close()
-    last = read_ledger(tmp_path / LEDGER).iloc[-1]
+    last = read_convergence_log(tmp_path / CONVERGENCE_LOG).iloc[-1]
     weight_n = 9.80665 * scenario.sand.grain_mass_kg(2 * RADIUS_M, 2)
     assert last.load_n == pytest.approx(weight_n, rel=1e-6)
     # the residual is that of the whole mesh under the same load
@@ -131,19 +131,19 @@ def test_its_energies_make_up_the_work_of_the_sand(engine: str, tmp_path: Path) 
     for _ in range(20):
         session.advance(1e-4)
     session.close()
-    ledger = read_ledger(tmp_path / LEDGER)
+    ledger = read_convergence_log(tmp_path / CONVERGENCE_LOG)
     assert ledger.damped_j.iloc[-1] > 0.01 * ledger.work_j.max()
     assert ledger.kinetic_j.max() > 0.0
     # exact for central differences; what is left is round-off of some hundred sums
     assert ledger.balance_j.abs().max() < 1e-11 * ledger.energy_j.max()
 
 
-def test_a_thrown_disc_moves_the_bar_as_the_judge_says(tmp_path: Path) -> None:
+def test_a_thrown_disc_moves_the_bar_as_in_the_monolithic_scheme(tmp_path: Path) -> None:
     pattern = wedge_pattern(6.4e6, gap_m=0.01)
     wall = {"friction": 0.0, "damping_ratio": 0.0, "normal_stiffness_n_m": 2e3}
     scenario = wedge_scene(pattern, contact={"grain_wall": wall})
     ways = []
-    for opened in (judge, in_step):
+    for opened in (monolithic, in_step):
         session: Any = opened(pattern, scenario, tmp_path, damping_ratio=0.0)
         put_disc(session, 0.01 - RADIUS_M - 1e-5, 0.1)
         moved = []
@@ -152,25 +152,25 @@ def test_a_thrown_disc_moves_the_bar_as_the_judge_says(tmp_path: Path) -> None:
             moved.append(end_moved_m(session, pattern))
         session.close()
         ways.append(np.array(moved))
-    judged, found = ways
+    exact, found = ways
     # both bars swing a little, each with masses of its own: 3 % apart
-    np.testing.assert_allclose(found, judged, atol=0.05 * judged.max())
+    np.testing.assert_allclose(found, exact, atol=0.05 * exact.max())
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_plate_under_discs_rests_as_the_judges(engine: str, tmp_path: Path) -> None:
+def test_a_plate_under_discs_rests_as_in_the_monolithic_scheme(engine: str, tmp_path: Path) -> None:
     pattern = plate_pattern()
     rests = []
-    for opened, name in ((judge, "reference"), (in_step, engine)):
+    for opened, name in ((monolithic, "reference"), (in_step, engine)):
         scenario = plate_scene(pattern, engine={"name": name})
         session: Any = opened(pattern, scenario, tmp_path, damping_ratio=1.0)
         rest_on_plate(session)
         rests.append(session.displacement_m)
         session.close()
-    judged, found = rests
-    assert np.abs(judged).max() > 1e-7
+    exact, found = rests
+    assert np.abs(exact).max() > 1e-7
     # both still swing a little
-    np.testing.assert_allclose(found, judged, atol=1e-3 * np.abs(judged).max())
+    np.testing.assert_allclose(found, exact, atol=1e-3 * np.abs(exact).max())
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -185,12 +185,12 @@ def test_a_stopped_session_goes_on_as_if_never_stopped(engine: str, tmp_path: Pa
     straight.write_checkpoint(kept)
     straight.advance()
     straight.close()
-    table = read_ledger(tmp_path / LEDGER).drop(columns="solve_s")
+    table = read_convergence_log(tmp_path / CONVERGENCE_LOG).drop(columns="solve_s")
     again = in_step(pattern, scenario, tmp_path, kept)
     again.advance()
     again.close()
     np.testing.assert_array_equal(again.displacement_m, straight.displacement_m)
-    assert read_ledger(tmp_path / LEDGER).drop(columns="solve_s").equals(table)
+    assert read_convergence_log(tmp_path / CONVERGENCE_LOG).drop(columns="solve_s").equals(table)
 
 
 def test_threads_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,9 +201,9 @@ def test_threads_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         session.insert_layer(1)
         session.start_stage(session.stage)
         session.advance(0.12)
-        session.solver._threads = threads  # also where the machine has one core
+        session.sand.solver._threads = threads  # also where the machine has one core
         session.advance(2e-3)
-        assert len(session.solver.moving.chunks.bound) > 4
+        assert len(session.sand.solver.moving.chunks.bound) > 4
         found.append(session.displacement_m)
         session.close()
     assert np.abs(found[0]).max() > 1e-5
@@ -215,11 +215,11 @@ def test_it_goes_back_to_what_it_kept(tmp_path: Path) -> None:
     session = in_step(pattern, wedge_scene(pattern), tmp_path)
     put_disc(session)
     session.advance(5e-4)
-    kept, found = session.keep(), []
+    checkpoint, found = session.save_checkpoint(), []
     for _ in range(2):
         session.advance(5e-4)
         found.append(session.displacement_m)
-        session.go_back(kept)
+        session.restore_checkpoint(checkpoint)
     session.close()
     np.testing.assert_array_equal(*found)
 

@@ -1,4 +1,4 @@
-"""The judge against exact rests and its own energies, and the staggered loop against the judge."""
+"""The monolithic scheme against exact rests and its own energies, and the staggered loop beside."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.interface import with_surface
 from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.scene import with_surface
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from sandmould.runs.outcome import Outcome
@@ -26,7 +26,7 @@ from tests.wedge import (
     WALL_N_M,
     end_moved_m,
     end_stiffness_n_m,
-    judge,
+    monolithic,
     plate_pattern,
     plate_scene,
     put_disc,
@@ -40,18 +40,18 @@ Array = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("young_pa", [2e5, 6.4e6])
-def test_judge_and_staggered_loop_rest_where_three_springs_in_series_do(
+def test_monolithic_and_staggered_loop_rest_where_three_springs_in_series_do(
     young_pa: float, tmp_path: Path
 ) -> None:
     pattern = wedge_pattern(young_pa)
     scenario, bar_n_m = wedge_scene(pattern), end_stiffness_n_m(pattern)
     exact_m = 2 * SQUEEZE_M / (2 / WALL_N_M + 1 / bar_n_m) / bar_n_m
-    judged: Any = judge(pattern, scenario, tmp_path, damping_ratio=1.0)
-    for session in (judged, staggered(pattern, scenario, tmp_path)):
+    explicit: Any = monolithic(pattern, scenario, tmp_path, damping_ratio=1.0)
+    for session in (explicit, staggered(pattern, scenario, tmp_path)):
         put_disc(session)
         for _ in range(20):
             session.advance()
-        # the judge is at rest to round-off, the loop still comes closer by a digit a record
+        # one is at rest to round-off, the loop still comes closer by a digit a record
         assert end_moved_m(session, pattern) == pytest.approx(exact_m, rel=1e-6)
         session.close()
 
@@ -60,12 +60,12 @@ def test_a_thrown_disc_leaves_a_part_of_its_energy_in_a_soft_bar(tmp_path: Path)
     pattern = wedge_pattern(2e5, gap_m=0.01)
     # dashpots of contacts would take energy
     scenario = wedge_scene(pattern, damping_ratio=0.0)
-    session = judge(pattern, scenario, tmp_path, damping_ratio=0.0)
+    session = monolithic(pattern, scenario, tmp_path, damping_ratio=0.0)
     put_disc(session, 0.01 - RADIUS_M - 1e-5, 0.1)
     session.advance(5e-3)
     left_m_s = session.snapshot().velocity_m_s[0]
     session.close()
-    last = read_ledger(tmp_path / LEDGER).iloc[-1]
+    last = read_convergence_log(tmp_path / CONVERGENCE_LOG).iloc[-1]
     assert last.load_n == 0.0
     assert left_m_s[0] < 0.0
     half_mass_kg = 0.5 * scenario.sand.grain_mass_kg(2 * RADIUS_M, 2)
@@ -82,19 +82,19 @@ def test_the_bars_energies_make_up_the_work_of_the_sand(
 ) -> None:
     pattern = wedge_pattern(6.4e6, gap_m=0.01)
     scenario = wedge_scene(pattern, damping_ratio=0.0)
-    session = judge(pattern, scenario, tmp_path, mass_scale=mass_scale, damping_ratio=0.3)
+    session = monolithic(pattern, scenario, tmp_path, mass_scale=mass_scale, damping_ratio=0.3)
     assert (session._foam.sub_steps > 1) == (mass_scale == 1.0)
     put_disc(session, 0.01 - RADIUS_M - 1e-5, 0.1)
     for _ in range(20):
         session.advance(1e-4)
     session.close()
-    ledger = read_ledger(tmp_path / LEDGER)
+    ledger = read_convergence_log(tmp_path / CONVERGENCE_LOG)
     assert ledger.damped_j.iloc[-1] > 0.01 * ledger.work_j.max()
     # exact for central differences; what is left is round-off of some thousand sums
     assert ledger.balance_j.abs().max() < 1e-12 * ledger.elastic_j.max()
 
 
-def test_smaller_windows_lead_the_staggered_answer_to_the_judges(tmp_path: Path) -> None:
+def test_smaller_windows_lead_the_staggered_loop_to_the_monolithic_scheme(tmp_path: Path) -> None:
     pattern = wedge_pattern(6.4e6, gap_m=0.01)
     wall = {"friction": 0.0, "damping_ratio": 0.0, "normal_stiffness_n_m": 2e3}
     scenario = wedge_scene(pattern, contact={"grain_wall": wall})
@@ -108,13 +108,13 @@ def test_smaller_windows_lead_the_staggered_answer_to_the_judges(tmp_path: Path)
         session.close()
         return np.array(moved)
 
-    judged = way_m(judge(pattern, scenario, tmp_path, damping_ratio=0.0))
+    explicit = way_m(monolithic(pattern, scenario, tmp_path, damping_ratio=0.0))
     errors = []
     for window_s in (4e-4, 2e-4, 1e-4, 5e-5):
         loop = staggered(pattern, scenario, tmp_path, window_s=window_s, repeats=20, tolerance=1e-6)
-        errors.append(np.abs(way_m(loop) - judged).max() / judged.max())
-    # The mean load of a window is half a window old: of first order. The judge's bar has masses and
-    # swings by some thousandths, which the last window begins to feel.
+        errors.append(np.abs(way_m(loop) - explicit).max() / explicit.max())
+    # The mean load of a window is half a window old: of first order. The monolithic scheme's bar
+    # has masses and swings by some thousandths, which the last window begins to feel.
     assert all(after < 0.6 * before for before, after in pairwise(errors))
     assert errors[-1] < 0.01
 
@@ -125,50 +125,50 @@ def test_a_plate_on_springs_carries_its_discs_where_their_weight_says(tmp_path: 
     weight_n = DISCS * 9.80665 * scenario.sand.grain_mass_kg(2 * RADIUS_M, 2)
     springs_n_m = pattern.supports.bedding_n_m3 * pattern.surface.vertex_area_m2
     springs_n_m = springs_n_m[pattern.surface.outer_line]
-    judged: Any = judge(pattern, scenario, tmp_path, damping_ratio=1.0)
-    for session in (judged, staggered(pattern, scenario, tmp_path, scheme="aitken")):
+    explicit: Any = monolithic(pattern, scenario, tmp_path, damping_ratio=1.0)
+    for session in (explicit, staggered(pattern, scenario, tmp_path, scheme="aitken")):
         rest_on_plate(session)
         # however the plate bends, its springs carry the weight; the loop still creeps towards it
         assert -springs_n_m @ session.displacement_m[:, 1] == pytest.approx(weight_n, rel=1e-3)
         session.close()
 
 
-def test_a_stopped_judge_goes_on_bit_for_bit(tmp_path: Path) -> None:
+def test_a_stopped_monolithic_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     pattern = wedge_pattern(2e5)
     scenario = wedge_scene(pattern)
     kept = tmp_path / "kept"
     kept.mkdir()
-    straight = judge(pattern, scenario, tmp_path)
+    straight = monolithic(pattern, scenario, tmp_path)
     put_disc(straight)
     straight.advance()
     straight.write_checkpoint(kept)
     straight.advance()
     straight.close()
-    table = (tmp_path / LEDGER).read_bytes()
-    again = judge(pattern, scenario, tmp_path, kept)
+    table = (tmp_path / CONVERGENCE_LOG).read_bytes()
+    again = monolithic(pattern, scenario, tmp_path, kept)
     again.advance()
     again.close()
     np.testing.assert_array_equal(again.displacement_m, straight.displacement_m)
-    assert (tmp_path / LEDGER).read_bytes() == table
+    assert (tmp_path / CONVERGENCE_LOG).read_bytes() == table
 
 
-def test_a_judge_goes_back_to_what_it_kept(tmp_path: Path) -> None:
+def test_the_monolithic_scheme_goes_back_to_its_checkpoint(tmp_path: Path) -> None:
     pattern = wedge_pattern(2e5)
-    session = judge(pattern, wedge_scene(pattern), tmp_path)
+    session = monolithic(pattern, wedge_scene(pattern), tmp_path)
     put_disc(session)
     session.advance(5e-4)
-    kept, found = session.keep(), []
+    checkpoint, found = session.save_checkpoint(), []
     for _ in range(2):
         session.advance(5e-4)
         found.append(session.displacement_m)
-        session.go_back(kept)
+        session.restore_checkpoint(checkpoint)
     session.close()
     np.testing.assert_array_equal(*found)
 
 
 def test_a_bar_that_runs_away_stops_the_run(tmp_path: Path) -> None:
     pattern = wedge_pattern(100.0)
-    session = judge(pattern, wedge_scene(pattern), tmp_path)
+    session = monolithic(pattern, wedge_scene(pattern), tmp_path)
     put_disc(session, RADIUS_M + 0.2 * RADIUS_M, 60.0)
     with pytest.raises(EngineStop, match="the pattern has moved by") as stop:
         session.advance(1e-3)

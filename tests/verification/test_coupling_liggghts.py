@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from pattern_fe.coupling.interface import with_surface
+from pattern_fe.coupling.loop_verdict import classify_loop
 from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.coupling.verdict import judge_loop
-from pattern_fe.scene import with_surface
 from sandmould.engines.driver import Driver
 from sandmould.engines.liggghts.bending_mesh import BendingMesh
 from sandmould.engines.liggghts.mesh_files import outline_strips
@@ -57,8 +57,8 @@ def test_plank_bends_as_on_the_reference_engine(tmp_path: Path) -> None:
     for engine in ("reference", "liggghts"):
         (folder := tmp_path / engine).mkdir()
         assert drive(plank_scene(engine), folder, driver).outcome is Outcome.FINISHED
-        ledger = read_ledger(folder / LEDGER)
-        found = judge_loop(ledger)
+        ledger = read_convergence_log(folder / CONVERGENCE_LOG)
+        found = classify_loop(ledger)
         assert found is not None
         assert found.state == "holds"
         ends.append(ledger.iloc[-4:].mean())

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.gain import measure_gain
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
-from pattern_fe.coupling.predicted import predicted_gain
+from pattern_fe.coupling.gain_prediction import predicted_gain
+from pattern_fe.coupling.interface import with_surface
+from pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop
 from pattern_fe.coupling.session import CoupledSession
-from pattern_fe.coupling.verdict import LoopVerdict, judge_loop
-from pattern_fe.scene import pattern_of, with_surface
+from pattern_fe.scene import pattern_of
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.step_counts import StepCounts
@@ -63,7 +64,7 @@ def filled(folder: Path, window_s: float, factor: float) -> tuple[CoupledSession
 def test_a_bed_answers_as_predicted(window_s: float, tmp_path: Path) -> None:
     session, scenario = filled(tmp_path, window_s, 0.02)
     shown = session.displacement_m.copy()
-    found = measure_gain(session._inner, session._body, "pattern", shown, window_s)
+    found = measure_gain(session.sand, session._body, "pattern", shown, window_s)
     session.close()
     assert found is not None
     predicted = predicted_gain(scenario, pattern_of(scenario), window_s)
@@ -80,7 +81,7 @@ def test_a_share_far_below_the_limit_holds_and_one_far_above_does_not(tmp_path: 
         (folder := tmp_path / str(share)).mkdir()
         session, _ = filled(folder, window_s, share * limit)
         session.close()
-        found = judge_loop(read_ledger(folder / LEDGER))
+        found = classify_loop(read_convergence_log(folder / CONVERGENCE_LOG))
         assert isinstance(found, LoopVerdict)
         states.append(found.state)
     assert states[0] == "holds"

@@ -39,18 +39,18 @@ def test_what_follows_follows_again(frame: str, tmp_path: Path) -> None:
     session.start_stage(session._program.stages[-1])
     while session.time_s < 0.1:  # sand has come down on the hill
         session.advance()
-    session.keep()
+    session.save_checkpoint()
     # kept where a record is half over and the hill on its way
     drawn_m = scenario.scene.outlines[0].vertices_m
     record = session._counts.window
     session.move_surface("hill", drawn_m - [0.0, 1e-4], record * session.step_s)
     session.advance(record // 2 * session.step_s)
     session.vertex_loads("hill")
-    kept = session.keep()
+    checkpoint = session.save_checkpoint()
     straight = follow(session)
     steps = session.steps
     for _ in range(2):
-        session.go_back(kept)
+        session.restore_checkpoint(checkpoint)
         again = follow(session)
         assert session.steps == steps
         for name, values in straight.items():
@@ -67,7 +67,7 @@ def test_sampled_loads_are_those_of_the_decks_own_fix(tmp_path: Path) -> None:
     session = open_lammps(hill(fill={"layers": [{"count": 60}]}), tmp_path)
     session.insert_layer(1)
     session.start_stage(session._program.stages[0])
-    session.keep()
+    session.save_checkpoint()
     logged = (tmp_path / "engine.log").read_text(encoding="utf-8")
     while session.time_s < 0.1:
         session.advance()
@@ -86,12 +86,12 @@ def test_sampled_loads_are_those_of_the_decks_own_fix(tmp_path: Path) -> None:
 def test_what_cannot_go_back_is_told(tmp_path: Path) -> None:
     session = open_lammps(tube_scene(), tmp_path)
     with pytest.raises(RefusedError, match=r"pattern = None .* to go back on engine lammps"):
-        session.keep()
+        session.save_checkpoint()
     session.close()
     session = open_lammps(hill(fill={"layers": [{"count": 2}]}), tmp_path)
     session.insert_layer(1)
     session.start_stage(session._program.stages[0])
     session.advance(1e-3)
     with pytest.raises(RefusedError, match=r"first kept step = .* start of a record"):
-        session.keep()
+        session.save_checkpoint()
     session.close()

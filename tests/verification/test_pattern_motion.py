@@ -80,34 +80,6 @@ def test_number_of_frequencies_has_a_bound() -> None:
         pattern_of_kind("quadrilaterals", 1).natural_frequencies_hz(12)
 
 
-def test_newmark_keeps_the_energy_at_steps_of_any_size() -> None:
-    pattern = l_pattern(0.015)
-    period = 1.0 / pattern.natural_frequencies_hz()[0]
-    load = np.zeros_like(pattern.space.node_m)
-    load[:, 1] = -1e-3
-    for step_s in (period / 50, 2 * period):
-        motion = pattern.newmark(step_s)
-        motion.displacement_m = pattern.solve_linear(load)
-        energy = motion.energy_j
-        for _ in range(100):
-            motion.advance(np.zeros_like(load))
-        assert motion.energy_j == pytest.approx(energy, rel=1e-9)
-
-
-def test_newmark_is_of_second_order() -> None:
-    pattern = l_pattern(0.015)
-    omega, shape = _first_mode(pattern)
-    end_s = 0.3 * 2.0 * math.pi / omega
-    errors = []
-    for steps in (20, 40):
-        motion = pattern.newmark(end_s / steps)
-        motion.displacement_m = shape
-        for _ in range(steps):
-            motion.advance(np.zeros_like(shape))
-        errors.append(np.abs(motion.displacement_m - math.cos(omega * end_s) * shape).max())
-    assert math.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("order", [1, 2])
 def test_stiffest_element_bounds_the_critical_step_closely(kind: str, order: int) -> None:
@@ -154,21 +126,16 @@ def test_damped_central_differences_come_to_rest_in_equilibrium(large: bool) -> 
     assert np.abs(other - rest).max() > 0.02 * np.abs(rest).max()
 
 
-@pytest.mark.parametrize("method", ["newmark", "central_differences"])
-def test_mass_damping_lets_a_mode_decay_at_its_rate(method: str) -> None:
+def test_mass_damping_lets_a_mode_decay_at_its_rate() -> None:
     pattern = l_pattern(0.015)
     omega, shape = _first_mode(pattern, lumped=True)
     damping = pattern.mass_damping_1_s(0.1)
     assert damping == pytest.approx(0.2 * omega, rel=2e-3)
     period = 2.0 * math.pi / math.sqrt(omega**2 - damping**2 / 4.0)
-    if method == "newmark":
-        steps = 400
-        motion = pattern.newmark(period / steps, damping, lumped=True)
-    else:
-        steps = math.ceil(period / pattern.critical_step_s())
-        motion = pattern.central_differences(period / steps, damping)
-        # velocities live half a step early: this one starts the mode at rest
-        motion.velocity_m_s = 0.5 * period / steps * omega**2 * shape
+    steps = math.ceil(period / pattern.critical_step_s())
+    motion = pattern.central_differences(period / steps, damping)
+    # velocities live half a step early: this one starts the mode at rest
+    motion.velocity_m_s = 0.5 * period / steps * omega**2 * shape
     motion.displacement_m = shape
     for _ in range(steps):
         motion.advance(np.zeros_like(shape))
@@ -180,7 +147,7 @@ def test_mass_damping_lets_a_mode_decay_at_its_rate(method: str) -> None:
 def test_impossible_steps_are_refused() -> None:
     pattern = pattern_of_kind("quadrilaterals", 1)
     with pytest.raises(ValueError, match="time step of the pattern is 0 s, valid is above 0"):
-        pattern.newmark(0.0)
+        pattern.central_differences(0.0)
     with pytest.raises(ValueError, match="mass damping of the pattern is -1 1/s, valid is 0"):
         pattern.central_differences(1e-6, -1.0)
     with pytest.raises(ValueError, match="mass scale of the pattern is 0, valid is above 0"):

@@ -11,13 +11,13 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import Answer
-from pattern_fe.coupling.ledger import LEDGER, read_ledger
+from pattern_fe.coupling.body import StaticSolution
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from pattern_fe.coupling.session import CoupledSession
 from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.session import EngineStop, RefusedError, Session
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
@@ -45,12 +45,12 @@ class Plate:
     vertices_m: Array
     stiffness_n_m: float = STIFFNESS_N_M
 
-    def answer(self, load_n: Array) -> Answer:
+    def solve(self, load_n: Array) -> StaticSolution:
         """Weight over stiffness."""
         force_n = load_n.sum(axis=0)
         sinks = np.zeros_like(self.vertices_m)
         sinks[:, 1] = force_n[1] / self.stiffness_n_m
-        return Answer(sinks, 0.5 * force_n[1] ** 2 / self.stiffness_n_m, -force_n)
+        return StaticSolution(sinks, 0.5 * force_n[1] ** 2 / self.stiffness_n_m, -force_n)
 
 
 def settings(**changes: Any) -> Loop:
@@ -114,10 +114,19 @@ def test_the_plate_comes_to_rest_where_its_springs_carry_the_sand(
 
 def after(session: CoupledSession, folder: Path) -> tuple[pd.DataFrame, Any]:
     """Ledger up to now, and its last window."""
-    session._ledger.size()
+    session._log.size()
     session._shapes.flush()
-    ledger = read_ledger(folder / LEDGER)
+    ledger = read_convergence_log(folder / CONVERGENCE_LOG)
     return ledger, ledger.iloc[-1]
+
+
+def test_windows_are_not_repeated_from_outside(tmp_path: Path) -> None:
+    session = coupled(tmp_path)
+    with pytest.raises(
+        RefusedError, match=r"pattern.loop.scheme = 'fixed' .* a scheme without win"
+    ):
+        session.save_checkpoint()
+    session.close()
 
 
 def test_shapes_and_loads_are_those_of_every_record(tmp_path: Path) -> None:
@@ -190,7 +199,9 @@ def test_a_stopped_loop_goes_on_as_if_never_stopped(engine: str, tmp_path: Path)
     np.testing.assert_allclose(
         second.displacement_m, straight.displacement_m, rtol=exact, atol=exact
     )
-    one, two = (read_ledger(tmp_path / name / LEDGER) for name in ("straight", "stopped"))
+    one, two = (
+        read_convergence_log(tmp_path / name / CONVERGENCE_LOG) for name in ("straight", "stopped")
+    )
     np.testing.assert_allclose(
         two.drop(columns="solve_s"), one.drop(columns="solve_s"), rtol=exact, atol=exact
     )
@@ -204,7 +215,7 @@ def test_repeated_windows_end_with_the_answer_that_was_shown(tmp_path: Path) -> 
         session = coupled(folder, scheme="quasi_newton", repeats=repeats)
         filled(session, records=12)
         session.close()
-        ledgers.append(read_ledger(folder / LEDGER).iloc[20:])
+        ledgers.append(read_convergence_log(folder / CONVERGENCE_LOG).iloc[20:])
     within = [(ledger.residual_m <= 0.01 * ledger.displacement_m).mean() for ledger in ledgers]
     assert within[1] > 0.9 > within[0]
     assert ledgers[1].passes.max() > 1
@@ -233,7 +244,7 @@ def test_one_solve_a_layer_bends_the_pattern_after_it_and_moves_it_under_the_nex
         while not session.stage_over:
             assert answers or not session.displacement_m.any()
             session.advance()
-        answers.append(session._answered.copy())
+        answers.append(session._solved.copy())
     ledger, last = after(session, tmp_path)
     session.close()
     first = ledger[ledger.displacement_m == 0.0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import metadata
 from pathlib import Path
 
+from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.refusals import refuse as refuse
@@ -18,6 +19,13 @@ from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 2.5e6
 RANKS = Ranks.PROCESSES
+CAPABILITIES = Capabilities(
+    bends_meshes=(2, 3),
+    bends_in_frames=("box", "laboratory"),
+    repeats_windows=True,
+    calls_movers=True,
+    loads_of_every_step=False,
+)
 
 
 def installed_version() -> int:

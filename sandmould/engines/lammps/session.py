@@ -240,7 +240,7 @@ class LammpsSession(DeckSession):
         """
         self._kernel_of(name).attach_mover(name, mover)
 
-    def keep(self) -> Any:
+    def save_checkpoint(self) -> Any:
         """Write LAMMPS's restart file to a temporary folder; copy what it does not hold.
 
         Raises
@@ -259,22 +259,20 @@ class LammpsSession(DeckSession):
             self.send('print "States are kept and gone back to: nothing more is logged"\nlog none')
         folder = TemporaryDirectory(prefix="kept_", dir=self._work)
         super()._save(Path(folder.name))
-        stage = (self.stage_over, self.at_rest, self._ended_window, dict(self._asked))
-        return folder, self._kernel.state(), self._wall_loads.sums.copy(), stage
+        return folder, self._kernel.state(), self._wall_loads.sums.copy(), self._stage_state()
 
-    def go_back(self, kept: Any) -> None:
-        """Compute on from what ``keep`` gave: LAMMPS is set up anew, in the same stage."""
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Compute on from what ``save_checkpoint`` gave: LAMMPS is set up anew."""
         assert self._kernel is not None
         assert self._wall_loads is not None
-        folder, memory, self._wall_loads.sums[:], stage = kept
+        folder, memory, self._wall_loads.sums[:], stage = checkpoint
         self.send("clear")
         self._set_up(Path(folder.name))
         self._register(self._kernel)
         self._kernel.restore(memory)
         self._begin_stage()
         self._tell_stage_start()
-        self.stage_over, self.at_rest, self._ended_window, asked = stage
-        self._asked = dict(asked)
+        self._restore_stage(stage)
 
     def _save(self, folder: Path) -> None:
         """Write LAMMPS's restart file and the memory of the callback."""

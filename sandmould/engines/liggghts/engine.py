@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck
 from sandmould.engines.liggghts import OLDEST_VERSION
 from sandmould.engines.liggghts.process import executable, version_of
@@ -17,6 +18,13 @@ from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 3e6
 RANKS = Ranks.ONE
+CAPABILITIES = Capabilities(
+    bends_meshes=(2,),
+    bends_in_frames=("box",),
+    repeats_windows=False,
+    calls_movers=False,
+    loads_of_every_step=False,
+)
 
 
 def installed_version() -> int | str:

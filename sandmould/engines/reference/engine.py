@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sandmould.dem import source_hash
+from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
@@ -21,6 +22,14 @@ from sandmould.scenario.time_step import inertia_factor
 GRAIN_STEPS_PER_S = 1.5e7
 RANKS = Ranks.THREADS
 _LAWS = (("grain", "contact.grain_grain"), ("wall", "contact.grain_wall"))
+
+CAPABILITIES = Capabilities(
+    bends_meshes=(2, 3),
+    bends_in_frames=("box", "laboratory"),
+    repeats_windows=True,
+    calls_movers=True,
+    loads_of_every_step=True,
+)
 
 
 def installed_version() -> str:

@@ -155,20 +155,19 @@ class ReferenceSession(StagedSession):
         self._vertices_of(name)
         self.solver.attach_mover(name, mover)
 
-    def keep(self) -> Any:
+    def save_checkpoint(self) -> Any:
         """Copies of the solver's arrays, loads of this record, where the stage stands."""
         loads = self.solver.moving.walls.loads.sum(axis=0)
-        stage = (self.stage_over, self.at_rest, self._ended_window, dict(self._asked))
-        return copy.deepcopy(self.solver.state()), loads, dict(self._loads), stage
+        state = copy.deepcopy(self.solver.state())
+        return state, loads, dict(self._loads), self._stage_state()
 
-    def go_back(self, kept: Any) -> None:
-        """Compute on from what ``keep`` gave."""
-        arrays, loads, means, stage = kept
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Compute on from what ``save_checkpoint`` gave."""
+        arrays, loads, means, stage = checkpoint
         self.solver.restore(copy.deepcopy(arrays))
         self.solver.moving.walls.loads[0] = loads
         self._loads = dict(means)
-        self.stage_over, self.at_rest, self._ended_window, asked = stage
-        self._asked = dict(asked)
+        self._restore_stage(stage)
 
     def _save(self, folder: Path) -> None:
         """Write the solver's state, of which nothing is lost."""

@@ -60,7 +60,7 @@ def resolved(scenario: Scenario) -> Scenario:
     So a changed mesh makes another run.
     """
     if scenario.pattern is not None:
-        from pattern_fe.scene import with_surface  # scikit-fem: few studies need it
+        from pattern_fe.coupling.interface import with_surface  # scikit-fem: few studies need it
 
         scenario = with_surface(scenario)
     obstacles = tuple(with_hash(o) if isinstance(o, SolidMesh) else o for o in scenario.obstacles)

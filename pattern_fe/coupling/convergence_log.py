@@ -10,42 +10,43 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import Answer
+from pattern_fe.coupling.body import StaticSolution
 
 Array = NDArray[np.float64]
-LEDGER = "pattern.tsv"
+CONVERGENCE_LOG = "pattern.tsv"
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One window of the loop."""
+class WindowEntry:
+    """One window of the loop; a field is a column."""
 
     time_s: float
     window_s: float
     passes: int
-    """Times that the window was computed."""
+    """Iterations: times that the window was computed."""
     factor: float
-    """Share of the residual that is gone next."""
+    """Relaxation factor of the next displacement."""
     gain: float
-    """Last measured one; none but in the measured scheme."""
+    """Last measured one; NaN in other schemes than the measured one."""
     residual_m: float
-    """Root of the mean square over the vertices of answered less shown displacement."""
+    """Root of the mean square over the vertices of the displacement that the loads give less the
+    one at the interface."""
     displacement_m: float
-    """The same of the displacement that the sand saw."""
+    """The same of the displacement at the interface."""
     largest_m: float
-    """Largest displacement of a vertex that the sand saw."""
+    """Largest displacement of a vertex at the interface."""
     load_n: float
     """Size of the sand's mean force on the pattern."""
     imbalance_n: float
     """Size of the sum of that force and the reaction of the supports."""
     moment_left_n_m: float
-    """Size of the moment of both about the origin; none of a body that does not tell."""
+    """Size of the moment of both about the origin; NaN where the pattern's solution lacks it."""
     work_j: float
-    """Work of the sand on the surface that it saw, since the run began."""
+    """Work of the sand on the interface since the run began."""
     energy_j: float
-    """Elastic energy of the pattern as it answered."""
+    """Elastic energy of the pattern at rest under the loads."""
     solve_s: float
-    """Wall time of the pattern's part."""
+    """Wall time of the pattern's participant."""
 
 
 def rms_m(displacement_m: Array) -> float:
@@ -63,16 +64,16 @@ def work_of(load_n: Array, moved_m: Array) -> float:
     return float((load_n * moved_m).sum())
 
 
-def imbalance_n(load_n: Array, answer: Answer) -> float:
+def imbalance_n(load_n: Array, solution: StaticSolution) -> float:
     """Size of what loads and reaction leave, N."""
-    return float(np.linalg.norm(load_n.sum(axis=0) + answer.reaction_n))
+    return float(np.linalg.norm(load_n.sum(axis=0) + solution.reaction_n))
 
 
-class Ledger:
-    """Table of rows of one kind; a resumed run cuts it back to its checkpoint."""
+class ConvergenceLog:
+    """Table of entries of one kind; a resumed run cuts it back to its checkpoint."""
 
     def __init__(
-        self, path: Path, trusted_bytes: int | None = None, kind: type[Any] = Entry
+        self, path: Path, trusted_bytes: int | None = None, kind: type[Any] = WindowEntry
     ) -> None:
         """Open the table.
 
@@ -80,9 +81,9 @@ class Ledger:
         ----------
         path : Path
         trusted_bytes : int, optional
-            Length of what a checkpoint vouches for; none begins anew.
+            Length of what a checkpoint vouches for; without it the table begins anew.
         kind : type
-            Frozen dataclass of the rows, a column a field.
+            Frozen dataclass of the entries, a column a field.
         """
         header = "\t".join(field.name for field in fields(kind)) + "\n"
         if trusted_bytes is None:
@@ -106,6 +107,6 @@ class Ledger:
         self._file.close()
 
 
-def read_ledger(path: Path) -> pd.DataFrame:
+def read_convergence_log(path: Path) -> pd.DataFrame:
     """All rows of a run; columns as the fields of what was written."""
     return pd.read_csv(path, sep="\t")

@@ -1,4 +1,4 @@
-"""Whether a coupled run is to be trusted: its ledger read in plain words."""
+"""Whether a coupled run is to be trusted: its convergence log classified."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 LAST_SHARE = 0.1
-"""Of the time of a ledger: its last part, which is judged."""
+"""Of the time of a convergence log: its last part, which is classified."""
 RESIDUAL_SHARE = 0.1
 """Residual over displacement up to which a loop holds. Equally good loops end some ten per cent
 apart, for the rest of sand under a pattern depends on the way there."""
@@ -32,7 +32,7 @@ _VERBS: dict[State, str] = {
 
 @dataclass(frozen=True)
 class LoopVerdict:
-    """What the last part of a ledger says."""
+    """What the last part of a convergence log says."""
 
     state: State
     residual_fraction: float
@@ -40,7 +40,7 @@ class LoopVerdict:
     spikes: int
     """Windows whose residual is larger than the displacement."""
     made_j: float
-    """Energy of the shape that the sand saw in the end less the work of the sand; above 0 the loop
+    """Energy of the shape at the interface in the end less the work of the sand; above 0 the loop
     itself gave it."""
     stored_j: float
     """Median of the elastic energy."""
@@ -50,34 +50,36 @@ class LoopVerdict:
     @property
     def sentence(self) -> str:
         """The verdict with its reasons."""
-        told = []
+        reasons = []
         if self.state == "one way":
             return f"One way: {_MEANS[self.state]}."
         if np.isfinite(self.residual_fraction):
-            told.append(f"a residual of {100 * self.residual_fraction:.0f} % of the displacement")
+            reasons.append(
+                f"a residual of {100 * self.residual_fraction:.0f} % of the displacement"
+            )
         if self.spikes:
-            told.append(f"{self.spikes} windows where it is larger than that")
+            reasons.append(f"{self.spikes} windows where it is larger than that")
         if self.made_j > MADE_SHARE * self.stored_j:
-            told.append(
+            reasons.append(
                 f"{self.made_j:.2g} J that no sand gave beside {self.stored_j:.2g} J in the foam"
             )
-        reasons = f"; in the last {self.last_s:.2g} s {', '.join(told)}" if told else ""
-        return f"{self.state.capitalize()}: {_MEANS[self.state]}{reasons}."
+        because = f"; in the last {self.last_s:.2g} s {', '.join(reasons)}" if reasons else ""
+        return f"{self.state.capitalize()}: {_MEANS[self.state]}{because}."
 
 
-def judge_loop(ledger: pd.DataFrame, stopped: bool = False) -> LoopVerdict | None:
-    """Judge the last part of a ledger.
+def classify_loop(log: pd.DataFrame, stopped: bool = False) -> LoopVerdict | None:
+    """Classify the last part of a convergence log.
 
-    Energy of the shape that the sand saw above the work of the sand was never given by sand: such
-    a loop goes in cycles,
-    that shake the sand, and it diverged where the median residual is above the displacement too, or
-    where it was stopped for that or has values that are not finite. Work above the stored energy is
-    only lost in the loop's delay, as in a dashpot: such a loop lags while its residual is large,
-    and it holds where that is small in the median and in no window above the displacement.
+    Energy of the shape at the interface above the work of the sand was never given by sand: such
+    a loop goes in cycles, which shake the sand. It diverged where the median residual is above the
+    displacement too, or where it was stopped for that or has values that are not finite. Work above
+    the stored energy is only lost in the loop's delay, as in a dashpot: such a loop lags while its
+    residual is large, and it holds where that is small in the median and in no window above the
+    displacement.
 
     Parameters
     ----------
-    ledger : DataFrame
+    log : DataFrame
         Of any scheme; rows in order of time. Without ``residual_m`` it has no windows: the pattern
         was stepped with the grains.
     stopped : bool
@@ -88,27 +90,27 @@ def judge_loop(ledger: pd.DataFrame, stopped: bool = False) -> LoopVerdict | Non
     LoopVerdict or None
         None where the sand has not yet moved the pattern.
     """
-    if ledger.empty or not ledger["load_n"].any():
+    if log.empty or not log["load_n"].any():
         return None
-    start_s, end_s = ledger["time_s"].iloc[[0, -1]]
+    start_s, end_s = log["time_s"].iloc[[0, -1]]
     last_s = LAST_SHARE * float(end_s - start_s)
-    last = ledger[ledger["time_s"] >= end_s - last_s]
-    stored = shown = stored_energy_j(last)
+    last = log[log["time_s"] >= end_s - last_s]
+    stored = at_interface = stored_energy_j(last)
     residual, spikes = np.nan, 0
-    if "residual_m" in ledger:
+    if "residual_m" in log:
         # Before the first move there is nothing that a residual could be a share of.
         shares = last["residual_m"] / last["displacement_m"].where(last["displacement_m"] > 0.0)
         residual, spikes = float(shares.median()), int((shares > 1.0).sum())
-        # The ledger has the energy of the answer, which a slow loop is far from: what is shown
-        # stores at least as much less as if both had one form.
-        shown = stored / (1.0 + shares) ** 2
+        # The log has the energy of the solution, which a slow loop is far from: the shape at the
+        # interface stores at least as much less as if both had one form.
+        at_interface = stored / (1.0 + shares) ** 2
     stored_j = float(stored.median())
-    made_j = float(shown.median()) - float(last["work_j"].median())
+    made_j = float(at_interface.median()) - float(last["work_j"].median())
     state: State = "holds"
     is_fed = made_j > MADE_SHARE * stored_j
     if stopped or not np.isfinite(last[["displacement_m", "work_j"]]).to_numpy().all():
         state = "diverged"
-    elif "factor" in ledger and not ledger["factor"].any():
+    elif "factor" in log and not log["factor"].any():
         state = "one way"
     elif is_fed:
         state = "diverged" if residual > 1.0 else "cycles"
@@ -117,21 +119,21 @@ def judge_loop(ledger: pd.DataFrame, stopped: bool = False) -> LoopVerdict | Non
     return LoopVerdict(state, residual, spikes, made_j, stored_j, last_s)
 
 
-def stored_energy_j(ledger: pd.DataFrame) -> pd.Series[float]:
-    """Elastic energy in the ledger of any scheme."""
-    return ledger["energy_j" if "energy_j" in ledger else "elastic_j"]
+def stored_energy_j(log: pd.DataFrame) -> pd.Series[float]:
+    """Elastic energy in the convergence log of any scheme."""
+    return log["energy_j" if "energy_j" in log else "elastic_j"]
 
 
 def study_sentence(verdicts: Sequence[LoopVerdict]) -> str:
     """How many runs of a study hold, and what the others do."""
-    found = [v.state for v in verdicts]
-    if not found:
-        return "No run has a ledger that tells of its loop."
-    count = f"all {len(found)} runs" if len(found) > 1 else "the one run"
-    if len(set(found)) == 1:
-        told = f"The loop {_VERBS[found[0]]} in {count}"
+    states = [v.state for v in verdicts]
+    if not states:
+        return "No run has a convergence log that tells of its loop."
+    count = f"all {len(states)} runs" if len(states) > 1 else "the one run"
+    if len(set(states)) == 1:
+        sentence = f"The loop {_VERBS[states[0]]} in {count}"
     else:
-        told = ", ".join(f"{_VERBS[s]} in {found.count(s)}" for s in _VERBS if s in found)
-        told = f"The loop {told} of {len(found)} runs"
-    rest = "" if set(found) == {"holds"} else ": only where it holds is a shape an answer"
-    return f"{told}{rest}."
+        counts = ", ".join(f"{_VERBS[s]} in {states.count(s)}" for s in _VERBS if s in states)
+        sentence = f"The loop {counts} of {len(states)} runs"
+    rest = "" if set(states) == {"holds"} else ": only where it holds is a shape an answer"
+    return f"{sentence}{rest}."

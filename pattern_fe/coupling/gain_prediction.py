@@ -1,4 +1,4 @@
-"""The gain of the staggered loop told from the scenario alone, before any sand has moved.
+"""The gain of the staggered loop predicted from the scenario alone, before any sand has moved.
 
 Grains lie in a full row on all that faces up. Each stands on a contact, spring and dashpot, and
 carries a column of sand that is free to move: in a window T a chain of springs k and masses m

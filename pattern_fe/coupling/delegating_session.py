@@ -1,0 +1,135 @@
+"""A session in front of another one: what it does not change goes to the sand's participant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sandmould.engines.program import Stage
+from sandmould.engines.session import Session, Shared
+from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.step_mover import StepMover
+
+Array = NDArray[np.float64]
+
+
+class DelegatingSession:
+    """The sand's participant behind the interface of a session; see ``Session`` for all members."""
+
+    def __init__(self, sand: Session) -> None:
+        self.sand = sand
+        """Session of the engine that computes the grains."""
+
+    @property
+    def version(self) -> str:
+        """Version of the engine."""
+        return self.sand.version
+
+    @property
+    def grains(self) -> int:
+        """Grains now in the box."""
+        return self.sand.grains
+
+    @property
+    def step_s(self) -> float:
+        """Time step."""
+        return self.sand.step_s
+
+    @property
+    def stage(self) -> Stage:
+        """Stage that is being computed."""
+        return self.sand.stage
+
+    @property
+    def stage_over(self) -> bool:
+        """Whether the stage's time is up or its rest rule met."""
+        return self.sand.stage_over
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the settling rule of the stage was met."""
+        return self.sand.at_rest
+
+    @property
+    def steps(self) -> int:
+        """Steps since the run began."""
+        return self.sand.steps
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time."""
+        return self.sand.time_s
+
+    @property
+    def can_checkpoint(self) -> bool:
+        """Whether the last advance ended a record."""
+        return self.sand.can_checkpoint
+
+    @property
+    def is_root(self) -> bool:
+        """Whether this process writes the files."""
+        return self.sand.is_root
+
+    def insert_layer(self, number: int) -> None:
+        """Drop a planned layer from over the bed."""
+        self.sand.insert_layer(number)
+
+    def set_state(self, position_m: Array, velocity_m_s: Array, spin_rad_s: Array) -> None:
+        """Place all grains now in the box exactly."""
+        self.sand.set_state(position_m, velocity_m_s, spin_rad_s)
+
+    def start_stage(self, stage: Stage) -> None:
+        """Begin to settle or to vibrate."""
+        self.sand.start_stage(stage)
+
+    def advance(self, duration_s: float | None = None) -> None:
+        """Compute for a duration, or up to the next record."""
+        self.sand.advance(duration_s)
+
+    def end_stage(self) -> None:
+        """Close the stage that is over."""
+        self.sand.end_stage()
+
+    def snapshot(self) -> Snapshot:
+        """State of all grains relative to the box."""
+        return self.sand.snapshot()
+
+    def surface_loads(self) -> Mapping[str, Array] | None:
+        """Mean force of the sand on each surface over the last record, N."""
+        return self.sand.surface_loads()
+
+    def vertex_loads(self, name: str) -> Array | None:
+        """Mean force of the sand on each vertex of a surface since the last call, N."""
+        return self.sand.vertex_loads(name)
+
+    def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
+        """Move a surface to new vertices over the next window."""
+        self.sand.move_surface(name, vertices_m, window_s)
+
+    def save_checkpoint(self) -> Any:
+        """Give all that is needed to compute on from here, in memory."""
+        return self.sand.save_checkpoint()
+
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Compute on from what ``save_checkpoint`` gave."""
+        self.sand.restore_checkpoint(checkpoint)
+
+    def attach_mover(self, name: str, mover: StepMover) -> None:
+        """Let a surface be moved in every step."""
+        self.sand.attach_mover(name, mover)
+
+    def write_checkpoint(self, folder: Path) -> None:
+        """Write all that a continued run needs."""
+        self.sand.write_checkpoint(folder)
+
+    def share(self, value: Shared) -> Shared:
+        """Give the first rank's value to all ranks."""
+        return self.sand.share(value)
+
+    def close(self) -> None:
+        """Free the engine."""
+        self.sand.close()

@@ -1,0 +1,27 @@
+"""What an engine's sessions can do with a surface that bends, known before one is opened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """Abilities of the sessions of one engine; see ``sandmould.engines.session.Session``.
+
+    A coupling asks for them and never for the engine's name.
+    """
+
+    bends_meshes: tuple[int, ...]
+    """Dimensions of the scenes in which ``move_surface`` takes a mesh to new vertices."""
+    bends_in_frames: tuple[Literal["box", "laboratory"], ...]
+    """Frames of reference in which it does."""
+    repeats_windows: bool
+    """Whether a window can be computed again from its checkpoint: ``save_checkpoint`` and
+    ``restore_checkpoint``."""
+    calls_movers: bool
+    """Whether ``attach_mover`` lets a surface be moved inside every step."""
+    loads_of_every_step: bool
+    """Whether ``vertex_loads`` are means over all steps, not over samples some steps apart, so
+    that a window may be as short as one step."""
