@@ -24,7 +24,7 @@ from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
 from sandmould.scenario.vibration import VibrationStage
 
 
-class Record(Section):
+class Recording(Section):
     """What a run writes down, and how often."""
 
     series_every_s: float = quantity(
@@ -66,7 +66,7 @@ FULL_OVERLAP = 2.0
 """Of the smaller radius: a grain lies wholly in another."""
 
 
-class Guard(Section):
+class GuardLimits(Section):
     """When a run is stopped because its numbers cannot be trusted."""
 
     largest_overlap_fraction: float = quantity(
@@ -118,8 +118,8 @@ class Scenario(Section):
     )
     engine: Engine = Field(Engine(), description="The engine.")
     time_step: TimeStep = Field(TimeStep(), description="The time step.")
-    record: Record = Field(Record(), description="What is recorded.")
-    guard: Guard = Field(Guard(), description="When a run is stopped.")
+    record: Recording = Field(Recording(), description="What is recorded.")
+    guard: GuardLimits = Field(GuardLimits(), description="When a run is stopped.")
     seed: int = quantity(1, "Seed of all that is drawn.", source="user", ge=0, le=2**31 - 1)
 
     @cached_property
