@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.files import replaced
 from sandmould.scenario.geometry import Array, Block, Scene, Solid
 from sandmould.scenario.outline import Outline
 from sandmould.scenario.revolved import Revolved
@@ -46,9 +46,8 @@ def to_vtk(snapshot: Snapshot, path: Path) -> None:
             "vibration_time_s": np.full(n, snapshot.vibration_time_s),
         },
     )
-    partial = _partial(path)
-    mesh.write(partial, file_format="vtu")
-    os.replace(partial, path)
+    with replaced(path) as partial:
+        mesh.write(partial, file_format="vtu")
 
 
 def solids_to_vtk(scene: Scene, path: Path) -> None:
@@ -72,9 +71,9 @@ def solids_to_vtk(scene: Scene, path: Path) -> None:
     kind = "line" if scene.dimension == 2 else "triangle"
     blocks = [(kind, np.concatenate(cells))] if cells else []
     data = {"solid": [np.concatenate(numbers)]} if cells else {}
-    partial = _partial(path)
-    meshio.Mesh(np.concatenate(points_m), blocks, cell_data=data).write(partial, file_format="vtu")
-    os.replace(partial, path)
+    mesh = meshio.Mesh(np.concatenate(points_m), blocks, cell_data=data)
+    with replaced(path) as partial:
+        mesh.write(partial, file_format="vtu")
 
 
 _SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
@@ -108,9 +107,9 @@ def elements_to_vtk(fields: Mapping[str, Array], path: Path) -> None:
     points_m = low_m + size_m.min() * np.column_stack(np.unravel_index(points, shape))
     data = {name: [np.asarray(fields[name], dtype=np.float64)] for name in _OF_ELEMENTS}
     blocks = [(kind, cells.reshape(-1, len(corners)))]
-    partial = _partial(path)
-    meshio.Mesh(_in_space(points_m), blocks, cell_data=data).write(partial, file_format="vtu")
-    os.replace(partial, path)
+    mesh = meshio.Mesh(_in_space(points_m), blocks, cell_data=data)
+    with replaced(path) as partial:
+        mesh.write(partial, file_format="vtu")
 
 
 def _surface(solid: Solid) -> tuple[Array, NDArray[np.int64]]:
@@ -163,14 +162,8 @@ def to_ovito(snapshot: Snapshot, path: Path) -> None:
     )
     # ten digits: less than a nanometre on a metre of box
     formats = ["%d", "%d", *["%.10g"] * 10, "%d"]
-    partial = _partial(path)
-    np.savetxt(partial, table, fmt=formats, header="\n".join(header), comments="")
-    os.replace(partial, path)
-
-
-def _partial(path: Path) -> Path:
-    """Temporary name beside the file's own."""
-    return path.with_name(path.name + ".partial")
+    with replaced(path) as partial:
+        np.savetxt(partial, table, fmt=formats, header="\n".join(header), comments="")
 
 
 def _in_space(vector: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from sandmould.casting.arpm.contact_case import LAYERS, run_contact
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.plates_case import read_aluminium
 
 KERNEL_SIZES = (1.4, 1.8, 2.1, 2.4, 2.8, 3.2, 3.6, 4.2)
@@ -21,7 +21,7 @@ def contact_rows() -> list[dict[str, Any]]:
     for resistance in RESISTANCES_M2K_W:
         for form, size in ways:
             for case in LAYERS:
-                method = Method(form, "explicit", size, refuse_ratio=False)  # type: ignore[arg-type]
+                method = HeatMethod(form, "explicit", size, refuse_ratio=False)  # type: ignore[arg-type]
                 found = run_contact(case, aluminium, resistance, method)
                 rows.append({
                     "case": case, "exchange": form, "resistance_m2k_w": resistance,

@@ -8,7 +8,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from benchmarks.tables import number
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.plates_case import Plates, PlatesRun, run_plates
 
 matplotlib.use("Agg")
@@ -34,7 +34,7 @@ def draw_fields(plates: Plates, least_m: float, path: Path) -> None:
     figure = Figure(figsize=(13, 4.6), layout="constrained")
     panels = figure.subplots(1, len(LAYOUTS), sharex=True, sharey=True)
     for panel, (case, size_m, exchange) in zip(panels, LAYOUTS, strict=True):
-        method = Method(exchange, "local")  # type: ignore[arg-type]
+        method = HeatMethod(exchange, "local")  # type: ignore[arg-type]
         run = run_plates(plates, case, method, max(size_m, least_m), AT_S, AT_S)
         shown = _draw(panel, run, plates)
         panel.set_title(

@@ -18,7 +18,7 @@ from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.exact import contact_temperature_k
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.marching import Substance
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.plates_case import read_aluminium
 
 Array = NDArray[np.float64]
@@ -40,18 +40,18 @@ def _filling() -> Filling:
     return Filling((aluminium, aluminium), (COLD_K, HOT_K))
 
 
-def _method(form: str, kernel_size: float = 2.1, share: float = 0.95) -> Method:
-    return Method(form, "explicit", kernel_size, False, share)  # type: ignore[arg-type]
+def _method(form: str, kernel_size: float = 2.1, share: float = 0.95) -> HeatMethod:
+    return HeatMethod(form, "explicit", kernel_size, False, share)  # type: ignore[arg-type]
 
 
-def _largest_k(elements: Elements, method: Method) -> float | None:
+def _largest_k(elements: Elements, method: HeatMethod) -> float | None:
     """Largest difference from the exact contact after 100 s; None where it has no bounds."""
     with np.errstate(all="ignore"):
         found = compare_contact(elements, _filling(), method).largest_k
     return found if found < LOST_K else None
 
 
-def _disturbed_k(elements: Elements, method: Method) -> float | None:
+def _disturbed_k(elements: Elements, method: HeatMethod) -> float | None:
     """As ``_largest_k``, from a start that has something of every mode: noise of 0.01 K."""
     filling = _filling()
     heat, marching = filling.heat(elements), method.stepping_of(elements, filling)

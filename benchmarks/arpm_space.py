@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.marching import Marching
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster
-from sandmould.casting.arpm.solidification import Solidification, solidify
+from sandmould.casting.arpm.solidification import SolidificationResult, solidify
 
 Array = NDArray[np.float64]
 BOX_M = (0.088, 0.072, 0.072)
@@ -22,20 +22,20 @@ PLATE_M = ((0.048, 0.024, 0.032), (0.064, 0.048, 0.040))
 PROBES_M = {"block": np.array([0.036, 0.036, 0.036]), "plate": np.array([0.056, 0.036, 0.036])}
 RECORD_S, UNTIL_S, WARMING_S = 0.5, 200.0, 1.0
 REFERENCE_MM, COARSE_MM = 0.5, 4.0
-Way = tuple[Method, tuple[int, ...], tuple[float, ...]]
+Way = tuple[HeatMethod, tuple[int, ...], tuple[float, ...]]
 """Method, layers kept of each size, and smallest sizes in mm."""
 SPACE_WAYS: dict[str, Way] = {
-    "uniform, corrected": (Method("corrected", "explicit"), (), (4.0, 2.0, 1.0)),
+    "uniform, corrected": (HeatMethod("corrected", "explicit"), (), (4.0, 2.0, 1.0)),
     # with fewer layers a kernel would reach over two sizes, which is refused
     "two and three layers, corrected, local steps": (
-        Method("corrected", "local"),
+        HeatMethod("corrected", "local"),
         (2, 3),
         (2.0, 1.0),
     ),
-    "uniform, faces, local steps": (Method("faces", "local"), (), (4.0, 2.0, 1.0)),
-    "one layer, faces, local steps": (Method("faces", "local"), (1, 1), (2.0, 1.0, 0.5)),
-    "two layers, faces, local steps": (Method("faces", "local"), (2, 2), (2.0, 1.0, 0.5)),
-    "finite differences": (Method("difference"), (), (4.0, 2.0, 1.0)),
+    "uniform, faces, local steps": (HeatMethod("faces", "local"), (), (4.0, 2.0, 1.0)),
+    "one layer, faces, local steps": (HeatMethod("faces", "local"), (1, 1), (2.0, 1.0, 0.5)),
+    "two layers, faces, local steps": (HeatMethod("faces", "local"), (2, 2), (2.0, 1.0, 0.5)),
+    "finite differences": (HeatMethod("difference"), (), (4.0, 2.0, 1.0)),
 }
 
 
@@ -55,7 +55,7 @@ def space_rows(filling: Filling, reference_mm: float = REFERENCE_MM) -> list[dic
         The reference first; errors are those of the solidification time and, of each cooling
         curve up to it, the mean over the initial difference of temperature.
     """
-    difference = Method("difference")
+    difference = HeatMethod("difference")
     _solidified(filling, difference, (), COARSE_MM, WARMING_S)
     elements, reference = _solidified(filling, difference, (), reference_mm)
     rows = [_row("finite differences", reference_mm, filling, elements, reference, reference)]
@@ -76,9 +76,9 @@ def space_rows(filling: Filling, reference_mm: float = REFERENCE_MM) -> list[dic
 
 
 def _solidified(
-    filling: Filling, method: Method, layers: tuple[int, ...], size_mm: float,
+    filling: Filling, method: HeatMethod, layers: tuple[int, ...], size_mm: float,
     until_s: float = UNTIL_S,
-) -> tuple[Elements, Solidification]:  # fmt: skip
+) -> tuple[Elements, SolidificationResult]:  # fmt: skip
     raster = _raster(1e-3 * size_mm)
     elements = placed(raster, layers)
     marching: Marching = method.marching(elements, filling, raster)
@@ -94,8 +94,8 @@ def _raster(cell_m: float) -> Raster:
 
 
 def _row(
-    name: str, size_mm: float, filling: Filling, elements: Elements, found: Solidification,
-    reference: Solidification,
+    name: str, size_mm: float, filling: Filling, elements: Elements, found: SolidificationResult,
+    reference: SolidificationResult,
 ) -> dict[str, Any]:  # fmt: skip
     count = min(len(found.time_s), len(reference.time_s))
     span_k = max(filling.initial_k) - min(filling.initial_k)

@@ -8,14 +8,14 @@ from typing import Any
 from benchmarks.arpm_fem import fem_exchange
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.marching import Marching, Substance
-from sandmould.casting.arpm.method import STEPS, Method
+from sandmould.casting.arpm.method import STEPS, HeatMethod
 from sandmould.casting.arpm.plates_case import (
     Plates,
     PlatesRun,
     curve_error_percent,
     plates_layout,
 )
-from sandmould.casting.arpm.solidification import Solidification, solidify
+from sandmould.casting.arpm.solidification import SolidificationResult, solidify
 
 ADAPTIVE = "2-3B"
 WARMING_S = 10.0
@@ -29,7 +29,7 @@ class Way:
     """A layout of the paper and a method; scikit-fem takes the layout's cells."""
 
     case: str
-    method: Method
+    method: HeatMethod
     sizes_mm: tuple[float, ...]
     is_fem: bool = False
 
@@ -46,22 +46,22 @@ class Way:
 _UNIFORM, _FINE = (10.0, 5.0, 4.0, 2.5, 2.0, 1.0), (5.0, 2.5, 2.0)
 # the paper's, the corrected, the conservative, local and super steps, and the competitors
 WAYS: dict[str, Way] = {
-    "uniform, printed or corrected": Way("2-1", Method("corrected", "explicit"), _UNIFORM),
-    "2-2A, corrected": Way("2-2A", Method("corrected", "explicit"), (2.0,)),
-    "2-2B, corrected": Way("2-2B", Method("corrected", "explicit"), (2.0,)),
-    "2-3A, corrected": Way("2-3A", Method("corrected", "explicit", refuse_ratio=False), (2.0,)),
-    "2-3B, corrected": Way(ADAPTIVE, Method("corrected", "explicit"), _FINE),
-    "2-3B, printed": Way(ADAPTIVE, Method("printed", "explicit"), _FINE),
-    "2-3B, symmetric": Way(ADAPTIVE, Method("symmetric", "explicit"), _FINE),
-    "2-3B, corrected, local steps": Way(ADAPTIVE, Method("corrected", "local"), _FINE),
-    "2-3B, faces": Way(ADAPTIVE, Method("faces", "explicit"), _FINE),
-    "2-3B, faces, super steps": Way(ADAPTIVE, Method("faces", "super"), _FINE),
-    "2-3B, faces, local steps": Way(ADAPTIVE, Method("faces", "local"), (*_FINE, 1.0)),
-    "uniform, faces, local steps": Way("2-1", Method("faces", "local"), (10.0, *_FINE, 1.0)),
-    "finite differences": Way("2-1", Method("difference"), (10.0, *_FINE)),
-    FEM: Way("2-1", Method("faces", "explicit"), (10.0, *_FINE), is_fem=True),
+    "uniform, printed or corrected": Way("2-1", HeatMethod("corrected", "explicit"), _UNIFORM),
+    "2-2A, corrected": Way("2-2A", HeatMethod("corrected", "explicit"), (2.0,)),
+    "2-2B, corrected": Way("2-2B", HeatMethod("corrected", "explicit"), (2.0,)),
+    "2-3A, corrected": Way("2-3A", HeatMethod("corrected", "explicit", refuse_ratio=False), (2.0,)),
+    "2-3B, corrected": Way(ADAPTIVE, HeatMethod("corrected", "explicit"), _FINE),
+    "2-3B, printed": Way(ADAPTIVE, HeatMethod("printed", "explicit"), _FINE),
+    "2-3B, symmetric": Way(ADAPTIVE, HeatMethod("symmetric", "explicit"), _FINE),
+    "2-3B, corrected, local steps": Way(ADAPTIVE, HeatMethod("corrected", "local"), _FINE),
+    "2-3B, faces": Way(ADAPTIVE, HeatMethod("faces", "explicit"), _FINE),
+    "2-3B, faces, super steps": Way(ADAPTIVE, HeatMethod("faces", "super"), _FINE),
+    "2-3B, faces, local steps": Way(ADAPTIVE, HeatMethod("faces", "local"), (*_FINE, 1.0)),
+    "uniform, faces, local steps": Way("2-1", HeatMethod("faces", "local"), (10.0, *_FINE, 1.0)),
+    "finite differences": Way("2-1", HeatMethod("difference"), (10.0, *_FINE)),
+    FEM: Way("2-1", HeatMethod("faces", "explicit"), (10.0, *_FINE), is_fem=True),
 }
-REFERENCE = Way("2-1", Method("difference"), (1.0,))
+REFERENCE = Way("2-1", HeatMethod("difference"), (1.0,))
 PAPERS = ("uniform, printed or corrected", "2-2A, corrected", "2-2B, corrected",
           "2-3A, corrected", "2-3B, corrected")  # fmt: skip
 """The paper's own cases: their courses over time are kept."""
@@ -110,7 +110,7 @@ def run_way(way: Way, plates: Plates, size_m: float, until_s: float = 20_000.0) 
 
 
 def _row(
-    name: str, size_mm: float, plates: Plates, run: PlatesRun, reference: Solidification
+    name: str, size_mm: float, plates: Plates, run: PlatesRun, reference: SolidificationResult
 ) -> dict[str, Any]:
     found = run.found
     error = curve_error_percent(plates, found, reference)
@@ -131,7 +131,9 @@ def _row(
     }
 
 
-def _courses(plates: Plates, found: Solidification, reference: Solidification) -> dict[str, Any]:
+def _courses(
+    plates: Plates, found: SolidificationResult, reference: SolidificationResult
+) -> dict[str, Any]:
     """Error of the cooling curve at A and drift of the enthalpy over time: Figures 9, 11 and 14."""
     kept = found.time_s[: len(reference.time_s)] % COURSE_S == 0.0
     mould_k, pour_k = plates.filling.initial_k

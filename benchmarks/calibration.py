@@ -52,6 +52,7 @@ from benchmarks.calibration_oracle import (
 from benchmarks.calibration_page import page
 from benchmarks.calibration_race import CAP, HELD_AFTER, run_race, summarised
 from sandmould import ROOT
+from sandmould.runs.files import write_text
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.simulate import provenance
 
@@ -172,9 +173,7 @@ def keep(found: dict[str, Any], oracle: str, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     kept = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     kept[oracle] = found
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    os.replace(partial, path)
+    write_text(path, json.dumps(kept, indent=1) + "\n")
 
 
 def main() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import tempfile
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from sandmould import ROOT
 from sandmould.dem import source_hash
 from sandmould.dem.solver import Solver
+from sandmould.digest import SHORT, digest
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.model import grains_of, solver_of
 from sandmould.engines.registry import engine_of
@@ -182,7 +182,7 @@ def settled(dimension: int, grains: int) -> Bed:
 
     falling, resting = changed(_falling(dimension)), changed(_resting())
     words = falling.model_dump_json() + resting.model_dump_json() + source_hash()
-    key = hashlib.sha256(words.encode()).hexdigest()[:12]
+    key = digest(words)[:SHORT]
     path = KEPT / f"bed_{dimension}d_{grains}_{key}.npz"
     if path.exists():
         with np.load(path) as kept:

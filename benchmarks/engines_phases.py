@@ -6,23 +6,23 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from benchmarks.engines_timing import interleaved, seconds, spread
+from sandmould.compiled import njit
 from sandmould.dem.motion import drift, kick
 from sandmould.dem.neighbours import Pairs
-from sandmould.dem.pairs import gather_incoming, press_pairs
+from sandmould.dem.pairs import gather_incoming, pair_forces
 from sandmould.dem.solver import Solver
-from sandmould.dem.steps import Moving, Scene
-from sandmould.dem.surface_contacts import press_on_surfaces
-from sandmould.dem.vectors import OPTIONS, like, no_vector
+from sandmould.dem.steps import DemScene, Moving
+from sandmould.dem.surface_contacts import surface_forces
+from sandmould.dem.vectors import OPTIONS, dim_of, no_vector
 
 PARTS = ("pairs", "surfaces", "gather", "kick", "drift")
 """Parts of a step in their order."""
 
 
 @njit(**OPTIONS)
-def _part_of_steps(dim: Any, parts: int, times: int, scene: Scene, moving: Moving) -> None:
+def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Moving) -> None:
     """Do the first parts of a step over and over, chunk by chunk as the step loop does.
 
     Nothing moves: the kick and the drift last for no time, and cost what they always cost.
@@ -31,11 +31,11 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: Scene, moving: Movin
     for _ in range(times):
         for c in range(len(chunks.bound) - 1):
             first, last = chunks.bound[c], chunks.bound[c + 1]
-            press_pairs(
+            pair_forces(
                 dim, c, chunks, grains, moving.kinds, moving.pairs, scene.grain_law, scene.dt
             )
             if parts > 1:
-                press_on_surfaces(
+                surface_forces(
                     dim, walls.first_row[c], walls.first_row[c + 1], walls.candidates,
                     grains.position, grains.velocity, grains.spin, grains.radius, grains.mass,
                     grains.force, grains.moment, walls.arrays, no_vector(dim), no_vector(dim),
@@ -63,7 +63,7 @@ def _with_pairs(moving: Moving, keep: np.ndarray) -> Moving:
 
 def _block(solver: Solver, moving: Moving, parts: int, block_s: float) -> Callable[[], float]:
     """Give a block whose value is ns per grain and repetition of the first parts."""
-    dim, scene, n = like(solver.dimension), solver.scene, len(solver.grains.id)
+    dim, scene, n = dim_of(solver.dimension), solver.scene, len(solver.grains.id)
 
     def work(times: int) -> float:
         return seconds(lambda: _part_of_steps(dim, parts, times, scene, moving))

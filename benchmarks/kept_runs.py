@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 
+from sandmould.digest import digest
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.kind import kind_of
@@ -15,8 +15,7 @@ Measures = dict[str, float]
 
 def key_of(scenario: Scenario) -> str:
     """Name of a run: what its scenario says and what its engine is told to compute."""
-    told = scenario_hash(scenario) + kind_of(scenario).computed_hash(scenario)
-    return hashlib.sha256(told.encode()).hexdigest()
+    return digest(scenario_hash(scenario), kind_of(scenario).computed_hash(scenario))
 
 
 class KeptRuns:

@@ -25,6 +25,7 @@ from benchmarks.scaling_parts import job_start, parts
 from benchmarks.scaling_peers import peers
 from benchmarks.scaling_study import Place
 from sandmould import ROOT
+from sandmould.runs.files import write_text
 from sandmould.study.build_plan import open_plan
 from sandmould.study.simulate import provenance
 
@@ -69,9 +70,7 @@ class Progress:
             begun = time.time()
             parts[name] = measure()
             self.kept["took_s"] += time.time() - begun
-            partial_path = self.path.with_name(self.path.name + ".partial")
-            partial_path.write_text(json.dumps(self.kept), encoding="utf-8")
-            os.replace(partial_path, self.path)
+            write_text(self.path, json.dumps(self.kept))
         return parts[name]
 
 

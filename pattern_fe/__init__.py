@@ -5,8 +5,9 @@ engine is given, one row a vertex. In 2D everything is per thickness of the patt
 are in N. The vertical axis is the last one.
 """
 
-import hashlib
 from pathlib import Path
+
+from sandmould.digest import sources_digest
 
 
 def source_files() -> list[Path]:
@@ -16,7 +17,4 @@ def source_files() -> list[Path]:
 
 def source_hash() -> str:
     """Hash of this room's sources, which results of bent patterns depend on."""
-    digest = hashlib.sha256()
-    for path in source_files():
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
+    return sources_digest(source_files())

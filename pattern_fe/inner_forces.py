@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from sandmould.compiled import njit
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -15,7 +16,7 @@ Indices = NDArray[np.int64]
 def _compiled(d: int) -> Callable[..., Array]:
     """Build the loop for a number of dimensions, which as a constant makes it twice as fast."""
 
-    @njit(cache=True)
+    @njit()
     def inner_forces(
         cells: Indices, gradient: Array, weight: Array, displacement: Array, lam: float, mu: float
     ) -> Array:

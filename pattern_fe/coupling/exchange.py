@@ -22,6 +22,7 @@ from pattern_fe.mesh_file import read_mesh, write_mesh
 from pattern_fe.pattern import Pattern
 from pattern_fe.perimeter import Perimeter
 from pattern_fe.supports import Supports
+from sandmould.runs.files import write_text
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -139,12 +140,10 @@ def read_solution(path: Path, outer: Perimeter) -> StaticSolution:
 
 
 def _write(path: Path, whole: Values, columns: tuple[str, ...], rows: Array) -> None:
-    """Write a table, first under a temporary name: where it is, it is whole."""
-    partial = path.with_name(path.name + ".partial")
+    """Write a table: where it is, it is whole."""
     head = [f"# {name}: {float(value)!r}" for name, value in whole.items()]
     lines = ("\t".join(map(repr, row)) for row in rows.tolist())
-    partial.write_text("\n".join([*head, "\t".join(columns), *lines]) + "\n", encoding="utf-8")
-    partial.replace(path)
+    write_text(path, "\n".join([*head, "\t".join(columns), *lines]) + "\n")
 
 
 def _read(

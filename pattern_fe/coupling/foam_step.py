@@ -1,15 +1,13 @@
-"""One step of a condensed pattern by central differences, as the step of an engine calls it.
-
-All that is compiled for it stands in this one file, whose changes numba notices.
-"""
+"""One step of a condensed pattern by central differences, as the step of an engine calls it."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from numba import carray, cfunc, njit
+from numba import carray
 
+from sandmould.compiled import cfunc, njit
 from sandmould.dem.addresses import Floats, Ints, int_line_at, line_at, rows_at, to_ints
 from sandmould.dem.vectors import OPTIONS
 
@@ -183,7 +181,7 @@ def _step_at(table: int, step: int) -> int:
 
 @lru_cache
 def _compiled() -> Any:
-    return cfunc("int64(int64, int64)", cache=True)(_step_at)
+    return cfunc("int64(int64, int64)")(_step_at)
 
 
 def address_of_step() -> int:

@@ -4,22 +4,13 @@ It knows no scenario: ``sandmould.engines.reference`` hands it arrays. The numbe
 its arrays says whether it computes discs (2) or spheres (3); nothing else differs.
 """
 
-import hashlib
-import os
 from pathlib import Path
 
 import numba
 
+from sandmould.digest import sources_digest
+
 
 def source_hash() -> str:
     """Hash of this room's sources: what a compiled kernel, and so a result, depends on."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-# Numba notices a change in a kernel's own file, not in the files of what it calls: each state of
-# the room has a cache of its own.
-_CACHES = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "sandmould"
-numba.config.CACHE_DIR = str(_CACHES / f"kernels-{source_hash()}")  # type: ignore[attr-defined]
+    return sources_digest(Path(__file__).parent.glob("*.py"), numba.__version__)

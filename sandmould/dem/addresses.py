@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, njit, types
+from numba import carray, types
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
+from sandmould.arrays import Floats, Ints
+from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def table_of(arrays: Any) -> Ints:

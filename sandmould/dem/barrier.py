@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
+from sandmould.arrays import Ints
+from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS
 
 _ARRIVED, _TURN = 0, 8
@@ -24,7 +25,7 @@ _SPINS = 20_000
 _sched_yield = types.ExternalFunction("sched_yield", types.intc())
 
 
-def new_barrier() -> NDArray[np.int64]:
+def new_barrier() -> Ints:
     """Counters of a barrier that nobody has reached yet."""
     return np.zeros(16, dtype=np.int64)
 
@@ -59,7 +60,7 @@ _look_now: Any = intrinsic(_look)
 
 
 @njit(**OPTIONS)
-def wait_for_all(counters: NDArray[np.int64], threads: int) -> None:
+def wait_for_all(counters: Ints, threads: int) -> None:
     """Return when all threads have come here.
 
     Parameters

@@ -6,9 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
+from sandmould.arrays import Floats, Ints
+from sandmould.compiled import njit
 from sandmould.dem.nearest_point import nearest
 from sandmould.dem.surfaces import SurfaceArrays
 from sandmould.dem.vectors import OPTIONS, dot, load, plus, store, times
@@ -17,11 +17,11 @@ from sandmould.dem.vectors import OPTIONS, dot, load, plus, store, times
 class Candidates(NamedTuple):
     """Grains near surfaces and the parts that they are near to."""
 
-    rows: NDArray[np.int64]
+    rows: Ints
     """(m,) int64: grains with at least one part within reach, in increasing order."""
-    start: NDArray[np.int64]
+    start: Ints
     """(m + 1,) int64: where the parts of each row begin."""
-    part: NDArray[np.int64]
+    part: Ints
     """(start[m],) int64: part numbers, see ``SurfaceArrays``."""
 
 
@@ -31,12 +31,12 @@ class _Grid(NamedTuple):
     low: tuple[float, float, float]
     size: float
     cells: tuple[int, int, int]
-    start: NDArray[np.int64]
-    part: NDArray[np.int64]
+    start: Ints
+    part: Ints
 
 
 @njit(**OPTIONS)
-def _span(points: NDArray[np.float64], k: int) -> tuple[float, float]:
+def _span(points: Floats, k: int) -> tuple[float, float]:
     """Smallest and largest of a coordinate."""
     low, high = math.inf, -math.inf
     for i in range(len(points)):
@@ -45,23 +45,23 @@ def _span(points: NDArray[np.float64], k: int) -> tuple[float, float]:
 
 
 @njit(**OPTIONS)
-def _bounds(like: Any, points: NDArray[np.float64]) -> Any:
+def _bounds(dim: Any, points: Floats) -> Any:
     """Smallest and largest coordinates, three each; in 2D the third is 0."""
     x, y, z = _span(points, 0), _span(points, 1), (0.0, 0.0)
-    if len(like) == 3:
+    if len(dim) == 3:
         z = _span(points, 2)
     return (x[0], y[0], z[0]), (x[1], y[1], z[1])
 
 
 @njit(**OPTIONS)
-def _flat_normal(like: Any, vertices: NDArray[np.float64], corner: NDArray[np.int64]) -> Any:
+def _flat_normal(dim: Any, vertices: Floats, corner: Ints) -> Any:
     """Unit normal of a facet, three components."""
-    a, b = load(like, vertices, corner[0]), load(like, vertices, corner[1])
+    a, b = load(dim, vertices, corner[0]), load(dim, vertices, corner[1])
     ab = plus(b, -1.0, a)
-    if len(like) == 2:
+    if len(dim) == 2:
         n = (-ab[1], ab[0], 0.0)
     else:
-        ac = plus(load(like, vertices, corner[2]), -1.0, a)
+        ac = plus(load(dim, vertices, corner[2]), -1.0, a)
         n = (
             ab[1] * ac[2] - ab[2] * ac[1],
             ab[2] * ac[0] - ab[0] * ac[2],
@@ -79,9 +79,9 @@ def _range(low: float, high: float, origin: float, size: float, cells: int) -> t
 
 @njit(**OPTIONS)
 def _sort_facets(
-    like: Any,
-    vertices: NDArray[np.float64],
-    corner: NDArray[np.int64],
+    dim: Any,
+    vertices: Floats,
+    corner: Ints,
     first_facet: int,
     reach: float,
     low: Any,
@@ -106,15 +106,15 @@ def _sort_facets(
     n_x, n_y, n_z = int(cells[0]), int(cells[1]), int(cells[2])
     start = np.zeros(n_x * n_y * n_z + 1, dtype=np.int64)
     part = np.empty(0, dtype=np.int64)
-    corners = np.empty((len(like), len(like)))
+    corners = np.empty((len(dim), len(dim)))
     for fill in range(2):
         for p in range(first_facet, len(corner)):
-            for j in range(len(like)):
-                store(load(like, vertices, corner[p, j]), corners, j)
-            lowest, highest = _bounds(like, corners)
-            normal = _flat_normal(like, vertices, corner[p])
+            for j in range(len(dim)):
+                store(load(dim, vertices, corner[p, j]), corners, j)
+            lowest, highest = _bounds(dim, corners)
+            normal = _flat_normal(dim, vertices, corner[p])
             height = 0.0
-            for k in range(len(like)):
+            for k in range(len(dim)):
                 height += normal[k] * corners[0, k]
             thick = reach + 0.5 * size * (abs(normal[0]) + abs(normal[1]) + abs(normal[2]))
             x_0, x_1 = _range(lowest[0] - reach, highest[0] + reach, low[0], size, n_x)
@@ -147,7 +147,7 @@ def _sort_facets(
 
 
 @njit(**OPTIONS)
-def _longer(array: NDArray[np.int64], filled: int) -> NDArray[np.int64]:
+def _longer(array: Ints, filled: int) -> Ints:
     longer = np.empty(2 * filled + 16, dtype=np.int64)
     for i in range(filled):
         longer[i] = array[i]
@@ -156,9 +156,9 @@ def _longer(array: NDArray[np.int64], filled: int) -> NDArray[np.int64]:
 
 @njit(**OPTIONS)
 def find_candidates(
-    like: Any,
-    position: NDArray[np.float64],
-    radius: NDArray[np.float64],
+    dim: Any,
+    position: Floats,
+    radius: Floats,
     skin: float,
     arrays: SurfaceArrays,
     shift: Any,
@@ -169,7 +169,7 @@ def find_candidates(
 
     Parameters
     ----------
-    like : tuple of d floats
+    dim : tuple of d floats
     position : (n, d or 3) float64, m
     radius : (n,) float64, m
     skin : float, m
@@ -186,9 +186,9 @@ def find_candidates(
     reach = skin
     for i in range(grains):
         reach = max(reach, skin + radius[i])
-    low, high = _bounds(like, position)
-    facet_low, facet_high = _bounds(like, vertices)
-    moved = (shift[0], shift[1], shift[2] if len(like) == 3 else 0.0)
+    low, high = _bounds(dim, position)
+    facet_low, facet_high = _bounds(dim, vertices)
+    moved = (shift[0], shift[1], shift[2] if len(dim) == 3 else 0.0)
     low = (
         max(low[0] - moved[0], facet_low[0] - reach),
         max(low[1] - moved[1], facet_low[1] - reach),
@@ -205,25 +205,25 @@ def find_candidates(
     if not sort:
         low = high = (0.0, 0.0, 0.0)
     last = len(corner) if sort else first_facet
-    grid = _sort_facets(like, vertices, corner[:last], first_facet, reach, low, high)
+    grid = _sort_facets(dim, vertices, corner[:last], first_facet, reach, low, high)
     size, (n_x, n_y, n_z) = grid.size, grid.cells
     cell_start, cell_part = grid.start, grid.part
     for i in range(grains):
-        x = plus(load(like, position, i), -1.0, shift)
+        x = plus(load(dim, position, i), -1.0, shift)
         near = radius[i] + skin
         before = found
         cell = -1
         if sort:
             i_x = math.floor((x[0] - low[0]) / size)
             i_y = math.floor((x[1] - low[1]) / size)
-            i_z = math.floor((x[2] - low[2]) / size) if len(like) == 3 else 0
+            i_z = math.floor((x[2] - low[2]) / size) if len(dim) == 3 else 0
             if 0 <= i_x < n_x and 0 <= i_y < n_y and 0 <= i_z < n_z:
                 cell = (int(i_x) * n_y + int(i_y)) * n_z + int(i_z)
         sorted_first = cell_start[cell] if cell >= 0 else 0
         in_cell = cell_start[cell + 1] - sorted_first if cell >= 0 else 0
         for k in range(first_facet + in_cell):
             p = k if k < first_facet else cell_part[sorted_first + k - first_facet]
-            distance = nearest(like, vertices, planes, shape, corner, p, x, near)[0]
+            distance = nearest(dim, vertices, planes, shape, corner, p, x, near)[0]
             if distance <= near:
                 if found == len(parts):
                     parts = _longer(parts, found)

@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from numba import njit
-
+from sandmould.compiled import njit
 from sandmould.dem.vectors import (
     INLINED,
     dot,
@@ -41,11 +40,11 @@ class Law(NamedTuple):
     """Stiffness, N/m, of the spring at the effective radius that regularises eq. (29)."""
     clip_total: bool
     """Whether 'no tension' (18) holds for the total normal force or for its elastic part alone."""
-    twist: bool
-    """Whether rolling resistance also resists twist about the normal in 3D, as (31) reads."""
+    torsion: bool
+    """Whether rolling resistance also resists spin about the normal in 3D, as (31) reads."""
 
 
-class Pairing(NamedTuple):
+class PairCoefficients(NamedTuple):
     """What the law makes of the sizes of two bodies in contact, or of a grain at a surface."""
 
     damping: float
@@ -57,7 +56,7 @@ class Pairing(NamedTuple):
 
 
 @njit(**INLINED)
-def pairing(law: Law, mass: float, smaller: float, effective: float) -> Pairing:
+def pair_coefficients(law: Law, mass: float, smaller: float, effective: float) -> PairCoefficients:
     """Apply a law to sizes.
 
     Parameters
@@ -70,7 +69,7 @@ def pairing(law: Law, mass: float, smaller: float, effective: float) -> Pairing:
     effective : float, m
         r1 r2 / (r1 + r2), or r1 at a surface.
     """
-    return Pairing(
+    return PairCoefficients(
         2.0 * law.damping_ratio * math.sqrt(mass * law.k_n),
         law.k_roll * effective * effective,
         law.rolling_arm * smaller,
@@ -86,7 +85,7 @@ def contact(
     w_2: Any,
     arm_1: float,
     arm_2: float,
-    sizes: Pairing,
+    sizes: PairCoefficients,
     law: Law,
     dt: float,
     friction: Any,
@@ -107,7 +106,7 @@ def contact(
         Spins, one component in 2D.
     arm_1, arm_2 : float, m
         Distances of the centres from the contact point; 0 for a surface.
-    sizes : Pairing
+    sizes : PairCoefficients
         Of this law.
     law : Law
     dt : float, s
@@ -139,7 +138,7 @@ def contact(
     if law.rolling_arm > 0.0:
         relative = plus(w_1, -1.0, w_2)
         rolling = plus(rolling, -sizes.rolling_stiffness * dt, relative)
-        rolling = rolling_part(n, rolling, law.twist)
+        rolling = rolling_part(n, rolling, law.torsion)
         rolling = limited(rolling, sizes.rolling_arm * abs(normal))
         moment_1 = plus(moment_1, 1.0, rolling)
         moment_2 = plus(moment_2, -1.0, rolling)

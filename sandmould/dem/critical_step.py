@@ -42,7 +42,7 @@ class StableStep:
     """Critical step with the dashpots, eq. (42)."""
 
 
-class Contacts(NamedTuple):
+class ActiveContacts(NamedTuple):
     """The springs and dashpots of c active contacts, and the grains between which they act.
 
     The rows of a contact give the elongations, times the square roots of their stiffnesses, that
@@ -117,7 +117,7 @@ def _tangents(normal: Floats) -> Floats:
     return np.stack([one, np.cross(normal, one)], axis=1)
 
 
-def _rows(solver: Solver, ends: _Ends, law: Law) -> Contacts:
+def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
     """Turn springs of eqs. (16), (25) and (29) into rows.
 
     The slip of grain 2 over grain 1 along a tangent t is
@@ -131,7 +131,7 @@ def _rows(solver: Solver, ends: _Ends, law: Law) -> Contacts:
     k_t = law.k_t if law.friction > 0.0 else 0.0
     k_roll = law.k_roll * ends.effective**2 if law.rolling_arm > 0.0 else np.zeros(c)
     roll = np.sqrt(k_roll)[:, None, None] * rolls
-    if d == 3 and not law.twist:
+    if d == 3 and not law.torsion:
         roll[:, 0] = 0.0
 
     def one(side: int, grain: Ints) -> Floats:
@@ -147,10 +147,10 @@ def _rows(solver: Solver, ends: _Ends, law: Law) -> Contacts:
 
     damping = 2.0 * law.damping_ratio * np.sqrt(ends.mass * law.k_n)
     rows = one(0, ends.first), one(1, ends.second)
-    return Contacts(ends.first, ends.second, *rows, damping / law.k_n, len(grains.id))
+    return ActiveContacts(ends.first, ends.second, *rows, damping / law.k_n, len(grains.id))
 
 
-def active_contacts(solver: Solver) -> Contacts:
+def active_contacts(solver: Solver) -> ActiveContacts:
     """Give the contacts of the last step, with grains and with surfaces.
 
     Parameters
@@ -163,10 +163,10 @@ def active_contacts(solver: Solver) -> Contacts:
     first, second, rows_first, rows_second, dashpot = (
         np.concatenate(parts) for parts in zip(between[:-1], at_walls[:-1], strict=True)
     )
-    return Contacts(first, second, rows_first, rows_second, dashpot, between.grains)
+    return ActiveContacts(first, second, rows_first, rows_second, dashpot, between.grains)
 
 
-def _per_grain(contacts: Contacts, values: Floats, of_second: Floats) -> Floats:
+def _per_grain(contacts: ActiveContacts, values: Floats, of_second: Floats) -> Floats:
     """Sum over the contacts of each grain of what they bring to their first and second grain."""
     total = np.zeros((contacts.grains, *values.shape[1:]))
     np.add.at(total, contacts.first, values)
@@ -183,7 +183,7 @@ def _stable(omega_rad_s: float, damped_rate_rad_s: float) -> StableStep:
     return StableStep(float(omega_rad_s), undamped, damped)
 
 
-def simplified_step(contacts: Contacts) -> StableStep:
+def simplified_step(contacts: ActiveContacts) -> StableStep:
     """The paper's estimate: a grain swings along one line or turns, eqs. (48)-(54).
 
     With the real number of contacts, all taken to act along that line: omega_n^2 = sum k_n / m
@@ -205,7 +205,7 @@ def simplified_step(contacts: Contacts) -> StableStep:
     return _stable(omega.max(initial=0.0), np.maximum(along, about).max(initial=0.0))
 
 
-def grain_step(contacts: Contacts) -> StableStep:
+def grain_step(contacts: ActiveContacts) -> StableStep:
     """Eigenproblem of every grain among neighbours held fixed, eqs. (43)-(47).
 
     A grain's matrix is a diagonal block of that of the whole, and a contact between two grains
@@ -238,7 +238,7 @@ def _largest(matrix: csr_array) -> float:
     return float(found[0])
 
 
-def whole_step(contacts: Contacts) -> StableStep:
+def whole_step(contacts: ActiveContacts) -> StableStep:
     """Eigenproblem of all grains together: the judge of the other two.
 
     The damped step is exact for central differences, whether or not the modes are damped alike.

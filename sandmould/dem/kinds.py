@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from sandmould.dem.contact_law import Law, Pairing, pairing
+from sandmould.compiled import njit
+from sandmould.dem.contact_law import Law, PairCoefficients, pair_coefficients
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.vectors import INLINED, OPTIONS
 
@@ -25,8 +25,8 @@ class Kinds(NamedTuple):
 
     of_grain: NDArray[np.uint8]
     """(n,) uint8."""
-    pairings: Floats
-    """(k, k, 3) float64: the fields of ``Pairing``."""
+    coefficients: Floats
+    """(k, k, 3) float64: the fields of ``PairCoefficients``."""
 
 
 @njit(**OPTIONS)
@@ -51,19 +51,24 @@ def _tell_apart(radius: Floats, mass: Floats) -> tuple[NDArray[np.uint8], Ints]:
 
 
 @njit(**OPTIONS)
-def _pair_up(radius: Floats, mass: Floats, law: Law, pairings: Floats) -> None:
+def _pair_up(radius: Floats, mass: Floats, law: Law, coefficients: Floats) -> None:
     for i in range(len(radius)):
         for j in range(len(radius)):
             r_i, r_j, m_i, m_j = radius[i], radius[j], mass[i], mass[j]
-            found = pairing(law, m_i * m_j / (m_i + m_j), min(r_i, r_j), r_i * r_j / (r_i + r_j))
-            pairings[i, j] = found
+            coefficients[i, j] = pair_coefficients(
+                law, m_i * m_j / (m_i + m_j), min(r_i, r_j), r_i * r_j / (r_i + r_j)
+            )
 
 
 @njit(**INLINED)
-def pairing_of(pairings: Floats, kind_1: int, kind_2: int) -> Pairing:
+def pair_coefficients_of(
+    coefficients: Floats, kind_1: int | np.uint64, kind_2: int | np.uint64
+) -> PairCoefficients:
     """Give what two kinds make of each other."""
-    return Pairing(
-        pairings[kind_1, kind_2, 0], pairings[kind_1, kind_2, 1], pairings[kind_1, kind_2, 2]
+    return PairCoefficients(
+        coefficients[kind_1, kind_2, 0],
+        coefficients[kind_1, kind_2, 1],
+        coefficients[kind_1, kind_2, 2],
     )
 
 
@@ -84,6 +89,6 @@ def find_kinds(grains: Grains, law: Law) -> Kinds:
     of_grain, example = _tell_apart(grains.radius, grains.mass)
     if len(grains.id) and not len(example):
         raise ValueError(f"grains of more than {MOST_KINDS} radii and masses; use size classes")
-    pairings = np.zeros((len(example), len(example), 3))
-    _pair_up(grains.radius[example], grains.mass[example], law, pairings)
-    return Kinds(of_grain, pairings)
+    coefficients = np.zeros((len(example), len(example), 3))
+    _pair_up(grains.radius[example], grains.mass[example], law, coefficients)
+    return Kinds(of_grain, coefficients)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from numba import njit
-
+from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.vectors import (
     INLINED,
@@ -87,8 +86,8 @@ def kick(
         push = damped(push, v, m, damping.form, damping.translation)
         store(plus(v, dt / m, push), velocity, i)
         inert, w = inertia[i], load_spin(dim, spin, i)
-        twist = damped(load_spin(dim, moment, i), w, inert, damping.form, damping.rotation)
-        store(plus(w, dt / inert, twist), spin, i)
+        torque = damped(load_spin(dim, moment, i), w, inert, damping.form, damping.rotation)
+        store(plus(w, dt / inert, torque), spin, i)
 
 
 @njit(**OPTIONS)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numba import njit
-from numpy.typing import NDArray
-
+from sandmould.arrays import Floats, Ints
+from sandmould.compiled import njit
 from sandmould.dem.vectors import INLINED, dot, load, plus, times
 
 FAR = math.inf
@@ -142,11 +140,11 @@ def _on_revolved(axis: Any, line: Any, origin: Any, x: Any, reach: float) -> Any
 
 @njit(**INLINED)
 def nearest(
-    like: Any,
-    vertices: NDArray[np.float64],
+    dim: Any,
+    vertices: Floats,
     planes: int,
-    shape: NDArray[np.float64],
-    corner: NDArray[np.int64],
+    shape: Floats,
+    corner: Ints,
     part: int,
     x: Any,
     reach: float,
@@ -155,7 +153,7 @@ def nearest(
 
     Parameters
     ----------
-    like : tuple of d floats
+    dim : tuple of d floats
     vertices, planes, shape, corner
         Of the ``SurfaceArrays``: a tuple of arrays costs more than its arrays.
     part : int
@@ -175,20 +173,20 @@ def nearest(
     inside : bool
         Whether the point lies inside the part, and not on an edge or a corner of it.
     """
-    a = load(like, vertices, corner[part, 0])
-    if len(like) == 2:
+    a = load(dim, vertices, corner[part, 0])
+    if len(dim) == 2:
         if part < planes:
-            normal = load(like, shape, part)
+            normal = load(dim, shape, part)
             return dot(plus(x, -1.0, a), normal), times(normal, -1.0), (1.0, 0.0), True
-        b = load(like, vertices, corner[part, 1])
+        b = load(dim, vertices, corner[part, 1])
         distance, n_x, n_y, share, inside = _on_segment(a[0], a[1], b[0], b[1], x[0], x[1], reach)
         return distance, (n_x, n_y), (1.0 - share, share), inside
     if part < planes:
-        normal = load(like, shape, part)
+        normal = load(dim, shape, part)
         return dot(plus(x, -1.0, a), normal), times(normal, -1.0), (1.0, 0.0, 0.0), True
     if part < len(shape):
         line = (shape[part, 3], shape[part, 4], shape[part, 5], shape[part, 6])
-        distance, n, inside = _on_revolved(load(like, shape, part), line, a, x, reach)
+        distance, n, inside = _on_revolved(load(dim, shape, part), line, a, x, reach)
         return distance, n, (1.0, 0.0, 0.0), inside
-    b, c = load(like, vertices, corner[part, 1]), load(like, vertices, corner[part, 2])
+    b, c = load(dim, vertices, corner[part, 1]), load(dim, vertices, corner[part, 2])
     return _on_triangle(a, b, c, x, reach)

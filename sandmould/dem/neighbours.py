@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains, Ints
-from sandmould.dem.vectors import OPTIONS, dot, like, load, load_spin, plus, store, times
+from sandmould.dem.vectors import OPTIONS, dim_of, dot, load, load_spin, plus, store, times
 
 
 class Pairs(NamedTuple):
@@ -206,7 +206,7 @@ def carry_history(dim: Any, old: Pairs, place: Ints, new: Pairs) -> None:
 def list_pairs(grains: Grains, start: Ints, grid: Grid, skin: float) -> Pairs:
     """List near pairs of sorted grains, without history."""
     d = grains.position.shape[1]
-    first, other = find_pairs(like(d), grains.position, grains.radius, skin, start, grid)
+    first, other = find_pairs(dim_of(d), grains.position, grains.radius, skin, start, grid)
     history = np.zeros((len(other), grains.spin.shape[1]))
     touching = np.zeros(len(other), dtype=np.uint8)
     return Pairs(first, other, touching, history, history.copy())

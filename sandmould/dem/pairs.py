@@ -11,11 +11,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sandmould.compiled import njit
 from sandmould.dem.contact_law import Law, contact
 from sandmould.dem.grains import Floats, Grains, Ints
-from sandmould.dem.kinds import Kinds, pairing_of
+from sandmould.dem.kinds import Kinds, pair_coefficients_of
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.vectors import (
     OPTIONS,
@@ -93,7 +93,7 @@ def split(grains: Grains, pairs: Pairs) -> Chunks:
 
 
 @njit(**OPTIONS)
-def press_pairs(
+def pair_forces(
     dim: Any,
     c: int,
     chunks: Chunks,
@@ -122,7 +122,7 @@ def press_pairs(
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     position, velocity, spin = grains.position, grains.velocity, grains.spin
     radius, force, moment = grains.radius, grains.force, grains.moment
-    kind, pairings = kinds.of_grain, kinds.pairings
+    kind, coefficients = kinds.of_grain, kinds.coefficients
     start, other, touching = pairs.start, pairs.other, pairs.touching
     friction, rolling = pairs.friction, pairs.rolling
     slot_force, slot_moment = chunks.force, chunks.moment
@@ -149,7 +149,7 @@ def press_pairs(
                     load_spin(dim, spin, j),
                     r - 0.5 * overlap,
                     r_j - 0.5 * overlap,
-                    pairing_of(pairings, kind_i, index(kind[j])),
+                    pair_coefficients_of(coefficients, kind_i, index(kind[j])),
                     law,
                     dt,
                     load_spin(dim, friction, k),

@@ -24,15 +24,15 @@ from sandmould.dem.pairs import split
 from sandmould.dem.steps import (
     LIST_IS_OLD,
     NOT_A_NUMBER,
+    DemScene,
     Moving,
-    Scene,
     Team,
     advance,
     find_forces,
     new_walls,
 )
 from sandmould.dem.surfaces import Surfaces
-from sandmould.dem.vectors import like
+from sandmould.dem.vectors import dim_of
 from sandmould.dem.wall_history import carry_history as carry_wall_history
 from sandmould.dem.wall_history import new_history
 
@@ -50,7 +50,7 @@ class Solver:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: DemScene,
         surfaces: Surfaces,
         skin_m: float,
         threads: int = 1,
@@ -60,7 +60,7 @@ class Solver:
 
         Parameters
         ----------
-        scene : Scene
+        scene : DemScene
         surfaces : Surfaces
         skin_m : float
             Pairs nearer than this are listed; the list serves until a grain has gone half of it.
@@ -76,7 +76,7 @@ class Solver:
         """Steps done."""
         self.lists = 0
         """How often pairs were listed."""
-        self._dim = like(self.dimension)
+        self._dim = dim_of(self.dimension)
         self._skin = skin_m
         self._threads = min(threads, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(max(1, self._threads - 1))

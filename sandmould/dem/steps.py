@@ -6,8 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sandmould.compiled import njit
 from sandmould.dem.barrier import wait_for_all
 from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.contact_law import Law
@@ -15,8 +15,8 @@ from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.kinds import Kinds
 from sandmould.dem.motion import Damping, drift, kick, turn
 from sandmould.dem.neighbours import Pairs
-from sandmould.dem.pairs import Chunks, gather_incoming, press_pairs
-from sandmould.dem.surface_contacts import press_on_surfaces
+from sandmould.dem.pairs import Chunks, gather_incoming, pair_forces
+from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
 from sandmould.dem.vectors import INLINED, OPTIONS, dot, load, no_vector, plus, times
 from sandmould.dem.wall_history import WallHistory
@@ -25,7 +25,7 @@ DONE, LIST_IS_OLD, NOT_A_NUMBER = 0, 1, 2
 """Why the loop returned."""
 
 
-class Scene(NamedTuple):
+class DemScene(NamedTuple):
     """What does not change while the loop runs."""
 
     grain_law: Law
@@ -104,12 +104,12 @@ def _farthest(dim: Any, grains: Grains, listed: Floats, shift: Any) -> float:
 
 @njit(**OPTIONS)
 def _press(
-    dim: Any, c: int, scene: Scene, moving: Moving, shift: Any, speed: Any, dt: float
+    dim: Any, c: int, scene: DemScene, moving: Moving, shift: Any, speed: Any, dt: float
 ) -> None:
     """Add all forces on the grains of a chunk but those of earlier chunks."""
     grains, walls = moving.grains, moving.walls
-    press_pairs(dim, c, moving.chunks, grains, moving.kinds, moving.pairs, scene.grain_law, dt)
-    press_on_surfaces(
+    pair_forces(dim, c, moving.chunks, grains, moving.kinds, moving.pairs, scene.grain_law, dt)
+    surface_forces(
         dim,
         walls.first_row[c],
         walls.first_row[c + 1],
@@ -133,13 +133,13 @@ def _press(
 
 
 @njit(**OPTIONS)
-def find_forces(dim: Any, scene: Scene, moving: Moving) -> None:
+def find_forces(dim: Any, scene: DemScene, moving: Moving) -> None:
     """Find the forces of the places as they are, before any friction; the box is at rest.
 
     Parameters
     ----------
     dim : tuple
-    scene : Scene
+    scene : DemScene
     moving : Moving
         Its grains' forces are zero before.
     """
@@ -150,7 +150,7 @@ def find_forces(dim: Any, scene: Scene, moving: Moving) -> None:
 
 
 @njit(**INLINED)
-def _box(dim: Any, scene: Scene, displacement: Floats, k: int) -> Any:
+def _box(dim: Any, scene: DemScene, displacement: Floats, k: int) -> Any:
     """Shift (m) and velocity (m/s) of the walls at the time k steps after the first."""
     if scene.box_frame:
         return no_vector(dim), no_vector(dim)
@@ -159,7 +159,7 @@ def _box(dim: Any, scene: Scene, displacement: Floats, k: int) -> Any:
 
 
 @njit(**OPTIONS)
-def _move(dim: Any, c: int, scene: Scene, moving: Moving, displacement: Floats, k: int) -> float:
+def _move(dim: Any, c: int, scene: DemScene, moving: Moving, displacement: Floats, k: int) -> float:
     """Advance the grains of a chunk by step k; gives their largest squared speed, m2/s2."""
     first, last = moving.chunks.bound[c], moving.chunks.bound[c + 1]
     body = scene.gravity
@@ -176,7 +176,7 @@ def _move(dim: Any, c: int, scene: Scene, moving: Moving, displacement: Floats, 
 
 @njit(**OPTIONS)
 def _finish(
-    dim: Any, c: int, scene: Scene, moving: Moving, displacement: Floats, k: int, goes_on: bool
+    dim: Any, c: int, scene: DemScene, moving: Moving, displacement: Floats, k: int, goes_on: bool
 ) -> float:
     """Add what earlier chunks put on a chunk, and move it on where another step follows."""
     gather_incoming(dim, c, moving.chunks, moving.grains)
@@ -185,7 +185,7 @@ def _finish(
 
 @njit(**OPTIONS)
 def _state(
-    dim: Any, scene: Scene, moving: Moving, fastest2: float, box: Any, half_skin: float
+    dim: Any, scene: DemScene, moving: Moving, fastest2: float, box: Any, half_skin: float
 ) -> int:
     """Move deforming surfaces and say whether the lists hold after all grains have moved."""
     if not fastest2 < math.inf:
@@ -210,7 +210,7 @@ def advance(
     dim: Any,
     steps: int,
     drifted: bool,
-    scene: Scene,
+    scene: DemScene,
     moving: Moving,
     displacement: Floats,
     half_skin: float,
@@ -227,7 +227,7 @@ def advance(
     steps : int
     drifted : bool
         Whether the first step has already moved the grains and waited for a new list.
-    scene : Scene
+    scene : DemScene
     moving : Moving
     displacement : (steps + 2,) float64, m
         Of the box along its direction, from one step before the first.

@@ -12,11 +12,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.arrays import Flags, Floats
+from sandmould.compiled import njit
 from sandmould.dem.broad_phase import Candidates
-from sandmould.dem.contact_law import Law, contact, pairing
+from sandmould.dem.contact_law import Law, contact, pair_coefficients
 from sandmould.dem.nearest_point import FAR, nearest
 from sandmould.dem.surfaces import SurfaceArrays
 from sandmould.dem.vectors import (
@@ -42,9 +43,7 @@ _WAITS, _COVERED, _SEEN = 0, 1, 2
 
 
 @njit(**OPTIONS)
-def _next(
-    distance: NDArray[np.float64], inside: NDArray[np.bool_], state: NDArray[np.int8], found: int
-) -> int:
+def _next(distance: Floats, inside: Flags, state: NDArray[np.int8], found: int) -> int:
     """Give the nearest part still waiting, or -1; of two equally near the one touched inside."""
     best, least = -1, FAR
     for i in range(found):
@@ -57,38 +56,38 @@ def _next(
 
 @njit(**OPTIONS)
 def _cover(
-    like: Any,
-    distance: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    inside: NDArray[np.bool_],
+    dim: Any,
+    distance: Floats,
+    normal: Floats,
+    inside: Flags,
     state: NDArray[np.int8],
     found: int,
     kept: int,
     r: float,
 ) -> None:
     """Rule out all that a contact covers."""
-    n, near = load(like, normal, kept), distance[kept]
+    n, near = load(dim, normal, kept), distance[kept]
     for i in range(found):
         if state[i] == _WAITS:
-            cosine = dot(n, load(like, normal, i))
+            cosine = dot(n, load(dim, normal, i))
             in_front = near - distance[i] * cosine
             if cosine > ONE_FACE or in_front <= (0.0 if inside[i] else EDGE_SHOWS * r):
                 state[i] = _COVERED
 
 
 @njit(**OPTIONS)
-def press_on_surfaces(
-    like: Any,
+def surface_forces(
+    dim: Any,
     first_row: int,
     last_row: int,
     candidates: Candidates,
-    position: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    spin: NDArray[np.float64],
-    radius: NDArray[np.float64],
-    mass: NDArray[np.float64],
-    force: NDArray[np.float64],
-    moment: NDArray[np.float64],
+    position: Floats,
+    velocity: Floats,
+    spin: Floats,
+    radius: Floats,
+    mass: Floats,
+    force: Floats,
+    moment: Floats,
     arrays: SurfaceArrays,
     shift: Any,
     shift_velocity: Any,
@@ -96,13 +95,13 @@ def press_on_surfaces(
     dt: float,
     keep: bool,
     history: WallHistory,
-    loads: NDArray[np.float64],
+    loads: Floats,
 ) -> None:
     """Add the forces of the surfaces to grains, and their reactions to the loads on vertices.
 
     Parameters
     ----------
-    like : tuple of d floats
+    dim : tuple of d floats
     first_row, last_row : int
         Rows first_row ... last_row - 1 of the candidates: several threads take rows of their own.
     candidates : Candidates
@@ -132,7 +131,7 @@ def press_on_surfaces(
     slots_used, slot_normal = history.used, history.normal
     slot_friction, slot_rolling = history.friction, history.rolling
     # Scratch: what one grain touches.
-    d, n_slots = len(like), slots(like)
+    d, n_slots = len(dim), slots(dim)
     f_distance, f_part = np.empty(_MOST), np.empty(_MOST, dtype=np.int64)
     f_normal, f_weights = np.empty((_MOST, d)), np.empty((_MOST, d))
     f_inside, f_state = np.empty(_MOST, dtype=np.bool_), np.empty(_MOST, dtype=np.int8)
@@ -140,11 +139,11 @@ def press_on_surfaces(
     for row in range(first_row, last_row):
         i = rows[row]
         r = radius[i]
-        x = plus(load(like, position, i), -1.0, shift)
+        x = plus(load(dim, position, i), -1.0, shift)
         found = 0
         for k in range(start[row], start[row + 1]):
             distance, n, weights, inside = nearest(
-                like, vertices, planes, shape, corner, part[k], x, r
+                dim, vertices, planes, shape, corner, part[k], x, r
             )
             if distance >= r:
                 continue
@@ -165,15 +164,15 @@ def press_on_surfaces(
             if keep and old:
                 slots_used[row] = 0
             continue
-        speed = plus(load(like, velocity, i), -1.0, shift_velocity)
-        w = load_spin(like, spin, i)
-        total, turning = no_vector(like), no_spin(like)
+        speed = plus(load(dim, velocity, i), -1.0, shift_velocity)
+        w = load_spin(dim, spin, i)
+        total, turning = no_vector(dim), no_spin(dim)
         contacts = taken = 0
         while contacts < n_slots:
             c = _next(f_distance, f_inside, f_state, found) if found > 1 else 0
             if c < 0:
                 break
-            n, distance, weights = load(like, f_normal, c), f_distance[c], load(like, f_weights, c)
+            n, distance, weights = load(dim, f_normal, c), f_distance[c], load(dim, f_weights, c)
             f_state[c] = _SEEN
             if contacts and not f_inside[c]:
                 # The edge of a concave joint is no contact: a nearer part goes on from there.
@@ -181,31 +180,31 @@ def press_on_surfaces(
                 joined = False
                 for k in range(found):
                     if k != c and f_state[k] != _WAITS and f_distance[k] <= distance:
-                        gap = nearest(like, vertices, planes, shape, corner, f_part[k], edge, r)[0]
+                        gap = nearest(dim, vertices, planes, shape, corner, f_part[k], edge, r)[0]
                         joined = joined or abs(gap) <= EDGE_SHOWS * r
                 if joined:
                     continue
             v = times(speed, -1.0)
             for j in range(d):
-                v = plus(v, weights[j], load(like, vertex_velocity, corner[f_part[c], j]))
-            friction, rolling = no_spin(like), no_spin(like)
+                v = plus(v, weights[j], load(dim, vertex_velocity, corner[f_part[c], j]))
+            friction, rolling = no_spin(dim), no_spin(dim)
             # Slots before this one are taken: no second contact may have them too.
             slot = base + taken
-            k = recall(like, slot_normal, slot, base + old, n)
+            k = recall(dim, slot_normal, slot, base + old, n)
             if k >= 0:
                 if k > slot:
-                    swap(like, slot_normal, slot_friction, slot_rolling, k, slot)
-                friction = load_spin(like, slot_friction, slot)
-                rolling = load_spin(like, slot_rolling, slot)
+                    swap(dim, slot_normal, slot_friction, slot_rolling, k, slot)
+                friction = load_spin(dim, slot_friction, slot)
+                rolling = load_spin(dim, slot_rolling, slot)
                 taken += 1
             elif keep:
                 if taken < old < n_slots:
-                    swap(like, slot_normal, slot_friction, slot_rolling, base + old, slot)
+                    swap(dim, slot_normal, slot_friction, slot_rolling, base + old, slot)
                     old += 1
                 taken += 1
             on_grain, moment_1, _, friction, rolling, _ = contact(
-                n, r - distance, v, w, no_spin(like), max(distance, 0.0), 0.0,
-                pairing(law, mass[i], r, r), law, lapse, friction, rolling,
+                n, r - distance, v, w, no_spin(dim), max(distance, 0.0), 0.0,
+                pair_coefficients(law, mass[i], r, r), law, lapse, friction, rolling,
             )  # fmt: skip
             total = plus(total, 1.0, on_grain)
             turning = plus(turning, 1.0, moment_1)
@@ -218,7 +217,7 @@ def press_on_surfaces(
             contacts += 1
             if found == 1:
                 break
-            _cover(like, f_distance, f_normal, f_inside, f_state, found, c, r)
+            _cover(dim, f_distance, f_normal, f_inside, f_state, found, c, r)
         if keep:
             slots_used[row] = taken
         add_to(total, 1.0, force, i)

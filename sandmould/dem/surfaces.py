@@ -11,13 +11,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sandmould.arrays import Floats, Ints
+from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 STAYS = -1
 """Steps left of a vertex that does not move; its velocity is felt all the same, as on a belt."""
 
@@ -28,22 +27,22 @@ class SurfaceArrays(NamedTuple):
     A part is a plane, one line of a profile of revolution or a facet, numbered in this order.
     """
 
-    vertices: Array
+    vertices: Floats
     """(nv, d) float64, m."""
-    vertex_velocity: Array
+    vertex_velocity: Floats
     """(nv, d) float64, m/s, in the frame of the box."""
-    steps_left: Indices
+    steps_left: Ints
     """(nv,) int64: steps that a vertex still moves with its velocity, or ``STAYS``."""
-    planes: Indices
+    planes: Ints
     """(1,) int64: number of planes."""
-    shape: Array
+    shape: Floats
     """(np, 7) float64 of planes and lines. Unit normal of a plane into the sand, or unit axis of a
     line and its ends in the meridian plane: axial and radial, axial and radial, m."""
-    corner: Indices
+    corner: Ints
     """(nf, d) int64: vertices of each part; a plane and a line hang on one vertex alone."""
 
 
-def _rows(values: ArrayLike, columns: int, what: str) -> Array:
+def _rows(values: ArrayLike, columns: int, what: str) -> Floats:
     rows = np.array(values, dtype=np.float64, order="C", ndmin=2)
     if rows.ndim != 2 or rows.shape[1] != columns:
         raise ValueError(f"{what} has the shape {rows.shape}, valid is (n, {columns})")
@@ -52,7 +51,7 @@ def _rows(values: ArrayLike, columns: int, what: str) -> Array:
     return rows
 
 
-def _unit(direction: ArrayLike, d: int, what: str) -> Array:
+def _unit(direction: ArrayLike, d: int, what: str) -> Floats:
     rows = _rows(direction, d, what)
     length = float(np.linalg.norm(rows))
     if length == 0.0:
@@ -70,7 +69,7 @@ class Surfaces:
     def __init__(self, dimension: int) -> None:
         d = self.dimension = dimension
         self._range: dict[str, slice] = {}
-        self._shape_of: dict[str, Array] = {"plane": np.empty((0, 7)), "line": np.empty((0, 7))}
+        self._shape_of: dict[str, Floats] = {"plane": np.empty((0, 7)), "line": np.empty((0, 7))}
         self._corner_of = {
             kind: np.empty((0, d), dtype=np.int64) for kind in ("plane", "line", "facet")
         }
@@ -175,7 +174,7 @@ class Surfaces:
         self._add(name, origin, "line", np.zeros((len(lines), 3), dtype=np.int64), shape)
 
     def _add(
-        self, name: str, vertices: Array, kind: str, corner: Indices, shape: Array | None = None
+        self, name: str, vertices: Floats, kind: str, corner: Ints, shape: Floats | None = None
     ) -> None:
         if name in self._range:
             raise ValueError(f"surface {name} is there twice")
@@ -191,7 +190,7 @@ class Surfaces:
             np.concatenate([old.steps_left, np.full(len(vertices), STAYS)]),
         )
 
-    def _set_arrays(self, vertices: Array, velocity: Array, steps_left: Indices) -> None:
+    def _set_arrays(self, vertices: Floats, velocity: Floats, steps_left: Ints) -> None:
         """Join the parts of all kinds on given vertices."""
         self.arrays = SurfaceArrays(
             vertices,
@@ -255,7 +254,7 @@ class Surfaces:
         self.arrays.vertex_velocity[rows] = np.asarray(velocity_m_s, dtype=np.float64)
         self.arrays.steps_left[rows] = STAYS
 
-    def forces(self, loads: Array) -> dict[str, Array]:
+    def forces(self, loads: Floats) -> dict[str, Floats]:
         """Sum the loads on the vertices of each surface.
 
         Parameters
@@ -288,7 +287,7 @@ def move_vertices(arrays: SurfaceArrays, dt: float) -> None:
 
 
 @njit(**OPTIONS)
-def farthest_moved(arrays: SurfaceArrays, since: Array) -> float:
+def farthest_moved(arrays: SurfaceArrays, since: Floats) -> float:
     """Largest distance (m) of a vertex from where it was, (nv, d) float64, m."""
     largest2 = 0.0
     for i in range(len(since)):

@@ -13,32 +13,25 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from llvmlite import binding
 from numba.extending import overload, register_jitable
 
-binding.set_option("sandmould", "-align-all-functions=6")  # at the beginning of a line of 64 bytes
 OPTIONS: dict[str, Any] = {
-    "cache": True,
     "nogil": True,
     "fastmath": {"contract", "nsz"},
     "error_model": "numpy",
 }
-"""How every kernel is compiled: fused multiply-add allowed, no other change of the arithmetic.
-
-Functions begin lines of the cache: taken from the disk they lie elsewhere than freshly compiled,
-and the same instructions were a quarter slower where they began in the middle of a line.
-"""
+"""How every kernel is compiled: fused multiply-add allowed, no other change of the arithmetic."""
 INLINED = OPTIONS | {"forceinline": True}
 """For functions called for every contact: their many arguments stay in registers."""
 index = np.uint64
 """Turns a row number into an index that never counts from the end, which need not be asked then."""
 PLANE = (0.0, 0.0)
-"""Pass as ``like`` for 2D."""
+"""Pass as ``dim`` for 2D."""
 SPACE = (0.0, 0.0, 0.0)
-"""Pass as ``like`` for 3D."""
+"""Pass as ``dim`` for 3D."""
 
 
-def like(dimension: int) -> tuple[float, ...]:
+def dim_of(dimension: int) -> tuple[float, ...]:
     """Tuple whose length tells compiled code the dimension."""
     return PLANE if dimension == 2 else SPACE
 
@@ -81,28 +74,28 @@ times = _by_length(
 )
 load = _by_length(
     "load",
-    "Row i of an array of vectors: load(like, array, i).",
-    two=lambda like, a, i: (a[index(i), 0], a[index(i), 1]),
-    three=lambda like, a, i: (a[index(i), 0], a[index(i), 1], a[index(i), 2]),
+    "Row i of an array of vectors: load(dim, array, i).",
+    two=lambda dim, a, i: (a[index(i), 0], a[index(i), 1]),
+    three=lambda dim, a, i: (a[index(i), 0], a[index(i), 1], a[index(i), 2]),
 )
 load_spin = _by_length(
     "load_spin",
-    "Row i of an array of spins, moments or tangents: load_spin(like, array, i).\n\n"
+    "Row i of an array of spins, moments or tangents: load_spin(dim, array, i).\n\n"
     "In 2D the last component, so that arrays of three serve too.",
-    two=lambda like, a, i: (a[index(i), index(a.shape[1] - 1)],),
-    three=lambda like, a, i: (a[index(i), 0], a[index(i), 1], a[index(i), 2]),
+    two=lambda dim, a, i: (a[index(i), index(a.shape[1] - 1)],),
+    three=lambda dim, a, i: (a[index(i), 0], a[index(i), 1], a[index(i), 2]),
 )
 no_vector = _by_length(
     "no_vector",
-    "Vector of zeros: no_vector(like).",
-    two=lambda like: (0.0, 0.0),
-    three=lambda like: (0.0, 0.0, 0.0),
+    "Vector of zeros: no_vector(dim).",
+    two=lambda dim: (0.0, 0.0),
+    three=lambda dim: (0.0, 0.0, 0.0),
 )
 no_spin = _by_length(
     "no_spin",
-    "Spin, moment or tangent of zeros: no_spin(like).",
-    two=lambda like: (0.0,),
-    three=lambda like: (0.0, 0.0, 0.0),
+    "Spin, moment or tangent of zeros: no_spin(dim).",
+    two=lambda dim: (0.0,),
+    three=lambda dim: (0.0, 0.0, 0.0),
 )
 
 
@@ -195,10 +188,10 @@ tangent_after = _by_length(
 )
 rolling_part = _by_length(
     "rolling_part",
-    "Part of a relative spin or its moment that rolls: rolling_part(n, w, twist).\n\n"
-    "In 3D the spin about n is left out unless twist is resisted too.",
-    two=lambda n, w, twist: w,
-    three=lambda n, w, twist: w if twist else without(n, w),
+    "Part of a relative spin or its moment that rolls: rolling_part(n, w, torsion).\n\n"
+    "In 3D the spin about n is left out unless torsion is resisted too.",
+    two=lambda n, w, torsion: w,
+    three=lambda n, w, torsion: w if torsion else without(n, w),
 )
 spin_cross = _by_length(
     "spin_cross",

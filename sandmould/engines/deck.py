@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +13,8 @@ import jinja2
 import numpy as np
 
 from sandmould import ROOT
+from sandmould.digest import sources_digest
+from sandmould.runs.files import write_text
 
 TEMPLATES = ROOT / "templates"
 _BLOCK = re.compile(r"^#--- block: (\w+) ---.*?\n(.*?)^#--- end: \1 ---$", re.M | re.S)
@@ -53,10 +53,7 @@ def environment(dialect: str) -> jinja2.Environment:
 
 def dialect_hash(dialect: str) -> str:
     """Hash of all templates of one dialect."""
-    digest = hashlib.sha256()
-    for path in sorted((TEMPLATES / dialect).glob("*.j2")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
+    return sources_digest((TEMPLATES / dialect).glob("*.j2"))
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,5 @@ class Deck:
         return cls(path.read_text(encoding="utf-8"))
 
     def write(self, folder: Path) -> None:
-        """Write ``deck.in``, first under a temporary name: where it is, it is whole."""
-        partial = folder / "deck.in.partial"
-        partial.write_text(self.text, encoding="utf-8")
-        os.replace(partial, folder / "deck.in")
+        """Write ``deck.in``: where it is, it is whole."""
+        write_text(folder / "deck.in", self.text)

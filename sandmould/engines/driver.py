@@ -10,14 +10,15 @@ from pathlib import Path
 from types import FrameType
 
 from sandmould.engines.blockage import what_blocks
+from sandmould.engines.cost import cost_before
 from sandmould.engines.guard import Guard
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.recording import Recorder
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.step_counts import StepCounts
-from sandmould.runs import checkpoint as checkpoints
-from sandmould.runs.checkpoint import Mark
+from sandmould.runs import checkpoint_folders as checkpoints
+from sandmould.runs.checkpoint_folders import CheckpointMark
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Cost, cpu_time_s, peak_memory_bytes
 from sandmould.runs.progress import Progress
@@ -71,7 +72,7 @@ class Driver:
         self._recorder: Recorder | None = None
         self.is_root = True
         """Whether this process writes the products; known once the engine has started."""
-        self.cost = Cost.of(program.scenario)
+        self.cost = cost_before(program.scenario)
 
     def run(self) -> RunOutcome:
         """Compute to the end, to the wall-time limit or to what stops it.
@@ -137,7 +138,7 @@ class Driver:
         # Last, since the time of an engine of its own process counts once that has ended.
         self._read_clocks()
 
-    def _go(self, session: Session, mark: Mark | None) -> None:
+    def _go(self, session: Session, mark: CheckpointMark | None) -> None:
         names = [stage.name for stage in self._program.stages]
         first = names.index(mark.stage) if mark else 0
         for number, stage in enumerate(self._program.stages[first:], start=first):
@@ -217,7 +218,7 @@ class Driver:
             series_bytes, loads_bytes = self._recorder.sizes()
             checkpoints.seal(
                 folder,
-                Mark(
+                CheckpointMark(
                     self._hash,
                     session.stage.name,
                     session.steps,

@@ -9,7 +9,7 @@ from typing import TextIO
 from sandmould.engines.guard import Health
 from sandmould.engines.session import Array
 from sandmould.engines.snapshot import Snapshot
-from sandmould.runs.checkpoint import Mark
+from sandmould.runs.checkpoint_folders import CheckpointMark
 
 _SERIES = ("time_s", "vibration_time_s", "stage", "grains", "kinetic_energy_j", "rms_speed_m_s",
            "largest_overlap_fraction")  # fmt: skip
@@ -18,14 +18,14 @@ _SERIES = ("time_s", "vibration_time_s", "stage", "grains", "kinetic_energy_j", 
 class Recorder:
     """Appends to tables in a work folder; a resumed run cuts them back to its checkpoint."""
 
-    def __init__(self, work: Path, dimension: int, mark: Mark | None = None) -> None:
+    def __init__(self, work: Path, dimension: int, mark: CheckpointMark | None = None) -> None:
         """Open the tables, cut back to what a checkpoint vouches for.
 
         Parameters
         ----------
         work : Path
         dimension : int
-        mark : Mark, optional
+        mark : CheckpointMark, optional
             The checkpoint that the run continues from.
         """
         self.snapshots = mark.snapshots if mark else 0

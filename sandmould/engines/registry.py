@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any, Protocol, cast
 
 from sandmould import ROOT
 from sandmould.dem import source_hash
+from sandmould.digest import digest
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
 from sandmould.engines.program import Program, build_program
@@ -148,7 +148,7 @@ def computed_hash(scenario: Scenario) -> str:
     engine = engine_of(scenario)
     deck = engine.render_deck(build_program(scenario), {}, "run", "study")
     ours = source_hash() if engine.uses_own_solver(scenario) else ""
-    return hashlib.sha256((deck.commands + ours).encode()).hexdigest()
+    return digest(deck.commands, ours)
 
 
 def engine_problem(scenario: Scenario) -> Problem | None:

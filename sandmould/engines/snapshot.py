@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.runs.files import replaced
 from sandmould.scenario.geometry import Scene
 from sandmould.scenario.scenario import Scenario
 
@@ -44,12 +44,10 @@ class Snapshot:
     last step where the pattern is stepped with the grains."""
 
     def save(self, path: Path) -> None:
-        """Write to an ``.npz`` file, first under a temporary name."""
-        partial = path.with_name(path.name + ".partial")
-        with partial.open("wb") as file:
+        """Write to an ``.npz`` file; where it is, it is whole."""
+        with replaced(path) as partial, partial.open("wb") as file:
             values = {f.name: getattr(self, f.name) for f in fields(self)}
             np.savez(file, **{name: v for name, v in values.items() if v is not None})
-        os.replace(partial, path)
 
     @classmethod
     def load(cls, path: Path) -> Snapshot:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.flow_plots import draw_frame, frame_of
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
-from sandmould.casting.mps.stability import Verdict as Stability
+from sandmould.casting.mps.stability import StabilityRating
 from sandmould.report.figures import png
 from sandmould.report.flow_film import SHADES, FlowFilm, make_flow_film
 from sandmould.report.flow_map import condition_text, said_of, stability_map
@@ -112,13 +112,13 @@ def flow_pages(
 
 def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
     """Runs that ended: excellent, good and failed, the calmest of each first."""
-    order = {stability.value: place for place, stability in enumerate(Stability)}
+    order = {stability.value: place for place, stability in enumerate(StabilityRating)}
     table = summary.copy()
     for column in ("classification", f"{scene.deepest(scenario)}_sd_pa"):
         if column not in table:
             table[column] = np.nan
     # a run that a guard stopped while it poured has no row of measures
-    table["classification"] = table["classification"].fillna(Stability.FAILED.value)
+    table["classification"] = table["classification"].fillna(StabilityRating.FAILED.value)
     table = table[table["outcome_code"].notna()]
     return table.assign(rank=table["classification"].map(order)).sort_values(
         ["rank", f"{scene.deepest(scenario)}_sd_pa"], kind="stable"
@@ -147,7 +147,7 @@ def _sentences(
 ) -> tuple[str, ...]:
     """How many settings hold, and how far their pressure is from rho g h."""
     counts = ranked["classification"].value_counts()
-    parts = [f"{counts.get(s.value, 0)} {s.value}" for s in Stability]
+    parts = [f"{counts.get(s.value, 0)} {s.value}" for s in StabilityRating]
     said = [f"By the rule of figure 6 {listed(parts)}, of {len(ranked)}."]
     name = scene.deepest(scenario)
     errors = pd.to_numeric(ranked[f"{name}_error_pa"], errors="coerce").dropna() if (
@@ -172,7 +172,7 @@ def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> 
     """Where metal of a casting hops, and where it does not."""
     if isinstance(scenario.case, StillTank) or "hops" not in ranked:
         return ()
-    ended = ranked[ranked["classification"] != Stability.FAILED.value]
+    ended = ranked[ranked["classification"] != StabilityRating.FAILED.value]
     parts = []
     for hops, verb in ((1, "hops"), (0, "does not hop")):
         own = ended[ended["hops"] == hops]
@@ -213,7 +213,7 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
             for value, (_, digits) in zip(values, shown, strict=True)
         ]
         rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
-    failed = tuple(c == Stability.FAILED.value for c in ranked["classification"])
+    failed = tuple(c == StabilityRating.FAILED.value for c in ranked["classification"])
     return Table(tuple(columns), tuple(rows), failed)
 
 

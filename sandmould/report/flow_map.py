@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from sandmould.casting.mps.stability import COUNTS, SHARES, STEPS_S, Verdict
+from sandmould.casting.mps.stability import COUNTS, SHARES, STEPS_S, StabilityRating
 from sandmould.report.figures import png
 from sandmould.runs.formatting import setting_text
 
@@ -21,8 +21,8 @@ SHARE = "source_share"
 MOST_ACROSS = 4
 """Panels in a row."""
 SIGNS = {
-    Verdict.EXCELLENT: ("o", "#009E73"), Verdict.GOOD: ("D", "#E69F00"),
-    Verdict.FAILED: ("x", "#D55E00"),
+    StabilityRating.EXCELLENT: ("o", "#009E73"), StabilityRating.GOOD: ("D", "#E69F00"),
+    StabilityRating.FAILED: ("x", "#D55E00"),
 }  # fmt: skip
 """The paper's signs, and colours that anyone can tell apart."""
 
@@ -61,7 +61,7 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
             axes.plot(
                 [counts.index(n) for n in own[AXES[1]]], [steps.index(dt) for dt in own[AXES[0]]],
                 marker, color=colour, ms=10, mew=2.2,
-                mfc="none" if verdict is not Verdict.GOOD else colour,
+                mfc="none" if verdict is not StabilityRating.GOOD else colour,
             )  # fmt: skip
         axes.set_xticks(range(len(counts)), [f"{n}" for n in counts])
         axes.set_yticks(range(len(steps)), [f"{1e3 * dt:g}" for dt in steps])
@@ -73,7 +73,7 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
         axes.set_ylabel("largest time step, ms")
     signs = [
         Line2D([], [], ls="", marker=marker, color=colour, mew=2.0, label=verdict.value,
-               mfc="none" if verdict is not Verdict.GOOD else colour)
+               mfc="none" if verdict is not StabilityRating.GOOD else colour)
         for verdict, (marker, colour) in SIGNS.items()
     ]  # fmt: skip
     figure.legend(handles=signs, loc="outside lower center", ncols=3, frameon=False)

@@ -26,6 +26,7 @@ from sandmould.report.robustness import certificate_pages
 from sandmould.report.sand import shown_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
+from sandmould.runs.files import replaced
 from sandmould.runs.formatting import name_of, number, setting_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
@@ -68,10 +69,9 @@ def write_report(study_folder: Path, out: Path) -> None:
         text, figures = _render(page, environment, budget)
         if len(text.encode("utf-8")) < LIMIT_BYTES:
             break
-    partial = out.with_name(out.name + ".partial")
-    partial.write_text(text, encoding="utf-8")
-    write_figures(study_folder / FIGURES, environment, figures)
-    os.replace(partial, out)
+    with replaced(out) as partial:
+        partial.write_text(text, encoding="utf-8")
+        write_figures(study_folder / FIGURES, environment, figures)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
-"""What tells one scenario from another."""
+"""What tells one scenario, and one computed run, from another."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 from typing import Any
 
+from sandmould.digest import digest
 from sandmould.scenario.quantity import Section
 
 
@@ -14,8 +14,7 @@ def scenario_hash(scenario: Section) -> str:
 
     What is absent is left out: a key that comes later, absent unless given, changes no hash.
     """
-    text = json.dumps(present(scenario.model_dump(mode="json")), sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return digest(json.dumps(present(scenario.model_dump(mode="json")), sort_keys=True))
 
 
 def present(tree: Any) -> Any:
@@ -23,3 +22,8 @@ def present(tree: Any) -> Any:
     if isinstance(tree, dict):
         return {key: present(value) for key, value in tree.items() if value not in (None, [])}
     return [present(item) for item in tree] if isinstance(tree, list) else tree
+
+
+def solution_hash(scenario: Section, solver: str) -> str:
+    """Hash of a scenario without its seed, and of the solver that computes it."""
+    return digest(scenario.model_dump_json(exclude={"seed"}), solver)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 from pathlib import Path
+
+from sandmould.runs.files import write_text
 
 
 class Outcome(IntEnum):
@@ -73,7 +74,7 @@ class RunOutcome:
     planned_s: float
 
     def write(self, path: Path) -> None:
-        """Write as JSON, first under a temporary name."""
+        """Write as JSON."""
         values = {
             "code": int(self.outcome),
             "outcome": self.outcome.label,
@@ -81,9 +82,7 @@ class RunOutcome:
             "restartable": self.outcome.restartable,
             **{k: v for k, v in asdict(self).items() if k != "outcome"},
         }
-        partial = path.with_name(path.name + ".partial")
-        partial.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
-        os.replace(partial, path)
+        write_text(path, json.dumps(values, indent=1) + "\n")
 
     @classmethod
     def read(cls, path: Path) -> RunOutcome:

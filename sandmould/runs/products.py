@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from sandmould.runs.outcome import RunOutcome
-from sandmould.scenario.scenario import Scenario
 
 
 @dataclass
@@ -35,12 +34,6 @@ class Cost:
     peak_memory_bytes: int = 0
     """Of the first rank."""
     largest_overlap_fraction: float = 0.0
-
-    @classmethod
-    def of(cls, scenario: Scenario) -> Cost:
-        """Cost of a run that has not begun."""
-        fraction = scenario.step_s / scenario.critical_step.step_s
-        return cls(scenario.engine.name, scenario.engine.ranks, scenario.step_s, fraction)
 
     def row(self) -> dict[str, Any]:
         """Values by name, as a continued run takes them up."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
 import time
 from pathlib import Path
+
+from sandmould.runs.files import write_text
 
 LINE_EVERY_S = 5.0
 
@@ -60,9 +61,7 @@ class Progress:
             "work_per_s": rate,
             "left_s": 0.0 if last else left,
         }
-        partial = self._path.with_name("progress.json.partial")
-        partial.write_text(json.dumps(state), encoding="utf-8")
-        os.replace(partial, self._path)
+        write_text(self._path, json.dumps(state))
         bar = "#" * round(percent / 5)
         ending = "done" if last else _left_text(left)
         print(

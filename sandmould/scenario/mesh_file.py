@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from sandmould.digest import file_digest
 from sandmould.scenario.mesh import signed_volumes_m3
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ def file_hash(path: Path) -> str:
         When it cannot be read.
     """
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return file_digest(path)
     except OSError as error:
         reason = error.strerror or "it cannot be read"
         raise MeshFileError(f"a readable file ({reason})") from error

@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from sandmould.compiled import njit
 
 Array = NDArray[np.float64]
 _LEAF = 4
@@ -114,7 +115,7 @@ def _pseudonormals(vertices_m: Array, triangles: NDArray[np.int64]) -> Array:
     return np.concatenate(normals, axis=1)
 
 
-@njit(cache=True)
+@njit()
 def _box_gap2(p, low, high):  # type: ignore[no-untyped-def]
     """Squared distance of a point from a box, 0 inside."""
     gap2 = 0.0
@@ -124,7 +125,7 @@ def _box_gap2(p, low, high):  # type: ignore[no-untyped-def]
     return gap2
 
 
-@njit(cache=True)
+@njit()
 def _nearest_on_triangle(p, t, nearest):  # type: ignore[no-untyped-def]
     """Nearest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
 
@@ -160,7 +161,7 @@ def _nearest_on_triangle(p, t, nearest):  # type: ignore[no-untyped-def]
     return part
 
 
-@njit(cache=True)
+@njit()
 def _distances(points, reach, corners, normals, low, high):  # type: ignore[no-untyped-def]
     """Signed distance of each point; that of the root's box where it is beyond the reach."""
     leaves = (len(low) + 1) // 2
@@ -211,7 +212,7 @@ def _distances(points, reach, corners, normals, low, high):  # type: ignore[no-u
     return found
 
 
-@njit(cache=True)
+@njit()
 def _near(points, radii, corners, low, high, sphere, triangle):  # type: ignore[no-untyped-def]
     """Count the pairs of sphere and triangle that meet, and list them while there is room."""
     leaves = (len(low) + 1) // 2

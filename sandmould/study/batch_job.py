@@ -15,12 +15,13 @@ from typing import Any
 
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.parent import end_with_parent
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.batches import is_done
 from sandmould.study.kinds.kind import kind_of
 from sandmould.study.moments import LAST_MEASURED
 from sandmould.study.plan_files import read_run
-from sandmould.study.process import die_with_parent, launch
+from sandmould.study.process import launch
 from sandmould.study.simulate import measure_run, render_run
 
 
@@ -89,7 +90,7 @@ def _side_by_side(number: int, work: Callable[[Callable[[], int]], None], stop: 
             return int(taken.value) - 1
 
     def work_beside() -> None:
-        die_with_parent()
+        end_with_parent()
         stop.workers = []  # those are the parent's
         work(place_of_next)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
+from sandmould.runs.files import replaced
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.agreement import (
@@ -72,9 +72,8 @@ def collect(study_folder: Path) -> None:
     agreement = agreement_table(compare_study(found.summary, found.keys, study))
     tables = {"summary": found.summary, "curves": found.curves, "agreement": agreement}
     for name, table in tables.items():
-        partial = study_folder / f"{name}.tsv.partial"
-        table.to_csv(partial, sep="\t", index=False, na_rep="nan")
-        os.replace(partial, study_folder / f"{name}.tsv")
+        with replaced(study_folder / f"{name}.tsv") as partial:
+            table.to_csv(partial, sep="\t", index=False, na_rep="nan")
 
 
 def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> tuple[Compared, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from analysis.solid_fraction import (
 )
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot, scene_at
+from sandmould.runs.files import replaced
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.moments import LAST_MEASURED, MOMENTS, list_moments, nearest
 from sandmould.study.outflow import add_outflow, measure_outflow
@@ -165,6 +165,5 @@ def write_measures(folder: Path, out: Path) -> None:
     table = add_outflow(table, folder)
     if bent is not None:
         table = add_loop(table, folder, bent.reach_m)
-    partial = out.with_name(out.name + ".partial")
-    table.to_csv(partial, sep="\t", index=False, float_format="%.8g")
-    os.replace(partial, out)
+    with replaced(out) as partial:
+        table.to_csv(partial, sep="\t", index=False, float_format="%.8g")

@@ -1,13 +1,12 @@
 """Start a run as a process of its own and watch it, so that an outcome is written whatever happens.
 
-Only the standard library is imported here: every run pays for this process once more.
+Nothing but the standard library is loaded here: every run pays for this process once more.
 """
 
 from __future__ import annotations
 
 import collections
 import contextlib
-import ctypes
 import fcntl
 import signal
 import subprocess
@@ -17,9 +16,10 @@ from pathlib import Path
 from types import FrameType
 from typing import TextIO
 
+from sandmould.runs.parent import end_with_parent
+
 RESTARTABLE_EXIT = 75
 """Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
-_PR_SET_PDEATHSIG = 1
 _ASKED_TO_END = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 
 
@@ -47,7 +47,7 @@ def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> Non
     A run whose outcome is already there is left as it is: Snakemake removes the outcome of a run
     that must be computed again.
     """
-    die_with_parent()
+    end_with_parent()
     command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
     with log.open("a", encoding="utf-8") as log_file, _only_one(folder):
         if (folder / "outcome.json").exists():
@@ -69,12 +69,6 @@ def _under_mpi(command: list[str], ranks: int, mpi: str) -> list[str]:
     launcher, *options = mpi.split()
     own = Path(sys.executable).parent / launcher
     return [str(own) if own.exists() else launcher, *options, "-n", str(ranks), *command]
-
-
-def die_with_parent() -> None:
-    """Ask Linux to end this process softly when the one that started it is killed."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 @contextlib.contextmanager
@@ -100,7 +94,7 @@ def _watch(command: list[str], log: TextIO) -> tuple[int, str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        preexec_fn=die_with_parent,
+        preexec_fn=end_with_parent,
     )
     with _passed_on(process):
         return _listen(process, log)

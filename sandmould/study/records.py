@@ -7,7 +7,6 @@ of each kind again.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import shutil
@@ -19,6 +18,7 @@ from typing import Any
 import pandas as pd
 
 from sandmould import ROOT
+from sandmould.digest import digest
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
@@ -45,10 +45,7 @@ their spread; heat is the same to round-off."""
 
 def study_hash(runs: list[Run]) -> str:
     """Hash of all scenarios of a study and of what their decks command."""
-    digest = hashlib.sha256()
-    for text in sorted(scenario_hash(r.scenario) + _computed_hash(r) for r in runs):
-        digest.update(text.encode())
-    return digest.hexdigest()
+    return digest(*sorted(scenario_hash(r.scenario) + _computed_hash(r) for r in runs))
 
 
 def _computed_hash(run: Run) -> str:

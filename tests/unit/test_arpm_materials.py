@@ -7,11 +7,11 @@ import pytest
 
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling, check_casting
-from sandmould.casting.arpm.material import Material, enthalpy_table
+from sandmould.casting.arpm.material import ThermalMaterial, enthalpy_table
 from sandmould.casting.arpm.raster import Raster
 
-STEEL = Material("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
-SAND = Material("sand", 1600.0, 1130.0, 1.255)
+STEEL = ThermalMaterial("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
+SAND = ThermalMaterial("sand", 1600.0, 1130.0, 1.255)
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ SAND = Material("sand", 1600.0, 1130.0, 1.255)
 def test_no_material_has_such_properties(changed: dict[str, float], words: str) -> None:
     given = {**STEEL.__dict__, **changed}
     with pytest.raises(ValueError, match=words):
-        Material(**given)
+        ThermalMaterial(**given)
 
 
 def test_enthalpy_by_hand() -> None:
@@ -47,7 +47,7 @@ def test_enthalpy_by_hand() -> None:
 
 
 def test_a_pure_metal_melts_at_one_temperature() -> None:
-    metal = Material("metal", 1000.0, 1000.0, 1.0, 1e5, 500.0, 500.0)
+    metal = ThermalMaterial("metal", 1000.0, 1000.0, 1.0, 1e5, 500.0, 500.0)
     table = enthalpy_table([metal], 400.0)
     one = np.zeros(3, dtype=np.int64)
     half_melted = np.array([1e8 + 0.5e8])

@@ -6,8 +6,8 @@ import pytest
 from sandmould.casting.arpm.contact_case import contact_elements
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling
-from sandmould.casting.arpm.material import Material
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.material import ThermalMaterial
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.plates_case import plates_layout, read_plates
 from sandmould.casting.arpm.power_diagram import power_exchange
 from sandmould.casting.arpm.probes import probe_weights
@@ -15,8 +15,8 @@ from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import UnstableError, solidify
 from sandmould.casting.arpm.super_steps import stage_weights
 
-STEEL = Material("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
-SAND = Material("sand", 1600.0, 1130.0, 1.255)
+STEEL = ThermalMaterial("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
+SAND = ThermalMaterial("sand", 1600.0, 1130.0, 1.255)
 FILLING = Filling((SAND, STEEL), (293.0, 1823.0), 1 / 837.0)
 
 
@@ -32,7 +32,7 @@ def test_a_cube_freezes_faster_than_a_bar() -> None:
         raster = block(dimensions)
         elements = placed(raster)
         for exchange in ("faces", "difference"):
-            marching = Method(exchange, "explicit").marching(elements, FILLING, raster)
+            marching = HeatMethod(exchange, "explicit").marching(elements, FILLING, raster)
             found = solidify(elements, FILLING, marching, record_s=20.0)
             time_s[dimensions, exchange] = found.solidification_time_s
             assert np.abs(found.drift_percent).max() < 1e-10
@@ -45,7 +45,7 @@ def test_a_cube_freezes_faster_than_a_bar() -> None:
 def test_too_long_a_step_is_told() -> None:
     raster = block(2)
     elements = placed(raster)
-    marching = Method("faces", "explicit", step_share=8.0).marching(elements, FILLING, raster)
+    marching = HeatMethod("faces", "explicit", step_share=8.0).marching(elements, FILLING, raster)
     with pytest.raises(UnstableError, match="the time step is too long"):
         solidify(elements, FILLING, marching, record_s=100.0)
 
@@ -53,7 +53,7 @@ def test_too_long_a_step_is_told() -> None:
 def test_runs_that_make_no_sense() -> None:
     raster = block(2)
     elements = placed(raster)
-    marching = Method("faces").marching(elements, FILLING, raster)
+    marching = HeatMethod("faces").marching(elements, FILLING, raster)
     with pytest.raises(ValueError, match="probe A is at"):
         solidify(elements, FILLING, marching, {"A": np.array([0.5, 0.5])})
     with pytest.raises(ValueError, match="it needs 2 coordinates"):
@@ -63,7 +63,7 @@ def test_runs_that_make_no_sense() -> None:
     with pytest.raises(ValueError, match="at least 3"):
         stage_weights(2)
     with pytest.raises(ValueError, match="no layers"):
-        Method("difference").marching(placed(raster, (0,)), FILLING, raster)
+        HeatMethod("difference").marching(placed(raster, (0,)), FILLING, raster)
     with pytest.raises(ValueError, match="no case"):
         contact_elements("1-9")
     with pytest.raises(ValueError, match="no case"):

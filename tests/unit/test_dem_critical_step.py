@@ -17,7 +17,7 @@ from sandmould.dem.critical_step import (
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import NONE, Damping
 from sandmould.dem.solver import Solver
-from sandmould.dem.steps import Scene
+from sandmould.dem.steps import DemScene
 from sandmould.dem.surfaces import Surfaces
 
 K_N_M = 7e4
@@ -40,7 +40,7 @@ def network(positions: list[list[float]] | np.ndarray, law: Law, floor: bool = F
         surfaces.add_plane("floor", np.zeros(d), np.eye(d)[-1])
     up = (0.0,) * (d - 1) + (1.0,)
     damping = Damping(NONE, 0.0, 0.0)
-    solver = Solver(Scene(law, law, damping, (0.0,) * d, up, True, 1e-9), surfaces, RADIUS_M)
+    solver = Solver(DemScene(law, law, damping, (0.0,) * d, up, True, 1e-9), surfaces, RADIUS_M)
     spin, mass = np.zeros((n, 1 if d == 2 else 3)), np.full(n, MASS_KG)
     inertia = (0.5 if d == 2 else 0.4) * mass * RADIUS_M**2
     still = np.zeros_like(position)
@@ -97,9 +97,9 @@ def test_rough_pair_adds_the_rolling_spring() -> None:
     assert squares(network([[0, 0], [2, 0]], stiff))[2] == pytest.approx(100 * 2 / 4 / 0.5)
 
 
-@pytest.mark.parametrize(("twist", "motions"), [(False, 3), (True, 4)])
-def test_twist_is_held_only_where_the_law_says_so(twist: bool, motions: int) -> None:
-    law = SMOOTH._replace(rolling_arm=0.1, k_roll=1000 * K_N_M, twist=twist)
+@pytest.mark.parametrize(("torsion", "motions"), [(False, 3), (True, 4)])
+def test_torsion_is_held_only_where_the_law_says_so(torsion: bool, motions: int) -> None:
+    law = SMOOTH._replace(rolling_arm=0.1, k_roll=1000 * K_N_M, torsion=torsion)
     solver = network([[0, 0, 1]], law, floor=True)
     # The sphere rolls on springs of k_roll r^2 and is pressed: two or three turns, one way.
     assert squares(solver)[2] == pytest.approx(1000 / 0.4)
@@ -147,7 +147,7 @@ def test_estimates_bound_each_other_in_a_random_heap() -> None:
     for dimension in (2, 3):
         place = rng.uniform(0.5, 9, (60, dimension))
         for zeta in (0.0, 0.5):
-            law = ROUGH._replace(damping_ratio=zeta, rolling_arm=0.1, twist=True)
+            law = ROUGH._replace(damping_ratio=zeta, rolling_arm=0.1, torsion=True)
             contacts = active_contacts(network(place, law, floor=True))
             grain, whole = grain_step(contacts), whole_step(contacts)
             assert grain.omega_rad_s <= whole.omega_rad_s <= math.sqrt(2) * grain.omega_rad_s

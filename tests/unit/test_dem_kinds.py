@@ -32,7 +32,7 @@ def test_two_kinds_have_the_damping_and_rolling_of_their_sizes() -> None:
             m = mass_kg[i] * mass_kg[j] / (mass_kg[i] + mass_kg[j])
             r = radius_m[i] * radius_m[j] / (radius_m[i] + radius_m[j])
             exact = (0.4 * math.sqrt(m * 1e4), 5e3 * r**2, 0.1 * min(radius_m[i], radius_m[j]))
-            found = kinds.pairings[kinds.of_grain[i], kinds.of_grain[j]]
+            found = kinds.coefficients[kinds.of_grain[i], kinds.of_grain[j]]
             np.testing.assert_allclose(found, exact, rtol=1e-14)  # the same few operations
 
 

@@ -11,17 +11,17 @@ from sandmould.dem.grains import Grains
 from sandmould.dem.motion import ISOTROPIC, NONE, Damping
 from sandmould.dem.neighbours import list_pairs, make_grid, sort_into_cells
 from sandmould.dem.solver import NotANumberError, Solver
-from sandmould.dem.steps import Scene
+from sandmould.dem.steps import DemScene
 from sandmould.dem.surfaces import Surfaces
 
 LAW = Law(7e4, 7e4, 0.8, 0.3, 0.1, 7e4, True, False)
 STEP_S = 5e-6
 
 
-def scene(dimension: int, **changes: object) -> Scene:
+def scene(dimension: int, **changes: object) -> DemScene:
     down = (0.0,) * (dimension - 1) + (-9.81,)
     up = (0.0,) * (dimension - 1) + (1.0,)
-    base = Scene(LAW, LAW, Damping(NONE, 0.0, 0.0), down, up, True, STEP_S)
+    base = DemScene(LAW, LAW, Damping(NONE, 0.0, 0.0), down, up, True, STEP_S)
     return base._replace(**changes)
 
 

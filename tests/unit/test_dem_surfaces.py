@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.typing import NDArray
 
+from sandmould.compiled import njit
 from sandmould.dem.broad_phase import find_candidates
 from sandmould.dem.nearest_point import nearest
 from sandmould.dem.surfaces import Surfaces, farthest_moved, move_vertices
-from sandmould.dem.vectors import OPTIONS, like, load, plus
+from sandmould.dem.vectors import OPTIONS, dim_of, load, plus
 from sandmould.dem.wall_history import carry_history, new_history
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ def test_candidates_are_those_of_comparing_everything(d: int, columns: str) -> N
         position = rng.uniform(-0.2, 1.2, (n, d if columns == "own" else 3))
         radius = rng.uniform(0.003, 0.02, n)
         shift = tuple(rng.normal(size=d) * 0.05)
-        dim = like(d)
+        dim = dim_of(d)
         c = find_candidates(dim, position, radius, 0.004, surfaces.arrays, shift)
         found = [
             (int(i), int(p))
@@ -66,7 +66,7 @@ def test_candidates_are_those_of_comparing_everything(d: int, columns: str) -> N
 @pytest.mark.parametrize("d", [2, 3])
 def test_there_are_no_candidates_without_grains_or_surfaces(d: int) -> None:
     surfaces = Surfaces(d)
-    dim, still = like(d), (0.0,) * d
+    dim, still = dim_of(d), (0.0,) * d
     grains = (np.zeros((1, d)), np.ones(1))
     nothing = find_candidates(dim, *grains, 0.1, surfaces.arrays, still)
     assert len(nothing.rows) == 0
@@ -170,7 +170,7 @@ def test_vertices_reach_their_target_and_stay() -> None:
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_memory_follows_the_grain_not_the_row(d: int) -> None:
-    rng, dim = np.random.default_rng(3), like(d)
+    rng, dim = np.random.default_rng(3), dim_of(d)
     ids = rng.permutation(40)[:10]
     old = new_history(dim, 10)
     slots = len(old.normal) // 10

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sandmould.casting import checkpoint
 from sandmould.casting.mps import computation, scene
 from sandmould.casting.mps.flow import Flow
+from sandmould.runs import checkpoint_file
+from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.products import Computed
 from sandmould.scenario.flow import MetalFlow
@@ -36,17 +37,17 @@ def killed(monkeypatch: pytest.MonkeyPatch) -> Kill:
     """Compute a run that keeps every step and is killed amid them; gives its checkpoint."""
 
     def kill(folder: Path, scenario: MetalFlow) -> Path:
-        keep, steps = checkpoint.Checkpoint.keep, []
+        keep, steps = CheckpointFile.write_when_due, []
 
-        def then_die(self: checkpoint.Checkpoint, arrays: Callable[[], dict[str, object]]) -> None:
+        def then_die(self: CheckpointFile, arrays: Callable[[], dict[str, object]]) -> None:
             keep(self, arrays)
             steps.append(1)
             if len(steps) == KEPT:
                 raise KeyboardInterrupt
 
         with monkeypatch.context() as now:
-            now.setattr(checkpoint, "EVERY_S", 0.0)
-            now.setattr(checkpoint.Checkpoint, "keep", then_die)
+            now.setattr(checkpoint_file, "INTERVAL_S", 0.0)
+            now.setattr(CheckpointFile, "write_when_due", then_die)
             with pytest.raises(KeyboardInterrupt):
                 computed(scenario, folder)
         return folder / "work" / computation.CHECKPOINT
@@ -101,8 +102,8 @@ def test_a_damaged_checkpoint_is_said_and_not_trusted(
     if harm == "flipped":
         whole[len(whole) // 2] ^= 1
     path.write_bytes({"torn": whole[:-100], "flipped": whole, "empty": b""}[harm])
-    kept = checkpoint.Checkpoint(path, computation.computed_hash(STILL))
-    assert kept.newest() is None
+    kept = CheckpointFile(path, computation.computed_hash(STILL))
+    assert kept.read() is None
     told = capsys.readouterr().err
     assert "checkpoint.bin cannot be used: its bytes do not match their hash" in told
 
@@ -112,17 +113,17 @@ def test_a_checkpoint_of_another_scenario_is_not_taken_up(
 ) -> None:
     path = killed(tmp_path, STILL)
     same = computation.computed_hash(STILL)
-    assert checkpoint.Checkpoint(path, same).newest() is not None
-    assert checkpoint.Checkpoint(path.with_name("none"), same).newest() is None
+    assert CheckpointFile(path, same).read() is not None
+    assert CheckpointFile(path.with_name("none"), same).read() is None
     assert "cannot be used" not in capsys.readouterr().err
     other = STILL.model_copy(update={"duration_s": 0.02})
-    assert checkpoint.Checkpoint(path, computation.computed_hash(other)).newest() is None
+    assert CheckpointFile(path, computation.computed_hash(other)).read() is None
     assert "of another scenario or solver" in capsys.readouterr().err
     fresh = computed(other, tmp_path)
     assert fresh.outcome.simulated_s == pytest.approx(0.02)
 
 
 def test_a_checkpoint_waits_until_it_is_due(tmp_path: Path) -> None:
-    kept = checkpoint.Checkpoint(tmp_path / "kept", "hash")
-    kept.keep(lambda: {"x": np.zeros(1)})
+    kept = CheckpointFile(tmp_path / "kept", "hash")
+    kept.write_when_due(lambda: {"x": np.zeros(1)})
     assert not list(tmp_path.iterdir())

@@ -13,8 +13,8 @@ import pytest
 import yaml
 
 from sandmould.casting.mps import scene
-from sandmould.casting.mps.measured import by_window, measure_flow
-from sandmould.casting.mps.stability import Verdict, table_2
+from sandmould.casting.mps.stability import StabilityRating, table_2
+from sandmould.casting.mps.stability_measures import by_window, measure_flow
 from sandmould.report.animation import ABSENT
 from sandmould.report.flow import _hopping
 from sandmould.report.flow_film import make_flow_film
@@ -194,12 +194,14 @@ def test_runs_are_judged_from_when_they_are_measured() -> None:
     assert found.mean_pa["h28"] == pytest.approx(700.0)
     assert found.sd_pa["h28"] == pytest.approx(100.0)
     assert found.ideal_pa == pytest.approx({"h12": 294.0, "h20": 490.0, "h28": 686.0})
-    assert found.verdict is Verdict.EXCELLENT
+    assert found.verdict is StabilityRating.EXCELLENT
     loud = measure_flow(scenario, table([0.0, 0.0, 950.0, 500.0, 950.0, 500.0]), "")
-    assert loud.verdict is Verdict.GOOD
+    assert loud.verdict is StabilityRating.GOOD
     hops = measure_flow(scenario, table([700.0] * 6, top_m=0.045), "")
-    assert (hops.hops, hops.verdict) == (True, Verdict.GOOD)
-    assert measure_flow(scenario, table([700.0] * 6), "it diverged").verdict is Verdict.FAILED
+    assert (hops.hops, hops.verdict) == (True, StabilityRating.GOOD)
+    assert (
+        measure_flow(scenario, table([700.0] * 6), "it diverged").verdict is StabilityRating.FAILED
+    )
 
 
 def test_metal_in_a_full_shoulder_that_rises_fast_hops() -> None:

@@ -7,11 +7,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from sandmould.casting.mps.flow import DivergedError, EscapedError, Flow, Guard, Progress
+from sandmould.casting.mps.flow import DivergedError, EscapedError, Flow, FlowGuard, FlowProgress
 from sandmould.casting.mps.operators import GRADIENTS
 from sandmould.casting.mps.particles import DUMMY, FLUID, WALL, at_rest, lattice
 from sandmould.casting.mps.pressure import ClosedRegionError
-from sandmould.casting.mps.scheme import Metal, Scheme
+from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.sources import SOURCES
 from sandmould.casting.mps.stability import run_still
 from sandmould.casting.mps.tank import still_tank
@@ -22,7 +22,7 @@ from sandmould.scenario.flow import MetalFlow
 SIZE_M = 2e-3
 
 
-def small_tank(guard: Guard | None = None, scheme: Scheme | None = None) -> Flow:
+def small_tank(guard: FlowGuard | None = None, scheme: Scheme | None = None) -> Flow:
     return Flow(still_tank(6, 6), make_kernel(2, SIZE_M), scheme=scheme, guard=guard)
 
 
@@ -55,9 +55,9 @@ def test_a_scenario_offers_all_forms_that_there_are(key, forms):
 
 def test_metals_and_kernels_that_cannot_be():
     with pytest.raises(ValueError, match="density"):
-        Metal(density_kg_m3=0.0)
+        LiquidMetal(density_kg_m3=0.0)
     with pytest.raises(ValueError, match="viscosity"):
-        Metal(viscosity_m2_s=-1e-6)
+        LiquidMetal(viscosity_m2_s=-1e-6)
     with pytest.raises(ValueError, match="dimension"):
         make_kernel(1, SIZE_M)
     with pytest.raises(ValueError, match="particle size"):
@@ -80,7 +80,7 @@ def test_the_papers_tank_has_its_particles():
 
 
 def test_a_flow_too_fast_is_stopped():
-    flow = small_tank(Guard(speed_m_s=0.1))
+    flow = small_tank(FlowGuard(speed_m_s=0.1))
     flow.particles.velocity_m_s[0, 1] = 1.0
     with pytest.raises(DivergedError, match="the limit is"):
         flow.step()
@@ -94,7 +94,7 @@ def test_a_flow_that_is_no_number_is_stopped():
 
 
 def test_fluid_that_leaves_is_reported():
-    flow = small_tank(Guard(high_m=(1.0, 0.05, 1.0)))
+    flow = small_tank(FlowGuard(high_m=(1.0, 0.05, 1.0)))
     flow.particles.position_m[0] = (0.005, 0.06, 0.0)
     with pytest.raises(EscapedError, match="1 particles left the mould"):
         flow.step()
@@ -106,13 +106,13 @@ def test_a_crowded_region_without_surface_is_refused():
     fluid.position_m *= 0.94
     length_m = 0.94 * cells * SIZE_M
     kernel = make_kernel(2, SIZE_M, period_m=(length_m, length_m, 0.0))
-    flow = Flow(fluid, kernel, Metal(gravity_m_s2=(0.0, 0.0, 0.0)))
+    flow = Flow(fluid, kernel, LiquidMetal(gravity_m_s2=(0.0, 0.0, 0.0)))
     with pytest.raises(ClosedRegionError, match="without a free surface"):
         flow.step()
 
 
 def test_progress_is_told_after_every_step():
-    told: list[Progress] = []
+    told: list[FlowProgress] = []
     flow = small_tank(scheme=Scheme(1e-3, 2))
     flow.advance(4.5e-3, progress=told.append)
     assert flow.time_s == pytest.approx(4.5e-3)

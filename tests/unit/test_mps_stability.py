@@ -11,11 +11,11 @@ from sandmould.casting.mps.particles import FLUID, at_rest, lattice
 from sandmould.casting.mps.probes import History, pressure_at, pressure_nearest
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.stability import (
-    Verdict,
+    StabilityRating,
     compression_gain,
     ideal_pa,
-    judge,
     probe_places,
+    rate_stability,
     run_still,
     stability_map,
     still_hops,
@@ -34,8 +34,8 @@ def history(deviation_pa: float, top_m: float) -> History:
     return History(np.cumsum(dt_s), dt_s, pressure, pressure, still, still, still, still + top_m)
 
 
-def judged(seen: History, stopped: str = "") -> Verdict:
-    return judge(stopped, still_hops(seen, 0.08, 2e-3), float(seen.deviation_pa()[-1]))
+def judged(seen: History, stopped: str = "") -> StabilityRating:
+    return rate_stability(stopped, still_hops(seen, 0.08, 2e-3), float(seen.deviation_pa()[-1]))
 
 
 def test_verdicts_follow_the_numbers_of_the_text():
@@ -45,10 +45,10 @@ def test_verdicts_follow_the_numbers_of_the_text():
     # the first two steps form a window, the third one of its own; then all three
     assert quiet.deviation_pa(2.0) == pytest.approx([199.0] * 3)
     assert quiet.deviation_pa(4.0) == pytest.approx([0.0] * 3, abs=1e-9)
-    assert judged(quiet) is Verdict.EXCELLENT
-    assert judged(loud) is Verdict.GOOD
-    assert judged(history(10.0, 0.0861)) is Verdict.GOOD  # a particle left the surface
-    assert judged(quiet, "the flow diverged") is Verdict.FAILED
+    assert judged(quiet) is StabilityRating.EXCELLENT
+    assert judged(loud) is StabilityRating.GOOD
+    assert judged(history(10.0, 0.0861)) is StabilityRating.GOOD  # a particle left the surface
+    assert judged(quiet, "the flow diverged") is StabilityRating.FAILED
 
 
 def test_the_conditions_of_table_2():
@@ -69,14 +69,14 @@ def test_the_map_is_a_full_grid():
         (2e-3, 2),
     ]
     assert runs[1].name == "MR2-0.5"
-    assert all(run.verdict in Verdict for run in runs)
+    assert all(run.verdict in StabilityRating for run in runs)
 
 
 def test_a_run_that_fails_says_why():
     flow: Flow = open_tank(Scheme())
     flow.particles.velocity_m_s[flow.fluid] = (0.0, 20.0, 0.0)
     run = run_still(flow.scheme, 0.01, flow)
-    assert run.verdict is Verdict.FAILED
+    assert run.verdict is StabilityRating.FAILED
     assert "diverged" in run.stopped
     assert np.isnan(run.mean_pa()).all()
 

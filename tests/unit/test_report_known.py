@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.engines.cost import cost_before
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.page import write_report
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.runs.products import Cost
 from sandmould.scenario.box import Box, Plate
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.fill import Fill, Layer
@@ -80,7 +80,7 @@ def write_planted(folder: Path, points: dict[tuple[float, float], float], extra:
         (place / "loads.tsv").write_text(header + rows)
         write_measures(place, place / "measures.tsv")
         RunOutcome(Outcome.FINISHED, "", 2.0, 2.0).write(place / "outcome.json")
-        cost = {**Cost.of(run.scenario).row(), "cpu_s": 3.5, "grain_steps_per_s": 1e6}
+        cost = {**cost_before(run.scenario).row(), "cpu_s": 3.5, "grain_steps_per_s": 1e6}
         pd.DataFrame([cost]).to_csv(place / "cost.tsv", sep="\t", index=False)
         (place / "provenance.json").write_text(json.dumps({"commit": "abc"}))
     collect(folder)

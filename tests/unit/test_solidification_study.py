@@ -14,9 +14,10 @@ import yaml
 from PIL import Image
 
 from analysis.freezing import freezing
-from sandmould.casting import checkpoint
 from sandmould.casting.arpm import computation
 from sandmould.report.page import write_report
+from sandmould.runs import checkpoint_file
+from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.solidification import Solidification
@@ -298,18 +299,18 @@ def test_files_that_hold_no_casting_are_told(
 
 def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     straight = (one_run(tmp_path, layers=[1]) / "series.tsv").read_bytes()
-    monkeypatch.setattr(checkpoint, "EVERY_S", 0.0)
+    monkeypatch.setattr(checkpoint_file, "INTERVAL_S", 0.0)
     (run,) = expand(open_study(opened(tmp_path, layers=[1])))
     kept_s: list[float] = []
-    keep = checkpoint.Checkpoint.keep
+    keep = CheckpointFile.write_when_due
 
-    def killed(self: checkpoint.Checkpoint, arrays: Callable[[], Mapping[str, Any]]) -> None:
+    def killed(self: CheckpointFile, arrays: Callable[[], Mapping[str, Any]]) -> None:
         keep(self, arrays)
         kept_s.append(float(arrays()["time_s"]))
         if kept_s == [5.0, 10.0, 15.0]:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(checkpoint.Checkpoint, "keep", killed)
+    monkeypatch.setattr(CheckpointFile, "write_when_due", killed)
     with pytest.raises(KeyboardInterrupt):
         computation.compute(run.scenario, tmp_path, run.run)
     computation.compute(run.scenario, tmp_path, run.run)

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from sandmould.dem.broad_phase import find_candidates
 from sandmould.dem.contact_law import Law
-from sandmould.dem.surface_contacts import press_on_surfaces
+from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import Surfaces
-from sandmould.dem.vectors import like
+from sandmould.dem.vectors import dim_of
 from sandmould.dem.wall_history import new_history
 
 Array = NDArray[np.float64]
 RADIUS_M, MASS_KG, STEP_S = 1e-3, 1e-5, 1e-6
-LAW = Law(2e4, 2e4, 0.35, 0.95, 0.1, 2e4, clip_total=True, twist=False)
+LAW = Law(2e4, 2e4, 0.35, 0.95, 0.1, 2e4, clip_total=True, torsion=False)
 SMOOTH = LAW._replace(friction=0.0, damping_ratio=0.0, rolling_arm=0.0)
 
 
@@ -36,8 +36,8 @@ class Probe:
     def __init__(self, surfaces: Surfaces, law: Law = LAW) -> None:
         self.surfaces, self.law = surfaces, law
         self.d = surfaces.dimension
-        self.like = like(self.d)
-        self.history = new_history(self.like, 1)
+        self.dim = dim_of(self.d)
+        self.history = new_history(self.dim, 1)
 
     def touch(
         self, position: Array, velocity: Array, spin: Array, shift_velocity: Array | None = None
@@ -48,10 +48,10 @@ class Probe:
         x, v, w = (np.array([a], dtype=float) for a in (position, velocity, spin))
         force, moment = np.zeros_like(x), np.zeros_like(w)
         loads = np.zeros_like(arrays.vertices)
-        found = find_candidates(self.like, x, radius, 0.0, arrays, still)
+        found = find_candidates(self.dim, x, radius, 0.0, arrays, still)
         shift_v = still if shift_velocity is None else tuple(shift_velocity)
-        press_on_surfaces(
-            self.like, 0, len(found.rows), found, x, v, w, radius, mass, force, moment, arrays,
+        surface_forces(
+            self.dim, 0, len(found.rows), found, x, v, w, radius, mass, force, moment, arrays,
             still, shift_v, self.law, STEP_S, True, self.history, loads,
         )  # fmt: skip
         contacts = int(self.history.used[0]) if len(found.rows) else 0

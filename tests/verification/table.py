@@ -16,6 +16,7 @@ from pathlib import Path
 
 from sandmould import ROOT
 from sandmould.engines.registry import engine_of
+from sandmould.runs.files import write_text
 from sandmould.scenario.engine import ENGINE_NAMES
 from tests.verification.cases.bench import scene
 from tests.verification.cases.case import Case, RefusedCase, Result
@@ -190,9 +191,7 @@ Numbers, and the largest error over its tolerance.
 
 def write(text: str) -> None:
     """Write the page, last of all."""
-    partial = PAGE.with_suffix(".partial")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(PAGE)
+    write_text(PAGE, text)
 
 
 def main() -> int:

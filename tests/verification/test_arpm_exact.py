@@ -11,14 +11,14 @@ from sandmould.casting.arpm.contact_case import compare_contact, contact_element
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.exact import contact_temperature_k, stefan_front, stefan_temperature_k
 from sandmould.casting.arpm.filling import Filling
-from sandmould.casting.arpm.material import Material
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.material import ThermalMaterial
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.plates_case import read_aluminium
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
 
 ALUMINIUM = read_aluminium()
-SAND = Material("sand", 1600.0, 1130.0, 1.255)
+SAND = ThermalMaterial("sand", 1600.0, 1130.0, 1.255)
 RESISTANCE = 0.001
 
 
@@ -38,7 +38,7 @@ def test_the_exact_contact_keeps_flux_and_jump() -> None:
 @pytest.mark.parametrize("resistance", [0.0, RESISTANCE])
 @pytest.mark.parametrize("case", ["1-1", "1-2", "1-3", "1-4", "1-3A", "1-3B"])
 def test_faces_agree_with_the_exact_contact(case: str, resistance: float) -> None:
-    found = run_contact(case, ALUMINIUM, resistance, Method("faces", "explicit"))
+    found = run_contact(case, ALUMINIUM, resistance, HeatMethod("faces", "explicit"))
     # measured up to 0.02 K at 5 mm and 0.07 K at 10 mm, of second order in the size
     assert found.largest_k < (0.1 if case == "1-4" else 0.03)
     assert abs(found.error_percent) < 0.01
@@ -48,10 +48,10 @@ def test_faces_agree_with_the_exact_contact(case: str, resistance: float) -> Non
 def test_faces_agree_between_unlike_materials() -> None:
     # sand's heat reaches 2 sqrt(a t) = 17 mm in 100 s: 5 mm elements resolve it to a few tenths
     filling = Filling((SAND, ALUMINIUM), (293.0, 393.0), RESISTANCE)
-    found = compare_contact(contact_elements("1-1"), filling, Method("faces", "explicit"))
+    found = compare_contact(contact_elements("1-1"), filling, HeatMethod("faces", "explicit"))
     assert found.largest_k < 1.5
     swapped = Filling((SAND, ALUMINIUM), (293.0, 393.0), 2 * RESISTANCE)
-    far = compare_contact(contact_elements("1-1"), swapped, Method("faces", "explicit"))
+    far = compare_contact(contact_elements("1-1"), swapped, HeatMethod("faces", "explicit"))
     assert found.largest_k != far.largest_k
 
 
@@ -62,7 +62,7 @@ def test_kernel_errors_are_those_of_the_papers_formulas() -> None:
     expected = {("printed", "1-2"): 12.0, ("corrected", "1-2"): 0.3,
                 ("printed", "1-3A"): 27.8, ("corrected", "1-3A"): 0.5}  # fmt: skip
     for (form, case), largest_k in expected.items():
-        method = Method(form, "explicit", refuse_ratio=False)  # type: ignore[arg-type]
+        method = HeatMethod(form, "explicit", refuse_ratio=False)  # type: ignore[arg-type]
         found = run_contact(case, ALUMINIUM, 0.0, method)
         assert found.largest_k == pytest.approx(largest_k, abs=0.15)
 
@@ -70,7 +70,7 @@ def test_kernel_errors_are_those_of_the_papers_formulas() -> None:
 def test_larger_kernels_blur_the_resistance() -> None:
     # Fig. 3b: the error grows simply with the kernel size
     error = [
-        abs(run_contact("1-1", ALUMINIUM, RESISTANCE, Method("corrected", "explicit", size))
+        abs(run_contact("1-1", ALUMINIUM, RESISTANCE, HeatMethod("corrected", "explicit", size))
             .error_percent)
         for size in (1.5, 2.1, 4.2)
     ]  # fmt: skip
@@ -91,7 +91,7 @@ def test_faces_converge_with_second_order() -> None:
     largest = []
     for cell in (0.02, 0.01):
         # the same short step for both sizes, or errors of space and time cancel
-        method = Method("faces", "explicit", step_share=0.24 * (0.005 / cell) ** 2)
+        method = HeatMethod("faces", "explicit", step_share=0.24 * (0.005 / cell) ** 2)
         largest.append(compare_contact(bar(cell), FILLING, method).largest_k)
     # 2.07 measured: the next order of the error shows at 20 mm
     assert math.log2(largest[0] / largest[1]) == pytest.approx(2.0, abs=0.2)
@@ -105,7 +105,7 @@ def test_the_kernels_resistance_is_too_small_at_any_size() -> None:
     assert too_well == pytest.approx(1.123, abs=0.001)
     elements = bar(0.005)
     heat = FILLING.heat(elements)
-    Method("corrected", "super").stepping_of(elements, FILLING).advance(heat, 100.0)
+    HeatMethod("corrected", "super").stepping_of(elements, FILLING).advance(heat, 100.0)
     off = [
         np.abs(heat.temperature_k - contact_temperature_k(
             elements.position_m[:, 0], 100.0, (ALUMINIUM, ALUMINIUM), (393.0, 293.0), r)).max()
@@ -116,8 +116,8 @@ def test_the_kernels_resistance_is_too_small_at_any_size() -> None:
     assert off[1] < 0.3
 
 
-METAL = Material("metal", 7000.0, 700.0, 30.0, 250e3, 1700.0, 1700.0)
-CHILL = Material("chill", 1e9, 700.0, 30.0 * 1e9 / 7000.0)
+METAL = ThermalMaterial("metal", 7000.0, 700.0, 30.0, 250e3, 1700.0, 1700.0)
+CHILL = ThermalMaterial("chill", 1e9, 700.0, 30.0 * 1e9 / 7000.0)
 
 
 def test_freezing_at_a_wall_follows_neumann() -> None:
@@ -126,7 +126,7 @@ def test_freezing_at_a_wall_follows_neumann() -> None:
     material[0] = 0
     elements = placed(Raster(material, cell, np.array([-cell, 0.0])))
     filling = Filling((CHILL, METAL), (1200.0, 1700.0))
-    marching = Method("faces", "explicit").stepping_of(elements, filling)
+    marching = HeatMethod("faces", "explicit").stepping_of(elements, filling)
     found = solidify(elements, filling, marching, record_s=duration, until_s=duration)
     place = elements.position_m[1:, 0]
     exact = stefan_temperature_k(place, duration, METAL, 1700.0, 1200.0)
@@ -161,7 +161,7 @@ def test_elements_at_random_places_agree_with_the_exact_contact(resistance: floa
     low, high = np.array([-0.5, 0.0]), np.array([0.5, 0.06])
     elements = Elements(place, size, material, low, high)
     filling = Filling((ALUMINIUM, ALUMINIUM), (293.0, 393.0), resistance)
-    found = compare_contact(elements, filling, Method("power", "explicit"))
+    found = compare_contact(elements, filling, HeatMethod("power", "explicit"))
     # 0.016 K measured, of 100 K
     assert found.largest_k < 0.05
     assert abs(found.drift_percent) < 1e-10

@@ -12,14 +12,14 @@ from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.kernel import kernel_exchange
 from sandmould.casting.arpm.local_steps import LocalSteps
 from sandmould.casting.arpm.marching import ExplicitSteps, Substance
-from sandmould.casting.arpm.material import Material
+from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.power_diagram import power_exchange
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.super_steps import SuperSteps
 
 CONDUCTIVITY = np.array([1.255, 29.3])
-STEEL = Material("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
-SAND = Material("sand", 1600.0, 1130.0, 1.255)
+STEEL = ThermalMaterial("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
+SAND = ThermalMaterial("sand", 1600.0, 1130.0, 1.255)
 FILLING = Filling((SAND, STEEL), (293.0, 1823.0), 1 / 837.0)
 
 

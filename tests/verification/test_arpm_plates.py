@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.plates_case import (
     PlatesRun,
     curve_error_percent,
@@ -13,7 +13,7 @@ from sandmould.casting.arpm.plates_case import (
     read_plates,
     run_plates,
 )
-from sandmould.casting.arpm.solidification import Progress
+from sandmould.casting.arpm.solidification import CoolingProgress
 
 PLATES = read_plates()
 
@@ -21,7 +21,7 @@ PLATES = read_plates()
 @pytest.fixture(scope="module")
 def grid() -> PlatesRun:
     """Finite differences at 10 mm."""
-    return run_plates(PLATES, "2-1", Method("difference"), 0.01)
+    return run_plates(PLATES, "2-1", HeatMethod("difference"), 0.01)
 
 
 def test_finite_differences_find_the_known_time(grid: PlatesRun) -> None:
@@ -32,7 +32,7 @@ def test_finite_differences_find_the_known_time(grid: PlatesRun) -> None:
 
 def test_faces_of_one_size_are_finite_differences(grid: PlatesRun) -> None:
     # two programs for the same sums, so that only their order differs
-    faces = run_plates(PLATES, "2-1", Method("faces", "explicit"), 0.01).found
+    faces = run_plates(PLATES, "2-1", HeatMethod("faces", "explicit"), 0.01).found
     for name, curve in faces.probe_k.items():
         np.testing.assert_allclose(curve, grid.found.probe_k[name], rtol=1e-10)
     assert faces.solidification_time_s == pytest.approx(grid.found.solidification_time_s, rel=1e-9)
@@ -46,9 +46,9 @@ def test_probes_cool_in_the_order_of_thickness(grid: PlatesRun) -> None:
 @pytest.mark.parametrize("exchange", ["faces", "corrected", "printed"])
 def test_several_sizes_against_one(exchange: str) -> None:
     # 5 and 10 mm for the paper's 2 and 4 mm, 5 layers kept: the budget of a test
-    told: list[Progress] = []
-    uniform = run_plates(PLATES, "2-1", Method("difference"), 0.005, until_s=400.0)
-    method = Method(exchange, "local")  # type: ignore[arg-type]
+    told: list[CoolingProgress] = []
+    uniform = run_plates(PLATES, "2-1", HeatMethod("difference"), 0.005, until_s=400.0)
+    method = HeatMethod(exchange, "local")  # type: ignore[arg-type]
     adaptive = run_plates(PLATES, "2-2B", method, 0.005, until_s=400.0, progress=told.append)
     assert len(adaptive.elements.size_m) < 0.5 * len(uniform.elements.size_m)
     error = curve_error_percent(PLATES, adaptive.found, uniform.found)

@@ -21,7 +21,7 @@ from sandmould.casting.mps.flows import (
     taylor_green_m_s,
 )
 from sandmould.casting.mps.particles import Floats
-from sandmould.casting.mps.scheme import Metal, Scheme
+from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.weight import make_kernel, weight
 
 WIDTH_M, NU = 0.1, 1e-3
@@ -42,7 +42,7 @@ def error(got: Floats, exact: Floats) -> float:
 
 def couette(rows: int, scheme: Scheme = ONE_SOLVE) -> float:
     """Error of the profile while it develops, at a tenth of the time of diffusion."""
-    flow = channel(rows, WIDTH_M, Metal(1000.0, NU, (0.0, 0.0, 0.0)), scheme, 0.1)
+    flow = channel(rows, WIDTH_M, LiquidMetal(1000.0, NU, (0.0, 0.0, 0.0)), scheme, 0.1)
     until_s = 0.1 * WIDTH_M**2 / NU
     flow.advance(until_s)
     y = flow.particles.position_m[flow.fluid, 1]
@@ -60,7 +60,7 @@ def test_couette_flow_converges():
 def poiseuille(rows: int, diffusions: float, scheme: Scheme = ONE_SOLVE) -> float:
     """Error of the profile after so many times of diffusion across the channel."""
     force = 8.0 * NU / WIDTH_M**2 * 0.1
-    flow = channel(rows, WIDTH_M, Metal(1000.0, NU, (force, 0.0, 0.0)), scheme)
+    flow = channel(rows, WIDTH_M, LiquidMetal(1000.0, NU, (force, 0.0, 0.0)), scheme)
     until_s = diffusions * WIDTH_M**2 / NU
     flow.advance(until_s)
     y = flow.particles.position_m[flow.fluid, 1]

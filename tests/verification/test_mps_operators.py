@@ -17,7 +17,7 @@ from sandmould.casting.mps.operators import (
     velocity_gradient,
 )
 from sandmould.casting.mps.particles import FLUID, WALL, Particles, at_rest, lattice
-from sandmould.casting.mps.scheme import Metal, Scheme
+from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.viscosity import fitted_laplacian
 from sandmould.casting.mps.weight import Kernel, make_kernel, weight, weight_slope
 
@@ -227,7 +227,7 @@ def test_colliding_particles_move_on_with_their_new_velocity():
     # as above, in a step without weight, friction or pressure: both are at a surface
     two = at_rest(np.array([[0.0, 0.0], [0.75, 0.0]]) * SIZE_M, FLUID)
     two.velocity_m_s[0, 0] = 1.0
-    weightless = Metal(viscosity_m2_s=0.0, gravity_m_s2=(0.0, 0.0, 0.0))
+    weightless = LiquidMetal(viscosity_m2_s=0.0, gravity_m_s2=(0.0, 0.0, 0.0))
     scheme = Scheme(collision_distance=0.8, restitution=0.0)
     flow = Flow(two, make_kernel(2, SIZE_M), weightless, scheme)
     flow.step(1e-5)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sandmould.casting.mps.flow import Flow, Guard
+from sandmould.casting.mps.flow import Flow, FlowGuard
 from sandmould.casting.mps.probes import Watch, pressure_at
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.shoulder import Ladle, open_shoulder, pressure_pa_m, run_shoulder
@@ -21,7 +21,7 @@ MR5 = Scheme(1e-3, 5, 0.5)
 
 def small_tank(scheme: Scheme) -> Flow:
     """8 x 16 particles: 32 mm of metal, 784 Pa."""
-    guard = Guard(speed_m_s=2.0)
+    guard = FlowGuard(speed_m_s=2.0)
     return Flow(still_tank(8, 16), make_kernel(2, SIZE_M), scheme=scheme, guard=guard)
 
 

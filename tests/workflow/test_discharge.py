@@ -14,7 +14,7 @@ import pytest
 
 from sandmould.engines.driver import Driver
 from sandmould.engines.session import Session
-from sandmould.runs.checkpoint import newest_checkpoint
+from sandmould.runs.checkpoint_folders import newest_checkpoint
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.placement import NOMINAL_FRACTION, filled_measure
 from sandmould.study.measure import write_measures

@@ -12,7 +12,7 @@ import pytest
 from sandmould import ROOT
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
-from sandmould.runs.checkpoint import newest_checkpoint
+from sandmould.runs.checkpoint_folders import newest_checkpoint
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.expand import expand

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import time
 from dataclasses import dataclass
@@ -11,15 +10,20 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from sandmould.arrays import Flags
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.elements import Elements
-from sandmould.casting.arpm.solidification import Cooling, UnstableError, solidify
-from sandmould.casting.arpm.solidification import Progress as Cooled
-from sandmould.casting.arpm.solidification import Solidification as Found
-from sandmould.casting.checkpoint import Checkpoint
-from sandmould.casting.hashing import hash_with
+from sandmould.casting.arpm.solidification import (
+    Cooling,
+    CoolingProgress,
+    SolidificationResult,
+    UnstableError,
+    solidify,
+)
+from sandmould.digest import sources_digest
+from sandmould.runs.checkpoint_file import CheckpointFile
+from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, peak_memory_bytes
 from sandmould.runs.progress import Progress
@@ -51,12 +55,12 @@ def source_files() -> list[Path]:
 
 def source_hash() -> str:
     """State of the solver, which stands in place of a version."""
-    return hashlib.sha256(b"".join(f.read_bytes() for f in source_files())).hexdigest()[:12]
+    return sources_digest(source_files())
 
 
 def computed_hash(scenario: Solidification) -> str:
     """Hash of scenario and solver."""
-    return hash_with(scenario, source_hash())
+    return solution_hash(scenario, source_hash())
 
 
 def engine_of(scenario: Solidification) -> str:
@@ -84,41 +88,42 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     work.mkdir(parents=True, exist_ok=True)
     begun = time.monotonic()
     cost, planned_s = no_cost(scenario), scene.expected_s(scenario)
-    shown = Progress(run, work, scene.expected_element_steps(scenario), "element-steps")
+    progress = Progress(run, work, scene.expected_element_steps(scenario), "element-steps")
     elements, filling = scene.elements_of(scenario), scene.filling_of(scenario)
     cost.elements = len(elements.size_m)
-    cooled = Cooled(0.0, 0.0, 0.0, 0)
-    checkpoint = Checkpoint(work / CHECKPOINT, computed_hash(scenario))
-    newest = checkpoint.newest()
+    cooled = CoolingProgress(0.0, 0.0, 0.0, 0)
+    checkpoint = CheckpointFile(work / CHECKPOINT, computed_hash(scenario))
+    newest = checkpoint.read()
 
-    def tell(now: Cooled) -> None:
+    def tell(now: CoolingProgress) -> None:
         nonlocal cooled
         cooled = now
-        shown.show("cooling", now.time_s, now.element_steps, now.element_steps_per_s)
+        progress.show("cooling", now.time_s, now.element_steps, now.element_steps_per_s)
 
     try:
         marching = scene.method_of(scenario).marching(elements, filling, scene.raster_of(scenario))
         marching.advance(filling.heat(elements), 1e-9)  # compiled before it is timed
         cost.time_step_s = marching.step_s
         probes_m = {probe.name: np.array(probe.at_m) for probe in scenario.probes}
-        found = solidify(
+        result = solidify(
             elements, filling, marching, probes_m, scenario.record_s, scenario.until_s, tell,
-            Cooling.of(newest) if newest else None, lambda now: checkpoint.keep(now.arrays),
+            Cooling.of(newest) if newest else None,
+            lambda now: checkpoint.write_when_due(now.arrays),
         )  # fmt: skip
     except (UnstableError, ValueError) as stop:
         code = Outcome.UNSTABLE if isinstance(stop, UnstableError) else Outcome.BAD_INPUT
         outcome = RunOutcome(code, str(stop), cooled.time_s, planned_s)
         cost.wall_s = time.monotonic() - begun
         return Computed(outcome, cost, is_root=True)
-    _write(scenario, elements, filling.melts(elements), found, work)
-    end_s = float(found.time_s[-1])
-    shown.show("cooling", end_s, found.heat.element_steps,
-               found.heat.element_steps / max(found.wall_s, 1e-9), last=True)  # fmt: skip
-    cost.element_steps, cost.cpu_s = found.heat.element_steps, found.cpu_s
-    cost.engine_wall_s, cost.wall_s = found.wall_s, time.monotonic() - begun
+    _write(scenario, elements, filling.melts(elements), result, work)
+    end_s = float(result.time_s[-1])
+    progress.show("cooling", end_s, result.heat.element_steps,
+               result.heat.element_steps / max(result.wall_s, 1e-9), last=True)  # fmt: skip
+    cost.element_steps, cost.cpu_s = result.heat.element_steps, result.cpu_s
+    cost.engine_wall_s, cost.wall_s = result.wall_s, time.monotonic() - begun
     cost.peak_memory_bytes = peak_memory_bytes()
     detail = ""
-    if math.isnan(found.solidification_time_s):
+    if math.isnan(result.solidification_time_s):
         detail = f"some of the casting is still liquid at {end_s:g} s: raise until_s"
     return Computed(RunOutcome(Outcome.FINISHED, detail, end_s, planned_s), cost, is_root=True)
 
@@ -126,20 +131,20 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
 def _write(
     scenario: Solidification,
     elements: Elements,
-    melts: NDArray[np.bool_],
-    found: Found,
+    melts: Flags,
+    result: SolidificationResult,
     work: Path,
 ) -> None:
     """Write the curves and the fields at the end."""
-    frozen_s, volume = found.heat.frozen_s[melts], elements.volume_m3[melts]
-    solid = [float(volume[frozen_s <= t].sum() / volume.sum()) for t in found.time_s]
+    frozen_s, volume = result.heat.frozen_s[melts], elements.volume_m3[melts]
+    solid = [float(volume[frozen_s <= t].sum() / volume.sum()) for t in result.time_s]
     clock, share, heat = scene.series_columns(scenario)
-    probes = {f"{name}_k": curve for name, curve in found.probe_k.items()}
-    table = pd.DataFrame({clock: found.time_s, **probes, share: solid, heat: found.enthalpy_j})
+    probes = {f"{name}_k": curve for name, curve in result.probe_k.items()}
+    table = pd.DataFrame({clock: result.time_s, **probes, share: solid, heat: result.enthalpy_j})
     table.to_csv(work / "series.tsv", sep="\t", index=False, float_format="%.10g")
     np.savez_compressed(
         work / "fields.npz", position_m=elements.position_m, size_m=elements.size_m,
-        melts=melts, frozen_s=found.heat.frozen_s, temperature_k=found.heat.temperature_k,
+        melts=melts, frozen_s=result.heat.frozen_s, temperature_k=result.heat.temperature_k,
     )  # fmt: skip
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.exact import contact_temperature_k
 from sandmould.casting.arpm.filling import Filling
-from sandmould.casting.arpm.material import Material
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.material import ThermalMaterial
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster
 
-Array = NDArray[np.float64]
 SMALL_M = 0.005
 HALF_LENGTH_M, WIDTH_M = 0.5, 0.08
 """Stand-ins: Fig. 1's dimensions are lost to us. Error (6) goes as one over the half length."""
@@ -28,7 +26,7 @@ LAYERS: dict[str, tuple[int, ...] | None] = {
 
 
 @dataclass(frozen=True)
-class Contact:
+class ContactResult:
     """What one case found."""
 
     error_percent: float
@@ -82,18 +80,20 @@ def _one_sided(several: Elements, uniform: Elements, side: int) -> Elements:
     )
 
 
-def run_contact(case: str, aluminium: Material, resistance_m2k_w: float, method: Method) -> Contact:
+def run_contact(
+    case: str, aluminium: ThermalMaterial, resistance_m2k_w: float, method: HeatMethod
+) -> ContactResult:
     """Compute a case and compare it with the exact solution.
 
     Parameters
     ----------
     case : str
         A key of ``LAYERS``.
-    aluminium : Material
+    aluminium : ThermalMaterial
         Of both areas.
     resistance_m2k_w : float, m2 K/W
         The paper takes 0 and 0.001.
-    method : Method
+    method : HeatMethod
         Small c_k break the rule of sizes, as in the paper: give ``refuse_ratio=False``.
     """
     elements = contact_elements(case)
@@ -101,7 +101,7 @@ def run_contact(case: str, aluminium: Material, resistance_m2k_w: float, method:
     return compare_contact(elements, filling, method)
 
 
-def compare_contact(elements: Elements, filling: Filling, method: Method) -> Contact:
+def compare_contact(elements: Elements, filling: Filling, method: HeatMethod) -> ContactResult:
     """Compute two areas in contact at x = 0 for 100 s; arguments as those of a case."""
     marching = method.stepping_of(elements, filling)
     heat = filling.heat(elements)
@@ -117,7 +117,7 @@ def compare_contact(elements: Elements, filling: Filling, method: Method) -> Con
     width = elements.high_m[1] - elements.low_m[1]
     over = float(np.sum((differ * elements.volume_m3)[hot])) / width
     scale = -elements.low_m[0] * (filling.initial_k[1] - filling.initial_k[0])
-    return Contact(
+    return ContactResult(
         100.0 * over / scale,
         float(np.abs(differ).max()),
         100.0 * float(heat.enthalpy_j_m3 @ marching.volume_m3 / before - 1.0),

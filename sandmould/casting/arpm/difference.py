@@ -8,17 +8,30 @@ none of their exchange.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange, set_num_threads
-from numpy.typing import NDArray
+from numba import prange, set_num_threads
 
+from sandmould.arrays import Floats
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
 from sandmould.casting.arpm.raster import Raster
+from sandmould.compiled import njit
 
-Array = NDArray[np.float64]
+
+class HeatGrid(NamedTuple):
+    """Cells of a box, the rates between them and their materials; compiled code takes it."""
+
+    through_x: Floats
+    through_y: Floats
+    through_z: Floats
+    """(nx, ny, nz) float64, W/m3/K: between each cell and the next along an axis."""
+    material: Any
+    """(nx, ny, nz) int64."""
+    rows: Floats
+    reference: float
+    """See ``EnthalpyTable``."""
 
 
 class DifferenceSteps:
@@ -28,7 +41,7 @@ class DifferenceSteps:
         self,
         raster: Raster,
         table: EnthalpyTable,
-        conductivity_w_m_k: Array,
+        conductivity_w_m_k: Floats,
         resistance_m2k_w: float,
         share: float = STEP_SHARE,
         threads: int = 1,
@@ -47,35 +60,34 @@ class DifferenceSteps:
         """
         # a plane is a box of one layer
         shape = (1,) * (3 - raster.material.ndim) + raster.material.shape
-        self._material, self._table = raster.material.reshape(shape), table
-        self._through = [
-            _between(self._material, axis, raster.cell_m, conductivity_w_m_k, resistance_m2k_w)
+        material = raster.material.reshape(shape)
+        along_x, along_y, along_z = (
+            _between(material, axis, raster.cell_m, conductivity_w_m_k, resistance_m2k_w)
             for axis in range(3)
-        ]
+        )
         rate = np.zeros(shape)
-        for axis, through in enumerate(self._through):
-            rate += through + np.roll(through, 1, axis=axis)
-        self.step_s = share * float((table.rows[self._material, 0] / rate).min())
-        self.volume_m3 = np.full(self._material.size, raster.cell_m**raster.material.ndim)
+        for axis, along in enumerate((along_x, along_y, along_z)):
+            rate += along + np.roll(along, 1, axis=axis)
+        self._grid = HeatGrid(along_x, along_y, along_z, material, table.rows, table.reference_k)
+        self.step_s = share * float((table.rows[material, 0] / rate).min())
+        self.volume_m3 = np.full(material.size, raster.cell_m**raster.material.ndim)
         self._threads = threads
 
     def advance(self, heat: Heat, duration_s: float) -> None:
         """Take equal steps over a duration, none longer than ``step_s``."""
         steps = max(1, math.ceil(duration_s / self.step_s * (1.0 - 1e-12)))
         set_num_threads(self._threads)
-        shape = self._material.shape
-        along_x, along_y, along_z = self._through
+        shape = self._grid.material.shape
         heat.temperature_k = _difference_steps(
-            steps, duration_s / steps, heat.time_s, along_x, along_y, along_z, self._material,
-            self._table.rows, self._table.reference_k, heat.enthalpy_j_m3.reshape(shape),
+            steps, duration_s / steps, heat.time_s, self._grid, heat.enthalpy_j_m3.reshape(shape),
             heat.temperature_k.reshape(shape), heat.frozen_s.reshape(shape),
         ).reshape(-1)  # fmt: skip
         heat.time_s += duration_s
-        heat.element_steps += steps * self._material.size
+        heat.element_steps += steps * self._grid.material.size
 
 
-def _between(material: Any, axis: int, cell_m: float, conductivity: Array, resistance: float
-             ) -> Array:  # fmt: skip
+def _between(material: Any, axis: int, cell_m: float, conductivity: Floats, resistance: float
+             ) -> Floats:  # fmt: skip
     """Rate (W/m3/K) between each cell and the next along an axis; 0 behind the last."""
     found = np.zeros(material.shape)
     n = material.shape[axis]
@@ -88,12 +100,13 @@ def _between(material: Any, axis: int, cell_m: float, conductivity: Array, resis
     return found
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _difference_steps(
-    steps: int, dt: float, time_s: float, through_x: Any, through_y: Any, through_z: Any,
-    material: Any, rows: Any, reference: float, enthalpy: Any, temperature: Any, frozen: Any,
+    steps: int, dt: float, time_s: float, grid: HeatGrid, enthalpy: Any, temperature: Any,
+    frozen: Any,
 ) -> Any:  # fmt: skip
     """Take explicit steps; enthalpy and freezing times change in place, temperatures come back."""
+    through_x, through_y, through_z, material, rows, reference = grid
     nx, ny, nz = enthalpy.shape
     now, then = temperature.copy(), np.empty_like(temperature)
     for step in range(steps):

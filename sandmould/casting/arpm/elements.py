@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from sandmould.arrays import Flags, Floats, Ints
 from sandmould.casting.arpm.raster import Raster
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -25,15 +23,15 @@ class Elements:
         When a size is not above 0 or the arrays' lengths differ.
     """
 
-    position_m: Array
+    position_m: Floats
     """(n, d) float64, m."""
-    size_m: Array
+    size_m: Floats
     """(n,) float64, m: r0 of the paper."""
-    material: Indices
+    material: Ints
     """(n,) int64."""
-    low_m: Array
+    low_m: Floats
     """(d,) float64, m: corners of the box that they fill."""
-    high_m: Array
+    high_m: Floats
 
     def __post_init__(self) -> None:
         lengths = {len(self.position_m), len(self.size_m), len(self.material)}
@@ -49,7 +47,7 @@ class Elements:
         return self.position_m.shape[1]
 
     @property
-    def volume_m3(self) -> Array:
+    def volume_m3(self) -> Floats:
         """(n,) float64, m3, or m2 in 2D."""
         return np.asarray(self.size_m**self.dimensions)
 
@@ -96,7 +94,7 @@ def placed(raster: Raster, layers: Sequence[int] = ()) -> Elements:
     return _elements(raster, span)
 
 
-def _from_interface(material: Indices) -> Array:
+def _from_interface(material: Ints) -> Floats:
     """Distance, in cells, of each cell's centre to the nearest of another material."""
     found = np.full(material.shape, np.inf)
     for number in np.unique(material):
@@ -105,7 +103,7 @@ def _from_interface(material: Indices) -> Array:
     return found
 
 
-def _distance_to(there: NDArray[np.bool_]) -> Array:
+def _distance_to(there: Flags) -> Floats:
     if not there.any():
         return np.full(there.shape, np.inf)
     return np.asarray(distance_transform_edt(~there), dtype=np.float64)
@@ -118,7 +116,7 @@ def _blocks(values: NDArray[np.generic], side: int) -> NDArray[np.generic]:
     return values[whole].reshape(shape)
 
 
-def _spread(of_block: NDArray[np.bool_], side: int, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _spread(of_block: Flags, side: int, shape: tuple[int, ...]) -> Flags:
     found = np.zeros(shape, dtype=np.bool_)
     for axis in range(len(shape)):
         of_block = np.repeat(of_block, side, axis=axis)
@@ -126,19 +124,19 @@ def _spread(of_block: NDArray[np.bool_], side: int, shape: tuple[int, ...]) -> N
     return found
 
 
-def _all_in_block(good: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
+def _all_in_block(good: Flags, side: int) -> Flags:
     """Cells whose whole block is good; those of blocks cut off at the edge are not."""
     within = tuple(range(1, 2 * good.ndim, 2))
     return _spread(np.all(_blocks(good, side), axis=within), side, good.shape)
 
 
-def _one_material(material: Indices, side: int) -> NDArray[np.bool_]:
+def _one_material(material: Ints, side: int) -> Flags:
     within = tuple(range(1, 2 * material.ndim, 2))
     apart = np.ptp(np.asarray(_blocks(material, side)), axis=within)
     return _spread(np.equal(apart, 0), side, material.shape)
 
 
-def _elements(raster: Raster, span: Indices) -> Elements:
+def _elements(raster: Raster, span: Ints) -> Elements:
     place = np.indices(span.shape)
     corner = np.all(place % span == 0, axis=0)
     low = place[:, corner].T

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import erf, erfcx
 
-from sandmould.casting.arpm.material import Material
+from sandmould.arrays import Floats
+from sandmould.casting.arpm.material import ThermalMaterial
 
-Array = NDArray[np.float64]
 
-
-def contact_temperature_k(place_m: Array, time_s: float, bodies: tuple[Material, Material],
-                          initial_k: tuple[float, float], resistance_m2k_w: float = 0.0
-                          ) -> Array:  # fmt: skip
+def contact_temperature_k(
+    place_m: Floats,
+    time_s: float,
+    bodies: tuple[ThermalMaterial, ThermalMaterial],
+    initial_k: tuple[float, float],
+    resistance_m2k_w: float = 0.0,
+) -> Floats:
     """Two half spaces that touch from time 0 on, with a resistance between them.
 
     Carslaw and Jaeger, Conduction of Heat in Solids, 2nd edition, section 2.16.
@@ -53,7 +55,7 @@ def contact_temperature_k(place_m: Array, time_s: float, bodies: tuple[Material,
     return found
 
 
-def stefan_front(body: Material, melting_k: float, wall_k: float) -> float:
+def stefan_front(body: ThermalMaterial, melting_k: float, wall_k: float) -> float:
     """Speed lambda of the one-phase Stefan problem: the front is at 2 lambda sqrt(a t).
 
     A liquid at its melting point freezes at a wall: lambda exp(lambda^2) erf(lambda) =
@@ -61,7 +63,7 @@ def stefan_front(body: Material, melting_k: float, wall_k: float) -> float:
 
     Parameters
     ----------
-    body : Material
+    body : ThermalMaterial
     melting_k, wall_k : float, K
     """
     number = body.heat_capacity_j_kg_k * (melting_k - wall_k) / body.latent_heat_j_kg
@@ -69,15 +71,15 @@ def stefan_front(body: Material, melting_k: float, wall_k: float) -> float:
     return float(brentq(lambda x: x * math.exp(x * x) * math.erf(x) - target, 1e-9, 5.0))
 
 
-def stefan_temperature_k(place_m: Array, time_s: float, body: Material, melting_k: float,
-                         wall_k: float) -> Array:  # fmt: skip
+def stefan_temperature_k(place_m: Floats, time_s: float, body: ThermalMaterial, melting_k: float,
+                         wall_k: float) -> Floats:  # fmt: skip
     """Temperature of the one-phase Stefan problem at distances from the wall, (n,) float64, K.
 
     Parameters
     ----------
     place_m : (n,) float64, m
     time_s : float, s
-    body : Material
+    body : ThermalMaterial
     melting_k, wall_k : float, K
     """
     front = stefan_front(body, melting_k, wall_k)

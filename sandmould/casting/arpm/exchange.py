@@ -10,24 +10,23 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from sandmould.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
 class Exchange:
     """Heat that each element takes up: dH_i/dt = sum over j of rate_ij (T_j - T_i)."""
 
-    start: Indices
+    start: Ints
     """(n + 1,) int64: where the neighbours of each element begin."""
     neighbour: NDArray[np.int32]
     """(p,) int32, in rising order for each element."""
-    rate_w_m3_k: Array
+    rate_w_m3_k: Floats
     """(p,) float64, W/m3/K."""
-    volume_m3: Array
+    volume_m3: Floats
     """(n,) float64, m3, or m2 in 2D."""
 
-    def limit_s(self, capacity_j_m3_k: Array) -> Array:
+    def limit_s(self, capacity_j_m3_k: Floats) -> Floats:
         """Longest stable explicit step of each element, (n,) float64, s.
 
         Half the row sum of Gershgorin's circle; where all rates are positive, temperatures then
@@ -45,11 +44,11 @@ class Exchange:
         with np.errstate(divide="ignore"):
             return np.asarray(capacity_j_m3_k / row)
 
-    def _padded(self) -> Array:
+    def _padded(self) -> Floats:
         """Rates with one more: reduceat takes no start behind the last entry."""
         return np.append(self.rate_w_m3_k, 0.0)
 
-    def instability_s(self, capacity_j_m3_k: Array) -> float:
+    def instability_s(self, capacity_j_m3_k: Floats) -> float:
         """Explicit step beyond which the fastest mode grows: 2 over the largest eigenvalue.
 
         Rates are symmetric up to a factor for each row and column in every form of exchange here,
@@ -70,7 +69,7 @@ class Exchange:
         return 2.0 / float(largest[0])
 
 
-def from_rows(row: Indices, column: Indices, rate_w_m3_k: Array, volume_m3: Array) -> Exchange:
+def from_rows(row: Ints, column: Ints, rate_w_m3_k: Floats, volume_m3: Floats) -> Exchange:
     """Sort rates into rows; those of pairs named twice are summed.
 
     Parameters

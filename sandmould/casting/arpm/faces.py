@@ -13,29 +13,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.exchange import Exchange, check_resistance, from_rows
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Faces:
     """Where elements touch."""
 
-    one: Indices
+    one: Ints
     """(f,) int64: the element on the low side of each face."""
-    two: Indices
-    axis: Indices
+    two: Ints
+    axis: Ints
     """(f,) int64: across which axis the face lies."""
-    area_m2: Array
+    area_m2: Floats
     """(f,) float64, m2, or m in 2D."""
 
 
-def owners(elements: Elements) -> Indices:
+def owners(elements: Elements) -> Ints:
     """Number of the element that covers each cell of the finest size.
 
     Parameters
@@ -96,7 +93,7 @@ def faces_of(elements: Elements) -> Faces:
     return Faces(one, two, across, areas.astype(np.float64))
 
 
-def face_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2k_w: float,
+def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float,
                   consistent: bool = True) -> Exchange:  # fmt: skip
     """Rates over true faces.
 
@@ -129,7 +126,7 @@ def face_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2k_
     return over_faces(one, two, conductance, elements.volume_m3)
 
 
-def over_faces(one: Indices, two: Indices, conductance_w_k: Array, volume_m3: Array) -> Exchange:
+def over_faces(one: Ints, two: Ints, conductance_w_k: Floats, volume_m3: Floats) -> Exchange:
     """Exchange of conductances between pairs: what one gains the other loses.
 
     Parameters
@@ -147,8 +144,8 @@ def over_faces(one: Indices, two: Indices, conductance_w_k: Array, volume_m3: Ar
     return from_rows(row, column, rate, volume_m3)
 
 
-def _shared(elements: Elements, faces: Faces, conductance: Array
-            ) -> tuple[Indices, Indices, Array]:  # fmt: skip
+def _shared(elements: Elements, faces: Faces, conductance: Floats
+            ) -> tuple[Ints, Ints, Floats]:  # fmt: skip
     """Pairs of small elements on one large face, and what sharing its flux adds between them.
 
     With shares a_k of the large face, q = h (T_large - sum a_k T_k) on all of it: beside the

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Flags, Floats
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.marching import Heat, Substance
-from sandmould.casting.arpm.material import EnthalpyTable, Material, enthalpy_table
-
-Array = NDArray[np.float64]
+from sandmould.casting.arpm.material import EnthalpyTable, ThermalMaterial, enthalpy_table
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class Filling:
         When the lists differ in length or a temperature is not above 0 K.
     """
 
-    materials: tuple[Material, ...]
+    materials: tuple[ThermalMaterial, ...]
     """The first is the mould."""
     initial_k: tuple[float, ...]
     resistance_m2k_w: float = 0.0
@@ -41,7 +39,7 @@ class Filling:
             raise ValueError(f"initial_k is {self.initial_k}; all must be finite and above 0")
 
     @property
-    def conductivity_w_m_k(self) -> Array:
+    def conductivity_w_m_k(self) -> Floats:
         """(m,) float64, W/m/K."""
         return np.array([it.conductivity_w_m_k for it in self.materials])
 
@@ -50,7 +48,7 @@ class Filling:
         """Enthalpy counted from the coldest initial temperature: heat that can be lost."""
         return enthalpy_table(self.materials, min(self.initial_k))
 
-    def melts(self, elements: Elements) -> NDArray[np.bool_]:
+    def melts(self, elements: Elements) -> Flags:
         """Which elements solidify, (n,) bool."""
         return np.array([it.melts for it in self.materials])[elements.material]
 

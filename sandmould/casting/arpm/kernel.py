@@ -11,20 +11,18 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.exchange import Exchange, check_resistance, from_rows
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Form = Literal["printed", "corrected", "symmetric"]
 """(4) as printed; (4) corrected; corrected with the mean of 1/n_i and 1/n_j, which conserves
 enthalpy but is no more consistent at a jump of sizes."""
 
 
-def weight(distance_m: Array, reach_m: Array) -> Array:
+def weight(distance_m: Floats, reach_m: Floats) -> Floats:
     """Weight of a pair, eq. (3): reach over distance less 1, and 0 beyond the reach.
 
     Parameters
@@ -34,8 +32,8 @@ def weight(distance_m: Array, reach_m: Array) -> Array:
     return np.asarray(np.maximum(reach_m / distance_m - 1.0, 0.0))
 
 
-def volume_weight(distance_m: Array, own_m: Array, other_m: Array, kernel_size: float,
-                  dimensions: int, form: Form = "corrected") -> Array:  # fmt: skip
+def volume_weight(distance_m: Floats, own_m: Floats, other_m: Floats, kernel_size: float,
+                  dimensions: int, form: Form = "corrected") -> Floats:  # fmt: skip
     """Weight w_ij of a pair by the elements' volumes, eq. (4).
 
     Parameters
@@ -58,7 +56,7 @@ def volume_weight(distance_m: Array, own_m: Array, other_m: Array, kernel_size: 
     return np.asarray(0.5 * (ratio * by_own + second * by_other))
 
 
-def with_images(elements: Elements, reach_m: float) -> tuple[Array, Indices]:
+def with_images(elements: Elements, reach_m: float) -> tuple[Floats, Ints]:
     """Places of all elements and of their mirror images behind the walls, with their numbers."""
     place, number = elements.position_m, np.arange(len(elements.size_m))
     for axis in range(elements.dimensions):
@@ -72,7 +70,7 @@ def with_images(elements: Elements, reach_m: float) -> tuple[Array, Indices]:
     return place, number
 
 
-def neighbours(elements: Elements, kernel_size: float) -> tuple[Indices, Indices, Array]:
+def neighbours(elements: Elements, kernel_size: float) -> tuple[Ints, Ints, Floats]:
     """Neighbours nearer than c_k times the larger of two sizes.
 
     Insulated walls are mirrors: elements have their images behind them, without which those at a
@@ -113,7 +111,7 @@ def neighbours(elements: Elements, kernel_size: float) -> tuple[Indices, Indices
     return one[near], number[two[near]], distance[near]
 
 
-def kernel_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2k_w: float,
+def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float,
                     kernel_size: float = 2.1, form: Form = "corrected",
                     refuse_ratio: bool = True) -> Exchange:  # fmt: skip
     """Rates of eq. (5), with neighbours found once.
@@ -163,7 +161,7 @@ def kernel_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2
     return from_rows(own[apart], other[apart], rate[apart], elements.volume_m3)
 
 
-def _check_ratio(size_1: Array, size_2: Array, kernel_size: float) -> None:
+def _check_ratio(size_1: Floats, size_2: Floats, kernel_size: float) -> None:
     small, large = np.minimum(size_1, size_2), np.maximum(size_1, size_2)
     beyond = small * kernel_size < large * (1.0 - 1e-9)
     if beyond.any():

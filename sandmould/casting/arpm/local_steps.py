@@ -10,19 +10,30 @@ where each keeps its own stable step. The paper leaves this for later (section 4
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange, set_num_threads
-from numpy.typing import NDArray
+from numba import prange, set_num_threads
 
+from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.exchange import Exchange
-from sandmould.casting.arpm.marching import STEP_SHARE, Heat, Substance
+from sandmould.casting.arpm.marching import STEP_SHARE, Heat, HeatSystem, Substance
 from sandmould.casting.arpm.material import temperature_of
+from sandmould.compiled import njit
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 MOST_LEVELS = 8
+
+
+class Levels(NamedTuple):
+    """Which elements step how often: at level k every 2^k of the shortest steps."""
+
+    end: Ints
+    """(levels,) int64: elements of a level and of those below come before it."""
+    own: Ints
+    """(n,) int64: level of each element, rising."""
+    slowest: Ints
+    fastest: Ints
+    """(n,) int64: highest and lowest level among an element and its neighbours."""
 
 
 class LocalSteps:
@@ -58,47 +69,46 @@ class LocalSteps:
         self.volume_m3 = exchange.volume_m3
         self.step_s = self._shortest_s * 2.0 ** int(level.max())
 
-    def _sort(self, exchange: Exchange, substance: Substance, level: Indices) -> None:
+    def _sort(self, exchange: Exchange, substance: Substance, level: Ints) -> None:
         """Bring everything into the order of levels: those who end a step are always the first."""
         order = self._order
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         count = np.diff(exchange.start)[order]
-        self._start = np.concatenate([[0], np.cumsum(count)])
-        entry = np.repeat(exchange.start[:-1][order] - self._start[:-1], count)
+        start = np.concatenate([[0], np.cumsum(count)])
+        entry = np.repeat(exchange.start[:-1][order] - start[:-1], count)
         entry += np.arange(len(entry))
-        self._neighbour = back[exchange.neighbour[entry]].astype(np.int32)
-        self._rate = exchange.rate_w_m3_k[entry]
-        self._material, self._table = substance.material[order], substance.table
-        self._level = level
-        self._end = np.searchsorted(level, np.arange(int(level.max()) + 1), side="right")
+        neighbour = back[exchange.neighbour[entry]].astype(np.int32)
+        self._system = HeatSystem(
+            start, neighbour, exchange.rate_w_m3_k[entry], substance.material[order],
+            substance.table.rows, substance.table.reference_k,
+        )  # fmt: skip
+        end = np.searchsorted(level, np.arange(int(level.max()) + 1), side="right")
         row = np.repeat(np.arange(len(level)), count)
-        self._slowest_beside, self._fastest_beside = level.copy(), level.copy()
-        np.maximum.at(self._slowest_beside, row, level[self._neighbour])
-        np.minimum.at(self._fastest_beside, row, level[self._neighbour])
+        slowest, fastest = level.copy(), level.copy()
+        np.maximum.at(slowest, row, level[neighbour])
+        np.minimum.at(fastest, row, level[neighbour])
+        self._levels = Levels(end, level, slowest, fastest)
 
     def advance(self, heat: Heat, duration_s: float) -> None:
         """Take whole cycles of the slowest elements' step over a duration."""
-        levels = len(self._end)
-        while levels > 1 and self._shortest_s * 2.0 ** (levels - 1) > duration_s:
-            levels -= 1
-        substeps = 2 ** (levels - 1)
+        count = len(self._levels.end)
+        while count > 1 and self._shortest_s * 2.0 ** (count - 1) > duration_s:
+            count -= 1
+        substeps = 2 ** (count - 1)
         cycles = max(1, math.ceil(duration_s / (self._shortest_s * substeps) * (1.0 - 1e-12)))
-        end = self._end[:levels].copy()
+        end = self._levels.end[:count].copy()
         end[-1] = len(self._order)
-        top = levels - 1
+        top = count - 1
+        levels = Levels(end, *(np.minimum(level, top) for level in self._levels[1:]))
         enthalpy, temperature, frozen = (
             values[self._order]
             for values in (heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s)
         )
         set_num_threads(self._threads)
         _local_steps(
-            cycles, duration_s / (cycles * substeps), heat.time_s, end,
-            np.minimum(self._level, top), np.minimum(self._slowest_beside, top),
-            np.minimum(self._fastest_beside, top),
-            self._start, self._neighbour, self._rate,
-            self._material, self._table.rows, self._table.reference_k,
-            enthalpy, temperature, frozen,
+            cycles, duration_s / (cycles * substeps), heat.time_s, levels, self._system, enthalpy,
+            temperature, frozen,
         )  # fmt: skip
         heat.enthalpy_j_m3[self._order] = enthalpy
         heat.temperature_k[self._order] = temperature
@@ -108,13 +118,14 @@ class LocalSteps:
         heat.element_steps += cycles * int((of_level * 2 ** np.arange(top, -1, -1)).sum())
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _update(
-    ending: int, at: int, dt: float, time_s: float, level: Any, fastest: Any, start: Any,
-    neighbour: Any, rate: Any, material: Any, rows: Any, reference: float, integral: Any,
-    enthalpy: Any, temperature: Any, frozen: Any, new: Any,
+    ending: int, at: int, dt: float, time_s: float, levels: Levels, system: HeatSystem,
+    integral: Floats, enthalpy: Floats, temperature: Floats, frozen: Floats, new: Floats,
 ) -> None:  # fmt: skip
     """End the steps of the first elements: new enthalpies, and temperatures into ``new``."""
+    start, neighbour, rate, material, rows, reference = system
+    level, fastest = levels.own, levels.fastest
     for i in prange(ending):
         own_level = level[i]
         own_dt = dt * (1 << own_level)
@@ -140,10 +151,18 @@ def _update(
             frozen[i] = time_s + at * dt - (1.0 - share) * own_dt
 
 
-@njit(cache=True, parallel=True)
-def _keep(ending: int, at: int, dt: float, level: Any, slowest: Any, integral: Any,
-          temperature: Any, new: Any) -> None:  # fmt: skip
+@njit(parallel=True)
+def _integrate(
+    ending: int,
+    at: int,
+    dt: float,
+    levels: Levels,
+    integral: Floats,
+    temperature: Floats,
+    new: Floats,
+) -> None:
     """Add ended steps to the integrals that slower neighbours read, and take new temperatures."""
+    level, slowest = levels.own, levels.slowest
     for i in prange(ending):
         for k in range(level[i] + 1, slowest[i] + 1):
             if at % (1 << k) == 0:
@@ -153,13 +172,13 @@ def _keep(ending: int, at: int, dt: float, level: Any, slowest: Any, integral: A
         temperature[i] = new[i]
 
 
-@njit(cache=True)
+@njit()
 def _local_steps(
-    cycles: int, dt: float, time_s: float, end: Any, level: Any, slowest: Any, fastest: Any,
-    start: Any, neighbour: Any, rate: Any, material: Any, rows: Any, reference: float,
-    enthalpy: Any, temperature: Any, frozen: Any,
+    cycles: int, dt: float, time_s: float, levels: Levels, system: HeatSystem, enthalpy: Floats,
+    temperature: Floats, frozen: Floats,
 ) -> None:  # fmt: skip
     """Take cycles of 2^(levels - 1) of the shortest steps."""
+    end = levels.end
     substeps = 1 << (len(end) - 1)
     integral, new = np.zeros((len(enthalpy), len(end))), np.empty(len(enthalpy))
     for at in range(1, cycles * substeps + 1):
@@ -167,6 +186,6 @@ def _local_steps(
         while highest < len(end) - 1 and at % (1 << (highest + 1)) == 0:
             highest += 1
         ending = end[highest]
-        _update(ending, at, dt, time_s, level, fastest, start, neighbour, rate, material, rows,
-                reference, integral, enthalpy, temperature, frozen, new)  # fmt: skip
-        _keep(ending, at, dt, level, slowest, integral, temperature, new)
+        _update(ending, at, dt, time_s, levels, system, integral, enthalpy, temperature, frozen,
+                new)  # fmt: skip
+        _integrate(ending, at, dt, levels, integral, temperature, new)

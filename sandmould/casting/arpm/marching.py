@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit, prange, set_num_threads
+from numba import prange, set_num_threads
 from numpy.typing import NDArray
 
+from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.exchange import Exchange
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
+from sandmould.compiled import njit
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 STEP_SHARE = 0.95
 """Of the longest stable step, taken by default."""
 
@@ -23,11 +23,11 @@ STEP_SHARE = 0.95
 class Heat:
     """What changes while elements cool."""
 
-    enthalpy_j_m3: Array
+    enthalpy_j_m3: Floats
     """(n,) float64, J/m3."""
-    temperature_k: Array
+    temperature_k: Floats
     """(n,) float64, K."""
-    frozen_s: Array
+    frozen_s: Floats
     """(n,) float64, s: when each fell below its solidus; NaN before, and where nothing melts."""
     time_s: float = 0.0
     element_steps: int = 0
@@ -38,19 +38,45 @@ class Heat:
 class Substance:
     """Of what the elements are made, as compiled code wants it."""
 
-    material: Indices
+    material: Ints
     """(n,) int64."""
     table: EnthalpyTable
 
     @property
-    def capacity_j_m3_k(self) -> Array:
+    def capacity_j_m3_k(self) -> Floats:
         """Heat capacity without latent heat, (n,) float64, J/m3/K."""
         return self.table.rows[self.material, 0]
 
-    def heat_at(self, temperature_k: Array) -> Heat:
+    def heat_at(self, temperature_k: Floats) -> Heat:
         """Heat of elements at temperatures, (n,) float64, K."""
         enthalpy = self.table.enthalpy_j_m3(temperature_k, self.material)
         return Heat(enthalpy, temperature_k.astype(np.float64), np.full(len(enthalpy), np.nan))
+
+
+class HeatSystem(NamedTuple):
+    """Elements, their exchange and their materials; compiled code takes it."""
+
+    start: Ints
+    neighbour: NDArray[np.int32]
+    rate: Floats
+    """See ``Exchange``."""
+    material: Ints
+    """(n,) int64."""
+    rows: Floats
+    reference: float
+    """See ``EnthalpyTable``."""
+
+
+def heat_system(exchange: Exchange, substance: Substance) -> HeatSystem:
+    """What an exchange and a substance make together."""
+    return HeatSystem(
+        exchange.start,
+        exchange.neighbour,
+        exchange.rate_w_m3_k,
+        substance.material,
+        substance.table.rows,
+        substance.table.reference_k,
+    )
 
 
 class Marching(Protocol):
@@ -58,7 +84,7 @@ class Marching(Protocol):
 
     step_s: float
     """Longest step that it takes."""
-    volume_m3: Array
+    volume_m3: Floats
 
     def advance(self, heat: Heat, duration_s: float) -> None:
         """Change the heat by what a duration does."""
@@ -87,27 +113,25 @@ class ExplicitSteps:
         """
         self.volume_m3 = exchange.volume_m3
         self.step_s = share * float(exchange.limit_s(substance.capacity_j_m3_k).min())
-        self._exchange, self._substance, self._threads = exchange, substance, threads
+        self._system, self._threads = heat_system(exchange, substance), threads
 
     def advance(self, heat: Heat, duration_s: float) -> None:
         """Take equal steps over a duration, none longer than ``step_s``."""
         steps = max(1, math.ceil(duration_s / self.step_s * (1.0 - 1e-12)))
-        x, s = self._exchange, self._substance
         set_num_threads(self._threads)
         heat.temperature_k = _explicit_steps(
-            steps, duration_s / steps, heat.time_s, x.start, x.neighbour, x.rate_w_m3_k,
-            s.material, s.table.rows, s.table.reference_k,
+            steps, duration_s / steps, heat.time_s, self._system,
             heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s,
         )  # fmt: skip
         heat.time_s += duration_s
-        heat.element_steps += steps * len(s.material)
+        heat.element_steps += steps * len(self._system.material)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _explicit_steps(
-    steps: int, dt: float, time_s: float, start: Any, neighbour: Any, rate: Any,
-    material: Any, rows: Any, reference: float, enthalpy: Any, temperature: Any, frozen: Any,
-) -> Any:  # fmt: skip
+    steps: int, dt: float, time_s: float, system: HeatSystem, enthalpy: Floats, temperature: Floats,
+    frozen: Floats,
+) -> Floats:  # fmt: skip
     """Take explicit steps; enthalpy and freezing times change in place.
 
     Every element sums over its own neighbours in their order, so that the result does not depend
@@ -118,6 +142,7 @@ def _explicit_steps(
     (n,) float64, K
         The new temperatures.
     """
+    start, neighbour, rate, material, rows, reference = system
     n = len(enthalpy)
     now, then = temperature.copy(), np.empty(n)
     for step in range(steps):

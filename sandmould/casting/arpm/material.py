@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from sandmould.arrays import Floats, Ints
+from sandmould.compiled import njit
 
 
 @dataclass(frozen=True)
-class Material:
+class ThermalMaterial:
     """Constant properties; between solidus and liquidus the latent heat goes linearly.
 
     Raises
@@ -71,10 +69,10 @@ class EnthalpyTable:
 
     reference_k: float
     """Where the enthalpy is 0."""
-    rows: Array
+    rows: Floats
     """(m, 5) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K."""
 
-    def enthalpy_j_m3(self, temperature_k: Array, material: Indices) -> Array:
+    def enthalpy_j_m3(self, temperature_k: Floats, material: Ints) -> Floats:
         """Enthalpy of elements; one on an isothermal front (solidus = liquidus) is liquid.
 
         Parameters
@@ -96,12 +94,12 @@ class EnthalpyTable:
             above = liquid + capacity * (temperature_k - liquidus)
         return np.where(liquids, above, np.where(melting, mushy, below))
 
-    def temperature_k(self, enthalpy_j_m3: Array, material: Indices) -> Array:
+    def temperature_k(self, enthalpy_j_m3: Floats, material: Ints) -> Floats:
         """Temperature of elements, (n,) float64, K; the inverse of ``enthalpy_j_m3``."""
         return np.asarray(_temperatures(enthalpy_j_m3, material, self.rows, self.reference_k))
 
 
-def enthalpy_table(materials: Sequence[Material], reference_k: float) -> EnthalpyTable:
+def enthalpy_table(materials: Sequence[ThermalMaterial], reference_k: float) -> EnthalpyTable:
     """Tabulate materials.
 
     Parameters
@@ -121,7 +119,7 @@ def enthalpy_table(materials: Sequence[Material], reference_k: float) -> Enthalp
     return EnthalpyTable(reference_k, np.array(rows, dtype=np.float64))
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     """Temperature (K) of an enthalpy (J/m3) of material m; compiled code takes it in."""
     if enthalpy < rows[m, 1]:
@@ -132,7 +130,7 @@ def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     return rows[m, 4] + (enthalpy - rows[m, 2]) / rows[m, 0]
 
 
-@njit(cache=True)
+@njit()
 def _temperatures(enthalpy: Any, material: Any, rows: Any, reference: float) -> Any:
     found = np.empty(len(enthalpy))
     for i in range(len(enthalpy)):

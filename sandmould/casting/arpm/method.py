@@ -23,7 +23,7 @@ STEPS = {"explicit": ExplicitSteps, "super": SuperSteps, "local": LocalSteps}
 
 
 @dataclass(frozen=True)
-class Method:
+class HeatMethod:
     """One way to compute a casting."""
 
     exchange: Exchanging = "faces"

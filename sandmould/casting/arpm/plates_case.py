@@ -13,20 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sandmould import ROOT
+from sandmould.arrays import Floats
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling
-from sandmould.casting.arpm.material import Material
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.material import ThermalMaterial
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster, painted
-from sandmould.casting.arpm.solidification import Progress, Solidification, solidify
+from sandmould.casting.arpm.solidification import CoolingProgress, SolidificationResult, solidify
 from sandmould.scenario.casting_shapes import FourPlates
 from sandmould.scenario.outline import Outline
 from sandmould.scenario.reading import Origin, merge, read_yaml
 
-Array = NDArray[np.float64]
 MATERIALS = ROOT / "config" / "materials" / "hirata_2019.yaml"
 ALUMINIUM = ROOT / "config" / "materials" / "hirata_2019_aluminium.yaml"
 SCENARIO = ROOT / "config" / "scenarios" / "plates.yaml"
@@ -67,7 +66,7 @@ class Plates:
         return FourPlates(reach_m=self.reach_m, thickness_m=self.thickness_m).solid
 
     @property
-    def probes_m(self) -> dict[str, Array]:
+    def probes_m(self) -> dict[str, Floats]:
         """Points A to D half a thickness from the tips, and E in the centre: a stand-in."""
         up, right, down, left = (self.reach_m - 0.5 * t for t in self.thickness_m)
         places = {"A": (0.0, up), "B": (right, 0.0), "C": (0.0, -down), "D": (-left, 0.0),
@@ -84,7 +83,7 @@ def read_plates() -> Plates:
     """The case of section 4 from its files."""
     values, scenario = read_values(MATERIALS), read_values(SCENARIO)["scenario"]
     (plates,), box, initial = scenario["shapes"], scenario["box"], values["initial_k"]
-    materials = tuple(Material(**values[name]) for name in ("mould", "casting"))
+    materials = tuple(ThermalMaterial(**values[name]) for name in ("mould", "casting"))
     filling = Filling(
         materials, (initial["mould"], initial["casting"]), 1.0 / values["heat_transfer_w_m2_k"]
     )
@@ -92,9 +91,9 @@ def read_plates() -> Plates:
     return Plates(filling, box_m, plates["reach_m"], tuple(plates["thickness_m"]))
 
 
-def read_aluminium() -> Material:
+def read_aluminium() -> ThermalMaterial:
     """The metal of the contact test of section 3."""
-    return Material(**read_values(ALUMINIUM))
+    return ThermalMaterial(**read_values(ALUMINIUM))
 
 
 @dataclass(frozen=True)
@@ -102,7 +101,7 @@ class PlatesRun:
     """A layout of the plates and what it found."""
 
     elements: Elements
-    found: Solidification
+    found: SolidificationResult
     steps_s: float
     """Longest time step."""
 
@@ -135,9 +134,9 @@ def plates_layout(plates: Plates, case: str, size_m: float = SMALL_M) -> tuple[R
     return raster, placed(raster, LAYERS[case])
 
 
-def run_plates(plates: Plates, case: str, method: Method, size_m: float = SMALL_M,
+def run_plates(plates: Plates, case: str, method: HeatMethod, size_m: float = SMALL_M,
                record_s: float = 5.0, until_s: float = 20_000.0,
-               progress: Callable[[Progress], None] | None = None) -> PlatesRun:  # fmt: skip
+               progress: Callable[[CoolingProgress], None] | None = None) -> PlatesRun:  # fmt: skip
     """Solidify a case; arguments as those of ``plates_layout`` and ``solidify``."""
     raster, elements = plates_layout(plates, case, size_m)
     marching = method.marching(elements, plates.filling, raster)
@@ -147,7 +146,7 @@ def run_plates(plates: Plates, case: str, method: Method, size_m: float = SMALL_
     return PlatesRun(elements, found, marching.step_s)
 
 
-def curve_error_percent(plates: Plates, found: Solidification, reference: Solidification
+def curve_error_percent(plates: Plates, found: SolidificationResult, reference: SolidificationResult
                         ) -> dict[str, tuple[float, float]]:  # fmt: skip
     """Error (7) of each cooling curve, and its largest value, % of the initial difference.
 
@@ -156,7 +155,7 @@ def curve_error_percent(plates: Plates, found: Solidification, reference: Solidi
     Parameters
     ----------
     plates : Plates
-    found, reference : Solidification
+    found, reference : SolidificationResult
         Recorded at the same times; the shorter one counts, up to 2000 s.
 
     Returns
@@ -184,6 +183,6 @@ def curve_error_percent(plates: Plates, found: Solidification, reference: Solidi
     }
 
 
-def _differences(found: Mapping[str, Array], reference: Mapping[str, Array], k: int
-                 ) -> dict[str, Array]:  # fmt: skip
+def _differences(found: Mapping[str, Floats], reference: Mapping[str, Floats], k: int
+                 ) -> dict[str, Floats]:  # fmt: skip
     return {name: np.abs(found[name][:k] - reference[name][:k]) for name in found}

@@ -9,21 +9,19 @@ Journal on Computing 16 (1987) 78-96: the diagram is the lower hull of points li
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.exchange import Exchange, check_resistance
 from sandmould.casting.arpm.faces import over_faces
 from sandmould.casting.arpm.kernel import with_images
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 REACH = 3.0
 """Sizes within which images stand behind the walls."""
 
 
-def power_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2k_w: float
+def power_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float
                    ) -> Exchange:  # fmt: skip
     """Rates over the faces of a power diagram with weights (r0/2)^2.
 
@@ -67,7 +65,7 @@ def power_exchange(elements: Elements, conductivity_w_m_k: Array, resistance_m2k
     return over_faces(one[once], two[once], np.asarray(length / path)[once], volume)
 
 
-def _edges(elements: Elements) -> tuple[Indices, Indices, Array, Array, Array]:
+def _edges(elements: Elements) -> tuple[Ints, Ints, Floats, Floats, Floats]:
     """Faces of real elements: own, other, length, distance of own to it, distance of centres.
 
     Others from n on are images behind the walls.

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
+from sandmould.arrays import Floats
 from sandmould.casting.arpm.elements import Elements
 
-Array = NDArray[np.float64]
 REACH = 1.6
 """Of the nearest element's size: at least the elements all round a point, corners included."""
 
 
-def probe_weights(elements: Elements, probes_m: Mapping[str, Array]) -> csr_array:
+def probe_weights(elements: Elements, probes_m: Mapping[str, Floats]) -> csr_array:
     """Weights of the elements round each point that give a linear temperature exactly.
 
     Moving least squares over elements of the material that the point is in (Lancaster and
@@ -55,7 +54,7 @@ def probe_weights(elements: Elements, probes_m: Mapping[str, Array]) -> csr_arra
     return csr_array((values, (rows, columns)), (len(probes_m), len(elements.size_m)))
 
 
-def _weights(elements: Elements, tree: cKDTree, place: Array) -> tuple[Array, Array]:
+def _weights(elements: Elements, tree: cKDTree, place: Floats) -> tuple[Floats, Floats]:
     owner = _owner(elements, tree, place)
     own_size = elements.size_m[owner]
     near = np.array(tree.query_ball_point(place, REACH * 1.5 * own_size))
@@ -69,7 +68,7 @@ def _weights(elements: Elements, tree: cKDTree, place: Array) -> tuple[Array, Ar
     return near, np.linalg.pinv(basis * root, rcond=1e-9)[0] * root[:, 0]
 
 
-def _owner(elements: Elements, tree: cKDTree, place: Array) -> int:
+def _owner(elements: Elements, tree: cKDTree, place: Floats) -> int:
     """The element whose square or cube holds a point, or the nearest centre."""
     near = tree.query(place, k=min(16, len(elements.size_m)))[1].reshape(-1)
     beyond = np.abs(elements.position_m[near] - place).max(axis=1) / elements.size_m[near]

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Flags, Floats, Ints
 from sandmould.scenario.casting_shapes import Body
 
-Array = NDArray[np.float64]
 MOULD = 0
 """Material of all that is not painted."""
 
@@ -25,10 +24,10 @@ class Raster:
         When it is neither 2D nor 3D, empty, or its cells have no size.
     """
 
-    material: NDArray[np.int64]
+    material: Ints
     """(nx, ny) or (nx, ny, nz) int64."""
     cell_m: float
-    low_m: Array
+    low_m: Floats
     """(d,) float64, m: the grid's corner."""
 
     def __post_init__(self) -> None:
@@ -43,7 +42,7 @@ class Raster:
             raise ValueError(f"low_m is {self.low_m}; a {self.material.ndim}D grid needs as many")
 
     @property
-    def centre_m(self) -> Array:
+    def centre_m(self) -> Floats:
         """Centres of the cells in C order, (n, d) float64, m."""
         axes = [
             low + (np.arange(n) + 0.5) * self.cell_m
@@ -52,7 +51,7 @@ class Raster:
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
-def painted(low_m: Array, high_m: Array, cell_m: float, solids: Mapping[int, Body]) -> Raster:
+def painted(low_m: Floats, high_m: Floats, cell_m: float, solids: Mapping[int, Body]) -> Raster:
     """Paint solids into a box of mould; a cell is a solid's where its centre is inside.
 
     Parameters
@@ -96,7 +95,7 @@ def painted(low_m: Array, high_m: Array, cell_m: float, solids: Mapping[int, Bod
     return raster
 
 
-def _inside(solid: Body, position_m: Array) -> NDArray[np.bool_]:
+def _inside(solid: Body, position_m: Floats) -> Flags:
     """Which points a solid holds; only those among its corners are measured, which costs."""
     corners = solid.corners()
     low_m, high_m = corners.min(axis=0), corners.max(axis=0)

@@ -12,8 +12,8 @@ import numpy as np
 
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling, check_casting
-from sandmould.casting.arpm.material import Material
-from sandmould.casting.arpm.method import Method
+from sandmould.casting.arpm.material import ThermalMaterial
+from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.super_steps import STAGES
 from sandmould.scenario.bad_input import BadInputError, Problem
@@ -68,16 +68,16 @@ def elements_of(scenario: Solidification) -> Elements:
 
 def filling_of(scenario: Solidification) -> Filling:
     """Materials: the mould, then the metal."""
-    mould = Material(**scenario.mould.model_dump())
-    metal = Material(**scenario.casting.model_dump())
+    mould = ThermalMaterial(**scenario.mould.model_dump())
+    metal = ThermalMaterial(**scenario.casting.model_dump())
     transfer = scenario.heat_transfer_w_m2_k
     initial_k = (scenario.initial_k.mould, scenario.initial_k.casting)
     return Filling((mould, metal), initial_k, 1.0 / transfer if transfer else 0.0)
 
 
-def method_of(scenario: Solidification) -> Method:
+def method_of(scenario: Solidification) -> HeatMethod:
     """How elements exchange heat and go forward in time."""
-    return Method(
+    return HeatMethod(
         scenario.exchange, scenario.stepping, scenario.kernel_size, scenario.refuse_ratio,
         step_share=scenario.step_share, threads=scenario.threads,
     )  # fmt: skip

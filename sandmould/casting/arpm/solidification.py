@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from sandmould.arrays import Floats
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.filling import Filling, check_casting
 from sandmould.casting.arpm.marching import Heat, Marching
 from sandmould.casting.arpm.probes import probe_weights
 
-Array = NDArray[np.float64]
 OUTSIDE = 0.05
 """Of the range of initial temperatures: farther out no stable step leads."""
 
@@ -27,7 +26,7 @@ class UnstableError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Progress:
+class CoolingProgress:
     """How far a run is."""
 
     time_s: float
@@ -38,14 +37,14 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class Solidification:
+class SolidificationResult:
     """What a run found."""
 
-    time_s: Array
+    time_s: Floats
     """(k,) float64, s: of the records, from 0 on."""
-    probe_k: dict[str, Array]
+    probe_k: dict[str, Floats]
     """Cooling curve of each probe, (k,) float64, K."""
-    enthalpy_j: Array
+    enthalpy_j: Floats
     """(k,) float64, J, or J/m in 2D: of all elements, from the coldest initial temperature."""
     heat: Heat
     """At the end."""
@@ -56,7 +55,7 @@ class Solidification:
     wall_s: float
 
     @property
-    def drift_percent(self) -> Array:
+    def drift_percent(self) -> Floats:
         """Change of the total enthalpy over the first, (k,) float64, %: Fig. 14."""
         return np.asarray(100.0 * (self.enthalpy_j / self.enthalpy_j[0] - 1.0))
 
@@ -67,7 +66,7 @@ class Cooling:
 
     heat: Heat
     time_s: list[float]
-    probe_k: list[Array]
+    probe_k: list[Floats]
     """One (probes,) float64 a record, K."""
     enthalpy_j: list[float]
     cpu_s: float = 0.0
@@ -97,13 +96,13 @@ def solidify(
     elements: Elements,
     filling: Filling,
     marching: Marching,
-    probes_m: Mapping[str, Array] | None = None,
+    probes_m: Mapping[str, Floats] | None = None,
     record_s: float = 5.0,
     until_s: float = 20_000.0,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[CoolingProgress], None] | None = None,
     start: Cooling | None = None,
     keep: Callable[[Cooling], None] | None = None,
-) -> Solidification:
+) -> SolidificationResult:
     """Cool a casting until all of it is below its solidus.
 
     Parameters
@@ -158,10 +157,10 @@ def solidify(
         if progress:
             share = max(volume[frozen].sum() / volume.sum(), target_s / until_s)
             rate = heat.element_steps / now.wall_s
-            progress(Progress(target_s, 100.0 * float(share), rate, heat.element_steps))
+            progress(CoolingProgress(target_s, 100.0 * float(share), rate, heat.element_steps))
         if keep:
             keep(now)
-    return Solidification(
+    return SolidificationResult(
         np.array(now.time_s),
         dict(zip(probes_m or {}, np.array(now.probe_k).T, strict=True)),
         np.array(now.enthalpy_j),

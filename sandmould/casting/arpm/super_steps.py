@@ -7,22 +7,27 @@ Meyer, Balsara and Aslam, Journal of Computational Physics 257 (2014) 594-626: s
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numba import njit, prange, set_num_threads
-from numpy.typing import NDArray
+from numba import prange, set_num_threads
 
+from sandmould.arrays import Floats
 from sandmould.casting.arpm.exchange import Exchange
-from sandmould.casting.arpm.marching import STEP_SHARE, Heat, Substance
+from sandmould.casting.arpm.marching import (
+    STEP_SHARE,
+    Heat,
+    HeatSystem,
+    Substance,
+    heat_system,
+)
 from sandmould.casting.arpm.material import temperature_of
+from sandmould.compiled import njit
 
-Array = NDArray[np.float64]
 STAGES = 9
 """Odd numbers damp better (Meyer et al., section 2)."""
 
 
-def stage_weights(stages: int) -> Array:
+def stage_weights(stages: int) -> Floats:
     """Coefficients of the stages.
 
     Parameters
@@ -82,7 +87,7 @@ class SuperSteps:
         self._explicit_s = share * float(exchange.limit_s(substance.capacity_j_m3_k).min())
         self._most_stages = len(stage_weights(stages))
         self.step_s = self._explicit_s * _gain(stages)
-        self._exchange, self._substance, self._threads = exchange, substance, threads
+        self._system, self._threads = heat_system(exchange, substance), threads
 
     def advance(self, heat: Heat, duration_s: float) -> None:
         """Take equal super steps over a duration, each of no more stages than it needs."""
@@ -93,15 +98,13 @@ class SuperSteps:
         ):
             stages += 1
         weights = stage_weights(stages)
-        x, s = self._exchange, self._substance
         set_num_threads(self._threads)
         heat.enthalpy_j_m3 = _super_steps(
-            steps, duration_s / steps, heat.time_s, weights,
-            x.start, x.neighbour, x.rate_w_m3_k, s.material, s.table.rows, s.table.reference_k,
+            steps, duration_s / steps, heat.time_s, weights, self._system,
             heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s,
         )  # fmt: skip
         heat.time_s += duration_s
-        heat.element_steps += steps * stages * len(s.material)
+        heat.element_steps += steps * stages * len(self._system.material)
 
 
 def _gain(stages: int) -> float:
@@ -109,9 +112,10 @@ def _gain(stages: int) -> float:
     return (stages**2 + stages - 2) / 4.0
 
 
-@njit(cache=True, parallel=True)
-def _taken(start: Any, neighbour: Any, rate: Any, temperature: Any, taken: Any) -> None:
+@njit(parallel=True)
+def _taken(system: HeatSystem, temperature: Floats, taken: Floats) -> None:
     """Heat that each element takes up, W/m3, into an array."""
+    start, neighbour, rate = system.start, system.neighbour, system.rate
     for i in prange(len(taken)):
         total = 0.0
         for k in range(start[i], start[i + 1]):
@@ -119,12 +123,13 @@ def _taken(start: Any, neighbour: Any, rate: Any, temperature: Any, taken: Any) 
         taken[i] = total
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _stage(
-    weights: Any, dt: float, begin: Any, at_begin: Any, last: Any, older: Any, taken: Any,
-    material: Any, rows: Any, reference: float, temperature: Any,
+    weights: Floats, dt: float, begin: Floats, at_begin: Floats, last: Floats, older: Floats,
+    taken: Floats, system: HeatSystem, temperature: Floats,
 ) -> None:  # fmt: skip
     """Stage j from the two before; the older one's array takes the new enthalpy."""
+    material, rows, reference = system.material, system.rows, system.reference
     mu, nu, rise, rise_0 = weights[0], weights[1], weights[2] * dt, weights[3] * dt
     for i in prange(len(begin)):
         new = mu * last[i] + nu * older[i] + (1.0 - mu - nu) * begin[i]
@@ -132,26 +137,25 @@ def _stage(
         temperature[i] = temperature_of(older[i], material[i], rows, reference)
 
 
-@njit(cache=True)
+@njit()
 def _super_steps(
-    steps: int, dt: float, time_s: float, weights: Any, start: Any, neighbour: Any, rate: Any,
-    material: Any, rows: Any, reference: float, enthalpy: Any, temperature: Any, frozen: Any,
-) -> Any:  # fmt: skip
+    steps: int, dt: float, time_s: float, weights: Floats, system: HeatSystem, enthalpy: Floats,
+    temperature: Floats, frozen: Floats,
+) -> Floats:  # fmt: skip
     """Take super steps; temperatures and freezing times change in place, enthalpy comes back."""
+    material, rows = system.material, system.rows
     n = len(enthalpy)
     begin, last, older = enthalpy.copy(), np.empty(n), np.empty(n)
     at_begin, taken = np.empty(n), np.empty(n)
     for step in range(steps):
-        _taken(start, neighbour, rate, temperature, at_begin)
+        _taken(system, temperature, at_begin)
         older[:] = begin
         last[:] = begin
-        _stage(weights[0], dt, begin, at_begin, last, older, at_begin, material, rows, reference,
-               temperature)  # fmt: skip
+        _stage(weights[0], dt, begin, at_begin, last, older, at_begin, system, temperature)
         last, older = older, last
         for j in range(1, len(weights)):
-            _taken(start, neighbour, rate, temperature, taken)
-            _stage(weights[j], dt, begin, at_begin, last, older, taken, material, rows, reference,
-                   temperature)  # fmt: skip
+            _taken(system, temperature, taken)
+            _stage(weights[j], dt, begin, at_begin, last, older, taken, system, temperature)
             last, older = older, last
         for i in range(n):
             solid = rows[material[i], 1]

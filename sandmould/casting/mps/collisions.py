@@ -8,12 +8,12 @@ collide as rigid balls do, with little restitution (Lee, Park, Kim and Hwang 201
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.operators import approach
 from sandmould.casting.mps.particles import FLUID, Floats, Kinds
 from sandmould.casting.mps.weight import OPTIONS
+from sandmould.compiled import njit
 
 
 @njit(**OPTIONS)

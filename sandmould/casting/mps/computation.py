@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import math
 import time
 from dataclasses import dataclass
@@ -12,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from sandmould.casting.checkpoint import Checkpoint
-from sandmould.casting.hashing import hash_with
 from sandmould.casting.mps import scene
-from sandmould.casting.mps.flow import EscapedError, Flow
-from sandmould.casting.mps.flow import Progress as Flowed
+from sandmould.casting.mps.flow import EscapedError, Flow, FlowProgress
 from sandmould.casting.mps.pressure import ClosedRegionError
-from sandmould.casting.mps.record import OF_FLUID, Record
+from sandmould.casting.mps.record import OF_FLUID, FlowRecord
+from sandmould.digest import sources_digest
+from sandmould.runs.checkpoint_file import CheckpointFile
+from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, peak_memory_bytes
 from sandmould.runs.progress import Progress
@@ -55,12 +54,12 @@ def source_files() -> list[Path]:
 
 def source_hash() -> str:
     """State of the solver, which stands in place of a version."""
-    return hashlib.sha256(b"".join(f.read_bytes() for f in source_files())).hexdigest()[:12]
+    return sources_digest(source_files())
 
 
 def computed_hash(scenario: MetalFlow) -> str:
     """Hash of scenario and solver."""
-    return hash_with(scenario, source_hash())
+    return solution_hash(scenario, source_hash())
 
 
 def no_cost(scenario: MetalFlow) -> FlowCost:
@@ -90,16 +89,16 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)
     begun, cost = time.monotonic(), no_cost(scenario)
-    shown = Progress(run, work, scene.expected_work(scenario), WORK)
+    progress = Progress(run, work, scene.expected_work(scenario), WORK)
     with contextlib.suppress(ArithmeticError):
         scene.open_flow(scenario).step()  # compiled before it is timed
-    course = _Course(scenario, Checkpoint(work / CHECKPOINT, computed_hash(scenario)))
+    course = _Course(scenario, CheckpointFile(work / CHECKPOINT, computed_hash(scenario)))
     flow, outcome, detail = course.flow, Outcome.FINISHED, ""
 
-    def tell(now: Flowed | None = None) -> None:
+    def tell(now: FlowProgress | None = None) -> None:
         done = flow.cost.particle_solves
         rate = done / max(flow.cost.wall_s, 1e-9)
-        shown.show(course.stage, flow.time_s, done, rate, last=now is None)
+        progress.show(course.stage, flow.time_s, done, rate, last=now is None)
 
     try:
         flow.advance(scenario.duration_s, course, tell)
@@ -122,16 +121,16 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
 class _Course:
     """A run on its way: what flows, pours and is noted; call it after every step."""
 
-    def __init__(self, scenario: MetalFlow, checkpoint: Checkpoint) -> None:
+    def __init__(self, scenario: MetalFlow, checkpoint: CheckpointFile) -> None:
         self.flow = scene.open_flow(scenario)
         self._ladle = scene.ladle_of(scenario, self.flow)
         up = -np.asarray(self.flow.metal.gravity_m_s2) / scenario.metal.gravity_m_s2
-        self.record = Record(scene.places_of(scenario), scenario.record_s, up)
+        self.record = FlowRecord(scene.places_of(scenario), scenario.record_s, up)
         self._checkpoint = checkpoint
         self._clock_s = {"cpu_s": time.process_time(), "wall_s": time.monotonic()}
         self.before_s = dict.fromkeys(self._clock_s, 0.0)
         """Processor and wall time of the processes that computed this run before."""
-        kept = checkpoint.newest()
+        kept = checkpoint.read()
         if kept is None:
             self.record.frame(self.flow)
             return
@@ -146,7 +145,7 @@ class _Course:
         if self._ladle:
             self._ladle(flow)
         self.record(flow)
-        self._checkpoint.keep(self._arrays)
+        self._checkpoint.write_when_due(self._arrays)
 
     def _arrays(self) -> dict[str, Any]:
         poured = self._ladle.poured if self._ladle else 0

@@ -12,8 +12,8 @@ import numpy as np
 
 from sandmould.casting.mps.collisions import collisions
 from sandmould.casting.mps.neighbours import (
-    Candidates,
     Neighbours,
+    VerletList,
     find_candidates,
     find_neighbours,
     list_is_old,
@@ -26,7 +26,7 @@ from sandmould.casting.mps.operators import (
 )
 from sandmould.casting.mps.particles import Floats, Particles
 from sandmould.casting.mps.pressure import solve_pressure
-from sandmould.casting.mps.scheme import VISCOUS_SHARE, Metal, Scheme
+from sandmould.casting.mps.scheme import VISCOUS_SHARE, LiquidMetal, Scheme
 from sandmould.casting.mps.sources import SOURCES, Tentative
 from sandmould.casting.mps.viscosity import LAPLACIANS
 from sandmould.casting.mps.weight import Kernel
@@ -44,7 +44,7 @@ class EscapedError(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class Guard:
+class FlowGuard:
     """When a run is stopped."""
 
     speed_m_s: float = math.inf
@@ -55,7 +55,7 @@ class Guard:
 
 
 @dataclass
-class Cost:
+class RunningCost:
     """What a run has taken so far."""
 
     steps: int = 0
@@ -71,7 +71,7 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Progress:
+class FlowProgress:
     """Where a run is."""
 
     time_s: float
@@ -93,17 +93,17 @@ class Flow:
         self,
         particles: Particles,
         kernel: Kernel,
-        metal: Metal | None = None,
+        metal: LiquidMetal | None = None,
         scheme: Scheme | None = None,
-        guard: Guard | None = None,
+        guard: FlowGuard | None = None,
     ) -> None:
         """Start at time 0, without pressure; what is not given is the paper's."""
         self.kernel = kernel
-        self.metal = metal or Metal()
+        self.metal = metal or LiquidMetal()
         self.scheme = scheme or Scheme()
-        self.guard = guard or Guard()
+        self.guard = guard or FlowGuard()
         self.time_s = 0.0
-        self.cost = Cost()
+        self.cost = RunningCost()
         self._set(particles)
 
     def _set(self, particles: Particles) -> None:
@@ -113,7 +113,7 @@ class Flow:
         """(n,) float64, Pa: sum over the relaxations of the last step, whose impulse it is."""
         self._solved_pa = np.zeros((self.scheme.relaxations, len(particles.kind)))
         """Of each relaxation of the last step, close to that of the same one in the next."""
-        self._listed: Candidates | None = None
+        self._listed: VerletList | None = None
 
     def pour(self, particles: Particles) -> None:
         """Add particles."""
@@ -134,7 +134,7 @@ class Flow:
         """Go on from what ``arrays`` gave: the rest comes out bit for bit as in one run."""
         self._set(Particles(kept["position_m"], kept["velocity_m_s"], kept["kind"]))
         self.pressure_pa, self.time_s = kept["flow_pressure_pa"], float(kept["time_s"])
-        self.cost = Cost(*(kept[f"cost_{name}"].item() for name in vars(self.cost)))
+        self.cost = RunningCost(*(kept[f"cost_{name}"].item() for name in vars(self.cost)))
         self._solved_pa = kept["solved_pa"]
 
     def speed(self) -> Floats:
@@ -192,7 +192,7 @@ class Flow:
         self,
         until_s: float,
         each: Callable[[Flow], None] | None = None,
-        progress: Callable[[Progress], None] | None = None,
+        progress: Callable[[FlowProgress], None] | None = None,
     ) -> None:
         """Step until a time.
 
@@ -201,7 +201,7 @@ class Flow:
         until_s : float, s
         each : function of the flow
             Called after every step.
-        progress : function of a ``Progress``
+        progress : function of a ``FlowProgress``
             Called after every step.
         """
         begin_s, wall_s, done = self.time_s, self.cost.wall_s, self.cost.particle_solves
@@ -216,7 +216,7 @@ class Flow:
                 share = (self.time_s - begin_s) / (until_s - begin_s)
                 rate = (self.cost.particle_solves - done) / spent_s
                 end_s = spent_s * (1.0 - share) / share
-                progress(Progress(self.time_s, 100.0 * share, rate, end_s))
+                progress(FlowProgress(self.time_s, 100.0 * share, rate, end_s))
 
     def _neighbours(self) -> Neighbours:
         """Neighbours of now; candidates are listed anew when particles moved too far."""

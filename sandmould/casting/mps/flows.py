@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Flags, Floats
 from sandmould.casting.mps.flow import Flow
 from sandmould.casting.mps.particles import (
     FLUID,
     WALL_LAYERS,
-    Floats,
     at_rest,
     lattice,
     mould_around,
 )
-from sandmould.casting.mps.scheme import Metal, Scheme
+from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.weight import make_kernel
 
 COLUMNS = 6
@@ -26,7 +25,7 @@ COLUMNS = 6
 def channel(
     rows: int,
     width_m: float,
-    metal: Metal,
+    metal: LiquidMetal,
     scheme: Scheme,
     upper_m_s: float = 0.0,
 ) -> Flow:
@@ -41,7 +40,7 @@ def channel(
         Of particles across.
     width_m : float, m
         Between the centres of the plates' first layers: rows + 1 particles.
-    metal : Metal
+    metal : LiquidMetal
         Its gravity along x drives a Poiseuille flow.
     scheme : Scheme
     upper_m_s : float, m/s
@@ -49,7 +48,7 @@ def channel(
     """
     size_m = width_m / (rows + 1)
 
-    def is_cavity(place: Floats) -> NDArray[np.bool_]:
+    def is_cavity(place: Floats) -> Flags:
         return np.asarray((place[:, 1] > 0.0) & (place[:, 1] < rows * size_m))
 
     sites = lattice((0, -WALL_LAYERS), (COLUMNS, rows + WALL_LAYERS), size_m)
@@ -109,7 +108,7 @@ def taylor_green(
     size_m = 1.0 / cells
     fluid = at_rest(lattice((0, 0), (cells, cells), size_m), FLUID)
     fluid.velocity_m_s[:] = taylor_green_m_s(fluid.position_m, 0.0, nu, speed_m_s)
-    metal = Metal(1000.0, nu, (0.0, 0.0, 0.0))
+    metal = LiquidMetal(1000.0, nu, (0.0, 0.0, 0.0))
     return Flow(fluid, make_kernel(2, size_m, reach, (1.0, 1.0, 0.0)), metal, scheme)
 
 
@@ -123,7 +122,7 @@ def rotating_patch(cells: int, scheme: Scheme, spin_rad_s: float = 1.0) -> Flow:
     fluid.position_m[:, :2] -= 0.5
     fluid.velocity_m_s[:, 0] = -spin_rad_s * fluid.position_m[:, 1]
     fluid.velocity_m_s[:, 1] = spin_rad_s * fluid.position_m[:, 0]
-    return Flow(fluid, make_kernel(2, size_m), Metal(1000.0, 0.0, (0.0, 0.0, 0.0)), scheme)
+    return Flow(fluid, make_kernel(2, size_m), LiquidMetal(1000.0, 0.0, (0.0, 0.0, 0.0)), scheme)
 
 
 def momentum_m_s(flow: Flow) -> Floats:

@@ -6,21 +6,22 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
+from sandmould.arrays import Floats, Ints
+from sandmould.casting.mps.particles import DUMMY, Kinds
 from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight
+from sandmould.compiled import njit
 
 SKIN = 0.35
 """Over the particle size. Wider lists last longer, and each pass over them costs more."""
 
 
-class Candidates(NamedTuple):
+class VerletList(NamedTuple):
     """Particles that may come within the kernel of each other, both ways round."""
 
-    start: NDArray[np.int64]
+    start: Ints
     """(n + 1,) int64: candidates of particle i are start[i] to start[i + 1]."""
     other: NDArray[np.uint32]
     """(p,) uint32: rising within each row, so that no sum depends on when the list was made."""
@@ -31,7 +32,7 @@ class Candidates(NamedTuple):
 class Neighbours(NamedTuple):
     """Particles within the kernel of fluid and walls at given positions; dummies have none."""
 
-    start: NDArray[np.int64]
+    start: Ints
     """(n + 1,) int64: neighbours of particle i are start[i] to start[i + 1]."""
     other: NDArray[np.uint32]
     """(e,) uint32."""
@@ -44,9 +45,7 @@ class Neighbours(NamedTuple):
 
 
 @njit(**OPTIONS)
-def _both_ways(
-    n: int, pair: NDArray[np.int64], kind: Kinds
-) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+def _both_ways(n: int, pair: Ints, kind: Kinds) -> tuple[Ints, NDArray[np.uint32]]:
     """Rows of candidates from pairs, in rising order; dummies need none of each other."""
     start = np.zeros(n + 1, dtype=np.int64)
     for k in range(len(pair)):
@@ -76,7 +75,7 @@ def _both_ways(
     return start, other
 
 
-def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> Candidates:
+def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> VerletList:
     """List candidates.
 
     Parameters
@@ -96,7 +95,7 @@ def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> Candidat
     reach_m = kernel.reach_m + SKIN * kernel.spacing_m
     pair = tree.query_pairs(reach_m, output_type="ndarray")
     start, other = _both_ways(len(position_m), pair, kind)
-    return Candidates(start, other, position_m.copy())
+    return VerletList(start, other, position_m.copy())
 
 
 @njit(**OPTIONS)
@@ -120,14 +119,14 @@ def _nearest(apart: float, period: float) -> float:
 
 @njit(**OPTIONS)
 def find_neighbours(
-    kernel: Kernel, listed: Candidates, position: Floats, kind: Kinds
+    kernel: Kernel, listed: VerletList, position: Floats, kind: Kinds
 ) -> Neighbours:
     """Pick the neighbours out of the candidates and weigh them.
 
     Parameters
     ----------
     kernel : Kernel
-    listed : Candidates
+    listed : VerletList
         Not old.
     position : (n, 3) float64, m
     kind : (n,) int8
@@ -160,7 +159,7 @@ def find_neighbours(
 
 
 @njit(**OPTIONS)
-def _weigh(kernel: Kernel, start: NDArray[np.int64], distance2: Floats) -> tuple[Floats, Floats]:
+def _weigh(kernel: Kernel, start: Ints, distance2: Floats) -> tuple[Floats, Floats]:
     """Weights over squared distances, and their number densities."""
     weights, share = np.empty(len(distance2)), np.empty(len(distance2))
     for k in range(len(distance2)):

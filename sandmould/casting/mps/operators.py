@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.particles import DUMMY, FLUID, Floats, Kinds
 from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight_slope
+from sandmould.compiled import njit
 
 LEAST, DIFFERENCE, SUM, CORRECTED, PRINTED = range(5)
 GRADIENTS = {
@@ -174,7 +174,7 @@ def _corrected(kernel: Kernel, near: Neighbours, kind: Kinds, gradient: Floats) 
         moment[:, 2, 2] = 1.0
     # where too few neighbours span the space, the uncorrected gradient stays
     moment[np.linalg.det(moment) < SMALLEST_MOMENT] = np.eye(3)
-    return np.linalg.solve(moment, gradient)
+    return np.asarray(np.linalg.solve(moment, gradient), dtype=np.float64)
 
 
 def pressure_gradient(

@@ -12,12 +12,12 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
-from sandmould.casting.mps.particles import Floats
+from sandmould.arrays import Floats, Ints
 from sandmould.casting.mps.weight import INLINED, OPTIONS
+from sandmould.compiled import njit
 
 RELAXATION = 1.5
 MOST_ITERATIONS = 2000
@@ -26,9 +26,9 @@ MOST_ITERATIONS = 2000
 class System(NamedTuple):
     """A symmetric positive matrix of unit diagonal, which is not stored."""
 
-    start: NDArray[np.int64]
+    start: Ints
     """(m + 1,) int64: entries of row q are start[q] to start[q + 1]."""
-    middle: NDArray[np.int64]
+    middle: Ints
     """(m,) int64: where the entries left of the diagonal end and those right of it begin."""
     column: NDArray[np.uint32]
     """(e,) uint32: rising within each row."""

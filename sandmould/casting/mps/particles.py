@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Floats = NDArray[np.float64]
+from sandmould.arrays import Flags, Floats
+
 Kinds = NDArray[np.int8]
 
 FLUID, WALL, DUMMY = 0, 1, 2
@@ -31,7 +32,7 @@ class Particles:
     """(n,) int8: FLUID, WALL or DUMMY."""
 
     @property
-    def fluid(self) -> NDArray[np.bool_]:
+    def fluid(self) -> Flags:
         """(n,) bool."""
         return self.kind == FLUID
 
@@ -70,7 +71,7 @@ def lattice(low: tuple[int, ...], high: tuple[int, ...], spacing_m: float) -> Fl
 
 
 def mould_around(
-    site_m: Floats, is_cavity: Callable[[Floats], NDArray[np.bool_]], spacing_m: float
+    site_m: Floats, is_cavity: Callable[[Floats], Flags], spacing_m: float
 ) -> Particles:
     """Mould particles behind the surface of a cavity.
 

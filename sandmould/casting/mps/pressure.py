@@ -6,18 +6,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from sandmould.arrays import Flags, Floats, Ints
 from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.overrelaxation import System, solve
-from sandmould.casting.mps.particles import DUMMY, Floats, Kinds
+from sandmould.casting.mps.particles import DUMMY, Kinds
 from sandmould.casting.mps.weight import OPTIONS, Kernel
+from sandmould.compiled import njit
 
-Flags = NDArray[np.bool_]
-Numbers = NDArray[np.int64]
+Flags = Flags
+Numbers = Ints
 
 CLOSED_COMPRESSION = 0.1
 """Mean excess of number density in a region without free surface beyond which it is refused: no

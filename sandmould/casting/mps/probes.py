@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Floats, Ints
 from sandmould.casting.mps.flow import Flow
-from sandmould.casting.mps.particles import DUMMY, Floats
+from sandmould.casting.mps.particles import DUMMY
 from sandmould.casting.mps.weight import weight
 
 
@@ -46,7 +46,7 @@ def pressure_nearest(flow: Flow, place_m: Floats) -> Floats:
 
 def window_means(
     time_s: Floats, dt_s: Floats, values: Floats, window_s: float
-) -> tuple[NDArray[np.int64], Floats, Floats]:
+) -> tuple[Ints, Floats, Floats]:
     """Means over windows of time, steps weighted by their length.
 
     Parameters

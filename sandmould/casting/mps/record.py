@@ -19,7 +19,7 @@ OF_FLUID = (
 """Columns of ``series.tsv`` after the time and the probes."""
 
 
-class Record:
+class FlowRecord:
     """Collects what a run leaves; call it after every step."""
 
     def __init__(self, places: Sequence[Floats], every_s: float, up: Floats) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from sandmould.casting.mps.flow import Flow, solves
 from sandmould.casting.mps.particles import Floats
-from sandmould.casting.mps.scheme import VISCOUS_SHARE, Metal, Scheme
+from sandmould.casting.mps.scheme import VISCOUS_SHARE, LiquidMetal, Scheme
 from sandmould.casting.mps.shoulder import (
     POUR_HEIGHT,
     POUR_M_S,
@@ -53,7 +53,7 @@ def open_flow(scenario: MetalFlow) -> Flow:
     case, metal, scheme = scenario.case, scenario.metal, scheme_of(scenario)
     plane = isinstance(case, StillTank)
     gravity = (0.0, -metal.gravity_m_s2, 0.0) if plane else (0.0, 0.0, -metal.gravity_m_s2)
-    liquid = Metal(metal.density_kg_m3, metal.viscosity_m2_s, gravity)
+    liquid = LiquidMetal(metal.density_kg_m3, metal.viscosity_m2_s, gravity)
     if isinstance(case, StillTank):
         return open_tank(scheme, liquid, *cells_of(case), case.particle_m)
     full = case.starts == "full"

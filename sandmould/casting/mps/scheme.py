@@ -14,7 +14,7 @@ VISCOUS_SHARE = 0.2
 
 
 @dataclass(frozen=True)
-class Metal:
+class LiquidMetal:
     """A Newtonian fluid under gravity."""
 
     density_kg_m3: float = 2500.0

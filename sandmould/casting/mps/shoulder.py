@@ -7,19 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sandmould.casting.mps.flow import Cost, Flow, Guard, Progress
+from sandmould.arrays import Flags, Floats
+from sandmould.casting.mps.flow import Flow, FlowGuard, FlowProgress, RunningCost
 from sandmould.casting.mps.particles import (
     FLUID,
     WALL_LAYERS,
-    Floats,
     at_rest,
     lattice,
     mould_around,
 )
 from sandmould.casting.mps.probes import pressure_at
-from sandmould.casting.mps.scheme import Metal, Scheme
+from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.weight import make_kernel
 
 RATE_KG_S = 0.1
@@ -46,7 +45,7 @@ class Casting:
     """Diameter of the lower half."""
     upper_m: float = 0.025
 
-    def holds(self, place_m: Floats, freeboard_m: float = 0.0) -> NDArray[np.bool_]:
+    def holds(self, place_m: Floats, freeboard_m: float = 0.0) -> Flags:
         """Whether points are inside the mould, (n,) bool; the upper half may reach higher."""
         across_m = np.hypot(place_m[:, 0], place_m[:, 1])
         height_m = place_m[:, 2]
@@ -75,7 +74,7 @@ class Casting:
 PAPERS = Casting()
 
 
-def pressure_pa_m(metal: Metal) -> float:
+def pressure_pa_m(metal: LiquidMetal) -> float:
     """Hydrostatic pressure by depth, Pa/m: 4410 Pa at the bottom of 180 mm of aluminium."""
     return metal.density_kg_m3 * float(np.linalg.norm(metal.gravity_m_s2))
 
@@ -84,7 +83,7 @@ def open_shoulder(
     size_m: float,
     scheme: Scheme,
     full: bool,
-    metal: Metal | None = None,
+    metal: LiquidMetal | None = None,
     casting: Casting = PAPERS,
 ) -> Flow:
     """Flow in the mould, full of metal at rest or with a first layer to be poured on.
@@ -95,7 +94,7 @@ def open_shoulder(
         Of the particles; the paper does not give it (2 mm make about 19 700 in the casting).
     scheme : Scheme
     full : bool
-    metal : Metal, optional
+    metal : LiquidMetal, optional
         The paper's unless given; its gravity is along -z.
     casting : Casting
 
@@ -109,7 +108,7 @@ def open_shoulder(
             f"particle size is {size_m} m: at most {casting.upper_m / 4:.4g} m, a quarter of the "
             "bore"
         )
-    metal = metal or Metal(gravity_m_s2=GRAVITY)
+    metal = metal or LiquidMetal(gravity_m_s2=GRAVITY)
     freeboard_m = FREEBOARD * size_m
     walls = mould_around(
         casting.sites(size_m), lambda place: casting.holds(place, freeboard_m), size_m
@@ -120,7 +119,7 @@ def open_shoulder(
     half_m = 0.5 * casting.lower_m + margin_m
     g = float(np.linalg.norm(metal.gravity_m_s2))
     top_m = casting.height_m + freeboard_m
-    guard = Guard(
+    guard = FlowGuard(
         2.0 * math.sqrt(2.0 * g * top_m) + POUR_M_S,
         (-half_m, -half_m, -margin_m),
         (half_m, half_m, top_m + casting.height_m),
@@ -204,7 +203,7 @@ class Poured:
     """Whether that is faster than ``HOP_SPEED_M_S``."""
     stopped: str
     """Why a guard stopped the run, or nothing."""
-    cost: Cost
+    cost: RunningCost
 
 
 def ring_m(radius_m: float, height_m: float) -> Floats:
@@ -220,7 +219,7 @@ def run_shoulder(
     settle_s: float,
     watch_s: float,
     pour: bool = False,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[FlowProgress], None] | None = None,
 ) -> Poured:
     """Run a casting with a shoulder and measure its pressure at the end.
 
@@ -234,7 +233,7 @@ def run_shoulder(
         Over which pressures are averaged.
     pour : bool
         Whether metal is poured, or what is there is watched at rest.
-    progress : function of a ``Progress``, optional
+    progress : function of a ``FlowProgress``, optional
     """
     size_m = flow.kernel.spacing_m
     radius_m = 0.25 * (PAPERS.lower_m + PAPERS.upper_m)

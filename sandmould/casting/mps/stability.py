@@ -10,10 +10,10 @@ from itertools import product
 
 import numpy as np
 
-from sandmould.casting.mps.flow import Cost, Flow, Progress
+from sandmould.casting.mps.flow import Flow, FlowProgress, RunningCost
 from sandmould.casting.mps.particles import Floats
 from sandmould.casting.mps.probes import History, Watch
-from sandmould.casting.mps.scheme import Metal, Scheme
+from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.tank import COLUMNS, ROWS, SPACING_M, open_tank
 from sandmould.casting.mps.weight import Kernel, weight_slope
 
@@ -31,7 +31,7 @@ HOP_PARTICLES = 3.0
 waves of a noisy surface lift whole rows by one or two, a particle three above it has left."""
 
 
-class Verdict(Enum):
+class StabilityRating(Enum):
     """The signs of figure 6."""
 
     EXCELLENT = "excellent"
@@ -47,11 +47,11 @@ class Still:
     """A run of the still fluid."""
 
     scheme: Scheme
-    verdict: Verdict
+    verdict: StabilityRating
     stopped: str
     """Why a guard stopped it, or nothing."""
     history: History
-    cost: Cost
+    cost: RunningCost
 
     @property
     def name(self) -> str:
@@ -87,9 +87,9 @@ def compression_gain(kernel: Kernel) -> float:
     return -total / (kernel.dimension * kernel.lattice_density)
 
 
-def ideal_pa(metal: Metal | None = None) -> Floats:
+def ideal_pa(metal: LiquidMetal | None = None) -> Floats:
     """Hydrostatic pressure at the depths, (3,) float64, Pa: 735, 1225 and 1715."""
-    metal = metal or Metal()
+    metal = metal or LiquidMetal()
     g = float(np.linalg.norm(metal.gravity_m_s2))
     return metal.density_kg_m3 * g * np.array(DEPTHS_M)
 
@@ -101,8 +101,10 @@ def probe_places() -> Floats:
     return np.stack((half, height_m, np.zeros(3)), axis=1)
 
 
-def judge(stopped: str, hops: bool, deviation_pa: float, quiet_pa: float = QUIET_PA) -> Verdict:
-    """Judge a run as the paper's figure 6 does, by numbers its text gives.
+def rate_stability(
+    stopped: str, hops: bool, deviation_pa: float, quiet_pa: float = QUIET_PA
+) -> StabilityRating:
+    """Rate a run as the paper's figure 6 does, by numbers its text gives.
 
     Parameters
     ----------
@@ -114,8 +116,10 @@ def judge(stopped: str, hops: bool, deviation_pa: float, quiet_pa: float = QUIET
     quiet_pa : float, Pa
     """
     if stopped:
-        return Verdict.FAILED
-    return Verdict.EXCELLENT if deviation_pa < quiet_pa and not hops else Verdict.GOOD
+        return StabilityRating.FAILED
+    return (
+        StabilityRating.EXCELLENT if deviation_pa < quiet_pa and not hops else StabilityRating.GOOD
+    )
 
 
 def still_hops(history: History, filled_m: float, spacing_m: float) -> bool:
@@ -127,7 +131,7 @@ def run_still(
     scheme: Scheme,
     duration_s: float = DURATION_S,
     flow: Flow | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[FlowProgress], None] | None = None,
 ) -> Still:
     """Run the still fluid.
 
@@ -137,7 +141,7 @@ def run_still(
     duration_s : float, s
     flow : Flow, optional
         Other metal in the same tank.
-    progress : function of a ``Progress``, optional
+    progress : function of a ``FlowProgress``, optional
 
     Raises
     ------
@@ -156,7 +160,9 @@ def run_still(
     history = watch.history()
     # a run that a guard stops at once has no history
     deviation_pa = math.nan if stopped else float(history.deviation_pa()[-1])
-    verdict = judge(stopped, still_hops(history, ROWS * SPACING_M, SPACING_M), deviation_pa)
+    verdict = rate_stability(
+        stopped, still_hops(history, ROWS * SPACING_M, SPACING_M), deviation_pa
+    )
     return Still(scheme, verdict, stopped, history, flow.cost)
 
 
@@ -181,6 +187,6 @@ def stability_map(
     duration_s: float = DURATION_S,
     base: Scheme | None = None,
 ) -> Iterator[Still]:
-    """Run and judge the full grid of figure 6, one condition after the other."""
+    """Run and rate the full grid of figure 6, one condition after the other."""
     for dt_s, count, share in product(dt_max_s, relaxations, shares):
         yield run_still(_condition(base, dt_s, count, share), duration_s)

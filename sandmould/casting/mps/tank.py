@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sandmould.casting.mps.flow import Flow, Guard
+from sandmould.arrays import Flags, Floats
+from sandmould.casting.mps.flow import Flow, FlowGuard
 from sandmould.casting.mps.particles import (
     FLUID,
     WALL_LAYERS,
-    Floats,
     Particles,
     at_rest,
     lattice,
     mould_around,
 )
-from sandmould.casting.mps.scheme import Metal, Scheme
+from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.weight import make_kernel
 
 SPACING_M = 2e-3
@@ -27,7 +26,7 @@ WALL_ROWS = 51
 def still_tank(columns: int = COLUMNS, rows: int = ROWS, spacing_m: float = SPACING_M) -> Particles:
     """Fluid on its lattice in an open box, its walls as far above it as in the paper."""
 
-    def is_cavity(place: Floats) -> NDArray[np.bool_]:
+    def is_cavity(place: Floats) -> Flags:
         inside = (place[:, 0] > 0.0) & (place[:, 0] < columns * spacing_m)
         return inside & (place[:, 1] > 0.0)
 
@@ -39,7 +38,7 @@ def still_tank(columns: int = COLUMNS, rows: int = ROWS, spacing_m: float = SPAC
 
 def open_tank(
     scheme: Scheme,
-    metal: Metal | None = None,
+    metal: LiquidMetal | None = None,
     columns: int = COLUMNS,
     rows: int = ROWS,
     spacing_m: float = SPACING_M,
@@ -49,11 +48,11 @@ def open_tank(
     The speed limit is that of a fall from three times the height of the walls: what started at
     rest can only be as fast if energy came from nowhere.
     """
-    metal = metal or Metal()
+    metal = metal or LiquidMetal()
     height_m = (rows + WALL_ROWS - ROWS) * spacing_m
     g = float(np.linalg.norm(metal.gravity_m_s2))
     margin = WALL_LAYERS * spacing_m
-    guard = Guard(
+    guard = FlowGuard(
         float(np.sqrt(2.0 * g * 3.0 * height_m)),
         (-margin, -margin, -1.0),
         (columns * spacing_m + margin, 2.0 * height_m, 1.0),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from sandmould.casting.mps.neighbours import Neighbours
 from sandmould.casting.mps.operators import laplacian
 from sandmould.casting.mps.particles import DUMMY, FLUID, Floats, Kinds
 from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel
+from sandmould.compiled import njit
 
 WORST_FIT = 1e-3
 """Smallest over largest eigenvalue of a fit's matrix below which its particle keeps (4); 0.02 on

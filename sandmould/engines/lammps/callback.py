@@ -11,12 +11,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import carray, types
 
-from sandmould.dem.addresses import Floats, Ints, call_with_two, to_floats, to_ints
+from sandmould.arrays import Floats, Ints
+from sandmould.compiled import cfunc, njit
+from sandmould.dem.addresses import call_with_two, to_floats, to_ints
 from sandmould.dem.broad_phase import Candidates, find_candidates
 from sandmould.dem.motion import ISOTROPIC, damped
-from sandmould.dem.surface_contacts import press_on_surfaces
+from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
 from sandmould.dem.vectors import (
     OPTIONS,
@@ -209,7 +211,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
     if _must_list(dim, bridge, arrays, position, shift):
         part = _list(dim, bridge, arrays, position, radius, ids, shift)
     _clear(bridge.step_loads)
-    press_on_surfaces(
+    surface_forces(
         dim,
         0,
         counts[ROWS],
@@ -302,6 +304,6 @@ def address_of(what: str, dimension: int) -> int:
     """Address of the function that LAMMPS is to call: ``press`` or ``damp``."""
     key = (what, dimension)
     if key not in _COMPILED:
-        _COMPILED[key] = cfunc(_SIGNATURE, cache=True)(_PLAIN[key])
+        _COMPILED[key] = cfunc(_SIGNATURE)(_PLAIN[key])
     address: int = _COMPILED[key].address
     return address

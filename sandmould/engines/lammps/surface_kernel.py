@@ -11,7 +11,7 @@ import numpy as np
 from sandmould.dem.addresses import table_of
 from sandmould.dem.contact_law import Law
 from sandmould.dem.surfaces import Surfaces
-from sandmould.dem.vectors import like
+from sandmould.dem.vectors import dim_of
 from sandmould.dem.wall_history import WallHistory, new_history
 from sandmould.engines.box_motion import displacements
 from sandmould.engines.lammps.bridge import (
@@ -65,7 +65,7 @@ class SurfaceKernel:
         d, n = scenario.dimension, sum(program.counts)
         self._dimension = d
         arrays = self._surfaces.arrays
-        memory = new_history(like(d), n)
+        memory = new_history(dim_of(d), n)
         # The names must live as long as LAMMPS is asked by their addresses.
         self._names = [ctypes.create_string_buffer(name) for name in GRAIN_ARRAYS]
         contact, damping = scenario.contact, scenario.background_damping

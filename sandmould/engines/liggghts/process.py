@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import functools
 import os
 import pty
@@ -12,11 +11,11 @@ import select
 import shutil
 import signal
 import subprocess
-import sys
 import termios
 from pathlib import Path
 
-_PR_SET_PDEATHSIG = 1
+from sandmould.runs.parent import end_with_parent
+
 _VERSION = re.compile(r"LIGGGHTS-PUBLIC (\d+(?:\.\d+)+)")
 _LOOK_EVERY_S = 1.0
 """How often a silent process is looked at, in case it died without closing its terminal."""
@@ -58,8 +57,7 @@ def _live_and_die_with_parent() -> None:
     checkpoint, for which it still needs LIGGGHTS.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    end_with_parent(signal.SIGKILL)
 
 
 class LiggghtsDied(Exception):  # noqa: N818 - the session turns it into an outcome

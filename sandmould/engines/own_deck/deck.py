@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
 import jinja2
 from jinja2 import meta
 
+from sandmould.digest import file_digest
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.registry import engine_module
 from sandmould.scenario.bad_input import BadInputError, Problem
@@ -28,7 +28,7 @@ def with_hashes(scenario: OwnDeck) -> OwnDeck:
 def _hashes(scenario: OwnDeck) -> Iterator[tuple[str, str]]:
     for name, path in scenario.paths.items():
         if path.is_file():
-            yield name, hashlib.sha256(path.read_bytes()).hexdigest()
+            yield name, file_digest(path)
 
 
 def problems(scenario: OwnDeck) -> list[Problem]:

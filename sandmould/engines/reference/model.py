@@ -7,7 +7,7 @@ import numpy as np
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import COMPONENTWISE, ISOTROPIC, NONE, VISCOUS, Damping
-from sandmould.dem.steps import Scene
+from sandmould.dem.steps import DemScene
 from sandmould.dem.surfaces import Surfaces
 from sandmould.engines.program import Stage
 from sandmould.engines.reference.moved_solver import MovedSolver
@@ -36,12 +36,12 @@ def _damping(scenario: Scenario) -> Damping:
     return Damping(form, damping.nonviscous_translation, damping.nonviscous_rotation)
 
 
-def scene_of(scenario: Scenario, stage: Stage, step_s: float) -> Scene:
+def scene_of(scenario: Scenario, stage: Stage, step_s: float) -> DemScene:
     """What does not change during a stage."""
     d = scenario.dimension
     up = (0.0,) * (d - 1) + (1.0,)
     direction = up if stage.vibration is None else stage.vibration.unit_direction(d)
-    return Scene(
+    return DemScene(
         _law(scenario, scenario.contact.grain_grain),
         _law(scenario, scenario.contact.grain_wall),
         _damping(scenario),

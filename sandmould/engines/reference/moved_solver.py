@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sandmould.compiled import njit
 from sandmould.dem.addresses import call_with_two
 from sandmould.dem.barrier import new_barrier, wait_for_all
 from sandmould.dem.grains import Floats, Ints
 from sandmould.dem.solver import Solver
-from sandmould.dem.steps import DONE, Moving, Scene, Team, Walls, advance
+from sandmould.dem.steps import DONE, DemScene, Moving, Team, Walls, advance
 from sandmould.dem.vectors import OPTIONS
 from sandmould.engines.step_mover import StepMover
 
@@ -59,7 +59,7 @@ def _advance(
     first_step: int,
     steps: int,
     drifted: bool,
-    scene: Scene,
+    scene: DemScene,
     moving: Moving,
     displacement: Floats,
     half_skin: float,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from sandmould.runs.files import write_text
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.config import Calibration, Sand
@@ -176,8 +176,6 @@ def write_materials(result: Calibrated, scenario: Scenario, study: str, folder: 
         if one.found is None:
             continue
         path = folder / f"{one.sand.name}.yaml"
-        partial = path.with_name(path.name + ".partial")
-        partial.write_text(material_text(one, result.keys, scenario, study), encoding="utf-8")
-        os.replace(partial, path)
+        write_text(path, material_text(one, result.keys, scenario, study))
         written.append(path)
     return written

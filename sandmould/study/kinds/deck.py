@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from sandmould.digest import SHORT, digest
 from sandmould.engines.own_deck import computation
 from sandmould.engines.own_deck import deck as own_deck
 from sandmould.engines.registry import engine_module
+from sandmould.runs.files import replaced, write_text
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
@@ -56,13 +56,12 @@ def sources(scenario: OwnDeck) -> list[Path]:
 def template_hash(scenario: OwnDeck) -> str:
     """Hash of template and files as they are now."""
     now = own_deck.with_hashes(scenario.model_copy(update={"sha256": {}})).sha256
-    return hashlib.sha256("".join(sorted(now.values())).encode()).hexdigest()[:12]
+    return digest(*sorted(now.values()))[:SHORT]
 
 
 def computed_hash(scenario: OwnDeck) -> str:
     """Hash of the rendered deck and of the files that it reads."""
-    text = own_deck.render(scenario, "run", "study") + template_hash(scenario)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return digest(own_deck.render(scenario, "run", "study"), template_hash(scenario))
 
 
 def threads(scenario: OwnDeck) -> int:
@@ -120,9 +119,7 @@ def render(run: Run, folder: Path) -> None:
     """Write the deck as the engine reads it at the beginning."""
     own_deck.check_unchanged(run.scenario)
     text = own_deck.render(run.scenario, run.run, run.study)
-    partial = folder / "deck.in.partial"
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
+    write_text(folder / "deck.in", text)
 
 
 def compute(run: Run, folder: Path) -> Computed:
@@ -142,9 +139,8 @@ def measure(run: Run, folder: Path) -> None:
     time_s = series["time_s"] if "time_s" in series else pd.Series(dtype=float)
     clock = {"time_s": time_s, "vibration_time_s": -1.0, "stage": "deck"}
     table = pd.DataFrame({**clock, **{name: series[name] for name in names}})
-    partial = folder / "measures.tsv.partial"
-    table.to_csv(partial, sep="\t", index=False)
-    os.replace(partial, folder / "measures.tsv")
+    with replaced(folder / "measures.tsv") as partial:
+        table.to_csv(partial, sep="\t", index=False)
     _draw(table, names, folder / LAST_MEASURED)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from sandmould.casting.mps import computation, scene
-from sandmould.casting.mps.measured import by_window, measure_flow
+from sandmould.casting.mps.stability_measures import by_window, measure_flow
 from sandmould.runs.outcome import RunOutcome
 from sandmould.scenario.flow import MetalFlow, StillTank
 from sandmould.study.kinds import own_solver

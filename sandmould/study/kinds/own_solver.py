@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import pandas as pd
 
+from sandmould.runs.files import replaced, write_text
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section
@@ -114,9 +114,8 @@ def read_fields(folder: Path) -> dict[str, Any] | None:
 
 def write_measures(folder: Path, table: pd.DataFrame) -> None:
     """Write the measures of a run."""
-    partial = folder / "measures.tsv.partial"
-    table.to_csv(partial, sep="\t", index=False, float_format="%.10g")
-    os.replace(partial, folder / "measures.tsv")
+    with replaced(folder / "measures.tsv") as partial:
+        table.to_csv(partial, sep="\t", index=False, float_format="%.10g")
 
 
 def write_picture(
@@ -139,9 +138,7 @@ def _write_given(run: Run, folder: Path, solver: str) -> None:
         f"# Study {run.study}, run {run.run}: what the solver {solver} is given",
         *_lines(run.scenario.model_dump(mode="json"), run.sources),
     ]
-    partial = folder / "deck.in.partial"
-    partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    os.replace(partial, folder / "deck.in")
+    write_text(folder / "deck.in", "\n".join(lines) + "\n")
 
 
 def _lines(tree: Any, sources: Mapping[str, str], key: str = "") -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import platform
@@ -13,12 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import pattern_fe
+from sandmould.digest import digest
 from sandmould.engines import recording, registry
+from sandmould.engines.cost import cost_before
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop, Session
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.products import SAND_PRODUCTS, Computed, Cost
+from sandmould.runs.products import SAND_PRODUCTS, Computed
 from sandmould.scenario import checks
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.placement import plan_counts
@@ -46,7 +47,7 @@ mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
 
 problems = checks.problems
 engine_problem = registry.engine_problem
-no_cost = Cost.of
+no_cost = cost_before
 
 
 def defaults() -> dict[str, Any]:
@@ -84,7 +85,7 @@ def computed_hash(scenario: Scenario) -> str:
     if scenario.pattern is None:
         return told
     beside = scenario.pattern.model_dump_json() + pattern_fe.source_hash()
-    return hashlib.sha256((told + beside).encode()).hexdigest()
+    return digest(told, beside)
 
 
 def lasts_s(scenario: Scenario) -> float:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sandmould.digest import digest
+from sandmould.runs.files import write_text
 from sandmould.runs.hashing import present
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.study import Study
@@ -52,7 +53,7 @@ def basis_of(study: Study) -> str:
     """Hash of what a study's rounds rest on: its scene, its objective and which keys it sweeps."""
     tree = study.model_dump(mode="json", include={"scenario", "objective"})
     text = json.dumps([present(tree), study.sweep.swept], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return digest(text)
 
 
 def read_ledger(folder: Path, study: Study) -> Ledger:
@@ -93,6 +94,4 @@ def write_ledger(ledger: Ledger, folder: Path) -> None:
         earlier = json.loads(path.read_text(encoding="utf-8"))
         if earlier["basis"] != ledger.basis:
             os.replace(path, folder / f"rounds_{earlier['basis'][:6]}.json")
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(json.dumps(asdict(ledger), indent=1) + "\n", encoding="utf-8")
-    os.replace(partial, path)
+    write_text(path, json.dumps(asdict(ledger), indent=1) + "\n")

@@ -15,7 +15,7 @@ from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import NONE, Damping
 from sandmould.dem.solver import Solver
-from sandmould.dem.steps import Scene
+from sandmould.dem.steps import DemScene
 from sandmould.dem.surfaces import Surfaces
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
@@ -111,7 +111,7 @@ def _lone_grain(dimension: int, step_s: float) -> Solver:
     unit = stiffness(dimension)
     smooth = Law(unit, unit, 0.0, 0.0, 0.0, unit, True, False)
     nothing, up = (0.0,) * dimension, (0.0,) * (dimension - 1) + (1.0,)
-    given = Scene(smooth, smooth, Damping(NONE, 0.0, 0.0), nothing, up, True, step_s)
+    given = DemScene(smooth, smooth, Damping(NONE, 0.0, 0.0), nothing, up, True, step_s)
     solver = Solver(given, Surfaces(dimension), RADIUS_M, orientations=True)
     spins = 1 if dimension == 2 else 3
     zeros, one = np.zeros((1, dimension)), np.ones(1)

@@ -1,18 +1,19 @@
-"""Checkpoints on disk: two in turn, each whole or not there at all."""
+"""Checkpoints that engines write to folders: two in turn, each whole or not there at all."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sandmould.digest import file_digest
+from sandmould.runs.files import write_text
+
 
 @dataclass(frozen=True)
-class Mark:
+class CheckpointMark:
     """Where a run stood when a checkpoint was written."""
 
     scenario_hash: str
@@ -27,20 +28,18 @@ class Mark:
     """The cost row so far."""
 
 
-def _digest(folder: Path) -> dict[str, str]:
+def _digests(folder: Path) -> dict[str, str]:
     return {
-        p.name: hashlib.sha256(p.read_bytes()).hexdigest()
+        p.name: file_digest(p)
         for p in sorted(folder.iterdir())
         if not p.name.startswith("mark.json")
     }
 
 
-def seal(folder: Path, mark: Mark) -> None:
+def seal(folder: Path, mark: CheckpointMark) -> None:
     """Close a checkpoint folder: the mark with the files' hashes comes last."""
-    partial = folder / "mark.json.partial"
-    text = json.dumps({"mark": asdict(mark), "sha256": _digest(folder)})
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, folder / "mark.json")
+    text = json.dumps({"mark": asdict(mark), "sha256": _digests(folder)})
+    write_text(folder / "mark.json", text)
 
 
 def next_folder(work: Path) -> Path:
@@ -54,7 +53,7 @@ def next_folder(work: Path) -> Path:
     return folder
 
 
-def set_aside(work: Path, mark: Mark) -> Path:
+def set_aside(work: Path, mark: CheckpointMark) -> Path:
     """Move both checkpoints of another scenario out of the work folder, which is swept later."""
     aside = work.parent / f"checkpoints_of_{mark.scenario_hash[:12]}"
     aside.mkdir(exist_ok=True)
@@ -64,7 +63,7 @@ def set_aside(work: Path, mark: Mark) -> Path:
     return aside
 
 
-def newest_checkpoint(work: Path) -> tuple[tuple[Path, Mark] | None, list[str]]:
+def newest_checkpoint(work: Path) -> tuple[tuple[Path, CheckpointMark] | None, list[str]]:
     """Find the newest whole checkpoint.
 
     Returns
@@ -73,16 +72,16 @@ def newest_checkpoint(work: Path) -> tuple[tuple[Path, Mark] | None, list[str]]:
     damaged : list of str
         One sentence for each checkpoint that cannot be used.
     """
-    whole: list[tuple[Path, Mark]] = []
+    whole: list[tuple[Path, CheckpointMark]] = []
     damaged: list[str] = []
     for folder in (work / "checkpoint_a", work / "checkpoint_b"):
         if not folder.is_dir():
             continue
         try:
             sealed = json.loads((folder / "mark.json").read_text(encoding="utf-8"))
-            if sealed["sha256"] != _digest(folder):
+            if sealed["sha256"] != _digests(folder):
                 raise ValueError("its files do not match their hashes")
-            whole.append((folder, Mark(**sealed["mark"])))
+            whole.append((folder, CheckpointMark(**sealed["mark"])))
         except (OSError, ValueError, KeyError, TypeError) as error:
             damaged.append(f"checkpoint {folder.name} cannot be used: {error}")
     return max(whole, key=lambda item: item[1].steps, default=None), damaged

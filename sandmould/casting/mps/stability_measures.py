@@ -12,14 +12,14 @@ import pandas as pd
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.probes import History, window_means
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
-from sandmould.casting.mps.stability import Verdict, judge, still_hops
+from sandmould.casting.mps.stability import StabilityRating, rate_stability, still_hops
 from sandmould.scenario.flow import MetalFlow, StillTank
 
 _MEANS = ("mean_speed_m_s", "kinetic_energy_j_kg", "step_iterations")
 
 
 @dataclass(frozen=True)
-class Measured:
+class StabilityMeasures:
     """What is measured from ``measured_from_s`` on; NaN where a guard stopped the run."""
 
     mean_pa: dict[str, float]
@@ -33,11 +33,11 @@ class Measured:
     peak_speed_m_s: float
     average_speed_m_s: float
     hops: bool
-    verdict: Verdict
+    verdict: StabilityRating
 
 
-def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> Measured:
-    """Measure and judge a run.
+def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> StabilityMeasures:
+    """Measure and rate a run.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> Meas
     windows = past.deviation_pa(scenario.noise_window_s).tolist() if known else nothing
     sd_pa = dict(zip(names, sd, strict=True))
     hops = _hops(scenario, table, whole)
-    return Measured(
+    return StabilityMeasures(
         dict(zip(names, past.mean_pa().tolist() if known else nothing, strict=True)),
         sd_pa,
         dict(zip(names, windows, strict=True)),
@@ -65,7 +65,7 @@ def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> Meas
         float(past.largest_speed_m_s.max()) if known else math.nan,
         float(np.average(past.mean_speed_m_s, weights=past.dt_s)) if known else math.nan,
         hops,
-        judge(stopped, hops, sd_pa[scene.deepest(scenario)], scenario.quiet_pa),
+        rate_stability(stopped, hops, sd_pa[scene.deepest(scenario)], scenario.quiet_pa),
     )
 
 

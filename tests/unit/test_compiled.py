@@ -1,0 +1,164 @@
+"""The one cache of compiled code: no kernel goes on computing what its sources no longer say."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from sandmould import ROOT, compiled
+from sandmould.compiled import PACKAGES, cache_folder, cache_key, kernel_sources
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Path:
+    """A copy of all rooms with a cache of its own, where sources may be edited."""
+    for package in PACKAGES:
+        target = tmp_path / "house" / package
+        shutil.copytree(ROOT / package, target, ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path / "house"
+
+
+def printed(house: Path, script: str) -> str:
+    """What a script prints that imports the rooms of a copy."""
+    environment = os.environ | {
+        "PYTHONPATH": str(house),
+        "XDG_CACHE_HOME": str(house / "cache"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    ran = subprocess.run(
+        [sys.executable, "-c", script], env=environment, cwd=house, capture_output=True, text=True
+    )
+    assert ran.returncode == 0, ran.stderr
+    return ran.stdout.strip()
+
+
+DEM = """
+import numpy as np
+from sandmould.dem.contact_law import Law
+from sandmould.dem.kinds import _pair_up
+table = np.zeros((1, 1, 3))
+_pair_up(np.ones(1), np.array([2.0]), Law(1.0, 1.0, 0.0, 0.5, 0.0, 0.0, True, False), table)
+print(table[0, 0, 0])
+"""
+ARPM = """
+import numpy as np
+from sandmould.casting.arpm.marching import HeatSystem
+from sandmould.casting.arpm.super_steps import _stage
+none = np.zeros(0, np.int64)
+rows = np.array([[1.0, 9.0, 9.0, 9.0, 9.0]])
+system = HeatSystem(none, none.astype(np.int32), np.zeros(0), np.zeros(1, np.int64), rows, 1.0)
+temperature = np.zeros(1)
+_stage(np.array([0.0, 0.0, 1.0, 0.0]), 1.0, np.ones(1), np.zeros(1), np.zeros(1), np.zeros(1),
+       np.ones(1), system, temperature)
+print(temperature[0])
+"""
+MPS = """
+import numpy as np
+from sandmould.casting.mps.collisions import collisions
+from sandmould.casting.mps.neighbours import Neighbours
+near = Neighbours(np.array([0, 1, 1]), np.array([1], np.uint32), np.array([[0.5, 0.0, 0.0]]),
+                  np.ones(1), np.ones(2))
+velocity = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+print(collisions(near, velocity, np.zeros(2, np.int8), 1.0, 0.0)[0, 0])
+"""
+PATTERN = """
+from pattern_fe.coupling.foam_step import FoamArrays, _open
+from sandmould.dem.addresses import table_of
+import numpy as np
+ints, rows = ("pressed",), ("inverse", "load", "speed", "load_sum")
+arrays = [np.ones(3, np.int64) if name in ints else np.ones((3, 3) if name in rows else 3)
+          for name in FoamArrays._fields]
+table = table_of(arrays)
+print(len(_open(table.ctypes.data).mass))
+"""
+
+
+@pytest.mark.parametrize(
+    ("script", "callee", "old", "new", "numbers"),
+    [
+        (DEM, "sandmould/dem/contact_law.py", "2.0 * law.damping_ratio",
+         "4.0 * law.damping_ratio", ("1.0", "2.0")),
+        (ARPM, "sandmould/casting/arpm/material.py", "return reference + enthalpy",
+         "return 10.0 + enthalpy", ("3.0", "12.0")),
+        (MPS, "sandmould/casting/mps/operators.py", "return (\n        near.away_m[k, 0]",
+         "return (\n        2.0 * near.away_m[k, 0]", ("-0.5", "-1.0")),
+        (PATTERN, "sandmould/dem/addresses.py", "to_floats(table[k, 0]), (table[k, 1],)",
+         "to_floats(table[k, 0]), (table[k, 1] - 1,)", ("3", "2")),
+    ],
+    ids=["dem", "arpm", "mps", "pattern"],
+)  # fmt: skip
+def test_an_edited_callee_is_compiled_again(
+    house: Path, script: str, callee: str, old: str, new: str, numbers: tuple[str, str]
+) -> None:
+    before = printed(house, script)
+    text = (house / callee).read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    (house / callee).write_text(text.replace(old, new), encoding="utf-8")
+    assert (before, printed(house, script)) == numbers
+
+
+def test_what_is_compiled_is_kept_for_the_next_process(house: Path) -> None:
+    printed(house, ARPM)
+    kept = {path: path.stat().st_mtime_ns for path in (house / "cache").rglob("*.nbc")}
+    assert kept
+    printed(house, ARPM)
+    assert {path: path.stat().st_mtime_ns for path in (house / "cache").rglob("*.nbc")} == kept
+
+
+def test_the_key_tells_processors_and_versions_apart() -> None:
+    given = ([b"kernel"], ("0.61", "0.44"), ("znver4", "+avx512f"))
+    others = [
+        ([b"kernels"], *given[1:]),
+        ([b"ker", b"nel"], *given[1:]),
+        (given[0], ("0.62", "0.44"), given[2]),
+        (given[0], ("0.61", "0.45"), given[2]),
+        (*given[:2], ("skylake", "+avx512f")),
+        (*given[:2], ("znver4", "-avx512f")),
+    ]
+    assert cache_key(*given) == cache_key(*given)
+    assert len({cache_key(*each) for each in [given, *others]}) == 1 + len(others)
+
+
+@pytest.mark.parametrize("of_llvm", ["get_host_cpu_name", "get_host_cpu_features"])
+def test_another_processor_has_another_folder(
+    of_llvm: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = cache_folder()
+    other = SimpleNamespace(flatten=lambda: "+other") if "features" in of_llvm else "other"
+    monkeypatch.setattr(compiled.binding, of_llvm, lambda: other)
+    assert cache_folder() != here
+
+
+@pytest.mark.parametrize("package", ["numba", "llvmlite"])
+def test_another_version_has_another_folder(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = cache_folder()
+    monkeypatch.setattr(getattr(compiled, package), "__version__", "0.0")
+    assert cache_folder() != here
+
+
+def test_the_folder_lies_where_caches_belong(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_folder().parent == tmp_path / "sandmould"
+
+
+def test_every_kernel_of_the_house_is_compiled_in_this_one_way() -> None:
+    sources = kernel_sources(ROOT)
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            if path.name == "compiled.py":
+                continue
+            assert "CACHE_DIR" not in text, path
+            assert not re.search(r"^from numba import .*\b(njit|jit|cfunc|vectorize)\b", text, re.M)
+            if re.search(r"@njit|cfunc\(", text):
+                assert text.encode() in sources.values(), path
+    assert {"sandmould.casting.mps.particles", "sandmould.dem.vectors"} <= set(sources)

@@ -1,0 +1,39 @@
+"""Files that appear whole, and hashes of what is in them."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+from sandmould.digest import SHORT, digest, file_digest, sources_digest
+from sandmould.runs.files import replaced, write_text
+
+
+def test_a_file_appears_when_it_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "table.tsv"
+    write_text(path, "old\n")
+    with replaced(path) as partial:
+        partial.write_text("new", encoding="utf-8")
+        assert partial.parent == path.parent  # of the same disk: moving is one act
+        assert path.read_text(encoding="utf-8") == "old\n"
+    assert path.read_text(encoding="utf-8") == "new"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_error_leaves_the_file_as_it_was(tmp_path: Path) -> None:
+    path = tmp_path / "table.tsv"
+    write_text(path, "old")
+    with pytest.raises(ZeroDivisionError), replaced(path) as partial:
+        partial.write_text(f"half {1 / 0}", encoding="utf-8")
+    assert path.read_text(encoding="utf-8") == "old"
+
+
+def test_digests_are_those_of_the_bytes(tmp_path: Path) -> None:
+    first, second = tmp_path / "a", tmp_path / "b"
+    first.write_bytes(b"one")
+    second.write_bytes(b"two")
+    assert digest("on", b"e") == file_digest(first) == hashlib.sha256(b"one").hexdigest()
+    whole = hashlib.sha256(b"0.1onetwo").hexdigest()[:SHORT]
+    assert sources_digest([second, first], "0.1") == whole
