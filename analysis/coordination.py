@@ -12,7 +12,7 @@ from sandmould.scenario.geometry import Array, Scene, Solid, Wall, distance_with
 
 
 @dataclass(frozen=True)
-class Contacts:
+class ContactCounts:
     """Number of contacts of the grains and the deepest of them."""
 
     count: NDArray[np.int64]
@@ -33,7 +33,7 @@ class Contacts:
 
 def contacts(
     position_m: Array, radius_m: Array, scene: Scene | None = None, tolerance_m: float = 0.0
-) -> Contacts:
+) -> ContactCounts:
     """Count the contacts: overlaps deeper than minus the tolerance.
 
     A grain with fewer than two contacts in 2D, or three in 3D, cannot be held by friction: it is a
@@ -51,7 +51,7 @@ def contacts(
 
     Returns
     -------
-    Contacts
+    ContactCounts
     """
     n, dimension = position_m.shape
     count = np.zeros(n, dtype=np.int64)
@@ -74,7 +74,7 @@ def contacts(
         grain_wall += int(touch.sum())
         deepest = max(deepest, float((overlap_m / radius_m).max(initial=0.0)))
     bearing = count >= dimension
-    return Contacts(
+    return ContactCounts(
         count=count,
         grain_grain=grain_grain,
         grain_wall=grain_wall,

@@ -48,11 +48,11 @@ def fit_limbs(x: ArrayLike, y: ArrayLike, se: ArrayLike) -> Limbs:
         Where no value is positive.
     """
     x, y, se = (np.asarray(v, dtype=np.float64) for v in (x, y, se))
-    known = np.isfinite(y) & (y > 0)
-    if not known.any():
+    is_measured = np.isfinite(y) & (y > 0)
+    if not is_measured.any():
         raise ValueError("no value is positive")
-    order = np.argsort(x[known])
-    x, y, se = (v[known][order] for v in (x, y, se))
+    order = np.argsort(x[is_measured])
+    x, y, se = (v[is_measured][order] for v in (x, y, se))
     top = int(y.argmax())
     up, down = slice(0, top + 1), slice(top, len(x))
     return Limbs(

@@ -138,7 +138,7 @@ def draw_grains(
     -------
     Axes
     """
-    grains, shown = _collection(snapshot, ax, cut_m)
+    grains, in_plane = _collection(snapshot, ax, cut_m)
     if values is None:
         grains.set_facecolor(_SAND)
     else:
@@ -146,7 +146,7 @@ def draw_grains(
         low, high = limits or (finite.min(initial=np.inf), finite.max(initial=-np.inf))
         grains.set_cmap(colormaps[cmap].with_extremes(bad="0.85"))
         grains.set_norm(Normalize(low, high) if low <= high else Normalize(0.0, 1.0))
-        grains.set_array(np.ma.masked_invalid(values[shown]))
+        grains.set_array(np.ma.masked_invalid(values[in_plane]))
     return ax
 
 
@@ -164,8 +164,8 @@ def draw_by_layer(snapshot: Snapshot, ax: Axes, cut_m: float | None = None) -> A
     -------
     Axes
     """
-    grains, shown = _collection(snapshot, ax, cut_m)
-    colours = _colour_of(snapshot.layer[shown]).tolist()
+    grains, in_plane = _collection(snapshot, ax, cut_m)
+    colours = _colour_of(snapshot.layer[in_plane]).tolist()
     grains.set_facecolor([LAYER_COLOURS[colour] for colour in colours])
     layers = np.unique(snapshot.layer)[::-1]
     keys = [
@@ -184,14 +184,14 @@ def _collection(
     """Add the discs to the axes; which of the grains they show."""
     position_m, radius_m = snapshot.position_m, snapshot.radius_m
     dimension = position_m.shape[1]
-    shown = np.ones(len(radius_m), dtype=np.bool_)
+    in_plane = np.ones(len(radius_m), dtype=np.bool_)
     if dimension == 3 and len(radius_m):
         y = position_m[:, 1]
         plane_m = 0.5 * float(y.min() + y.max()) if cut_m is None else cut_m
-        shown = np.abs(y - plane_m) < radius_m
+        in_plane = np.abs(y - plane_m) < radius_m
         radius_m = np.sqrt(np.maximum(radius_m**2 - (y - plane_m) ** 2, 0.0))
-    centre_m, radius_m = position_m[shown][:, [0, -1]], radius_m[shown]
-    many = len(radius_m) > _MANY
+    centre_m, radius_m = position_m[in_plane][:, [0, -1]], radius_m[in_plane]
+    is_dense = len(radius_m) > _MANY
     grains = EllipseCollection(
         2.0 * radius_m * _MM,
         2.0 * radius_m * _MM,
@@ -199,16 +199,16 @@ def _collection(
         units="xy",
         offsets=centre_m * _MM,
         offset_transform=ax.transData,
-        edgecolors="none" if many else "0.2",
-        linewidths=0.0 if many else 0.25,
-        rasterized=many,
+        edgecolors="none" if is_dense else "0.2",
+        linewidths=0.0 if is_dense else 0.25,
+        rasterized=is_dense,
         zorder=2.0,
     )
     ax.add_collection(grains)
     if len(radius_m):
         reach = radius_m[:, None]
         _frame(ax, dimension, np.concatenate([centre_m - reach, centre_m + reach]))
-    return grains, shown
+    return grains, in_plane
 
 
 def _colour_of(layer: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -167,16 +167,16 @@ def profiles(surface: Surface, width_m: float, axis_m: Array) -> dict[str, tuple
         part = np.minimum((turn * SECTORS).astype(np.int64), SECTORS - 1)
     # A ring holds many points: a single grain on the cone is not to raise it.
     middle = np.mean if apart.shape[1] == 1 else np.median
-    found = {}
+    of_part = {}
     for number, name in enumerate(names):
         r, z = distance[part == number], surface.height_m[part == number]
         column = np.floor(r / width_m).astype(np.int64)
         held = np.unique(column)
-        found[name] = (
+        of_part[name] = (
             np.array([r[column == k].mean() for k in held]),
             np.array([middle(z[column == k]) for k in held]),
         )
-    return found
+    return of_part
 
 
 def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT) -> Flank:
@@ -242,15 +242,15 @@ def heap_slope(surface: Surface, width_m: float, axis_m: Array) -> Slope:
         crest, height_m = surface.height_m.argmax(), surface.height_m.max(initial=0.0)
         # The crest of a cone is not looked for: a few grains high up would turn all sectors.
         axis_m = surface.point_m[crest] if height_m > 0.0 else axis_m
-    found = profiles(surface, width_m, axis_m)
-    flanks = (fit_flank(name, r[::-1], z[::-1], HEAP_FOOT) for name, (r, z) in found.items())
+    parts = profiles(surface, width_m, axis_m)
+    flanks = (fit_flank(name, r[::-1], z[::-1], HEAP_FOOT) for name, (r, z) in parts.items())
     return Slope(axis_m, tuple(flanks))
 
 
 def residue_slope(surface: Surface, width_m: float, axis_m: Array) -> Slope:
     """Slope of what stays round an outlet, rising away from it; arguments as ``heap_slope``."""
-    found = profiles(surface, width_m, axis_m)
-    return Slope(axis_m, tuple(fit_flank(name, r, z) for name, (r, z) in found.items()))
+    parts = profiles(surface, width_m, axis_m)
+    return Slope(axis_m, tuple(fit_flank(name, r, z) for name, (r, z) in parts.items()))
 
 
 def walls_touched(surface: Surface, low_m: Array, high_m: Array, depth_m: float) -> list[str]:
@@ -266,9 +266,9 @@ def walls_touched(surface: Surface, low_m: Array, high_m: Array, depth_m: float)
     """
     names = (("left", "right"), ("front", "back"))
     deep = surface.height_m > depth_m
-    found = []
+    touched = []
     for axis, (low, high) in enumerate(zip(low_m, high_m, strict=True)):
         along = surface.point_m[:, axis]
         beside = (along - low < depth_m, high - along < depth_m)
-        found += [name for name, by in zip(names[axis], beside, strict=True) if (by & deep).any()]
-    return found
+        touched += [name for name, by in zip(names[axis], beside, strict=True) if (by & deep).any()]
+    return touched

@@ -50,8 +50,8 @@ def convex_section(corners_m: Array, cut_m: float) -> Array:
     points_m = corners_m
     if corners_m.shape[1] == 3:
         # every line between two corners lies inside the body, so its section is their hull
-        one, two = np.triu_indices(len(corners_m), 1)
-        a, b = corners_m[one], corners_m[two]
+        first, second = np.triu_indices(len(corners_m), 1)
+        a, b = corners_m[first], corners_m[second]
         crossed = (a[:, 1] - cut_m) * (b[:, 1] - cut_m) <= 0.0
         crossed &= a[:, 1] != b[:, 1]
         a, b = a[crossed], b[crossed]

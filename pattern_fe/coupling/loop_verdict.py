@@ -71,11 +71,11 @@ def classify_loop(log: pd.DataFrame, stopped: bool = False) -> LoopVerdict | Non
     """Classify the last part of a convergence log.
 
     Energy of the shape at the interface above the work of the sand was never given by sand: such
-    a loop goes in cycles,
-    that shake the sand, and it diverged where the median residual is above the displacement too, or
-    where it was stopped for that or has values that are not finite. Work above the stored energy is
-    only lost in the loop's delay, as in a dashpot: such a loop lags while its residual is large,
-    and it holds where that is small in the median and in no window above the displacement.
+    a loop goes in cycles, which shake the sand. It diverged where the median residual is above the
+    displacement too, or where it was stopped for that or has values that are not finite. Work above
+    the stored energy is only lost in the loop's delay, as in a dashpot: such a loop lags while its
+    residual is large, and it holds where that is small in the median and in no window above the
+    displacement.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def dialect_hash(dialect: str) -> str:
 
 
 @dataclass(frozen=True)
-class Block:
+class DeckBlock:
     """One named block of a deck."""
 
     name: str
@@ -86,9 +86,9 @@ class Deck:
     text: str
 
     @property
-    def blocks(self) -> dict[str, Block]:
+    def blocks(self) -> dict[str, DeckBlock]:
         """Named blocks in order."""
-        return {m.group(1): Block(m.group(1), m.group(2)) for m in _BLOCK.finditer(self.text)}
+        return {m.group(1): DeckBlock(m.group(1), m.group(2)) for m in _BLOCK.finditer(self.text)}
 
     @property
     def commands(self) -> str:

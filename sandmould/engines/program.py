@@ -16,6 +16,7 @@ from sandmould.scenario.placement import (
     plan_layer,
 )
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind
 from sandmould.scenario.vibration import VibrationStage
 
 OUTFLOW = 0.6
@@ -29,9 +30,9 @@ REST_AFTER_FALL_S = 0.3
 class Stage:
     """One part of a run: a layer falls and settles, sand flows out, or the box vibrates."""
 
-    name: str
-    layer: int = 0
-    """Layer that falls at the start, from 1; 0 in any other stage."""
+    kind: StageKind
+    number: int = 0
+    """Among the stages of its kind, from 1; 0 of one that is the only one."""
     opens: str = ""
     """Plate that is taken away at the start."""
     settling: Settling | None = None
@@ -39,8 +40,21 @@ class Stage:
     vibration: VibrationStage | None = None
     expected_s: float = 0.0
     """Duration: exact for vibration, a guess for settling."""
-    counts_as_vibration: bool = False
-    """Whether the stage belongs to the vibration after the fill."""
+
+    @property
+    def name(self) -> str:
+        """Name in decks, snapshots and tables."""
+        return self.kind.numbered(self.number)
+
+    @property
+    def layer(self) -> int:
+        """Layer that falls at the start, from 1; 0 in any other stage."""
+        return self.number if self.kind is StageKind.SETTLE else 0
+
+    @property
+    def counts_as_vibration(self) -> bool:
+        """Whether the stage belongs to the vibration after the fill."""
+        return self.kind is StageKind.VIBRATE
 
 
 @dataclass(frozen=True)
@@ -99,20 +113,25 @@ def build_program(scenario: Scenario) -> Program:
     for number, count in enumerate(counts, start=1):
         stages.append(
             Stage(
-                f"settle_{number}",
-                layer=number,
+                StageKind.SETTLE,
+                number,
                 settling=scenario.fill.settling,
                 expected_s=_settling_s(scenario, count),
             )
         )
         if between is not None and number < len(counts):
             stages.append(
-                Stage(f"between_{number}", vibration=between, expected_s=between.whole_duration_s)
+                Stage(
+                    StageKind.BETWEEN,
+                    number,
+                    vibration=between,
+                    expected_s=between.whole_duration_s,
+                )
             )
     if scenario.discharge is not None:
         stages.append(
             Stage(
-                "discharge",
+                StageKind.DISCHARGE,
                 opens=scenario.discharge.gate,
                 settling=scenario.discharge.settling,
                 expected_s=_outflow_s(scenario, scenario.discharge),
@@ -120,10 +139,10 @@ def build_program(scenario: Scenario) -> Program:
         )
     stages += [
         Stage(
-            f"vibrate_{number}",
+            StageKind.VIBRATE,
+            number,
             vibration=stage,
             expected_s=stage.whole_duration_s,
-            counts_as_vibration=True,
         )
         for number, stage in enumerate(scenario.vibration, start=1)
     ]

@@ -6,7 +6,7 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,16 @@ from sandmould.engines.session import Array, RefusedError, Shared
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.step_mover import StepMover
+
+
+class StageState(NamedTuple):
+    """How far a session is in its stage, beside the engine's own state."""
+
+    stage_over: bool
+    at_rest: bool
+    ended_window: bool
+    last_sums: dict[str, tuple[int, int, Array]]
+    """See ``StagedSession``."""
 
 
 class StagedSession(ABC):
@@ -47,7 +57,7 @@ class StagedSession(ABC):
         self._vibration_start: int | None = None
         self._ended_window = False
         self._opened: set[str] = set()
-        self._asked: dict[str, tuple[int, int, Array]] = {}
+        self._last_sums: dict[str, tuple[int, int, Array]] = {}
         """Record, samples and sums of the loads on a surface's vertices when last asked for."""
 
     @property
@@ -191,8 +201,8 @@ class StagedSession(ABC):
         """Mean force of the sand on each vertex of a surface since the last asking, N."""
         record = (self.steps - 1) // self._counts.window
         sums, samples = self._vertex_sums(name)
-        earlier = self._asked.get(name)
-        self._asked[name] = (record, samples, sums)
+        earlier = self._last_sums.get(name)
+        self._last_sums[name] = (record, samples, sums)
         if earlier is not None and earlier[0] == record:
             sums, samples = sums - earlier[2], samples - earlier[1]
         return sums / samples if samples else None
@@ -204,6 +214,15 @@ class StagedSession(ABC):
     def restore_checkpoint(self, checkpoint: Any) -> None:
         """Refuse as ``save_checkpoint`` does."""
         self.save_checkpoint()
+
+    def _stage_state(self) -> StageState:
+        """How far the session is in its stage, for a checkpoint in memory."""
+        return StageState(self.stage_over, self.at_rest, self._ended_window, dict(self._last_sums))
+
+    def _restore_stage(self, state: StageState) -> None:
+        """Stand in the stage as ``_stage_state`` found it."""
+        self.stage_over, self.at_rest, self._ended_window = state[:3]
+        self._last_sums = dict(state.last_sums)
 
     def attach_mover(self, name: str, mover: StepMover) -> None:
         """Refuse: this engine calls nobody in its steps."""

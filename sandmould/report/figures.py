@@ -24,7 +24,8 @@ from analysis.plots import SceneSection, draw_by_layer, draw_grains, draw_scene,
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.scenario.box import Tube
 from sandmould.scenario.geometry import Block
-from sandmould.scenario.scenario import FILLING, Scenario
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind
 
 Array = NDArray[np.float64]
 _MM = 1e3
@@ -86,7 +87,7 @@ def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
     ax = figure.add_axes((0, 0, 1, 1))
     if bed_height_m is not None:
         _draw_bed(scenario, ax, bed_height_m * _MM)
-    _draw_scene(scenario, ax, scenario.box.height_m, FILLING[0])
+    _draw_scene(scenario, ax, scenario.box.height_m, StageKind.SETTLE.value)
     _dimension(ax, (0, -far), (width, -far), f"{width:g}")
     _dimension(ax, (-far, 0), (-far, height), f"{height:g}")
     for tube in scenario.obstacles:

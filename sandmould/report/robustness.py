@@ -15,7 +15,8 @@ from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import BED_HEIGHT_M, STAGE, TIME_S
 from sandmould.runs.formatting import name_of, number
-from sandmould.scenario.scenario import FILLING, Scenario
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind, is_filling
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.robustness import Robustness, assess_robustness, shaken_runs
 from sandmould.study.collect import Collected
@@ -116,14 +117,14 @@ def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
         loads = pd.read_csv(folder / "loads.tsv", sep="\t")
         upward = [c for c in loads.columns if c.startswith("force_")][-1]
         total = loads.groupby([STAGE, TIME_S], sort=False)[upward].sum().reset_index()
-        filled = total[total[STAGE].str.startswith(FILLING)]
+        filled = total[total[STAGE].map(is_filling).astype(bool)]
         # Sand presses down on the box; the mean of the last layer's rest is its weight.
         weight_n = -float(filled[upward].iloc[-len(filled) // 20 :].mean())
         rigid_n = weight_n / scenario.gravity_m_s2 * SHAKE_G * STANDARD_GRAVITY_M_S2
         window_s = scenario.record.series_every_s
         shaken, response = [], []
         for place, stage in enumerate(scenario.vibration, start=1):
-            rows = total[total[STAGE] == f"vibrate_{place}"]
+            rows = total[total[STAGE] == StageKind.VIBRATE.numbered(place)]
             if len(rows) < 4:
                 continue
             shaken.append(stage.frequency_hz)

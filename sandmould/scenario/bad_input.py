@@ -23,12 +23,12 @@ class Problem:
 
     def __str__(self) -> str:
         where = f"{self.file}: " if self.file else ""
-        shown = repr(self.value)
-        if len(shown) > 120:
-            shown = shown[:117] + "..."
+        value_text = repr(self.value)
+        if len(value_text) > 120:
+            value_text = value_text[:117] + "..."
         # An unknown key is the user's text and may hold line breaks.
         key = self.key if self.key.isprintable() else repr(self.key)
-        return f"{where}{key} = {shown} cannot be used: valid is {self.valid}."
+        return f"{where}{key} = {value_text} cannot be used: valid is {self.valid}."
 
 
 class BadInputError(Exception):

@@ -201,10 +201,10 @@ def with_file_hash(shape: Any) -> Any:
 
 def _picture_solid(shape: CastPicture, key: str) -> Pixels:
     try:
-        found = file_hash(shape.path)
-        if shape.sha256 not in (None, found):
+        sha256_now = file_hash(shape.path)
+        if shape.sha256 not in (None, sha256_now):
             raise MeshFileError("the picture that the study was planned with; it has changed since")
-        distance = _read_picture(shape.path, found)
+        distance = _read_picture(shape.path, sha256_now)
     except MeshFileError as fault:
         problem = Problem(f"{key}.file", shown_name(shape.path), str(fault))
         raise BadInputError([problem]) from fault

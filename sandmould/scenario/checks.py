@@ -29,7 +29,7 @@ def problems(scenario: Scenario) -> list[Problem]:
     -------
     list of Problem
     """
-    found = [
+    faults = [
         *_obstacles(scenario),
         *_discharge(scenario),
         *_grains(scenario),
@@ -38,7 +38,7 @@ def problems(scenario: Scenario) -> list[Problem]:
         *_vibration(scenario),
     ]
     # The bed can only be predicted for a scene that is otherwise sound.
-    return found or [*_fill(scenario)]
+    return faults or [*_fill(scenario)]
 
 
 def _obstacles(s: Scenario) -> Iterator[Problem]:
@@ -135,14 +135,14 @@ def _mesh(s: Scenario, solid: SolidMesh, key: str) -> Iterator[Problem]:
 
 
 def _triangles(s: Scenario, solid: Triangles, key: str) -> Iterator[Problem]:
-    shown = f"{len(solid.triangles)} triangles"
+    size = f"{len(solid.triangles)} triangles"
     try:
         check_surface(solid.solid.vertices_m, solid.solid.triangles)
     except MeshFileError as fault:
-        yield Problem(f"{key}.triangles", shown, str(fault))
+        yield Problem(f"{key}.triangles", size, str(fault))
         return
     if not _in_box(s, solid.solid.corners()):
-        yield Problem(f"{key}.vertices_m", shown, f"a solid inside the box, {_size(s)}")
+        yield Problem(f"{key}.vertices_m", size, f"a solid inside the box, {_size(s)}")
 
 
 def _in_box(s: Scenario, corners: np.ndarray, slack: float = 1e-9) -> bool:

@@ -88,13 +88,13 @@ def outline_fault(vertices_m: Array) -> str | None:
 def _meets_itself(start_m: Array, end_m: Array) -> bool:
     """Whether two edges meet elsewhere than at the vertex that they share."""
     k = len(start_m)
-    one, two = np.triu_indices(k, 1)
-    neighbours = (two - one == 1) | ((one == 0) & (two == k - 1))
+    first, second = np.triu_indices(k, 1)
+    neighbours = (second - first == 1) | ((first == 0) & (second == k - 1))
     # neighbours meet in more than their vertex only when one folds back on the other
-    i, j = one[neighbours], two[neighbours]
+    i, j = first[neighbours], second[neighbours]
     along_i, along_j = end_m[i] - start_m[i], end_m[j] - start_m[j]
     folded = (_cross(along_i, along_j) == 0.0) & (np.sum(along_i * along_j, axis=1) < 0.0)
-    i, j = one[~neighbours], two[~neighbours]
+    i, j = first[~neighbours], second[~neighbours]
     a, b, c, d = start_m[i], end_m[i], start_m[j], end_m[j]
     sides = [_cross(b - a, c - a), _cross(b - a, d - a), _cross(d - c, a - c), _cross(d - c, b - c)]
     apart = (np.maximum(a, b) < np.minimum(c, d)) | (np.maximum(c, d) < np.minimum(a, b))

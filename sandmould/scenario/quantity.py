@@ -65,7 +65,7 @@ def models_at(model: type[BaseModel], parts: list[str]) -> list[type[BaseModel]]
     return here
 
 
-def known_keys(model: type[BaseModel], parts: list[str]) -> list[str]:
+def keys_at(model: type[BaseModel], parts: list[str]) -> list[str]:
     """Keys that a model has at a path, list positions skipped."""
     return sorted({name for m in models_at(model, parts) for name in m.model_fields})
 

@@ -14,7 +14,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.quantity import known_keys
+from sandmould.scenario.quantity import keys_at
 
 Tree = dict[str, Any]
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -62,23 +62,23 @@ _OF_USERS = _strict(yaml.SafeLoader)
 _OF_THE_PLAN = _strict(getattr(yaml, "CSafeLoader", yaml.SafeLoader))
 
 
-def read_planned(path: Path, shown: str) -> Tree:
+def read_planned(path: Path, name: str) -> Tree:
     """Read a file that the plan of a study wrote, as :func:`read_yaml` does.
 
     libyaml reads it six times as fast as Python, and a report reads hundreds. It is not trusted
     with the files of users: what it says of a fault teaches less, and a file nested without end
     crashes it.
     """
-    return _read(path, shown, _OF_THE_PLAN)
+    return _read(path, name, _OF_THE_PLAN)
 
 
-def read_yaml(path: Path, shown: str) -> Tree:
+def read_yaml(path: Path, name: str) -> Tree:
     """Read one YAML file that must hold a mapping.
 
     Parameters
     ----------
     path : Path
-    shown : str
+    name : str
         The file's name in messages.
 
     Raises
@@ -86,19 +86,19 @@ def read_yaml(path: Path, shown: str) -> Tree:
     BadInputError
         When the file is missing, is no YAML or holds no mapping.
     """
-    return _read(path, shown, _OF_USERS)
+    return _read(path, name, _OF_USERS)
 
 
-def _read(path: Path, shown: str, loader: Any) -> Tree:
+def _read(path: Path, name: str, loader: Any) -> Tree:
     try:
         tree = yaml.load(path.read_text(encoding="utf-8"), Loader=loader)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise BadInputError([Problem("file", reason, "a readable YAML file", shown)]) from error
+        raise BadInputError([Problem("file", reason, "a readable YAML file", name)]) from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise BadInputError([Problem("file", _fault(error), "YAML text", shown)]) from error
+        raise BadInputError([Problem("file", _fault(error), "YAML text", name)]) from error
     if not isinstance(tree, dict):
-        raise BadInputError([Problem("file", tree, "a mapping of keys to values", shown)])
+        raise BadInputError([Problem("file", tree, "a mapping of keys to values", name)])
     return tree
 
 
@@ -135,9 +135,9 @@ class Origin:
 def _nearest(table: Mapping[str, str], key: str) -> str | None:
     parts = key.split(".")
     for n in range(len(parts), 0, -1):
-        found = table.get(".".join(parts[:n]))
-        if found is not None:
-            return found
+        origin = table.get(".".join(parts[:n]))
+        if origin is not None:
+            return origin
     return table.get("")
 
 
@@ -207,15 +207,15 @@ def validated(model: type[ModelT], tree: Tree, origin: Origin, above: str = "") 
         return model.model_validate_json(json.dumps(tree, default=str), strict=True)
     except ValidationError as error:
         findings = [(item, _problem(model, tree, item, origin, above)) for item in error.errors()]
-        found: dict[str, Problem] = {}
-        for item, one in findings:
-            if _is_beside_the_point(item, one.key, findings):
+        problems: dict[str, Problem] = {}
+        for item, problem in findings:
+            if _is_beside_the_point(item, problem.key, findings):
                 continue
-            before = found.get(one.key)
+            before = problems.get(problem.key)
             # Each branch of a union that fits nowhere has its own finding.
-            valid = f"{before.valid} or {one.valid}" if before else one.valid
-            found[one.key] = replace(one, valid=valid)
-        raise BadInputError(list(found.values())) from None
+            valid = f"{before.valid} or {problem.valid}" if before else problem.valid
+            problems[problem.key] = replace(problem, valid=valid)
+        raise BadInputError(list(problems.values())) from None
 
 
 def _is_beside_the_point(item: Any, key: str, findings: list[tuple[Any, Problem]]) -> bool:
@@ -255,10 +255,10 @@ def _problem(model: type[BaseModel], tree: Tree, item: Any, origin: Origin, abov
 
 def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: list[str]) -> str:
     if kind == "extra_forbidden":
-        known = known_keys(model, parts[:-1])
-        near = difflib.get_close_matches(parts[-1], known, n=1, cutoff=0.5)
+        keys = keys_at(model, parts[:-1])
+        near = difflib.get_close_matches(parts[-1], keys, n=1, cutoff=0.5)
         hint = f" (did you mean {near[0]}?)" if near else ""
-        return f"one of the keys {', '.join(sorted(known)) or '(none)'}{hint}"
+        return f"one of the keys {', '.join(sorted(keys)) or '(none)'}{hint}"
     limit = next((context[k] for k in ("gt", "ge", "lt", "le") if k in context), None)
     limit = f"{limit:g}" if isinstance(limit, float) else limit
     words = {

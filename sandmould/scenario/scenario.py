@@ -19,14 +19,12 @@ from sandmould.scenario.geometry import Scene
 from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
+from sandmould.scenario.stages import is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
 from sandmould.scenario.vibration import VibrationStage
 
-FILLING = ("settle_", "between_")
-"""How the names of those stages of a run begin in which sand is filled in."""
 
-
-class Record(Section):
+class Recording(Section):
     """What a run writes down, and how often."""
 
     series_every_s: float = quantity(
@@ -68,7 +66,7 @@ FULL_OVERLAP = 2.0
 """Of the smaller radius: a grain lies wholly in another."""
 
 
-class Guard(Section):
+class GuardLimits(Section):
     """When a run is stopped because its numbers cannot be trusted."""
 
     largest_overlap_fraction: float = quantity(
@@ -120,8 +118,8 @@ class Scenario(Section):
     )
     engine: Engine = Field(Engine(), description="The engine.")
     time_step: TimeStep = Field(TimeStep(), description="The time step.")
-    record: Record = Field(Record(), description="What is recorded.")
-    guard: Guard = Field(Guard(), description="When a run is stopped.")
+    record: Recording = Field(Recording(), description="What is recorded.")
+    guard: GuardLimits = Field(GuardLimits(), description="When a run is stopped.")
     seed: int = quantity(1, "Seed of all that is drawn.", source="user", ge=0, le=2**31 - 1)
 
     @cached_property
@@ -131,7 +129,7 @@ class Scenario(Section):
 
     def scene_in(self, stage: str) -> Scene:
         """Geometry in a stage of the run: from the discharge on without its gate."""
-        if self.discharge is None or stage.startswith(FILLING):
+        if self.discharge is None or is_filling(stage):
             return self.scene
         return self.scene.without(self.discharge.gate)
 

@@ -131,15 +131,15 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     BadInputError
         When the file bounds no solid, or is not the one that the scenario was planned with.
     """
-    shown = shown_name(solid.path)
+    file_name = shown_name(solid.path)
     try:
-        found = file_hash(solid.path)
-        if solid.sha256 not in (None, found):
+        sha256_now = file_hash(solid.path)
+        if solid.sha256 not in (None, sha256_now):
             valid = "the file that the study was planned with; this one has changed since"
             raise MeshFileError(valid)
         vertices, triangles = read_surface(solid.path)
     except MeshFileError as fault:
-        raise BadInputError([Problem(f"{key}.file", shown, str(fault))]) from fault
+        raise BadInputError([Problem(f"{key}.file", file_name, str(fault))]) from fault
     c, s = math.cos(math.radians(solid.angle_deg)), math.sin(math.radians(solid.angle_deg))
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     placed_m = solid.unit_m * vertices @ turn.T + np.array(solid.position_m)

@@ -9,7 +9,7 @@ import jinja2
 import pytest
 
 from sandmould import ROOT
-from sandmould.engines.deck import Block, Deck, environment, exact
+from sandmould.engines.deck import Deck, DeckBlock, environment, exact
 from sandmould.engines.lammps.render import layer_data, render_deck
 from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
@@ -110,7 +110,7 @@ def test_numbers_read_back_exactly() -> None:
 
 def test_a_block_with_two_runs_is_refused() -> None:
     with pytest.raises(ValueError, match="2 run commands"):
-        _ = Block("twice", "run 10\nrun 20\n").run_steps
+        _ = DeckBlock("twice", "run 10\nrun 20\n").run_steps
 
 
 def test_layer_file_holds_every_grain_with_its_diameter() -> None:

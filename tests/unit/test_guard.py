@@ -12,6 +12,7 @@ from sandmould.engines.program import Stage
 from sandmould.engines.session import EngineStop
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.stages import StageKind
 from tests.scenes import tube_scene
 
 R = 0.002
@@ -33,7 +34,7 @@ def two_grains(overlap_m: float = 0.0, speed_m_s: float = 0.0) -> Snapshot:
 def stopped_by(snapshot: Snapshot) -> EngineStop:
     """Give what the guard says of a snapshot."""
     guard = Guard(SCENE)
-    guard.start_stage(Stage("settle_1", layer=1), two_grains())
+    guard.start_stage(Stage(StageKind.SETTLE, 1), two_grains())
     with pytest.raises(EngineStop) as stop:
         guard.check(snapshot)
     return stop.value
@@ -73,12 +74,12 @@ def test_energy_beyond_the_fall_stops_and_just_below_does_not() -> None:
     limit_m_s = np.sqrt(2 * bound_j / MASS_KG)
     assert stopped_by(two_grains(speed_m_s=1.001 * limit_m_s)).outcome is Outcome.UNSTABLE
     guard = Guard(SCENE)
-    guard.start_stage(Stage("settle_1", layer=1), two_grains())
+    guard.start_stage(Stage(StageKind.SETTLE, 1), two_grains())
     guard.check(two_grains(speed_m_s=0.999 * limit_m_s))
 
 
 def test_vibration_raises_the_energy_bound() -> None:
-    stage = Stage("vibrate_1", vibration=SCENE.vibration[0])
+    stage = Stage(StageKind.VIBRATE, 1, vibration=SCENE.vibration[0])
     guard = Guard(SCENE)
     guard.start_stage(stage, two_grains())
     wall = SCENE.vibration[0].amplitude_m * 2 * np.pi * 50

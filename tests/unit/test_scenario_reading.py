@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.quantity import fields_at, known_keys
+from sandmould.scenario.quantity import fields_at, keys_at
 from sandmould.scenario.reading import Origin, merge, read_planned, read_yaml, validated
 from sandmould.scenario.scenario import Scenario
 
@@ -105,9 +105,9 @@ def test_rule_of_a_section_is_told_at_the_section() -> None:
 
 
 def test_keys_of_a_path_are_known_from_the_types() -> None:
-    assert known_keys(Scenario, ["box"]) == ["depth_m", "height_m", "width_m"]
-    assert "facets" in known_keys(Scenario, ["obstacles", "0"])
-    assert known_keys(Scenario, ["seed"]) == []
+    assert keys_at(Scenario, ["box"]) == ["depth_m", "height_m", "width_m"]
+    assert "facets" in keys_at(Scenario, ["obstacles", "0"])
+    assert keys_at(Scenario, ["seed"]) == []
     (thickness,) = fields_at(Scenario, "obstacles.0.wall_thickness_m")
     assert thickness.description == "Thickness of the tube's wall."
     assert len(fields_at(Scenario, "obstacles.0.name")) == 6

@@ -18,6 +18,7 @@ from sandmould.runs.progress import duration_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import stage_kind
 from sandmould.study.definition.run import RUN_NAME, Run
 from sandmould.study.kinds.sand import speed
 from sandmould.study.kinds.sand.planning import planned_steps, planned_work, predicted_s
@@ -156,6 +157,7 @@ def test_stages_are_falls_and_vibrations() -> None:
     expected = [falls[0] + REST_AFTER_FALL_S, 0.1, falls[1] + REST_AFTER_FALL_S, 9 / 30]
     stages = build_program(scene).stages
     assert [stage.name for stage in stages] == ["settle_1", "between_1", "settle_2", "vibrate_1"]
+    assert [stage_kind(stage.name) for stage in stages] == [stage.kind for stage in stages]
     assert [stage.expected_s for stage in stages] == pytest.approx(expected)
     steps = [time / scene.step_s for time in expected]
     assert planned_steps(scene) == pytest.approx(sum(steps), abs=4)

@@ -11,7 +11,8 @@ from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 from numba import types
 from numba.extending import intrinsic
 
-from sandmould.dem.addresses import Floats, Ints, int_line_at, int_rows_at, line_at, rows_at
+from sandmould.arrays import Floats, Ints
+from sandmould.dem.addresses import int_line_at, int_rows_at, line_at, rows_at
 from sandmould.dem.contact_law import Law
 
 COUNTS = 12

@@ -13,14 +13,9 @@ from typing import Any
 import numpy as np
 from numba import carray, types
 
+from sandmould.arrays import Floats, Ints
 from sandmould.compiled import cfunc, njit
-from sandmould.dem.addresses import (
-    Floats,
-    Ints,
-    call_with_two,
-    to_floats,
-    to_ints,
-)
+from sandmould.dem.addresses import call_with_two, to_floats, to_ints
 from sandmould.dem.broad_phase import Candidates, find_candidates
 from sandmould.dem.motion import ISOTROPIC, damped
 from sandmould.dem.surface_contacts import surface_forces

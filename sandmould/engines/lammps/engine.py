@@ -17,6 +17,8 @@ from sandmould.engines.program import Program
 from sandmould.engines.ranks import Ranks
 from sandmould.scenario.scenario import Scenario
 
+GRAIN_STEPS_PER_S = 2.5e6
+RANKS = Ranks.PROCESSES
 CAPABILITIES = Capabilities(
     bends_meshes=(2, 3),
     bends_in_frames=("box", "laboratory"),
@@ -24,8 +26,6 @@ CAPABILITIES = Capabilities(
     calls_movers=True,
     loads_of_every_step=False,
 )
-GRAIN_STEPS_PER_S = 2.5e6
-RANKS = Ranks.PROCESSES
 
 
 def installed_version() -> int:

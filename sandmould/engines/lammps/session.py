@@ -259,8 +259,7 @@ class LammpsSession(DeckSession):
             self.send('print "States are kept and gone back to: nothing more is logged"\nlog none')
         folder = TemporaryDirectory(prefix="kept_", dir=self._work)
         super()._save(Path(folder.name))
-        stage = (self.stage_over, self.at_rest, self._ended_window, dict(self._asked))
-        return folder, self._kernel.state(), self._wall_loads.sums.copy(), stage
+        return folder, self._kernel.state(), self._wall_loads.sums.copy(), self._stage_state()
 
     def restore_checkpoint(self, checkpoint: Any) -> None:
         """Compute on from what ``save_checkpoint`` gave: LAMMPS is set up anew."""
@@ -273,8 +272,7 @@ class LammpsSession(DeckSession):
         self._kernel.restore(memory)
         self._begin_stage()
         self._tell_stage_start()
-        self.stage_over, self.at_rest, self._ended_window, asked = stage
-        self._asked = dict(asked)
+        self._restore_stage(stage)
 
     def _save(self, folder: Path) -> None:
         """Write LAMMPS's restart file and the memory of the callback."""

@@ -32,11 +32,11 @@ class BendingMesh:
     @classmethod
     def of(cls, scenario: Scenario) -> BendingMesh | None:
         """The pattern of a scenario; None where there is none."""
-        told = scenario.pattern
-        if told is None:
+        pattern = scenario.pattern
+        if pattern is None:
             return None
-        outline = next(o for o in scenario.scene.outlines if o.name == told.name)
-        return cls(told.name, outline.vertices_m)
+        outline = next(o for o in scenario.scene.outlines if o.name == pattern.name)
+        return cls(pattern.name, outline.vertices_m)
 
     def move(self, vertices_m: Array) -> None:
         """Take a new place."""

@@ -16,6 +16,8 @@ from sandmould.engines.program import Program
 from sandmould.engines.ranks import Ranks
 from sandmould.scenario.scenario import Scenario
 
+GRAIN_STEPS_PER_S = 3e6
+RANKS = Ranks.ONE
 CAPABILITIES = Capabilities(
     bends_meshes=(2,),
     bends_in_frames=("box",),
@@ -23,8 +25,6 @@ CAPABILITIES = Capabilities(
     calls_movers=False,
     loads_of_every_step=False,
 )
-GRAIN_STEPS_PER_S = 3e6
-RANKS = Ranks.ONE
 
 
 def installed_version() -> int | str:

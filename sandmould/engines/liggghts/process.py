@@ -28,8 +28,8 @@ def executable() -> str | None:
 
 def version_in(text: str) -> str | None:
     """Version in LIGGGHTS's own first line."""
-    found = _VERSION.search(text)
-    return found.group(1) if found else None
+    match = _VERSION.search(text)
+    return match.group(1) if match else None
 
 
 @functools.cache
@@ -98,7 +98,7 @@ class Conversation:
         assert self._process.stdin is not None
         self._pipe = self._process.stdin.fileno()
         os.set_blocking(self._pipe, False)
-        self._asked = 0
+        self._requests = 0
         self._heard = b""
 
     def say(self, commands: str) -> str:
@@ -117,8 +117,8 @@ class Conversation:
         ------
         LiggghtsDied
         """
-        self._asked += 1
-        marker = f"<sandmould {self._asked}>"
+        self._requests += 1
+        marker = f"<sandmould {self._requests}>"
         waiting = f'{commands.rstrip()}\nprint "{marker}"\n'.encode()
         end = f"{marker}\n".encode()
         while end not in self._heard:

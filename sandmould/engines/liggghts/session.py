@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sandmould.engines.deck import Block, Deck
+from sandmould.engines.deck import Deck, DeckBlock
 from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.liggghts.bending_mesh import BendingMesh
 from sandmould.engines.liggghts.grains_file import read_grains
@@ -32,7 +32,7 @@ _LOOP = re.compile(r"^label settling_\d+$.*^label settled_\d+$\n", re.M | re.S)
 _VALUE = re.compile(r"^value (\S+)$", re.M)
 
 
-def around_run(block: Block) -> tuple[str, str]:
+def around_run(block: DeckBlock) -> tuple[str, str]:
     """Commands before and after a block's long run, be it one command or a loop of windows."""
     loop = _LOOP.search(block.text)
     if loop is None:

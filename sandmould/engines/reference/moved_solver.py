@@ -116,7 +116,7 @@ class MovedSolver(Solver):
         threads = min(self._threads, chunks)
         team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
 
-        def one(thread: int) -> tuple[int, int]:
+        def run_thread(thread: int) -> tuple[int, int]:
             ended: tuple[int, int] = _advance(
                 self._dim,
                 self.steps,
@@ -133,8 +133,8 @@ class MovedSolver(Solver):
             )
             return ended
 
-        others = [self._pool.submit(one, thread) for thread in range(1, threads)]
-        ended = one(0)
+        others = [self._pool.submit(run_thread, thread) for thread in range(1, threads)]
+        ended = run_thread(0)
         for other in others:
             other.result()
         loads[0, rows] = mover.sum

@@ -158,8 +158,8 @@ class ReferenceSession(StagedSession):
     def save_checkpoint(self) -> Any:
         """Copies of the solver's arrays, loads of this record, where the stage stands."""
         loads = self.solver.moving.walls.loads.sum(axis=0)
-        stage = (self.stage_over, self.at_rest, self._ended_window, dict(self._asked))
-        return copy.deepcopy(self.solver.state()), loads, dict(self._loads), stage
+        state = copy.deepcopy(self.solver.state())
+        return state, loads, dict(self._loads), self._stage_state()
 
     def restore_checkpoint(self, checkpoint: Any) -> None:
         """Compute on from what ``save_checkpoint`` gave."""
@@ -167,8 +167,7 @@ class ReferenceSession(StagedSession):
         self.solver.restore(copy.deepcopy(arrays))
         self.solver.moving.walls.loads[0] = loads
         self._loads = dict(means)
-        self.stage_over, self.at_rest, self._ended_window, asked = stage
-        self._asked = dict(asked)
+        self._restore_stage(stage)
 
     def _save(self, folder: Path) -> None:
         """Write the solver's state, of which nothing is lost."""

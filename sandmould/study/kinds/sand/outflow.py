@@ -21,7 +21,8 @@ from analysis.repose import (
 )
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.box import Plate
-from sandmould.scenario.scenario import FILLING, Scenario
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import is_filling
 
 COLUMN_WIDTH = {2: 1.0, 3: 0.5}
 """Columns in 2D or rings in 3D that a surface is averaged over, in largest diameters: a ring holds
@@ -53,7 +54,7 @@ def slopes(scenario: Scenario, snapshot: Snapshot) -> tuple[Slope, Slope]:
 def measure_outflow(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
     """Columns of one snapshot after the gate has opened; empty before, and without a gate."""
     gate = scenario.gate
-    if gate is None or snapshot.stage.startswith(FILLING):
+    if gate is None or is_filling(snapshot.stage):
         return {}
     return (_heap if gate.is_level else _run_out)(scenario, gate, snapshot)
 
@@ -153,7 +154,7 @@ def side_load_fraction(loads: pd.DataFrame) -> float:
     loads : DataFrame
         ``loads.tsv`` of a run; the last window before the gate opens is taken.
     """
-    filled = loads[loads["stage"].str.startswith(FILLING)]
+    filled = loads[loads["stage"].map(is_filling).astype(bool)]
     last = filled[filled["time_s"] == filled["time_s"].max()]
     columns = [c for c in last.columns if c.startswith("force_")]
     weight_n = -float(last[columns[-1]].sum())

@@ -1,0 +1,43 @@
+"""Kinds of stages of a run, and their names in snapshots and tables."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class StageKind(Enum):
+    """What happens in a stage; the value begins its name."""
+
+    SETTLE = "settle"
+    """A layer falls and comes to rest."""
+    BETWEEN = "between"
+    """The box vibrates before the next layer falls."""
+    DISCHARGE = "discharge"
+    """Sand flows out through the gate until it rests."""
+    VIBRATE = "vibrate"
+    """The box vibrates after the fill."""
+
+    @property
+    def fills(self) -> bool:
+        """Whether the stage belongs to the fill."""
+        return self in (StageKind.SETTLE, StageKind.BETWEEN)
+
+    def numbered(self, number: int) -> str:
+        """Name of a stage of this kind, counted from 1; 0 of one that is the only one."""
+        return f"{self.value}_{number}" if number else self.value
+
+
+def stage_kind(name: str) -> StageKind:
+    """Kind of the stage of a name.
+
+    Raises
+    ------
+    ValueError
+        When no stage is called so.
+    """
+    return StageKind(name.partition("_")[0])
+
+
+def is_filling(name: str) -> bool:
+    """Whether the stage of a name belongs to the fill."""
+    return stage_kind(name).fills
