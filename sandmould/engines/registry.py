@@ -16,6 +16,7 @@ from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.scenario import Scenario
 
 
