@@ -182,7 +182,7 @@ def find_candidates(
     grains, first_facet = len(radius), len(shape)
     rows, parts = np.empty(16, dtype=np.int64), np.empty(16, dtype=np.int64)
     start = np.zeros(17, dtype=np.int64)
-    m = found = 0
+    m = listed = 0
     reach = skin
     for i in range(grains):
         reach = max(reach, skin + radius[i])
@@ -211,7 +211,7 @@ def find_candidates(
     for i in range(grains):
         x = plus(load(dim, position, i), -1.0, shift)
         near = radius[i] + skin
-        before = found
+        before = listed
         cell = -1
         if sort:
             i_x = math.floor((x[0] - low[0]) / size)
@@ -225,14 +225,14 @@ def find_candidates(
             p = k if k < first_facet else cell_part[sorted_first + k - first_facet]
             distance = nearest(dim, vertices, planes, shape, corner, p, x, near)[0]
             if distance <= near:
-                if found == len(parts):
-                    parts = _longer(parts, found)
-                parts[found] = p
-                found += 1
-        if found > before:
+                if listed == len(parts):
+                    parts = _longer(parts, listed)
+                parts[listed] = p
+                listed += 1
+        if listed > before:
             if m == len(rows):
                 rows, start = _longer(rows, m), _longer(start, m + 1)
             rows[m] = i
             m += 1
-            start[m] = found
-    return Candidates(rows[:m].copy(), start[: m + 1].copy(), parts[:found].copy())
+            start[m] = listed
+    return Candidates(rows[:m].copy(), start[: m + 1].copy(), parts[:listed].copy())

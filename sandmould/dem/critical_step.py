@@ -112,9 +112,9 @@ def _tangents(normal: Floats) -> Floats:
     if normal.shape[1] == 2:
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None]
     least = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    one = np.cross(normal, least)
-    one /= np.sqrt((one**2).sum(axis=1))[:, None]
-    return np.stack([one, np.cross(normal, one)], axis=1)
+    tangent = np.cross(normal, least)
+    tangent /= np.sqrt((tangent**2).sum(axis=1))[:, None]
+    return np.stack([tangent, np.cross(normal, tangent)], axis=1)
 
 
 def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
@@ -134,7 +134,7 @@ def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
     if d == 3 and not law.torsion:
         roll[:, 0] = 0.0
 
-    def one(side: int, grain: Ints) -> Floats:
+    def rows_of_side(side: int, grain: Ints) -> Floats:
         sign = 2.0 * side - 1.0
         moving = np.zeros((c, 3 * d - 3, d + rolls.shape[2]))
         moving[:, 0, :d] = sign * math.sqrt(law.k_n) * n
@@ -146,7 +146,7 @@ def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
         return np.where((grain < 0)[:, None, None], 0.0, moving)
 
     damping = 2.0 * law.damping_ratio * np.sqrt(ends.mass * law.k_n)
-    rows = one(0, ends.first), one(1, ends.second)
+    rows = rows_of_side(0, ends.first), rows_of_side(1, ends.second)
     return ActiveContacts(ends.first, ends.second, *rows, damping / law.k_n, len(grains.id))
 
 
@@ -234,8 +234,8 @@ def _largest(matrix: csr_array) -> float:
         return float(np.linalg.eigvalsh(matrix.toarray())[-1])
     # A start of no symmetry, always the same.
     start = np.random.default_rng(1).standard_normal(n)
-    found = eigsh(matrix, k=1, which="LA", v0=start, ncv=40, tol=1e-10, return_eigenvectors=False)
-    return float(found[0])
+    largest = eigsh(matrix, k=1, which="LA", v0=start, ncv=40, tol=1e-10, return_eigenvectors=False)
+    return float(largest[0])
 
 
 def whole_step(contacts: ActiveContacts) -> StableStep:

@@ -242,7 +242,7 @@ class Solver:
         threads = min(self._threads, chunks)
         team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
 
-        def one(thread: int) -> tuple[int, int]:
+        def run_thread(thread: int) -> tuple[int, int]:
             ended: tuple[int, int] = advance(
                 self._dim,
                 steps,
@@ -257,8 +257,8 @@ class Solver:
             )
             return ended
 
-        others = [self._pool.submit(one, thread) for thread in range(1, threads)]
-        ended = one(0)
+        others = [self._pool.submit(run_thread, thread) for thread in range(1, threads)]
+        ended = run_thread(0)
         for other in others:
             other.result()
         return ended

@@ -103,7 +103,7 @@ def _farthest(dim: Any, grains: Grains, listed: Floats, shift: Any) -> float:
 
 
 @njit(**OPTIONS)
-def _press(
+def _add_forces(
     dim: Any, c: int, scene: DemScene, moving: Moving, shift: Any, speed: Any, dt: float
 ) -> None:
     """Add all forces on the grains of a chunk but those of earlier chunks."""
@@ -144,7 +144,7 @@ def find_forces(dim: Any, scene: DemScene, moving: Moving) -> None:
         Its grains' forces are zero before.
     """
     for c in range(len(moving.chunks.bound) - 1):
-        _press(dim, c, scene, moving, no_vector(dim), no_vector(dim), 0.0)
+        _add_forces(dim, c, scene, moving, no_vector(dim), no_vector(dim), 0.0)
     for c in range(len(moving.chunks.bound) - 1):
         gather_incoming(dim, c, moving.chunks, moving.grains)
 
@@ -253,7 +253,7 @@ def advance(
         else:
             shift, speed = _box(dim, scene, displacement, k)
             for c in mine:
-                _press(dim, c, scene, moving, shift, speed, scene.dt)
+                _add_forces(dim, c, scene, moving, shift, speed, scene.dt)
                 if threads == 1:
                     # The chunk moves on while it is still in the cache: later chunks neither
                     # read it nor add to it.

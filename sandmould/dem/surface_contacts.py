@@ -43,10 +43,10 @@ _WAITS, _COVERED, _SEEN = 0, 1, 2
 
 
 @njit(**OPTIONS)
-def _next(distance: Floats, inside: Flags, state: NDArray[np.int8], found: int) -> int:
+def _next(distance: Floats, inside: Flags, state: NDArray[np.int8], touched: int) -> int:
     """Give the nearest part still waiting, or -1; of two equally near the one touched inside."""
     best, least = -1, FAR
-    for i in range(found):
+    for i in range(touched):
         if state[i] == _WAITS and (
             distance[i] < least or (distance[i] == least and inside[i] and not inside[best])
         ):
@@ -61,13 +61,13 @@ def _cover(
     normal: Floats,
     inside: Flags,
     state: NDArray[np.int8],
-    found: int,
-    kept: int,
+    touched: int,
+    contact: int,
     r: float,
 ) -> None:
     """Rule out all that a contact covers."""
-    n, near = load(dim, normal, kept), distance[kept]
-    for i in range(found):
+    n, near = load(dim, normal, contact), distance[contact]
+    for i in range(touched):
         if state[i] == _WAITS:
             cosine = dot(n, load(dim, normal, i))
             in_front = near - distance[i] * cosine
@@ -140,16 +140,16 @@ def surface_forces(
         i = rows[row]
         r = radius[i]
         x = plus(load(dim, position, i), -1.0, shift)
-        found = 0
+        touched = 0
         for k in range(start[row], start[row + 1]):
             distance, n, weights, inside = nearest(
                 dim, vertices, planes, shape, corner, part[k], x, r
             )
             if distance >= r:
                 continue
-            c = found
-            if found < _MOST:
-                found += 1
+            c = touched
+            if touched < _MOST:
+                touched += 1
             else:
                 # Of too many parts the nearest count.
                 c = int(np.argmax(f_distance))
@@ -160,7 +160,7 @@ def surface_forces(
             store(n, f_normal, c)
             store(weights, f_weights, c)
         old, base = slots_used[row], row * n_slots
-        if found == 0:
+        if touched == 0:
             if keep and old:
                 slots_used[row] = 0
             continue
@@ -169,7 +169,7 @@ def surface_forces(
         total, turning = no_vector(dim), no_spin(dim)
         contacts = taken = 0
         while contacts < n_slots:
-            c = _next(f_distance, f_inside, f_state, found) if found > 1 else 0
+            c = _next(f_distance, f_inside, f_state, touched) if touched > 1 else 0
             if c < 0:
                 break
             n, distance, weights = load(dim, f_normal, c), f_distance[c], load(dim, f_weights, c)
@@ -178,7 +178,7 @@ def surface_forces(
                 # The edge of a concave joint is no contact: a nearer part goes on from there.
                 edge = plus(x, distance, n)
                 joined = False
-                for k in range(found):
+                for k in range(touched):
                     if k != c and f_state[k] != _WAITS and f_distance[k] <= distance:
                         gap = nearest(dim, vertices, planes, shape, corner, f_part[k], edge, r)[0]
                         joined = joined or abs(gap) <= EDGE_SHOWS * r
@@ -215,9 +215,9 @@ def surface_forces(
                 store(friction, slot_friction, slot)
                 store(rolling, slot_rolling, slot)
             contacts += 1
-            if found == 1:
+            if touched == 1:
                 break
-            _cover(dim, f_distance, f_normal, f_inside, f_state, found, c, r)
+            _cover(dim, f_distance, f_normal, f_inside, f_state, touched, c, r)
         if keep:
             slots_used[row] = taken
         add_to(total, 1.0, force, i)

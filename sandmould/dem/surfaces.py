@@ -210,8 +210,8 @@ class Surfaces:
                 self._range[other] = slice(its.start - gone, its.stop - gone)
         for kind, corner in self._corner_of.items():
             stays = (corner[:, 0] < rows.start) | (corner[:, 0] >= rows.stop)
-            kept = corner[stays]
-            self._corner_of[kind] = kept - gone * (kept >= rows.stop)
+            left = corner[stays]
+            self._corner_of[kind] = left - gone * (left >= rows.stop)
             if kind in self._shape_of:
                 self._shape_of[kind] = self._shape_of[kind][stays]
         old = self.arrays

@@ -103,11 +103,11 @@ def carry_history(dim: Any, old_ids: Ints, old: WallHistory, new_ids: Ints) -> W
         row_of[old_ids[row]] = row
     n = slots(dim)
     for row in range(len(new_ids)):
-        found = row_of[new_ids[row]] if new_ids[row] < len(row_of) else -1
-        if found >= 0:
-            new.used[row] = old.used[found]
-            for k in range(old.used[found]):
-                a, b = found * n + k, row * n + k
+        old_row = row_of[new_ids[row]] if new_ids[row] < len(row_of) else -1
+        if old_row >= 0:
+            new.used[row] = old.used[old_row]
+            for k in range(old.used[old_row]):
+                a, b = old_row * n + k, row * n + k
                 store(load(dim, old.normal, a), new.normal, b)
                 store(load_spin(dim, old.friction, a), new.friction, b)
                 store(load_spin(dim, old.rolling, a), new.rolling, b)

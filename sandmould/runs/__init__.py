@@ -1,1 +1,1 @@
-"""What every run has, whatever computes it: outcome, cost, progress, checkpoint, products."""
+"""What every run has, whatever computes it: outcome, cost, progress, checkpoint, provenance."""

@@ -95,7 +95,7 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     checkpoint = CheckpointFile(work / CHECKPOINT, computed_hash(scenario))
     newest = checkpoint.read()
 
-    def tell(now: CoolingProgress) -> None:
+    def show_progress(now: CoolingProgress) -> None:
         nonlocal cooled
         cooled = now
         progress.show("cooling", now.time_s, now.element_steps, now.element_steps_per_s)
@@ -106,8 +106,8 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
         cost.time_step_s = marching.step_s
         probes_m = {probe.name: np.array(probe.at_m) for probe in scenario.probes}
         result = solidify(
-            elements, filling, marching, probes_m, scenario.record_s, scenario.until_s, tell,
-            Cooling.of(newest) if newest else None,
+            elements, filling, marching, probes_m, scenario.record_s, scenario.until_s,
+            show_progress, Cooling.of(newest) if newest else None,
             lambda now: checkpoint.write_when_due(now.arrays),
         )  # fmt: skip
     except (UnstableError, ValueError) as stop:

@@ -89,15 +89,15 @@ class DifferenceSteps:
 def _between(material: Any, axis: int, cell_m: float, conductivity: Floats, resistance: float
              ) -> Floats:  # fmt: skip
     """Rate (W/m3/K) between each cell and the next along an axis; 0 behind the last."""
-    found = np.zeros(material.shape)
+    rate = np.zeros(material.shape)
     n = material.shape[axis]
     before, after = (np.take(material, range(k, n - 1 + k), axis=axis) for k in (0, 1))
     path = 0.5 * cell_m / conductivity[before] + 0.5 * cell_m / conductivity[after]
     path += np.where(before != after, resistance, 0.0)
     inner = [slice(None)] * 3
     inner[axis] = slice(0, n - 1)
-    found[tuple(inner)] = 1.0 / (path * cell_m)
-    return found
+    rate[tuple(inner)] = 1.0 / (path * cell_m)
+    return rate
 
 
 @njit(parallel=True)

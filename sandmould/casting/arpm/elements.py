@@ -83,12 +83,12 @@ def placed(raster: Raster, layers: Sequence[int] = ()) -> Elements:
         raise ValueError(f"layers are {list(layers)}; none may be negative")
     span = np.ones(raster.material.shape, dtype=np.int64)
     distance = _from_interface(raster.material)
-    for level, kept in enumerate(layers, start=1):
+    for level, layer_count in enumerate(layers, start=1):
         half = 2 ** (level - 1)
         if level > 1:
             distance = _distance_to(span < half)
-        mergeable = _all_in_block((distance > kept * half) & (span == half), 2 * half)
-        if kept == 0:
+        mergeable = _all_in_block((distance > layer_count * half) & (span == half), 2 * half)
+        if layer_count == 0:
             mergeable &= _one_material(raster.material, 2 * half)
         span[mergeable] = 2 * half
     return _elements(raster, span)

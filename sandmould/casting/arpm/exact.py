@@ -39,7 +39,7 @@ def contact_temperature_k(
     """
     effusivity = [math.sqrt(b.conductivity_w_m_k * b.capacity_j_m3_k) for b in bodies]
     contact = sum(e * t for e, t in zip(effusivity, initial_k, strict=True)) / sum(effusivity)
-    found = np.empty(len(place_m))
+    temperature_k = np.empty(len(place_m))
     for number, body in enumerate(bodies):
         own = (place_m < 0.0) if number == 0 else (place_m >= 0.0)
         depth = np.abs(place_m[own])
@@ -51,8 +51,8 @@ def contact_temperature_k(
             late = h * math.sqrt(diffusivity * time_s) / body.conductivity_w_m_k
             # exp(a) erfc(b) with a - b^2 = -similar^2, in a form that does not overflow
             share = share + np.exp(-(similar**2)) * erfcx(similar + late)
-        found[own] = contact + (initial_k[number] - contact) * share
-    return found
+        temperature_k[own] = contact + (initial_k[number] - contact) * share
+    return temperature_k
 
 
 def stefan_front(body: ThermalMaterial, melting_k: float, wall_k: float) -> float:

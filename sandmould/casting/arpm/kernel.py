@@ -91,19 +91,19 @@ def neighbours(elements: Elements, kernel_size: float) -> tuple[Ints, Ints, Floa
     place, number = with_images(elements, kernel_size * float(elements.size_m.max()))
     size = elements.size_m[number]
     octave = np.round(np.log2(size / size.min())).astype(np.int64)
-    found = []
+    pairs = []
     for level in np.unique(octave):
         own, smaller = np.flatnonzero(octave == level), np.flatnonzero(octave < level)
         reach = kernel_size * float(size[own].max())
         tree = cKDTree(place[own])
         within = tree.query_pairs(reach, output_type="ndarray")
-        found.append(np.stack([own[within[:, 0]], own[within[:, 1]]]))
+        pairs.append(np.stack([own[within[:, 0]], own[within[:, 1]]]))
         if len(smaller):
             across = tree.sparse_distance_matrix(
                 cKDTree(place[smaller]), reach, output_type="ndarray"
             )
-            found.append(np.stack([own[across["i"]], smaller[across["j"]]]))
-    one, two = np.concatenate(found, axis=1)
+            pairs.append(np.stack([own[across["i"]], smaller[across["j"]]]))
+    one, two = np.concatenate(pairs, axis=1)
     one, two = np.concatenate([one, two]), np.concatenate([two, one])
     one, two = one[one < real], two[one < real]
     distance = np.linalg.norm(place[one] - place[two], axis=1)

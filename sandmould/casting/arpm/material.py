@@ -132,7 +132,7 @@ def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
 
 @njit()
 def _temperatures(enthalpy: Any, material: Any, rows: Any, reference: float) -> Any:
-    found = np.empty(len(enthalpy))
+    temperature = np.empty(len(enthalpy))
     for i in range(len(enthalpy)):
-        found[i] = temperature_of(enthalpy[i], material[i], rows, reference)
-    return found
+        temperature[i] = temperature_of(enthalpy[i], material[i], rows, reference)
+    return temperature

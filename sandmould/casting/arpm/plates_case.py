@@ -140,14 +140,15 @@ def run_plates(plates: Plates, case: str, method: HeatMethod, size_m: float = SM
     """Solidify a case; arguments as those of ``plates_layout`` and ``solidify``."""
     raster, elements = plates_layout(plates, case, size_m)
     marching = method.marching(elements, plates.filling, raster)
-    found = solidify(
+    result = solidify(
         elements, plates.filling, marching, plates.probes_m, record_s, until_s, progress
     )
-    return PlatesRun(elements, found, marching.step_s)
+    return PlatesRun(elements, result, marching.step_s)
 
 
-def curve_error_percent(plates: Plates, found: SolidificationResult, reference: SolidificationResult
-                        ) -> dict[str, tuple[float, float]]:  # fmt: skip
+def curve_error_percent(
+    plates: Plates, result: SolidificationResult, reference: SolidificationResult
+) -> dict[str, tuple[float, float]]:
     """Error (7) of each cooling curve, and its largest value, % of the initial difference.
 
     (7) calls itself K/s and lacks the time step in its sum; here it has it, and no unit.
@@ -155,7 +156,7 @@ def curve_error_percent(plates: Plates, found: SolidificationResult, reference: 
     Parameters
     ----------
     plates : Plates
-    found, reference : SolidificationResult
+    result, reference : SolidificationResult
         Recorded at the same times; the shorter one counts, up to 2000 s.
 
     Returns
@@ -167,12 +168,12 @@ def curve_error_percent(plates: Plates, found: SolidificationResult, reference: 
     ValueError
         When their records are at different times.
     """
-    times = found.time_s[: np.searchsorted(found.time_s, ERROR_TIME_S, side="right")]
+    times = result.time_s[: np.searchsorted(result.time_s, ERROR_TIME_S, side="right")]
     k = min(len(times), len(reference.time_s))
     if not np.allclose(times[:k], reference.time_s[:k]):
         raise ValueError("cooling curves are recorded at different times; give one record_s")
     mould_k, pour_k = plates.filling.initial_k
-    error = _differences(found.probe_k, reference.probe_k, k)
+    error = _differences(result.probe_k, reference.probe_k, k)
     lasted = np.gradient(times[:k])
     return {
         name: (
@@ -183,6 +184,6 @@ def curve_error_percent(plates: Plates, found: SolidificationResult, reference: 
     }
 
 
-def _differences(found: Mapping[str, Floats], reference: Mapping[str, Floats], k: int
+def _differences(result: Mapping[str, Floats], reference: Mapping[str, Floats], k: int
                  ) -> dict[str, Floats]:  # fmt: skip
-    return {name: np.abs(found[name][:k] - reference[name][:k]) for name in found}
+    return {name: np.abs(result[name][:k] - reference[name][:k]) for name in result}

@@ -136,9 +136,9 @@ def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
     try:
         check_casting(elements_of(scenario), filling_of(scenario))
     except ValueError as error:
-        shown = [shape.kind for shape in scenario.shapes]
+        kinds = [shape.kind for shape in scenario.shapes]
         valid = f"a casting that elements of {scenario.element_m:g} m can fill in its mould"
-        yield Problem("shapes", shown, f"{valid} ({error})")
+        yield Problem("shapes", kinds, f"{valid} ({error})")
 
 
 def expected_s(scenario: Solidification) -> float:

@@ -51,13 +51,13 @@ def stage_weights(stages: int) -> Floats:
     b = np.full(stages + 1, 1.0 / 3.0)
     b[2:] = (j[2:] ** 2 + j[2:] - 2.0) / (2.0 * j[2:] * (j[2:] + 1.0))
     w = 4.0 / (stages**2 + stages - 2.0)
-    found = np.zeros((stages, 4))
-    found[0, 2] = b[1] * w
+    weights = np.zeros((stages, 4))
+    weights[0, 2] = b[1] * w
     for k in range(2, stages + 1):
         mu = (2.0 * k - 1.0) / k * b[k] / b[k - 1]
         nu = -(k - 1.0) / k * b[k] / b[k - 2]
-        found[k - 1] = mu, nu, mu * w, -(1.0 - b[k - 1]) * mu * w
-    return found
+        weights[k - 1] = mu, nu, mu * w, -(1.0 - b[k - 1]) * mu * w
+    return weights
 
 
 class SuperSteps:

@@ -95,13 +95,13 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     course = _Course(scenario, CheckpointFile(work / CHECKPOINT, computed_hash(scenario)))
     flow, outcome, detail = course.flow, Outcome.FINISHED, ""
 
-    def tell(now: FlowProgress | None = None) -> None:
+    def show_progress(now: FlowProgress | None = None) -> None:
         done = flow.cost.particle_solves
         rate = done / max(flow.cost.wall_s, 1e-9)
         progress.show(course.stage, flow.time_s, done, rate, last=now is None)
 
     try:
-        flow.advance(scenario.duration_s, course, tell)
+        flow.advance(scenario.duration_s, course, show_progress)
     except ArithmeticError as stop:
         detail = str(stop)
         outcome = Outcome.FINISHED if isinstance(scenario.case, StillTank) else _outcome(stop)
@@ -112,7 +112,7 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     )
     np.savez_compressed(work / "fields.npz", **course.record.fields(flow))
     cost.wall_s = course.before_s["wall_s"] + time.monotonic() - begun
-    tell()
+    show_progress()
     return Computed(
         RunOutcome(outcome, detail, flow.time_s, scenario.duration_s), cost, is_root=True
     )
@@ -130,15 +130,15 @@ class _Course:
         self._clock_s = {"cpu_s": time.process_time(), "wall_s": time.monotonic()}
         self.before_s = dict.fromkeys(self._clock_s, 0.0)
         """Processor and wall time of the processes that computed this run before."""
-        kept = checkpoint.read()
-        if kept is None:
+        arrays = checkpoint.read()
+        if arrays is None:
             self.record.frame(self.flow)
             return
-        self.flow.take_up(kept)
-        self.record.take_up(kept)
-        self.before_s = {name: float(kept[name]) for name in self._clock_s}
+        self.flow.take_up(arrays)
+        self.record.take_up(arrays)
+        self.before_s = {name: float(arrays[name]) for name in self._clock_s}
         if self._ladle:
-            self._ladle.poured = int(kept["poured"])
+            self._ladle.poured = int(arrays["poured"])
 
     def __call__(self, flow: Flow) -> None:
         """Pour what is due, note the step, and keep the run now and then."""

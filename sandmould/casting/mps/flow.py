@@ -130,12 +130,12 @@ class Flow:
             "time_s": self.time_s,
         }  # fmt: skip
 
-    def take_up(self, kept: Mapping[str, Any]) -> None:
+    def take_up(self, arrays: Mapping[str, Any]) -> None:
         """Go on from what ``arrays`` gave: the rest comes out bit for bit as in one run."""
-        self._set(Particles(kept["position_m"], kept["velocity_m_s"], kept["kind"]))
-        self.pressure_pa, self.time_s = kept["flow_pressure_pa"], float(kept["time_s"])
-        self.cost = RunningCost(*(kept[f"cost_{name}"].item() for name in vars(self.cost)))
-        self._solved_pa = kept["solved_pa"]
+        self._set(Particles(arrays["position_m"], arrays["velocity_m_s"], arrays["kind"]))
+        self.pressure_pa, self.time_s = arrays["flow_pressure_pa"], float(arrays["time_s"])
+        self.cost = RunningCost(*(arrays[f"cost_{name}"].item() for name in vars(self.cost)))
+        self._solved_pa = arrays["solved_pa"]
 
     def speed(self) -> Floats:
         """Speeds of the fluid, (m,) float64, m/s."""
@@ -239,12 +239,12 @@ class Flow:
             kernel, near, state.kind, state.velocity_m_s, dt, compression, compression_before,
             rate_before,
         )  # fmt: skip
-        asked = SOURCES[scheme.source](now)
+        source = SOURCES[scheme.source](now)
         surface = near.density < scheme.surface * kernel.lattice_density
         factor = scheme.source_share * self.metal.density_kg_m3 / dt**2
         begin = time.perf_counter()
         pressure, iterations = solve_pressure(
-            kernel, near, state.kind, surface, factor * asked, self._solved_pa[number],
+            kernel, near, state.kind, surface, factor * source, self._solved_pa[number],
             scheme.tolerance,
         )  # fmt: skip
         self.cost.pressure_s += time.perf_counter() - begin

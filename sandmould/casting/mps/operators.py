@@ -76,12 +76,12 @@ def density_rate(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
 @njit(**OPTIONS)
 def divergence(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
     """Divergence of the velocity, d/n0 sum of r_ij . u_ij w / r^2; as ``density_rate``."""
-    found = np.zeros(len(velocity))
+    result = np.zeros(len(velocity))
     factor = kernel.dimension / kernel.lattice_density
     for i in range(len(velocity)):
         for k in range(near.start[i], near.start[i + 1]):
-            found[i] += factor * near.share[k] * approach(near, velocity, k, i)
-    return found
+            result[i] += factor * near.share[k] * approach(near, velocity, k, i)
+    return result
 
 
 @njit(**OPTIONS)
@@ -101,15 +101,15 @@ def laplacian(kernel: Kernel, near: Neighbours, field: Floats, kind: Kinds) -> F
     (n, 3) float64, the field's unit over m2
         0 on walls and dummies.
     """
-    found = np.zeros_like(field)
+    result = np.zeros_like(field)
     factor = 2.0 * kernel.dimension / kernel.lattice_density
     for i in range(len(field)):
         if kind[i] == FLUID:
             for k in range(near.start[i], near.start[i + 1]):
                 j = near.other[k]
                 for a in range(3):
-                    found[i, a] += factor * near.share[k] * (field[j, a] - field[i, a])
-    return found
+                    result[i, a] += factor * near.share[k] * (field[j, a] - field[i, a])
+    return result
 
 
 @njit(**OPTIONS)
@@ -128,7 +128,7 @@ def least_around(near: Neighbours, pressure: Floats, kind: Kinds) -> Floats:
 @njit(**OPTIONS)
 def _gradient(kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, form: int) -> Floats:
     """As ``pressure_gradient``, before any correction."""
-    found = np.zeros((len(pressure), 3))
+    result = np.zeros((len(pressure), 3))
     factor = kernel.dimension / kernel.lattice_density
     least = least_around(near, pressure, kind) if form == LEAST else pressure
     for i in range(len(pressure)):
@@ -147,8 +147,8 @@ def _gradient(kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, f
             else:
                 part = pressure[j] - pressure[i]
             for a in range(3):
-                found[i, a] += factor * part * near.share[k] * near.away_m[k, a]
-    return found
+                result[i, a] += factor * part * near.share[k] * near.away_m[k, a]
+    return result
 
 
 @njit(**OPTIONS)
@@ -208,7 +208,7 @@ def _velocity_differences(
     kernel: Kernel, near: Neighbours, velocity: Floats, kind: Kinds
 ) -> Floats:
     """As ``velocity_gradient``, before correction."""
-    found = np.zeros((len(kind), 3, 3))
+    result = np.zeros((len(kind), 3, 3))
     factor = kernel.dimension / kernel.lattice_density
     for i in range(len(kind)):
         for k in range(near.start[i], near.start[i + 1]):
@@ -217,8 +217,8 @@ def _velocity_differences(
                 for a in range(3):
                     along = factor * near.share[k] * near.away_m[k, a]
                     for b in range(3):
-                        found[i, a, b] += along * (velocity[j, b] - velocity[i, b])
-    return found
+                        result[i, a, b] += along * (velocity[j, b] - velocity[i, b])
+    return result
 
 
 def velocity_gradient(kernel: Kernel, near: Neighbours, velocity: Floats, kind: Kinds) -> Floats:
@@ -256,11 +256,11 @@ def crowding(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
     (n, 3) float64, 1/m
         0 on walls and dummies, which count as neighbours.
     """
-    found = np.zeros((len(kind), 3))
+    result = np.zeros((len(kind), 3))
     factor = kernel.dimension / kernel.lattice_density
     for i in range(len(kind)):
         if kind[i] == FLUID:
             for k in range(near.start[i], near.start[i + 1]):
                 for a in range(3):
-                    found[i, a] += factor * near.share[k] * near.away_m[k, a]
-    return found
+                    result[i, a] += factor * near.share[k] * near.away_m[k, a]
+    return result

@@ -80,10 +80,10 @@ def _begun(system: System, right: Floats, guess: Floats) -> tuple[Floats, Floats
 
 
 @njit(**OPTIONS)
-def _added(system: System, begin: Floats, found: Floats) -> Floats:
+def _added(system: System, begin: Floats, solution: Floats) -> Floats:
     """What the iteration began with and, by K'^-1, what it found."""
-    step = np.empty_like(found)
-    _sweep_up(system, found, step)
+    step = np.empty_like(solution)
+    _sweep_up(system, solution, step)
     return begin + step
 
 

@@ -92,5 +92,5 @@ def mould_around(
     outer = site_m[~inside]
     far, _ = cKDTree(site_m[inside]).query(outer, p=np.inf)
     layer = np.round(far / spacing_m)
-    kept = layer <= WALL_LAYERS
-    return at_rest(outer[kept], np.where(layer[kept] == 1, WALL, DUMMY).astype(np.int8))
+    within = layer <= WALL_LAYERS
+    return at_rest(outer[within], np.where(layer[within] == 1, WALL, DUMMY).astype(np.int8))

@@ -168,16 +168,16 @@ def solve_pressure(
         null = 1.0 / rows.scale[region]
         wanted[region] -= null * float(null @ wanted[region]) / float(null @ null)
     begin = guess[rows.number] / rows.scale
-    found, iterations, met = solve(rows.system, wanted, begin, tolerance)
+    solution, iterations, met = solve(rows.system, wanted, begin, tolerance)
     if not met:
         raise NotSolvedError(
             f"the pressure of {len(wanted)} particles did not converge to {tolerance:g} "
             f"in {iterations} iterations"
         )
-    found *= rows.scale
+    solution *= rows.scale
     for region in regions:
-        found[region] -= found[region].min()
-    pressure[rows.number] = found
+        solution[region] -= solution[region].min()
+    pressure[rows.number] = solution
     return pressure, iterations
 
 

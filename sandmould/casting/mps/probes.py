@@ -26,15 +26,15 @@ def pressure_at(flow: Flow, place_m: Floats) -> Floats:
         NaN where nothing is within the kernel.
     """
     state = flow.particles
-    known = state.kind != DUMMY
-    far = np.linalg.norm(state.position_m[known][None] - place_m[:, None], axis=2)
-    found = np.full(len(place_m), np.nan)
+    has_pressure = state.kind != DUMMY
+    far = np.linalg.norm(state.position_m[has_pressure][None] - place_m[:, None], axis=2)
+    pressure_pa = np.full(len(place_m), np.nan)
     for k, row in enumerate(far):
         near = np.flatnonzero(row < flow.kernel.reach_m)
         shares = np.array([weight(flow.kernel, float(r)) for r in row[near]])
         if shares.sum() > 0.0:
-            found[k] = shares @ flow.pressure_pa[known][near] / shares.sum()
-    return found
+            pressure_pa[k] = shares @ flow.pressure_pa[has_pressure][near] / shares.sum()
+    return pressure_pa
 
 
 def pressure_nearest(flow: Flow, place_m: Floats) -> Floats:

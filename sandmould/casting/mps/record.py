@@ -105,12 +105,12 @@ class FlowRecord:
             "next_record_s": self._next_s,
         }  # fmt: skip
 
-    def take_up(self, kept: Mapping[str, Any]) -> None:
+    def take_up(self, arrays: Mapping[str, Any]) -> None:
         """Go on from what ``arrays`` gave."""
-        self._watch.rows = [tuple(row) for row in kept["steps"].tolist()]
-        self._rows = [(rise, int(n), int(done)) for rise, n, done in kept["of_fluid"].tolist()]
-        self._times_s = kept["times_s"].tolist()
-        ends = np.cumsum(kept["counts"])[:-1]
+        self._watch.rows = [tuple(row) for row in arrays["steps"].tolist()]
+        self._rows = [(rise, int(n), int(done)) for rise, n, done in arrays["of_fluid"].tolist()]
+        self._times_s = arrays["times_s"].tolist()
+        ends = np.cumsum(arrays["counts"])[:-1]
         names = ("places_m", "velocities_m_s", "pressures_pa")
-        self._frames = list(zip(*(np.split(kept[name], ends) for name in names), strict=True))
-        self._next_s = float(kept["next_record_s"])
+        self._frames = list(zip(*(np.split(arrays[name], ends) for name in names), strict=True))
+        self._next_s = float(arrays["next_record_s"])

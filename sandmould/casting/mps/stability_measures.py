@@ -51,19 +51,19 @@ def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> Stab
     whole = _history(table, names)
     past = _later(whole, scenario.measured_from_s)
     particles = int(table["particles"].iloc[-1]) if len(table) else 0
-    known = not stopped and len(past.time_s) > 0
+    is_measured = not stopped and len(past.time_s) > 0
     nothing = [math.nan] * len(names)
-    sd = past.deviation_pa().tolist() if known else nothing
-    windows = past.deviation_pa(scenario.noise_window_s).tolist() if known else nothing
+    sd = past.deviation_pa().tolist() if is_measured else nothing
+    windows = past.deviation_pa(scenario.noise_window_s).tolist() if is_measured else nothing
     sd_pa = dict(zip(names, sd, strict=True))
     hops = _hops(scenario, table, whole)
     return StabilityMeasures(
-        dict(zip(names, past.mean_pa().tolist() if known else nothing, strict=True)),
+        dict(zip(names, past.mean_pa().tolist() if is_measured else nothing, strict=True)),
         sd_pa,
         dict(zip(names, windows, strict=True)),
         scene.ideal_pa(scenario, particles),
-        float(past.largest_speed_m_s.max()) if known else math.nan,
-        float(np.average(past.mean_speed_m_s, weights=past.dt_s)) if known else math.nan,
+        float(past.largest_speed_m_s.max()) if is_measured else math.nan,
+        float(np.average(past.mean_speed_m_s, weights=past.dt_s)) if is_measured else math.nan,
         hops,
         rate_stability(stopped, hops, sd_pa[scene.deepest(scenario)], scenario.quiet_pa),
     )
@@ -79,8 +79,8 @@ def _history(table: pd.DataFrame, names: Sequence[str]) -> History:
 
 def _later(past: History, from_s: float) -> History:
     """Steps that end after a time."""
-    kept = past.time_s > from_s
-    return History(*(getattr(past, name)[kept] for name in History.__dataclass_fields__))
+    later = past.time_s > from_s
+    return History(*(getattr(past, name)[later] for name in History.__dataclass_fields__))
 
 
 def _hops(scenario: MetalFlow, table: pd.DataFrame, past: History) -> bool:
@@ -116,7 +116,7 @@ def by_window(table: pd.DataFrame, names: Sequence[str], window_s: float) -> pd.
     number, _, mean = window_means(time_s, dt_s, values, window_s)
     window = ((time_s - 0.5 * dt_s) / window_s).astype(np.int64)
     fastest = table["largest_speed_m_s"].groupby(window).max()
-    found = pd.DataFrame(mean, columns=columns)
-    found.insert(0, "time_s", (number + 0.5) * window_s)
-    found["largest_speed_m_s"] = fastest.to_numpy()
-    return found
+    windows = pd.DataFrame(mean, columns=columns)
+    windows.insert(0, "time_s", (number + 0.5) * window_s)
+    windows["largest_speed_m_s"] = fastest.to_numpy()
+    return windows

@@ -58,14 +58,14 @@ def fitted_laplacian(kernel: Kernel, near: Neighbours, field: Floats, kind: Kind
     they carry the mould's velocity, which does not go on beyond its surface. Arguments and result
     as ``laplacian``; as that where too few neighbours span the space.
     """
-    found = laplacian(kernel, near, field, kind)
+    laplacians = laplacian(kernel, near, field, kind)
     matrix, right = _fits(kernel, near, field, kind)
     values = np.linalg.eigvalsh(matrix)
     good = values[:, 0] > WORST_FIT * values[:, -1]
     d = kernel.dimension
     fitted = np.linalg.solve(matrix[good], right[good])[:, d : 2 * d]
-    found[good] = fitted.sum(axis=1) / kernel.spacing_m**2
-    return found
+    laplacians[good] = fitted.sum(axis=1) / kernel.spacing_m**2
+    return laplacians
 
 
 LAPLACIANS = {"lattice": laplacian, "fitted": fitted_laplacian}
