@@ -10,7 +10,7 @@ from benchmarks import cheapest
 from benchmarks.cheapest import Factor, factors_of
 from benchmarks.twins import Recorded
 from sandmould.study.collect import compare_study
-from sandmould.study.definition.study import Study
+from sandmould.study.kinds.sand.kind import SandStudy
 
 KEY = "time_step.fraction"
 
@@ -25,7 +25,7 @@ def factor(angles: dict[float, float], cost: dict[float, float]) -> Factor:
     ]  # fmt: skip
     rows[0] |= {"outcome_code": 310, "heap_angle_deg": np.nan}
     summary = pd.DataFrame(rows)
-    study = Study.model_validate(
+    study = SandStudy.model_validate(
         {
             "sweep": {"keys": {KEY: list(angles)}},
             "equivalence": {"keys": [KEY], "margins": {"heap_angle_deg": 1.5}},
