@@ -9,7 +9,7 @@ import pytest
 from benchmarks.agreement.recorded import Recorded
 from benchmarks.agreement.repose_settings import Factor, factors_of
 from sandmould.study.collect import compare_study
-from sandmould.study.definition.study import Study
+from sandmould.study.kinds.sand.kind import SandStudy
 
 KEY = "time_step.fraction"
 
@@ -24,7 +24,7 @@ def factor(angles: dict[float, float], cost: dict[float, float]) -> Factor:
     ]  # fmt: skip
     rows[0] |= {"outcome_code": 310, "heap_angle_deg": np.nan}
     summary = pd.DataFrame(rows)
-    study = Study.model_validate(
+    study = SandStudy.model_validate(
         {
             "sweep": {"keys": {KEY: list(angles)}},
             "equivalence": {"keys": [KEY], "margins": {"heap_angle_deg": 1.5}},

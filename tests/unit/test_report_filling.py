@@ -14,7 +14,7 @@ from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.page import write_report
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import collect, gather, read_study
-from sandmould.study.definition.study import Study
+from sandmould.study.kinds.sand.kind import SandStudy
 from tests.unit.report_study import DURATION_S, KEY, scenario, write_study
 
 BEST_HZ = 40.0
@@ -34,7 +34,7 @@ def pages(folder: Path, height: float, spread: float, **objective: object) -> Fi
     tree = read_study(folder).model_dump(mode="json")
     tree["objective"] |= objective
     tree["sweep"]["keys"] = {KEY: list(HZ)}
-    study = Study.model_validate(tree)
+    study = SandStudy.model_validate(tree)
     collected = gather(folder)
     verdict = compare_settings(
         collected.summary, collected.keys, "tube_fill_fraction", "larger", ()

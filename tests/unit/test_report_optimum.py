@@ -13,7 +13,7 @@ from sandmould.report.chart import Chart
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.page import write_report
 from sandmould.study.collect import collect, gather, read_study
-from sandmould.study.definition.study import Study
+from sandmould.study.kinds.sand.kind import SandStudy
 from sandmould.study.rounds.decide import next_round
 from sandmould.study.rounds.round_log import RoundLog, basis_of, write_rounds
 from tests.unit.report_study import KEY, write_study
@@ -111,7 +111,7 @@ def test_settings_above_a_thousand_are_told_in_words(tmp_path: Path) -> None:
     tree = read_study(folder).model_dump(mode="json")
     tree["sweep"]["keys"] = {key: [1000.0 * f for f in SWEPT]}
     tree["refine"]["interval"] = {}
-    pages = optimum_pages(folder, Study.model_validate(tree), found)
+    pages = optimum_pages(folder, SandStudy.model_validate(tree), found)
     assert pages is not None
     assert "normal stiffness 4" in pages.sentences[0]
 
