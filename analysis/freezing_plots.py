@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 from analysis.freezing import Freezing
 
 Array = NDArray[np.float64]
-SHOWN_SPOTS = 12
+MOST_SPOTS = 12
 
 
-def draw_freezing(fields: Mapping[str, Array], found: Freezing, axes: Axes) -> None:
+def draw_freezing(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
     """Draw freezing times over the casting with hot spots and the last point to freeze.
 
     Parameters
     ----------
     fields : mapping
         Arrays of ``fields.npz``.
-    found : Freezing
+    freezing : Freezing
     axes : Axes
     """
-    cut, axis = _cut(fields, found)
+    cut, axis = _cut(fields, freezing)
     melts = cut["melts"].astype(bool)
     values = np.where(melts, cut["frozen_s"], np.nan)
     _draw(cut, axis, values, axes, "frozen at, s", "viridis")
@@ -32,12 +32,12 @@ def draw_freezing(fields: Mapping[str, Array], found: Freezing, axes: Axes) -> N
     beyond_mm = 1e3 * (cut["position_m"][melts].max(axis=0) + 3.0 * cut["size_m"].max())
     axes.set_xlim(beside_mm[0], beyond_mm[0])
     axes.set_ylim(beside_mm[1], beyond_mm[1])
-    spots_mm = 1e3 * _flat(found.hot_spots_m[:SHOWN_SPOTS], axis)
+    spots_mm = 1e3 * _flat(freezing.hot_spots_m[:MOST_SPOTS], axis)
     axes.plot(*spots_mm.T, "o", mfc="none", mec="#D55E00", ms=9, mew=1.5, label="hot spot")
-    if np.isfinite(found.last_point_m).all():
-        at = f"last to freeze, {found.solidification_time_s:.0f} s"
+    if np.isfinite(freezing.last_point_m).all():
+        at = f"last to freeze, {freezing.solidification_time_s:.0f} s"
         axes.plot(
-            *(1e3 * _flat(found.last_point_m[None], axis).T),
+            *(1e3 * _flat(freezing.last_point_m[None], axis).T),
             "x",
             color="#D55E00",
             ms=9,
@@ -47,13 +47,13 @@ def draw_freezing(fields: Mapping[str, Array], found: Freezing, axes: Axes) -> N
     axes.legend(fontsize=8, loc="upper right")
 
 
-def draw_temperature(fields: Mapping[str, Array], found: Freezing, axes: Axes) -> None:
+def draw_temperature(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
     """Draw temperatures at the end over casting and mould, as ``draw_freezing``."""
-    cut, axis = _cut(fields, found)
+    cut, axis = _cut(fields, freezing)
     _draw(cut, axis, cut["temperature_k"], axes, "temperature at the end, K", "inferno")
 
 
-def _cut(fields: Mapping[str, Array], found: Freezing) -> tuple[dict[str, Array], int]:
+def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Array], int]:
     """Elements of 3D that a plane through the last point to freeze cuts; all of 2D.
 
     Of the three planes the one with most of the casting; given with its normal's number.
@@ -61,9 +61,9 @@ def _cut(fields: Mapping[str, Array], found: Freezing) -> tuple[dict[str, Array]
     position_m, half_m = fields["position_m"], 0.5 * fields["size_m"]
     if position_m.shape[1] == 2:
         return dict(fields), 2
-    through_m = found.last_point_m
+    through_m = freezing.last_point_m
     if not np.isfinite(through_m).all():
-        through_m = found.hot_spots_m[0]
+        through_m = freezing.hot_spots_m[0]
     melts = fields["melts"].astype(bool)
     # a plane between elements belongs to those above it
     off = position_m - through_m
@@ -84,12 +84,12 @@ def _draw(
 ) -> None:
     grid, low_m, high_m = _grid(fields["position_m"], fields["size_m"], values)
     (left, below), (right, above) = (1e3 * low_m).tolist(), (1e3 * high_m).tolist()
-    shown = axes.imshow(
+    image = axes.imshow(
         grid.T, origin="lower", extent=(left, right, below, above), cmap=colours,
         interpolation="nearest",
     )  # fmt: skip
     figure = axes.figure
-    figure.colorbar(shown, ax=axes, label=title, shrink=0.85)
+    figure.colorbar(image, ax=axes, label=title, shrink=0.85)
     across, up = (name for place, name in enumerate("xyz") if place != axis)
     axes.set_xlabel(f"{across}, mm")
     axes.set_ylabel(f"{up}, mm")
