@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.freezing import Freezing
 
 Array = NDArray[np.float64]
-SHOWN_SPOTS = 12
+MOST_SPOTS = 12
 
 
 def draw_freezing(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
@@ -32,7 +32,7 @@ def draw_freezing(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -
     beyond_mm = 1e3 * (cut["position_m"][melts].max(axis=0) + 3.0 * cut["size_m"].max())
     axes.set_xlim(beside_mm[0], beyond_mm[0])
     axes.set_ylim(beside_mm[1], beyond_mm[1])
-    spots_mm = 1e3 * _flat(freezing.hot_spots_m[:SHOWN_SPOTS], axis)
+    spots_mm = 1e3 * _flat(freezing.hot_spots_m[:MOST_SPOTS], axis)
     axes.plot(*spots_mm.T, "o", mfc="none", mec="#D55E00", ms=9, mew=1.5, label="hot spot")
     if np.isfinite(freezing.last_point_m).all():
         at = f"last to freeze, {freezing.solidification_time_s:.0f} s"

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from sandmould import ROOT
-from sandmould.statistics.agreement import Compared, Speed, agreement_sentences, speeds
+from sandmould.statistics.agreement import Compared, EngineSpeed, agreement_sentences, speeds
 from sandmould.study.collect import compare_study, swept_keys
 from sandmould.study.plan.load_study import open_study
 
@@ -28,7 +28,7 @@ class Recorded:
     keys: tuple[str, ...]
     """Keys whose values are compared."""
     compared: tuple[Compared, ...]
-    speeds: tuple[Speed, ...]
+    speeds: tuple[EngineSpeed, ...]
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -88,21 +88,21 @@ def _table(compared: Sequence[Compared], percent: str) -> Table:
     )
     rows, marked = [], []
     for c in compared:
-        found = c.agreement
+        agreement = c.agreement
         where = f"{c.pair}, {c.at}" if c.at else c.pair
-        cells = (*found.means, found.difference)
+        cells = (*agreement.means, agreement.difference)
         rows.append(
             (
                 Cell(name_of(c.measure), c.measure),
                 Cell(where, where),
                 *(Cell(number(v, d), str(v)) for v, d in zip(cells, (4, 4, 2), strict=True)),
-                Cell(interval_text(found), str(found.ci[0])),
-                Cell(f"±{found.margin:g}", str(found.margin)),
-                Cell(f"{found.n}{' pairs' if found.paired else ''}", str(found.n)),
-                Cell(found.verdict, found.verdict, note=found.note),
+                Cell(interval_text(agreement), str(agreement.ci[0])),
+                Cell(f"±{agreement.margin:g}", str(agreement.margin)),
+                Cell(f"{agreement.n}{' pairs' if agreement.paired else ''}", str(agreement.n)),
+                Cell(agreement.verdict, agreement.verdict, note=agreement.note),
             )
         )
-        marked.append(found.verdict != "equivalent")
+        marked.append(agreement.verdict != "equivalent")
     return Table(columns, tuple(rows), tuple(marked))
 
 

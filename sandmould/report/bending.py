@@ -81,24 +81,27 @@ def bending_pages(
     shown : str
         Name of that run.
     """
-    found: dict[str, LoopVerdict] = {}
+    verdicts: dict[str, LoopVerdict] = {}
     for run in collected.summary[RUN]:
-        judged = verdict_of(study_folder / "runs" / str(run))
-        if judged is not None:
-            found[str(run)] = judged
+        loop_verdict = verdict_of(study_folder / "runs" / str(run))
+        if loop_verdict is not None:
+            verdicts[str(run)] = loop_verdict
     curves = collected.curves
     own = curves[curves[RUN] == shown] if TIP in curves else curves.iloc[:0]
     picture, note = draw_outlines(study_folder / "runs" / shown, scenario)
     ledger = ledger_of(study_folder / "runs" / shown)
     return BendingPages(
-        sentences=(study_sentence(list(found.values())), *_told(own, found.get(shown), scenario)),
+        sentences=(
+            study_sentence(list(verdicts.values())),
+            *_told(own, verdicts.get(shown), scenario),
+        ),
         deflection=deflection_chart(collected, verdict),
         outlines=picture,
         outlines_note=note,
-        map=coupling_map(collected, {run: v.state for run, v in found.items()}),
+        map=coupling_map(collected, {run: v.state for run, v in verdicts.items()}),
         ledger=() if ledger is None else ledger_charts(ledger, _begins_s(own)),
         shown_run=shown,
-        runs=_runs_table(study_folder, href, collected, verdict, found),
+        runs=_runs_table(study_folder, href, collected, verdict, verdicts),
     )
 
 
@@ -220,7 +223,7 @@ def _runs_table(
     href: str,
     collected: Collected,
     verdict: Verdict,
-    found: Mapping[str, LoopVerdict],
+    verdicts: Mapping[str, LoopVerdict],
 ) -> Table:
     """Verdict, numbers at the last snapshot and files of every run."""
     columns = (
@@ -234,26 +237,26 @@ def _runs_table(
     rows, marked = [], []
     for planned in listed_runs(collected.summary, verdict).to_dict("records"):
         run = str(planned[RUN])
-        judged, measures = found.get(run), last.get(run, pd.Series(dtype=np.float64))
+        loop_verdict, measures = verdicts.get(run), last.get(run, pd.Series(dtype=np.float64))
         setting = setting_text({key: planned[key] for key in collected.keys})
         rows.append(
             (
                 Cell(run, run),
                 *([Cell(setting, setting)] if collected.keys else []),
-                _loop_cell(judged),
+                _loop_cell(loop_verdict),
                 *(_value_cell(measures.get(name), factor) for _, name, factor, _ in _COLUMNS),
                 *(_file_cell(study_folder, href, run, suffix) for suffix in ("vtu", "stl")),
             )
         )
-        marked.append(judged is None or judged.state != "holds")
+        marked.append(loop_verdict is None or loop_verdict.state != "holds")
     return Table(columns, tuple(rows), tuple(marked))
 
 
 def _loop_cell(verdict: LoopVerdict | None) -> Cell:
     if verdict is None:
         return Cell("–", "")
-    told = verdict.sentence.split(": ", 1)[1]
-    return Cell(verdict.state, verdict.state, note=told[0].upper() + told[1:])
+    reason = verdict.sentence.split(": ", 1)[1]
+    return Cell(verdict.state, verdict.state, note=reason[0].upper() + reason[1:])
 
 
 def _value_cell(value: Any, factor: float) -> Cell:

@@ -243,16 +243,16 @@ def _sand_figures(
     pages: SandPages, filling: FillingPages | None, bending: BendingPages | None
 ) -> dict[str, Chart | bytes]:
     """The sand at its moments, the pattern, filling over what is swept, and over time."""
-    found: dict[str, Chart | bytes] = {}
+    files: dict[str, Chart | bytes] = {}
     if pages.panels:
-        found["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
+        files["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
     if filling and filling.chart:
-        found["filling"] = filling.chart
+        files["filling"] = filling.chart
     if bending:
-        found |= pictures(pattern=bending.outlines)
+        files |= pictures(pattern=bending.outlines)
     if bending and bending.deflection:
-        found["deflection"] = bending.deflection
-    return found | _curve_figures(pages.tubes)
+        files["deflection"] = bending.deflection
+    return files | _curve_figures(pages.tubes)
 
 
 def _deck_curves(scenario: OwnDeck, collected: Collected, verdict: Verdict) -> tuple[Curve, ...]:

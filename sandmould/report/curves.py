@@ -316,14 +316,14 @@ def best_passage(
     complete = rows.loc[finished(rows), RUN]
     curves = collected.curves
     shaken = curves[curves[RUN].isin(complete) & (curves[VIBRATION_TIME_S] >= 0)]
-    found = []
+    passages = []
     for _, run in shaken.groupby(RUN):
         time_s = run[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
         value = run[measure].to_numpy(dtype=np.float64)
         if len(time_s) > 3 and np.isfinite(value).all():
             late = float(np.interp(0.75 * time_s[-1], time_s, value))
-            found.append((float(value[0]), late, float(value[-1])))
-    if not found:
+            passages.append((float(value[0]), late, float(value[-1])))
+    if not passages:
         return None
-    first, late, last = np.mean(found, axis=0).tolist()
+    first, late, last = np.mean(passages, axis=0).tolist()
     return first, late, last

@@ -105,12 +105,12 @@ def estimate_pages(
 
 def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
     """Heaps side by side, the map, and what is known of each sand, as files."""
-    found = pictures(
+    files = pictures(
         map=pages.map_picture, **{f"posterior_{one.name}": one.posterior for one in pages.sands}
     )
     if pages.heaps:
-        found["heaps"] = strip([(heap.heading, heap.picture) for heap in pages.heaps])
-    return found
+        files["heaps"] = strip([(heap.heading, heap.picture) for heap in pages.heaps])
+    return files
 
 
 def _value_sentences(settings: Sequence[Setting], measure: str, study: Study) -> list[str]:
@@ -164,7 +164,7 @@ def _heaps(
         return ()
     values = finished_values(summary, verdict.measure).dropna().sort_values()
     places = np.unique(np.linspace(0, len(values) - 1, SHOWN_HEAPS).round().astype(int))
-    found = []
+    heaps = []
     for index in [values.index[i] for i in places] if len(values) else []:
         run = str(summary.loc[index, RUN])
         moments = list_moments(study_folder / "runs" / run)
@@ -173,8 +173,8 @@ def _heaps(
         sand = Snapshot.load(moments[-1].path)
         heading = f"{number(values[index])}°: {run}"
         picture = draw_heap(sand, scenario, 1.02 * scenario.scene.top_m)
-        found.append(Heap(heading, picture, f"Heap and hopper of run {run} with fitted lines"))
-    return tuple(found)
+        heaps.append(Heap(heading, picture, f"Heap and hopper of run {run} with fitted lines"))
+    return tuple(heaps)
 
 
 def _map_table(settings: Sequence[Setting], keys: tuple[str, str]) -> Table:
@@ -214,27 +214,29 @@ def _map_picture(
     return draw_map(emulator, pair, titled(measure), points[np.isfinite(values)], sands)
 
 
-def _sand(one: CalibratedSand, calibrated: Calibrated) -> SandEstimate:
+def _sand(sand: CalibratedSand, calibrated: Calibrated) -> SandEstimate:
     """What is said of a calibrated sand."""
-    name = one.sand.name
-    if one.posterior is None or one.by_first is None:
-        return SandEstimate(name, (f"{name}: {one.problem}.",), "")
+    name = sand.sand.name
+    if sand.posterior is None or sand.by_first is None:
+        return SandEstimate(name, (f"{name}: {sand.problem}.",), "")
     values = [
         f"{name_of(key)} {with_margin(mode, sd)}"
-        for key, mode, sd in zip(calibrated.keys, one.posterior.mode, one.posterior.sd, strict=True)
+        for key, mode, sd in zip(
+            calibrated.keys, sand.posterior.mode, sand.posterior.sd, strict=True
+        )
     ]
-    targets = listed([f"{name_of(m)} {t.value:g} ± {t.sd:g}" for m, t in one.sand.targets.items()])
-    taken = [f"{name_of(k)} {t.value:g} ± {t.sd:g}" for k, t in one.sand.assumed.items()]
+    targets = listed([f"{name_of(m)} {t.value:g} ± {t.sd:g}" for m, t in sand.sand.targets.items()])
+    taken = [f"{name_of(k)} {t.value:g} ± {t.sd:g}" for k, t in sand.sand.assumed.items()]
     granted = f", {listed(taken)} taken for granted" if taken else ""
     said = [
         f"{name}, measured {targets}{granted}: most probable are {listed(values)} (standard "
-        f"deviations), which are correlated by {one.posterior.correlation:.2f}."
+        f"deviations), which are correlated by {sand.posterior.correlation:.2f}."
     ]
-    ridge = f"One measured value leaves a ridge, {one.by_first.bits:.1f} bits of the two"
-    more = len(one.sand.targets) + len(one.sand.assumed) > 1
-    in_all = f"; all that is known tells {one.posterior.bits:.1f}" if more else ""
+    ridge = f"One measured value leaves a ridge, {sand.by_first.bits:.1f} bits of the two"
+    more = len(sand.sand.targets) + len(sand.sand.assumed) > 1
+    in_all = f"; all that is known tells {sand.posterior.bits:.1f}" if more else ""
     said.append(f"{ridge}{in_all}.")
-    return SandEstimate(name, tuple(said), draw_posterior(one, calibrated.keys))
+    return SandEstimate(name, tuple(said), draw_posterior(sand, calibrated.keys))
 
 
 def _worth_table(calibrated: Calibrated) -> Table:

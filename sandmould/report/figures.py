@@ -223,15 +223,17 @@ def draw_densities(
     tuple of float, kg/m3
         Median of each snapshot.
     """
-    found = [
+    density_kg_m3 = [
         apparent_density(
             s.position_m, s.radius_m, scenario.sand.density_kg_m3, scene=scene_at(scenario, s)
         ).corrected_kg_m3
         for s in snapshots
     ]
-    finite = np.concatenate([f[np.isfinite(f)] for f in found]) if found else np.zeros(0)
+    finite = (
+        np.concatenate([f[np.isfinite(f)] for f in density_kg_m3]) if density_kg_m3 else np.zeros(0)
+    )
     low, high = (0.0, 1.0) if not len(finite) else np.percentile(finite, [5.0, 98.0]).tolist()
-    value = {id(s): f for s, f in zip(snapshots, found, strict=True)}
+    value = {id(s): f for s, f in zip(snapshots, density_kg_m3, strict=True)}
 
     def densities(ax: Axes, snapshot: Snapshot) -> None:
         draw_grains(
@@ -244,7 +246,7 @@ def draw_densities(
         )
 
     pictures = tuple(panel(s, scenario, height_m, densities) for s in snapshots)
-    medians = tuple(float(np.nanmedian(f)) if len(f) else math.nan for f in found)
+    medians = tuple(float(np.nanmedian(f)) if len(f) else math.nan for f in density_kg_m3)
     return pictures, DensityScale(low, high), medians
 
 

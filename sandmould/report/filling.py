@@ -64,11 +64,11 @@ def filling_pages(
     one_key = len(keys) == 1 and all(
         isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
     )
-    known = [s for s in verdict.settings if s.n]
+    settings = [s for s in verdict.settings if s.n]
     advice = (_drive(scenario, best), _time_to_fill(collected.summary, shaken, best, measure))
-    if not one_key or len(known) < 3:
+    if not one_key or len(settings) < 3:
         return FillingPages(advice, None, "")
-    table = _fill_at_times(collected.summary, shaken, known, keys[0], measure)
+    table = _fill_at_times(collected.summary, shaken, settings, keys[0], measure)
     return FillingPages(
         advice, _chart(table, study, keys[0], measure), _limbs(table, keys[0], measure)
     )
@@ -135,7 +135,7 @@ class _AtTimes:
 def _fill_at_times(
     summary: pd.DataFrame,
     shaken: pd.DataFrame,
-    known: list[Setting],
+    settings_with_runs: list[Setting],
     key: str,
     measure: str,
 ) -> _AtTimes:
@@ -145,7 +145,7 @@ def _fill_at_times(
     runs_at = runs_by_setting(summary[[RUN, key]], [key])
     last_s = float(shaken.groupby(RUN)[VIBRATION_TIME_S].max().min())
     time_s = last_s * np.array([0.0, *SHARES])
-    settings = sorted(known, key=lambda s: float(s.values[key]))
+    settings = sorted(settings_with_runs, key=lambda s: float(s.values[key]))
     mean, error = [], []
     for setting in settings:
         runs = []

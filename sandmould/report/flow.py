@@ -128,14 +128,14 @@ def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
 
 def _shown(ranked: pd.DataFrame, keys: Sequence[str], study_folder: Path) -> list[_Shown]:
     """Runs that left fields, evenly from the calmest to the worst."""
-    found = []
+    drawable = []
     for _, row in ranked.iterrows():
         folder = study_folder / "runs" / str(row[RUN])
         if (folder / "fields.npz").is_file():
             label = condition_text({key: row[key] for key in keys})
-            found.append(_Shown(folder.name, label, folder, str(row[CLASSIFICATION])))
-    places = np.linspace(0, len(found) - 1, min(SHOWN, len(found))).round().astype(int)
-    return [found[place] for place in np.unique(places).tolist()]
+            drawable.append(_Shown(folder.name, label, folder, str(row[CLASSIFICATION])))
+    places = np.linspace(0, len(drawable) - 1, min(SHOWN, len(drawable))).round().astype(int)
+    return [drawable[place] for place in np.unique(places).tolist()]
 
 
 def _load(folder: Path) -> dict[str, NDArray[np.float64]]:

@@ -86,11 +86,11 @@ def _parts(summary: pd.DataFrame, others: Sequence[str]) -> list[tuple[str, pd.D
     if not others:
         return [("", summary)]
     values = summary[list(others)].drop_duplicates().sort_values(list(others), ascending=False)
-    found = []
+    parts = []
     for _, one in values.iterrows():
         title = setting_text({key: one[key] for key in others}).replace(", ", "\n")
-        found.append((title, summary[(summary[list(others)] == one).all(axis=1)]))
-    return found
+        parts.append((title, summary[(summary[list(others)] == one).all(axis=1)]))
+    return parts
 
 
 def condition_text(values: Mapping[str, Any]) -> str:

@@ -110,7 +110,7 @@ Response = tuple[np.ndarray, np.ndarray]
 
 def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
     """Amplification of the small shake in each of its runs."""
-    found = []
+    responses = []
     for run in runs:
         folder = study_folder / "runs" / run
         scenario = read_run(folder / "scenario.yaml").scenario
@@ -137,8 +137,8 @@ def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
                     rigid_n,
                 )
             )
-        found.append((np.array(shaken), np.array(response)))
-    return found
+        responses.append((np.array(shaken), np.array(response)))
+    return responses
 
 
 def _chart(responses: Sequence[Response]) -> Chart:
@@ -174,12 +174,11 @@ def _column(scenario: Scenario, summary: pd.DataFrame, responses: Sequence[Respo
     own_hz = [first_resonance_hz(f, r) for f, r in responses]
     if not own_hz:
         return f"{said}."
-    known = [f for f in own_hz if math.isfinite(f)]
-    if not known:
+    finite_hz = [f for f in own_hz if math.isfinite(f)]
+    if not finite_hz:
         return f"{said}; shaken weakly, the bed shows no resonance."
-    return (
-        f"{said}; shaken weakly, the bed's own first resonance is at {number(np.mean(known))} Hz."
-    )
+    mean_hz = number(np.mean(finite_hz))
+    return f"{said}; shaken weakly, the bed's own first resonance is at {mean_hz} Hz."
 
 
 def opening_sentences(pages: RobustnessPages, measure: str) -> tuple[str, ...]:

@@ -146,9 +146,11 @@ def shown_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> d
     alone: to see how it failed.
     """
     ranks = rank_runs(summary, verdict.measure, verdict.better)
-    seen = {r: run for r, run in ranks.items() if list_moments(study_folder / "runs" / run)}
-    if seen:
-        return seen if len(ranks) > 1 else {"only": next(iter(seen.values()))}
+    with_snapshots = {
+        r: run for r, run in ranks.items() if list_moments(study_folder / "runs" / run)
+    }
+    if with_snapshots:
+        return with_snapshots if len(ranks) > 1 else {"only": next(iter(with_snapshots.values()))}
     count = {str(r): len(list_moments(study_folder / "runs" / str(r))) for r in summary[RUN]}
     longest = max(count, key=lambda r: count[r], default="")
     return {"longest": longest} if count.get(longest) else {}
@@ -191,8 +193,8 @@ def _bed_height_m(curves: pd.DataFrame, run: str) -> float | None:
     if BED_HEIGHT_M not in curves:
         return None
     rows = curves[(curves[RUN] == run) & (curves[VIBRATION_TIME_S] >= 0)]
-    found = rows[BED_HEIGHT_M].dropna()
-    return float(found.iloc[0]) if len(found) else None
+    height_m = rows[BED_HEIGHT_M].dropna()
+    return float(height_m.iloc[0]) if len(height_m) else None
 
 
 def _films(
@@ -209,8 +211,8 @@ def _films(
         curve = collected.curves[collected.curves[RUN] == run]
         reading = None
         if verdict.measure in curve:
-            known = curve[[TIME_S, verdict.measure]].dropna().to_numpy(dtype=np.float64)
-            reading = (known[:, 0], known[:, 1])
+            readings = curve[[TIME_S, verdict.measure]].dropna().to_numpy(dtype=np.float64)
+            reading = (readings[:, 0], readings[:, 1])
         label = f"{role}: {setting}"
         film = make_film(study_folder / "runs" / run, label, reading, budget_bytes)
         if film is not None:
@@ -265,13 +267,14 @@ def _other_measures(scenario: Scenario, verdict: Verdict) -> list[str]:
 
 
 def _density_conclusion(median_kg_m3: Sequence[float]) -> str:
-    known = [d for d in median_kg_m3 if math.isfinite(d)]
-    if len(known) < 2:
+    finite = [d for d in median_kg_m3 if math.isfinite(d)]
+    if len(finite) < 2:
         return ""
-    way = "rose" if known[-1] > known[0] else "fell"
+    first, last = finite[0], finite[-1]
+    way = "rose" if last > first else "fell"
     return (
-        f"The median over all grains {way} from {number(known[0], 4)} to {number(known[-1], 4)} "
-        "kg/m³ during the vibration."
+        f"The median over all grains {way} from {number(first, 4)} to {number(last, 4)} kg/m³ "
+        "during the vibration."
     )
 
 

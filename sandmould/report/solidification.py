@@ -131,31 +131,31 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
     """Picture of a run's fields, what it says in words, and its hot spots."""
     if not (folder / "fields.npz").is_file():
         return "", ("No run has left fields.",), None
-    with np.load(folder / "fields.npz") as kept:
-        fields = dict(kept)
+    with np.load(folder / "fields.npz") as file:
+        fields = dict(file)
     melts = fields["melts"]
-    found = freezing(
+    frozen = freezing(
         fields["position_m"][melts], fields["frozen_s"][melts], scenario.hot_spot_reach_m
     )
     figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2)
-    draw_freezing(fields, found, left)
-    draw_temperature(fields, found, right)
+    draw_freezing(fields, frozen, left)
+    draw_temperature(fields, frozen, right)
     said = "Some of the casting is still liquid at the end of the run."
-    if math.isfinite(found.solidification_time_s):
+    if math.isfinite(frozen.solidification_time_s):
         at = ", ".join(
             f"{axis} = {number(1e3 * place_m)} mm"
-            for axis, place_m in zip("xyz", found.last_point_m, strict=False)
+            for axis, place_m in zip("xyz", frozen.last_point_m, strict=False)
         )
         said = (
-            f"The casting is solid after {number(found.solidification_time_s, 4)} s; the last "
+            f"The casting is solid after {number(frozen.solidification_time_s, 4)} s; the last "
             f"point to freeze lies at {at}."
         )
     axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
     columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
     rows = tuple(
         tuple(Cell(number(v, 4), str(v)) for v in (*(1e3 * place), time_s))
-        for place, time_s in zip(found.hot_spots_m, found.hot_spot_s, strict=True)
+        for place, time_s in zip(frozen.hot_spots_m, frozen.hot_spot_s, strict=True)
     )
     return png(figure), (said,), Table(columns, rows, (False,) * len(rows))
 
@@ -170,15 +170,15 @@ def _errors(point: Point, scenario: Solidification, collected: Collected) -> lis
     own = dict(list(collected.curves.groupby(RUN)))
     probes = [f"{probe.name}_k" for probe in scenario.probes]
     range_k = scenario.initial_k.casting - scenario.initial_k.mould
-    found = []
+    errors = []
     for _, row in done.iterrows():
         if row[RUN] == base[RUN]:
             continue
         time_s, base_s = float(row[SOLIDIFICATION_TIME_S]), float(base[SOLIDIFICATION_TIME_S])
         curve = _curve_percent(own[row[RUN]], own[base[RUN]], probes, range_k)
         label = setting_text({key: row[key] for key in collected.keys})
-        found.append(_Error(label, float(row[CPU_S]), 100.0 * (time_s / base_s - 1.0), curve))
-    return sorted(found, key=lambda error: error.cpu_s)
+        errors.append(_Error(label, float(row[CPU_S]), 100.0 * (time_s / base_s - 1.0), curve))
+    return sorted(errors, key=lambda error: error.cpu_s)
 
 
 def _curve_percent(

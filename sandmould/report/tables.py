@@ -87,32 +87,32 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
     tuple of KeyNumber
         Without those whose data are missing.
     """
-    found = []
+    numbers = []
     if verdict.best is not None:
         best = verdict.best
         label = f"{name_of(verdict.measure)}, {best.label}"
         mean = f"mean of {best.n} runs" if best.n > 1 else "one run"
-        found.append(KeyNumber(number(best.mean), label, mean))
+        numbers.append(KeyNumber(number(best.mean), label, mean))
     complete = summary[finished(summary)]
-    found.append(KeyNumber(f"{len(complete)} of {len(summary)}", "runs finished"))
+    numbers.append(KeyNumber(f"{len(complete)} of {len(summary)}", "runs finished"))
     # a run that failed may have stopped before it had all its grains
     typical = complete if len(complete) else summary
     for what in ("grains", "elements", "particles"):
         count = _total(typical, what, "median")
         if count is not None:
             shown = f"{count:,.0f}".replace(",", "\u202f")
-            found.append(KeyNumber(shown, f"{what} in a run"))
+            numbers.append(KeyNumber(shown, f"{what} in a run"))
     wall_s, cpu_s = _total(summary, WALL_S, "sum"), _total(summary, CPU_S, "sum")
     if wall_s is not None:
         note = "" if cpu_s is None else f"{seconds(cpu_s)} of processor time"
-        found.append(KeyNumber(seconds(wall_s), "computing, all runs added up", note))
+        numbers.append(KeyNumber(seconds(wall_s), "computing, all runs added up", note))
     speed = _total(typical, GRAIN_STEPS_PER_S, "median")
     if speed is not None:
-        found.append(KeyNumber(f"{number(speed / 1e6)} M", "grain-steps a second, median run"))
+        numbers.append(KeyNumber(f"{number(speed / 1e6)} M", "grain-steps a second, median run"))
     overlap = _total(summary, LARGEST_OVERLAP_FRACTION, "max")
     if overlap is not None:
-        found.append(KeyNumber(f"{100 * overlap:.1f} %", "largest overlap, of a radius"))
-    return tuple(found)
+        numbers.append(KeyNumber(f"{100 * overlap:.1f} %", "largest overlap, of a radius"))
+    return tuple(numbers)
 
 
 def _total(summary: pd.DataFrame, column: str, how: str) -> float | None:

@@ -39,13 +39,13 @@ def measure_curves(
     conclude : callable
         Gives the sentence of a measure.
     """
-    found = []
+    curves = []
     drawn, part = drawn_part(collected, verdict)
     for measure in measures:
         chart = time_chart(drawn.curves, drawn.summary, part, collected.keys, measure)
         if chart is not None:
-            found.append(Curve(chart, measure, conclude(collected, verdict, measure)))
-    return tuple(found)
+            curves.append(Curve(chart, measure, conclude(collected, verdict, measure)))
+    return tuple(curves)
 
 
 def late_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:

@@ -74,15 +74,15 @@ def compare_keys(
 
     Keys that are averaged over do not make comparisons of their own: their values only pair runs.
     """
-    found: tuple[Compared, ...] = ()
+    comparisons: tuple[Compared, ...] = ()
     for key in equivalence.keys:
         others = [k for k in keys if k != key]
         over = [k for k in others if k in equivalence.over]
         for rest, alike in group_settings(summary, [k for k in others if k not in over]):
             for (a, rows), (b, other_rows) in combinations(group_settings(alike, [key]), 2):
                 pair = shown_value(key, a[key]), shown_value(key, b[key])
-                found += compare_pair(key, pair, rest, (rows, other_rows), equivalence, over)
-    return tuple(sorted(found, key=lambda c: list(equivalence.margins).index(c.measure)))
+                comparisons += compare_pair(key, pair, rest, (rows, other_rows), equivalence, over)
+    return tuple(sorted(comparisons, key=lambda c: list(equivalence.margins).index(c.measure)))
 
 
 def shown_value(key: str, value: Any) -> str:
@@ -101,13 +101,13 @@ def compare_pair(
     """One pair of settings in every measure that has a margin."""
     where = setting_text(at) if at else ""
     at_values = ", ".join(value_text(k, v) for k, v in at.items())
-    found = []
+    comparisons = []
     for measure, margin in equivalence.margins.items():
         values = [finished_values(r, measure).dropna() for r in rows]
         first, second = (by_block(r, v, over) for r, v in zip(rows, values, strict=True))
         agreement = agree(first, second, margin, equivalence.confidence)
-        found.append(Compared(measure, key, *pair, where, at_values, agreement))
-    return tuple(found)
+        comparisons.append(Compared(measure, key, *pair, where, at_values, agreement))
+    return tuple(comparisons)
 
 
 def agreement_table(compared: Sequence[Compared]) -> pd.DataFrame:
@@ -135,17 +135,19 @@ def agreement_sentences(compared: Sequence[Compared], confidence: float) -> tupl
     if len(by_verdict["equivalent"]) == many:
         what = "The pair agrees" if many == 1 else f"All {many} comparisons agree"
         return (f"{what} within the margins set beforehand, at {percent}.",)
-    said = []
+    sentences = []
     if different:
-        said.append(f"They differ by more than the margin in {_named(different)}, at {percent}.")
+        sentences.append(
+            f"They differ by more than the margin in {_named(different)}, at {percent}."
+        )
     if open_:
-        first = "Not resolved" if not said else "Also not resolved"
-        said.append(f"{first}, since the interval reaches over the margin: {_named(open_)}.")
+        first = "Not resolved" if not sentences else "Also not resolved"
+        sentences.append(f"{first}, since the interval reaches over the margin: {_named(open_)}.")
     if untested:
-        said.append(f"Not tested: {_named(untested)}.")
+        sentences.append(f"Not tested: {_named(untested)}.")
     agreeing = len(by_verdict["equivalent"])
-    said.append(f"{agreeing} of {many} comparisons agree within the margins set beforehand.")
-    return tuple(said)
+    sentences.append(f"{agreeing} of {many} comparisons agree within the margins set beforehand.")
+    return tuple(sentences)
 
 
 def _named(compared: Sequence[Compared]) -> str:
@@ -162,14 +164,14 @@ def _named(compared: Sequence[Compared]) -> str:
     return listed(parts)
 
 
-def interval_text(found: Agreement) -> str:
+def interval_text(agreement: Agreement) -> str:
     """An interval as a table shows it."""
-    low, high = found.ci
+    low, high = agreement.ci
     return "–" if low != low else f"{number(low, 2)} to {number(high, 2)}"
 
 
 @dataclass(frozen=True)
-class Speed:
+class EngineSpeed:
     """What the finished runs of one engine cost."""
 
     engine: str
@@ -181,14 +183,14 @@ class Speed:
     """Median over the runs."""
 
 
-def speeds(summary: pd.DataFrame) -> tuple[Speed, ...]:
-    """Speed of each engine that computed runs, the fastest first."""
+def speeds(summary: pd.DataFrame) -> tuple[EngineSpeed, ...]:
+    """EngineSpeed of each engine that computed runs, the fastest first."""
     wanted = {ENGINE, VERSION, GRAIN_STEPS_PER_S, WALL_S, OUTCOME_CODE}
     if not wanted <= set(summary.columns):
         return ()
     complete = summary[finished(summary)]
-    found = [
-        Speed(
+    engine_speeds = [
+        EngineSpeed(
             str(engine),
             listed([str(v) for v in dict.fromkeys(runs[VERSION])]),
             len(runs),
@@ -197,4 +199,4 @@ def speeds(summary: pd.DataFrame) -> tuple[Speed, ...]:
         )
         for engine, runs in complete.groupby(ENGINE)
     ]
-    return tuple(sorted(found, key=lambda s: -s.grain_steps_per_s))
+    return tuple(sorted(engine_speeds, key=lambda s: -s.grain_steps_per_s))

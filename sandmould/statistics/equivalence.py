@@ -75,8 +75,8 @@ def agree(
     nothing = (math.nan, math.nan)
     if n < 2:
         runs = "pair of finished runs" if len(shared) else "finished run on one side"
-        said = f"only one {runs}" if n else "no finished run on one side"
-        return Agreement(means, nothing, margin, n, bool(len(shared)), "not tested", said)
+        note = f"only one {runs}" if n else "no finished run on one side"
+        return Agreement(means, nothing, margin, n, bool(len(shared)), "not tested", note)
     test = compare_means(first, second)
     if test is None:
         return _without_spread(first, means, margin, n)
@@ -88,13 +88,13 @@ def agree(
         return Agreement(means, ci, margin, n, paired, verdict, "")
     error = (ci[1] - ci[0]) / 2 / float(stats.t.ppf(0.5 + confidence / 2, result.df))
     more = _more(abs(difference), error * math.sqrt(n), margin, confidence, n, paired)
-    said = (
+    note = (
         f"more than {MOST_REPLICATES} replicates would be needed: the difference lies about on "
         "the margin"
         if more is None
         else f"about {more} more replicates would be needed at this spread"
     )
-    return Agreement(means, ci, margin, n, paired, verdict, said, more)
+    return Agreement(means, ci, margin, n, paired, verdict, note, more)
 
 
 def classify_interval(ci: tuple[float, float], margin: float) -> EquivalenceVerdict:
@@ -110,12 +110,12 @@ def _without_spread(
 ) -> Agreement:
     """Pairs that all differ by the same amount, most often by nothing."""
     if float(first.std(ddof=1)) <= 1e-12 * float(first.abs().max()):
-        said = "the replicates do not differ: check that the seed reaches the sand"
-        return Agreement(means, (math.nan, math.nan), margin, n, True, "not tested", said)
+        note = "the replicates do not differ: check that the seed reaches the sand"
+        return Agreement(means, (math.nan, math.nan), margin, n, True, "not tested", note)
     difference = means[0] - means[1]
     ci = (difference, difference)
-    said = "the same to round-off in every pair" if abs(difference) < 1e-9 * margin else ""
-    return Agreement(means, ci, margin, n, True, classify_interval(ci, margin), said)
+    note = "the same to round-off in every pair" if abs(difference) < 1e-9 * margin else ""
+    return Agreement(means, ci, margin, n, True, classify_interval(ci, margin), note)
 
 
 def _more(

@@ -43,8 +43,10 @@ def propose(
     keys = optimum.keys
     rng = np.random.default_rng([seed, runs])
     count: dict[tuple[float, ...], int] = {}
-    for *known, replicate in summary[[*keys, REPLICATE]].to_numpy(dtype=np.float64).tolist():
-        place = tuple(known)
+    for *values_of_run, replicate in (
+        summary[[*keys, REPLICATE]].to_numpy(dtype=np.float64).tolist()
+    ):
+        place = tuple(values_of_run)
         count[place] = max(count.get(place, 0), int(replicate))
     chosen = []
     for pick in rng.choice(optimum.picks, size=runs, replace=False):

@@ -82,12 +82,12 @@ def group_settings(
     return [(values, summary.iloc[rows]) for values, rows in setting_rows(summary, keys)]
 
 
-def setting_of(values: dict[str, Any], planned: int, found: pd.Series[float]) -> Setting:
+def setting_of(values: dict[str, Any], planned: int, measured: pd.Series[float]) -> Setting:
     """Mean, spread and interval of one setting's finished values."""
-    n = len(found)
-    sd = float(found.std(ddof=1)) if n > 1 else math.nan
+    n = len(measured)
+    sd = float(measured.std(ddof=1)) if n > 1 else math.nan
     half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * sd / math.sqrt(n) if n > 1 else sd
-    mean = float(found.mean()) if n else math.nan
+    mean = float(measured.mean()) if n else math.nan
     return Setting(values, setting_text(values), planned, n, mean, sd, half)
 
 
@@ -100,14 +100,14 @@ def number_blocks(summary: pd.DataFrame) -> NDArray[np.intp]:
 
 
 def by_block(
-    summary: pd.DataFrame, found: pd.Series[float], over: Sequence[str] = ()
+    summary: pd.DataFrame, values: pd.Series[float], over: Sequence[str] = ()
 ) -> pd.Series[float]:
     """Values by replicate, seed and further keys, or by row where replicates are not told apart."""
     blocks = [c for c in (REPLICATE, SEED, *over) if c in summary]
     if REPLICATE not in blocks:
-        return found.rename(index=lambda row: ("row", row))
-    rows = summary.loc[found.index, blocks]
-    return pd.Series(found.to_numpy(), index=[tuple(r) for r in rows.to_numpy().tolist()])
+        return values.rename(index=lambda row: ("row", row))
+    rows = summary.loc[values.index, blocks]
+    return pd.Series(values.to_numpy(), index=[tuple(r) for r in rows.to_numpy().tolist()])
 
 
 def compare(

@@ -27,9 +27,8 @@ _FEW = 3
 _DEEP = 0.05
 """Overlap over radius from which the reader is told of it."""
 NOT_TESTED = (
-    "Whether the optimum belongs to the sand or to the model's springs is not tested here: the "
-    "controls of the certificate (contact stiffness, bed depth, grain size, time step) have not "
-    "been run."
+    "Whether the optimum belongs to the sand or to the model's springs is not tested here: its "
+    "robustness checks (contact stiffness, bed depth, grain size, time step) have not been run."
 )
 
 

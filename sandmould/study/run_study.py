@@ -1,7 +1,7 @@
 """A study from its file to its report.
 
 Snakemake computes the runs; where the study asks for rounds, its results choose the runs of the
-next one, which are appended until there is reason to end, then those of its certificate. Options
+next one, which are appended until there is reason to end, then those of its controls. Options
 go on to Snakemake.
 """
 
@@ -22,7 +22,7 @@ from sandmould.study.rounds.round_log import read_rounds, write_rounds
 
 
 def drive(path: Path, options: Sequence[str]) -> int:
-    """Compute a study, all its rounds and its certificate.
+    """Compute a study, all its rounds and its robustness checks.
 
     Parameters
     ----------

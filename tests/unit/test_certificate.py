@@ -24,7 +24,7 @@ from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.robustness.controls import BY_FACTOR, SHAKEN_HZ, Case, cases
-from sandmould.study.rounds.decide import choose_certified, next_round
+from sandmould.study.rounds.decide import choose_controls, next_round
 from sandmould.study.rounds.round_log import RoundLog, basis_of, read_rounds, write_rounds
 
 FREQUENCY = "vibration.0.frequency_hz"
@@ -293,7 +293,7 @@ def test_frequencies_are_chosen_round_the_optimum_and_anew_after_more_rounds(
 ) -> None:
     study = opened(tmp_path, refine={"rounds": 2, "runs": 3}).study
     table = planted(lambda part, f: hill(f, BEST_HZ), [], 0.002)
-    ledger = choose_certified(RoundLog(basis_of(study)), study, table, [FREQUENCY])
+    ledger = choose_controls(RoundLog(basis_of(study)), study, table, [FREQUENCY])
     low, best, high = ledger.certified_hz
     assert best == pytest.approx(BEST_HZ, rel=0.06)
     assert (low, high) == pytest.approx((best / 1.4, best * 1.4), rel=0.01)

@@ -46,14 +46,14 @@ def worths(
     share = (np.arange(TRUTHS) + 0.5) / TRUTHS
     truths = [base.low + (base.high - base.low) * np.array([a, b]) for a in share for b in share]
     alone = {m: _mean_bits(emulators, [m], truths) for m in emulators}
-    found = [
+    worth_of_each = [
         Worth(
             m, alone[m], _mean_bits(emulators, [first, m], truths) - alone[first], cpu_s.get(m, 0.0)
         )
         for m in emulators
         if m != first
     ]
-    return sorted(found, key=lambda worth: -worth.bits_added)
+    return sorted(worth_of_each, key=lambda worth: -worth.bits_added)
 
 
 def _mean_bits(

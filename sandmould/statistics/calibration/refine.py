@@ -77,8 +77,8 @@ def next_point(
     -------
     (2,) float64
     """
-    known = (candidates[:, None] == tried[None]).all(axis=-1).any(axis=1)
-    left = candidates[~known]
+    is_tried = (candidates[:, None] == tried[None]).all(axis=-1).any(axis=1)
+    left = candidates[~is_tried]
     chosen: Array = left[int(chance(emulator, target, tolerance, left).argmax())]
     return chosen
 

@@ -107,11 +107,11 @@ def _measures(
     calibration: Calibration, summary: pd.DataFrame, others: Mapping[str, pd.DataFrame]
 ) -> Iterator[tuple[str, pd.DataFrame, str]]:
     """Each measure that may be emulated: its name, its table and its column there."""
-    asked = {measure for sand in calibration.sands for measure in sand.targets}
+    targeted = {measure for sand in calibration.sands for measure in sand.targets}
     tables = {"": summary} | {f"{name}__": table for name, table in others.items()}
     for prefix, table in tables.items():
         for column in map(str, table.columns):
-            if column in CANDIDATES or prefix + column in asked:
+            if column in CANDIDATES or prefix + column in targeted:
                 yield prefix + column, table, column
 
 
@@ -151,8 +151,8 @@ def material_text(
     assert calibrated.posterior is not None
     parts = {"sand", "contact", "background_damping"}
     tree: dict[str, Any] = scenario.model_dump(mode="json", include=parts, exclude_none=True)
-    known = [*calibrated.sand.targets.items(), *calibrated.sand.assumed.items()]
-    measured = ", ".join(f"{m} {t.value:g} with sd {t.sd:g}" for m, t in known)
+    targets = [*calibrated.sand.targets.items(), *calibrated.sand.assumed.items()]
+    measured = ", ".join(f"{m} {t.value:g} with sd {t.sd:g}" for m, t in targets)
     for key, value, sd in zip(
         keys, calibrated.posterior.mode, calibrated.posterior.sd, strict=True
     ):

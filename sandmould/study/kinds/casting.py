@@ -22,7 +22,7 @@ SLOWER = 10.0
 """Than predicted a machine may be, and a run longer than expected."""
 
 
-class Solver(Protocol):
+class CastingSolver(Protocol):
     """What a module that computes runs offers."""
 
     def source_files(self) -> list[Path]:
@@ -45,7 +45,7 @@ class Solver(Protocol):
 
 
 def casting_planning(
-    solver: Solver,
+    solver: CastingSolver,
     *,
     work_unit: str,
     resolved: Callable[[ScenarioT], ScenarioT],
@@ -85,7 +85,7 @@ def casting_planning(
 
 
 def casting_execution(
-    solver: Solver, products: tuple[str, ...], measure: Callable[[Run, Path], None]
+    solver: CastingSolver, products: tuple[str, ...], measure: Callable[[Run, Path], None]
 ) -> Execution[Any]:
     """Compute runs with a solver of our own; its deck lists all values with their sources."""
     return Execution(

@@ -24,7 +24,7 @@ OF_SAND = ("cross_check", "calibration", "certificate")
 
 
 @dataclass(frozen=True)
-class Speed(Generic[ScenarioT]):
+class MachineSpeed(Generic[ScenarioT]):
     """How fast a core of this machine is; of kinds whose engines differ from machine to machine.
 
     Both functions take a scenario and the folder of all results, and give work a second.
@@ -74,7 +74,7 @@ class Planning(Generic[ScenarioT]):
     """Scenarios of one class are computed at one speed."""
     plan_cells: Callable[[ScenarioT], Mapping[str, str]]
     """What the plan says of a run, by heading."""
-    speed: Speed[ScenarioT] | None = None
+    speed: MachineSpeed[ScenarioT] | None = None
     """None where ``predicted_s`` is all that is known."""
 
 

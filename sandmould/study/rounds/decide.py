@@ -19,7 +19,7 @@ from sandmould.study.rounds.round_log import Round, RoundLog
 
 
 def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> RoundLog:
-    """Add what comes next: a round, or, once they have ended, the certificate.
+    """Add what comes next: a round, or, once they have ended, the controls of the optimum.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str
     if not log.ended or not study.certificate.controls or log.certified_hz:
         return log
     try:
-        return choose_certified(log, study, summary, keys)
+        return choose_controls(log, study, summary, keys)
     except TooFewRunsError as error:
-        return replace(log, ended=f"No certificate: {error}.")
+        return replace(log, ended=f"No robustness checks: {error}.")
 
 
 def next_round(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> RoundLog:
@@ -56,20 +56,20 @@ def next_round(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[st
     if ended:
         return replace(log, ended=ended)
     whole = [key for key in keys if is_whole(type(study.scenario), key)]
-    one = Round(
+    added = Round(
         tuple(propose(optimum, summary, refine.runs, done, whole)),
         optimum.setting,
         {key: optimum.interval(key) for key in keys},
         spent_h,
     )
-    # A certificate is of the optimum that was best then: with more runs it is chosen anew.
-    return replace(log, rounds=(*log.rounds, one), ended="", certified_hz=())
+    # Controls are of the optimum that was best then: with more runs they are chosen anew.
+    return replace(log, rounds=(*log.rounds, added), ended="", certified_hz=())
 
 
-def choose_certified(
+def choose_controls(
     log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]
 ) -> RoundLog:
-    """Choose the frequencies of the certificate: the best, one below and one above.
+    """Choose the frequencies of the controls: the best, one below and one above.
 
     Raises
     ------
@@ -124,9 +124,9 @@ def _intervals(optimum: Optimum, keys: list[str]) -> str:
 def decision_text(log: RoundLog, study: Study) -> str:
     """One line on the last decision, for the terminal."""
     if log.ended and log.certified_hz:
-        shown = listed([number(f) for f in log.certified_hz])
+        frequencies = listed([number(f) for f in log.certified_hz])
         controls = listed([c.replace("_", " ") for c in study.certificate.controls], most=8)
-        return f"{log.ended} The certificate's controls at {shown} Hz: {controls}."
+        return f"{log.ended} The controls of the optimum at {frequencies} Hz: {controls}."
     if log.ended:
         return log.ended
     last = log.rounds[-1]

@@ -41,7 +41,7 @@ class RoundLog:
     ended: str = ""
     """Why there are no more, as a sentence; empty while they go on."""
     certified_hz: tuple[float, ...] = ()
-    """Frequencies of the certificate, the best in the middle; none before it is known."""
+    """Frequencies of the controls, the best in the middle; none before it is known."""
 
     @property
     def runs(self) -> list[tuple[Point, int]]:

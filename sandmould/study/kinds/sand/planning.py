@@ -14,7 +14,7 @@ from sandmould.scenario import checks
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, with_hash
-from sandmould.study.kinds.kind import Planning, Speed, SpeedClass
+from sandmould.study.kinds.kind import MachineSpeed, Planning, SpeedClass
 from sandmould.study.kinds.sand import speed
 
 BASE_MEMORY_MB = 600
@@ -141,5 +141,5 @@ PLANNING = Planning[Scenario](
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
-    speed=Speed(speed.stored_rate, speed.measured_rate),
+    speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
 )
