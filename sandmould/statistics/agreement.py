@@ -184,7 +184,7 @@ class EngineSpeed:
 
 
 def speeds(summary: pd.DataFrame) -> tuple[EngineSpeed, ...]:
-    """EngineSpeed of each engine that computed runs, the fastest first."""
+    """Speed of each engine that computed runs, the fastest first."""
     wanted = {ENGINE, VERSION, GRAIN_STEPS_PER_S, WALL_S, OUTCOME_CODE}
     if not wanted <= set(summary.columns):
         return ()

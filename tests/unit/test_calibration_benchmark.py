@@ -162,7 +162,7 @@ def test_a_run_by_dem_is_the_studys_with_the_point_and_another_filling(
 
     monkeypatch.setattr(oracle, "simulate", simulated)
     monkeypatch.setattr(oracle, "render_run", lambda folder: None)
-    monkeypatch.setattr(oracle, "write_measures", lambda folder, out: None)
+    monkeypatch.setattr(oracle, "write_measures", lambda scenario, folder, out: None)
     run = by_dem(1, tmp_path)
     # Nothing was computed, so there is no angle.
     assert [math.isnan(run(point)) for point in ((0.3, 0.1), (0.3, 0.2))] == [True, True]
