@@ -23,7 +23,7 @@ from sandmould.study.definition.run import Run
 from sandmould.study.kinds.sand.measure import write_exports, write_measures
 from sandmould.study.plan.plan_files import read_run, write_plan
 from tests.bent_run import SCENE, write_bent_run
-from tests.unit.test_report_page import Page
+from tests.unit.report.test_page import Page
 
 SHARES = {"one": 0.8, "two": 1.0, "three": 1.2}
 
