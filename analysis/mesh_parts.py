@@ -47,11 +47,11 @@ def sphere_mesh_m3(centre_m: Array, radius_m: Array, mesh: TriangleMesh) -> Arra
         inside = mesh.distance_m(centre_m[on]) < 0.0
         volume[near[on]] = np.where(inside, 4.0 / 3.0 * np.pi * radius_m[on] ** 3, 0.0)
     corners_m = mesh.corners_m
-    sphere, triangle = mesh.near_triangles(centre_m, radius_m)
-    for at in range(0, len(sphere), _CHUNK):
-        one, two = sphere[at : at + _CHUNK], triangle[at : at + _CHUNK]
-        part = _triangle_part_m3(corners_m[two] - centre_m[one, None], radius_m[one])
-        volume += np.bincount(near[one], weights=part, minlength=len(volume))
+    spheres, triangles = mesh.near_triangles(centre_m, radius_m)
+    for at in range(0, len(spheres), _CHUNK):
+        sphere, triangle = spheres[at : at + _CHUNK], triangles[at : at + _CHUNK]
+        part = _triangle_part_m3(corners_m[triangle] - centre_m[sphere, None], radius_m[sphere])
+        volume += np.bincount(near[sphere], weights=part, minlength=len(volume))
     return np.clip(volume, 0.0, None)
 
 
@@ -123,8 +123,8 @@ def mesh_below_m3(mesh: TriangleMesh, height_m: Array) -> Array:
     """
     corners_m = mesh.corners_m
     # twice the area seen from above, negative for a triangle that faces down
-    one, two = corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0]
-    plan = 0.5 * (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+    first_m, second_m = corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0]
+    plan = 0.5 * (first_m[:, 0] * second_m[:, 1] - first_m[:, 1] * second_m[:, 0])
     low, middle, top = np.sort(corners_m[:, :, 2], axis=1).T
     return np.array([-float(plan @ _mean_depth(low, middle, top, h)) for h in height_m.tolist()])
 

@@ -27,7 +27,7 @@ LAYER_COLOURS = (
 """Okabe and Ito's colours, told apart with any colour vision, and a grey; the ninth layer has the
 first again."""
 _SAND = "#D9B97C"
-_MANY = 3_000
+_DENSE_FROM = 3_000
 """Grains from which on outlines would blacken the picture and vectors bloat the file."""
 _MM = 1e3
 
@@ -191,7 +191,7 @@ def _collection(
         in_plane = np.abs(y - plane_m) < radius_m
         radius_m = np.sqrt(np.maximum(radius_m**2 - (y - plane_m) ** 2, 0.0))
     centre_m, radius_m = position_m[in_plane][:, [0, -1]], radius_m[in_plane]
-    is_dense = len(radius_m) > _MANY
+    is_dense = len(radius_m) > _DENSE_FROM
     grains = EllipseCollection(
         2.0 * radius_m * _MM,
         2.0 * radius_m * _MM,

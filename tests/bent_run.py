@@ -1,4 +1,4 @@
-"""A run with a pattern as engines leave it: four snapshots and a ledger, made up by hand."""
+"""A run with a pattern as engines leave it: four snapshots and a convergence log, by hand."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SCENE: dict[str, Any] = {
 def write_bent_run(folder: Path, body: FoamBody, share: float = 1.0) -> None:
     """Drawn, bent by a share of what a load does, the same as vibration begins, bent half as far.
 
-    The ledger has ten windows a snapshot.
+    The convergence log has ten windows a snapshot.
     """
     (folder / "snapshots").mkdir()
     load, bent = tip_load(body)
@@ -42,7 +42,7 @@ def write_bent_run(folder: Path, body: FoamBody, share: float = 1.0) -> None:
             time_s, shaken_s, stage, one, one, place_m, none, np.zeros((1, 3)), np.array([0.002]),
             pattern_m=moved_m, pattern_load_n=load,
         ).save(folder / "snapshots" / f"{number:06d}.npz")  # fmt: skip
-    write_ledger(folder)
+    write_convergence_log(folder)
     pd.DataFrame({"wall_s": [6.0]}).to_csv(folder / "cost.tsv", sep="\t", index=False)
 
 
@@ -52,7 +52,7 @@ def tip_load(body: FoamBody) -> tuple[np.ndarray, np.ndarray]:
     return load, body.solve(load).displacement_m
 
 
-def write_ledger(folder: Path) -> None:
+def write_convergence_log(folder: Path) -> None:
     time_s = WINDOW_S * np.arange(1, 31)
     rows = pd.DataFrame(
         {

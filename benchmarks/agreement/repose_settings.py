@@ -11,7 +11,7 @@ from benchmarks.agreement.recorded import Recorded, read_all
 from benchmarks.frame import render
 from sandmould.runs.formatting import name_of, number, seconds
 from sandmould.runs.outcome import Outcome
-from sandmould.statistics.agreement import Compared, shown_value
+from sandmould.statistics.agreement import Compared, value_label
 from sandmould.study.records import RECORDS
 
 MEASURE = "heap_angle_deg"
@@ -83,11 +83,11 @@ def factors_of(recorded: Recorded, summary: pd.DataFrame, keys: tuple[str, ...])
     factors = []
     for key in keys:
         cost = finished.groupby(key, sort=False)["cpu_s"].mean().sort_values(ascending=False)
-        dearest = shown_value(key, cost.index[0])
+        dearest = value_label(key, cost.index[0])
         levels = []
         for value, cpu_s in cost.items():
             angle = finished.loc[finished[key] == value, MEASURE].dropna()
-            label = shown_value(key, value)
+            label = value_label(key, value)
             compared = _pair(recorded.compared, key, dearest, label)
             against, agrees = "–", False
             if compared is not None:

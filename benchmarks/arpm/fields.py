@@ -56,7 +56,7 @@ def _draw(panel: matplotlib.axes.Axes, run: PlatesRun, plates: Plates
     width = dot * float(smallest_m) * PANEL_POINTS / (2.0 * HALF_WIDTH_M)
     panel.set_facecolor("0.8")
     dots = panel.scatter(
-        x, y, c=run.found.heat.temperature_k, s=width**2, marker="s", linewidths=0, cmap="inferno",
+        x, y, c=run.result.heat.temperature_k, s=width**2, marker="s", linewidths=0, cmap="inferno",
         vmin=plates.filling.initial_k[0], vmax=plates.filling.initial_k[1], rasterized=True,
     )  # fmt: skip
     panel.set(

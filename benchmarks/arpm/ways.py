@@ -81,14 +81,14 @@ def way_rows(plates: Plates, least_mm: float) -> list[dict[str, Any]]:
     finest_mm = max(1.0, 0.5 * least_mm)
     run_way(REFERENCE, plates, COARSE_M, WARMING_S)
     reference = run_way(REFERENCE, plates, 1e-3 * finest_mm)
-    rows = [_row("finite differences", finest_mm, plates, reference, reference.found)]
+    rows = [_row("finite differences", finest_mm, plates, reference, reference.result)]
     for name, way in WAYS.items():
         run_way(way, plates, COARSE_M, WARMING_S)  # compiled before it is timed
         for size_mm in way.sizes_mm:
             if size_mm < least_mm:
                 continue
             run = run_way(way, plates, 1e-3 * size_mm)
-            rows.append(_row(name, size_mm, plates, run, reference.found))
+            rows.append(_row(name, size_mm, plates, run, reference.result))
             row = rows[-1]
             print(
                 f"{name}, {size_mm:g} mm: {row['cpu_s']:.2f} s, "
@@ -98,7 +98,7 @@ def way_rows(plates: Plates, least_mm: float) -> list[dict[str, Any]]:
                 flush=True,
             )
             if name in PAPERS:
-                rows[-1] |= _courses(plates, run.found, reference.found)
+                rows[-1] |= _courses(plates, run.result, reference.result)
     return rows
 
 
@@ -112,7 +112,7 @@ def run_way(way: Way, plates: Plates, size_m: float, until_s: float = 20_000.0) 
 def _row(
     name: str, size_mm: float, plates: Plates, run: PlatesRun, reference: SolidificationResult
 ) -> dict[str, Any]:
-    solidification = run.found
+    solidification = run.result
     error = curve_error_percent(plates, solidification, reference)
     late = solidification.solidification_time_s / reference.solidification_time_s - 1.0
     return {

@@ -13,8 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
+from benchmarks.frame.page import render
 from benchmarks.house.picture import draw_house
 from benchmarks.house.rooms import House, Room, read_house, rooms_at
 from sandmould import ROOT
@@ -49,22 +48,16 @@ def page_text(house: House, before: dict[str, Any], changes: Sequence[Change]) -
         The ``commit`` and its ``rooms``, as ``BEFORE`` holds them.
     changes : sequence of Change
     """
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
     earlier = {room["name"]: Room(**room) for room in before["rooms"]}
-    return environment.get_template("architecture.md.j2").render(
-        house=house,
-        names=[name for floor in house.floors for name in floor],
-        earlier=earlier,
-        commit=before["commit"],
-        changes=changes,
-        picture=PICTURE,
-    )
+    values = {
+        "house": house,
+        "names": [name for floor in house.floors for name in floor],
+        "earlier": earlier,
+        "commit": before["commit"],
+        "changes": changes,
+        "picture": PICTURE,
+    }
+    return render(Path(__file__).with_name("architecture.md.j2"), values)
 
 
 def read_changes(path: Path = CHANGES) -> list[Change]:

@@ -36,10 +36,10 @@ def draw_house(house: House, path: Path) -> None:
         for name, (x, y) in places.items():
             _box(axes, x, y, colours[name])
             room = house.rooms[name]
-            shown = f"{room.lines:,}".replace(",", " ")
+            lines_text = f"{room.lines:,}".replace(",", " ")
             axes.text(x, y + 0.1, name.removeprefix("sandmould."), ha="center", va="center",
                       fontsize=11, fontweight="bold", zorder=5)  # fmt: skip
-            axes.text(x, y - 0.14, f"{shown} lines", ha="center", va="center", zorder=5)
+            axes.text(x, y - 0.14, f"{lines_text} lines", ha="center", va="center", zorder=5)
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 

@@ -16,7 +16,7 @@ from importlib import metadata
 from typing import Any
 
 
-class StopAskedError(Exception):
+class StopRequestedError(Exception):
     """The benchmark wants no more of this problem."""
 
 
@@ -43,7 +43,7 @@ class JsonlPipe:
         self.say({"ask": [float(x) for x in point]})
         answer = json.loads(sys.stdin.readline() or '{"stop": true}')
         if answer.get("stop"):
-            raise StopAskedError
+            raise StopRequestedError
         value = answer["value"]
         return None if value is None else float(value)
 
@@ -68,7 +68,7 @@ def serve(solve: Callable[[JsonlPipe, dict[str, Any]], str], packages: Iterable[
     for line in sys.stdin:
         try:
             why = solve(pipe, json.loads(line))
-        except StopAskedError:
+        except StopRequestedError:
             why = "asked to stop"
         except Exception as error:
             # A method that breaks has failed this problem, not the benchmark.

@@ -90,10 +90,10 @@ def run(
     cores: Cores = None,
 ) -> None:
     """Compute a study, or what is missing of it; write its report."""
-    from sandmould.study.run_study import drive
+    from sandmould.study.run_study import run_study
 
     of_cores = [] if cores is None else ["--cores", str(cores)]
-    raise typer.Exit(drive(study, [*of_cores, *(options or [])]))
+    raise typer.Exit(run_study(study, [*of_cores, *(options or [])]))
 
 
 @app.command()

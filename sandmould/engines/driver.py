@@ -68,7 +68,7 @@ class Driver:
         counts, record = StepCounts.of(program.scenario), program.scenario.record
         self._snapshot_steps = counts.windows(record.snapshot_every_s)
         self._checkpoint_steps = counts.windows(record.checkpoint_every_s)
-        self._stop_asked = False
+        self._stop_requested = False
         self._recorder: Recorder | None = None
         self.is_root = True
         """Whether this process writes the products; known once the engine has started."""
@@ -118,7 +118,7 @@ class Driver:
         return RunOutcome(outcome, detail, simulated_s, self._program.expected_s)
 
     def _ask_to_stop(self, number: int, frame: FrameType | None) -> None:
-        self._stop_asked = True
+        self._stop_requested = True
 
     def _begin_clocks(self) -> None:
         self._earlier = (self.cost.wall_s, self.cost.cpu_s)
@@ -147,12 +147,12 @@ class Driver:
             self._guard.start_stage(stage, session.snapshot())
             while not session.stage_over:
                 self._window(session)
-            self._judge_end(session, stage)
+            self._check_rest(session, stage)
             session.end_stage()
         if session.is_root:
             self._show(session, last=True)
 
-    def _judge_end(self, session: Session, stage: Stage) -> None:
+    def _check_rest(self, session: Session, stage: Stage) -> None:
         """Stop where the sand did not come to rest, or came to rest before it had flowed out."""
         settling = stage.settling
         if settling is not None and not session.at_rest:
@@ -206,7 +206,7 @@ class Driver:
         if not session.can_checkpoint:
             return
         limit_s = self._scenario.guard.wall_limit_s or float("inf")
-        stop = session.share(self._stop_asked or time.monotonic() - self._begun > limit_s)
+        stop = session.share(self._stop_requested or time.monotonic() - self._begun > limit_s)
         if not stop and session.steps % self._checkpoint_steps:
             return
         # All ranks write into the one folder that the first has emptied.
@@ -229,7 +229,7 @@ class Driver:
                 ),
             )
         if stop:
-            why = "the system asked" if self._stop_asked else "guard.wall_limit_s came"
+            why = "the system asked" if self._stop_requested else "guard.wall_limit_s came"
             raise EngineStop(
                 Outcome.OUT_OF_WALL_TIME, f"stopped at {session.time_s:.4g} s because {why}"
             )

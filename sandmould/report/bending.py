@@ -15,9 +15,9 @@ import pandas as pd
 from pattern_fe.coupling.loop_verdict import LoopVerdict, study_sentence
 from sandmould.report.bending_figure import draw_outlines
 from sandmould.report.chart import Area, Chart
+from sandmould.report.convergence_charts import ConvergenceChart, convergence_charts
 from sandmould.report.coupling_map import CouplingMap, coupling_map
 from sandmould.report.curves import runs_of, setting_tints, time_chart
-from sandmould.report.ledger_charts import LedgerChart, ledger_charts
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.thinning import drawn_part, listed_runs
 from sandmould.runs.columns import (
@@ -31,7 +31,7 @@ from sandmould.runs.formatting import number, setting_text
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.kinds.sand.bending import ledger_of, verdict_of
+from sandmould.study.kinds.sand.bending import convergence_log_of, verdict_of
 
 TIP = "pattern_tip_deflection_m"
 ROJEK = (
@@ -53,8 +53,8 @@ class BendingPages:
     """Picture; empty where the shown run has no shape."""
     outlines_note: str
     map: CouplingMap | None
-    ledger: tuple[LedgerChart, ...]
-    shown_run: str
+    convergence: tuple[ConvergenceChart, ...]
+    pictured_run: str
     runs: Table
     paper: str = ROJEK
 
@@ -65,7 +65,7 @@ def bending_pages(
     scenario: Scenario,
     collected: Collected,
     verdict: Verdict,
-    shown: str,
+    pictured_run: str,
 ) -> BendingPages:
     """Draw what a study shows of its pattern.
 
@@ -87,20 +87,20 @@ def bending_pages(
         if loop_verdict is not None:
             verdicts[str(run)] = loop_verdict
     curves = collected.curves
-    own = curves[curves[RUN] == shown] if TIP in curves else curves.iloc[:0]
-    picture, note = draw_outlines(study_folder / "runs" / shown, scenario)
-    ledger = ledger_of(study_folder / "runs" / shown)
+    own = curves[curves[RUN] == pictured_run] if TIP in curves else curves.iloc[:0]
+    picture, note = draw_outlines(study_folder / "runs" / pictured_run, scenario)
+    log = convergence_log_of(study_folder / "runs" / pictured_run)
     return BendingPages(
         sentences=(
             study_sentence(list(verdicts.values())),
-            *_told(own, verdicts.get(shown), scenario),
+            *_tip_sentences(own, verdicts.get(pictured_run), scenario),
         ),
         deflection=deflection_chart(collected, verdict),
         outlines=picture,
         outlines_note=note,
         map=coupling_map(collected, {run: v.state for run, v in verdicts.items()}),
-        ledger=() if ledger is None else ledger_charts(ledger, _begins_s(own)),
-        shown_run=shown,
+        convergence=() if log is None else convergence_charts(log, _begins_s(own)),
+        pictured_run=pictured_run,
         runs=_runs_table(study_folder, href, collected, verdict, verdicts),
     )
 
@@ -112,7 +112,9 @@ def _begins_s(rows: pd.DataFrame) -> float:
     return float(times.iloc[0]) if len(times) else 0.0
 
 
-def _told(rows: pd.DataFrame, verdict: LoopVerdict | None, scenario: Scenario) -> tuple[str, ...]:
+def _tip_sentences(
+    rows: pd.DataFrame, verdict: LoopVerdict | None, scenario: Scenario
+) -> tuple[str, ...]:
     """What became of the tip and of the sand under the pattern in the run that is shown."""
     if rows.empty:
         return ()

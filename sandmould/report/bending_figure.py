@@ -36,26 +36,26 @@ def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
     (str, str)
         PNG as a ``data:`` address and what it shows; both empty where the run left no shape.
     """
-    told = scenario.pattern
-    assert told is not None
-    drawn = next(s for s in scenario.scene.solids if s.name == told.name)
+    pattern = scenario.pattern
+    assert pattern is not None
+    drawn = next(s for s in scenario.scene.solids if s.name == pattern.name)
     moments = shape_moments(list_moments(run_folder))
     shapes = {name: Snapshot.load(m.path).pattern_m for name, m in moments.items()}
-    known = {name: shape for name, shape in shapes.items() if shape is not None}
-    if not known:
+    outlines_m = {name: shape for name, shape in shapes.items() if shape is not None}
+    if not outlines_m:
         return "", ""
     figure = Figure(dpi=110, layout="constrained")
     ax = figure.add_subplot()
     for line_m in _lines_m(drawn, drawn.corners()):
         ax.add_patch(Polygon(line_m * _MM, facecolor="0.9", edgecolor="0.35", ls="--"))
     ax.plot([], [], color="0.35", ls="--", label="as drawn")
-    for name, shape_m in known.items():
+    for name, shape_m in outlines_m.items():
         label, colour = _STYLES[name]
         for line_m in _lines_m(drawn, shape_m):
             ax.add_patch(Polygon(line_m * _MM, fill=False, edgecolor=colour, lw=1.8))
         ax.plot([], [], color=colour, lw=1.8, label=label)
-    _frame(figure, np.concatenate([drawn.corners(), *known.values()])[:, [0, -1]] * _MM)
-    said = ", ".join(["as drawn (broken line)", *(_STYLES[name][0] for name in known)])
+    _frame(figure, np.concatenate([drawn.corners(), *outlines_m.values()])[:, [0, -1]] * _MM)
+    said = ", ".join(["as drawn (broken line)", *(_STYLES[name][0] for name in outlines_m)])
     return png(figure), said
 
 

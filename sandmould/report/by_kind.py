@@ -15,7 +15,7 @@ from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.flow import flow_method, flow_pages
 from sandmould.report.method import Row, deck_method, sand_method
 from sandmould.report.sand import SandPages, sand_pages
-from sandmould.report.solidification import shown_run, solid_method, solid_pages
+from sandmould.report.solidification import choose_pictured_run, solid_method, solid_pages
 from sandmould.report.time_series import Curve, measure_curves, whole_conclusion
 from sandmould.runs.columns import LARGEST_OVERLAP_FRACTION
 from sandmould.scenario.flow import MetalFlow, StillTank
@@ -154,8 +154,8 @@ def _sand_notes(
 
 def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
     column = LARGEST_OVERLAP_FRACTION
-    found = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
-    return float(found) if found > 0 else 0.0
+    deepest = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
+    return float(deepest) if deepest > 0 else 0.0
 
 
 def _deck_pages(findings: Findings[OwnDeck]) -> KindPages:
@@ -176,8 +176,8 @@ def _solidification_pages(findings: Findings[Solidification]) -> KindPages:
     of_sweep, keys = findings.collected.of_sweep, findings.collected.keys
     reference = getattr(study, "reference", {})
     best = _run_of(of_sweep.summary, verdict) if study.seeks_best else ""
-    shown = shown_run(reference, of_sweep, best)
-    pages = solid_pages(findings.study_folder, reference, scenario, of_sweep, verdict, shown)
+    pictured_run = choose_pictured_run(reference, of_sweep, best)
+    pages = solid_pages(findings.study_folder, reference, scenario, of_sweep, verdict, pictured_run)
     return KindPages(
         "solidification.html",
         solid_method(scenario, keys),
@@ -217,7 +217,9 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
     if scenario.pattern is not None:
         from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
 
-        bending = bending_pages(folder, findings.href, scenario, of_sweep, verdict, pages.shown_run)
+        bending = bending_pages(
+            folder, findings.href, scenario, of_sweep, verdict, pages.pictured_run
+        )
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),

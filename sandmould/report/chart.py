@@ -312,14 +312,14 @@ def _text(value: float, ticks: Sequence[float], is_logarithmic: bool = False) ->
 
 def _not_touching(ticks: Sequence[Tick]) -> tuple[Tick, ...]:
     """Ticks without the texts that would run into the one before."""
-    shown: list[Tick] = []
+    labelled: list[Tick] = []
     free_from = -math.inf
     for tick in sorted(ticks, key=lambda t: t.at):
         half = _CHARACTER * len(tick.text) / 2 + 3
         fits = tick.at - half >= free_from
-        shown.append(tick if fits else Tick(tick.at, ""))
+        labelled.append(tick if fits else Tick(tick.at, ""))
         free_from = tick.at + half if fits else free_from
-    return tuple(shown)
+    return tuple(labelled)
 
 
 def _laid_area(area: Area, x: Axis, y: Axis) -> LaidArea:

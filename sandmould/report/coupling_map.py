@@ -83,7 +83,7 @@ def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingM
     for axes in grid[-1]:
         axes.set_xlabel("Young's modulus, Pa")
     figure.legend(handles=_legend(), loc="outside lower center", ncols=5, frameon=False)
-    return CouplingMap(png(figure), _told(rows))
+    return CouplingMap(png(figure), _prediction_sentence(rows))
 
 
 def _draw(axes: Axes, part: pd.DataFrame) -> None:
@@ -106,7 +106,7 @@ def _legend() -> list[Line2D]:
     return [*signs, Line2D([], [], color=_LINE, lw=1.4, label="predicted limit")]
 
 
-def _told(rows: pd.DataFrame) -> str:
+def _prediction_sentence(rows: pd.DataFrame) -> str:
     """How good the prediction is: its verdicts, right and wrong either way."""
     below, stable = rows[FACTOR] < rows[LIMIT], rows["state"].isin(STABLE)
     wrong = [

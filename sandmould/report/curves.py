@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from sandmould.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
 from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, finished
 from sandmould.runs.formatting import (
+    display_scale,
     name_of,
     number,
     setting_text,
-    shown_scale,
     titled,
     value_text,
     with_margin,
@@ -48,10 +48,10 @@ def reported_lines(study: Study, key: str, low: float, high: float) -> list[Line
     """Upright lines where others found the best value of the swept key."""
     return [
         Line(
-            np.array([[one.value, low], [one.value, high]]), PLAIN,
-            label=value_text(key, one.value), title=f"best by {one.by}",
+            np.array([[reported.value, low], [reported.value, high]]), PLAIN,
+            label=value_text(key, reported.value), title=f"best by {reported.by}",
         )
-        for one in study.objective.reported_best
+        for reported in study.objective.reported_best
     ]  # fmt: skip
 
 
@@ -104,11 +104,11 @@ def time_chart(
         return None
     shaken = curves[curves[VIBRATION_TIME_S] >= 0]
     clock = VIBRATION_TIME_S if len(shaken) else TIME_S
-    shown = shaken if len(shaken) else curves
-    factor, what = shown_scale(measure)
-    xy_all = shown[[clock, measure]].to_numpy(dtype=np.float64) * [1.0, factor]
-    by_run = {str(run): xy_all[rows] for run, rows in shown.groupby(RUN).indices.items()}
-    stride = max(1, len(shown) // _POINTS)
+    charted = shaken if len(shaken) else curves
+    factor, what = display_scale(measure)
+    xy_all = charted[[clock, measure]].to_numpy(dtype=np.float64) * [1.0, factor]
+    by_run = {str(run): xy_all[rows] for run, rows in charted.groupby(RUN).indices.items()}
+    stride = max(1, len(charted) // _POINTS)
     colour = setting_tints(verdict, keys)
     labelled = _labelled(verdict)
     lines: list[Line] = []
@@ -129,8 +129,8 @@ def time_chart(
         mean = _mean_curve(complete)
         if mean is not None:
             label = setting.label if setting.label in labelled else ""
-            many = f"{setting.label}, mean of {len(complete)}"
-            means.append(Line(_thinned(mean, stride), tint, "mean", label, many))
+            title = f"{setting.label}, mean of {len(complete)}"
+            means.append(Line(_thinned(mean, stride), tint, "mean", label, title))
     when = "time of vibration, s" if clock == VIBRATION_TIME_S else "time, s"
     return Chart(when, what, _alt(what, when, means), tuple(lines + means))
 
@@ -195,7 +195,7 @@ def objective_charts(
     if len(verdict.settings) <= _MOST_ROWS:
         return (_row_chart(summary, verdict),)
     values = finished_values(summary, verdict.measure)
-    factor, what = shown_scale(verdict.measure)
+    factor, what = display_scale(verdict.measure)
     numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
     return tuple(
         Chart(
@@ -222,7 +222,7 @@ def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
     """Points over a numeric key, means joined by a line."""
     colour = setting_tints(verdict, [key])
     places = [float(s.values[key]) for s in verdict.settings]
-    factor, what = shown_scale(verdict.measure)
+    factor, what = display_scale(verdict.measure)
     marks: list[Mark] = []
     rows_of = runs_by_setting(summary, [key])
     for setting, x in zip(verdict.settings, places, strict=True):
@@ -246,7 +246,7 @@ def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
 
 def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
     """One row a setting, the highest mean on top."""
-    factor, what = shown_scale(verdict.measure)
+    factor, what = display_scale(verdict.measure)
     ranked = sorted(verdict.settings, key=lambda s: -s.mean if s.n else math.inf)
     marks: list[Mark] = []
     rows_of = runs_by_setting(summary, list(ranked[0].values))
@@ -271,7 +271,7 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
 def _run_marks(rows: pd.DataFrame, verdict: Verdict, tint: Tint) -> list[Mark]:
     """Marks of a setting's runs, given their rows; x is left to the caller."""
     values = finished_values(rows, verdict.measure)
-    factor = shown_scale(verdict.measure)[0]
+    factor = display_scale(verdict.measure)[0]
     marks = []
     for run, outcome, value in zip(rows[RUN], rows[OUTCOME], values, strict=True):
         if math.isfinite(value):

@@ -12,7 +12,7 @@ import pandas as pd
 
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.figure_files import pictures, strip
-from sandmould.report.repose_figures import draw_heap, draw_map, draw_posterior, shown
+from sandmould.report.repose_figures import draw_heap, draw_map, draw_posterior, plotted
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin
@@ -27,7 +27,7 @@ from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.kinds.sand.moments import list_moments
 
-SHOWN_HEAPS = 3
+PICTURED_HEAPS = 3
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def estimate_pages(
     summary, keys = collected.of_sweep.summary, collected.keys
     settings = [s for s in verdict.settings if s.n]
     calibrated = read_calibrated(study_folder, study, summary, keys)
-    sands = tuple(_sand(one, calibrated) for one in calibrated.sands) if calibrated else ()
+    sands = tuple(_sand(sand, calibrated) for sand in calibrated.sands) if calibrated else ()
     sentences = [*_value_sentences(settings, verdict.measure, study), *_touching(summary)]
     sentences += [sentence for sand in sands for sentence in sand.sentences[:1]]
     numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
@@ -106,7 +106,7 @@ def estimate_pages(
 def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
     """Heaps side by side, the map, and what is known of each sand, as files."""
     files = pictures(
-        map=pages.map_picture, **{f"posterior_{one.name}": one.posterior for one in pages.sands}
+        map=pages.map_picture, **{f"posterior_{sand.name}": sand.posterior for sand in pages.sands}
     )
     if pages.heaps:
         files["heaps"] = strip([(heap.heading, heap.picture) for heap in pages.heaps])
@@ -125,13 +125,17 @@ def _value_sentences(settings: Sequence[Setting], measure: str, study: Study) ->
             f"The {what} goes from {number(low.mean)}{unit} ({low.label}) to {number(high.mean)}"
             f"{unit} ({high.label})."
         ]
-    (one,) = settings
-    rests = f"95 % interval of the mean of {one.n} runs" if one.n > 1 else "one run, no interval"
-    said = [f"The {what} is {with_margin(one.mean, one.ci_half_width)}{unit} ({rests})."]
+    (setting,) = settings
+    rests = (
+        f"95 % interval of the mean of {setting.n} runs"
+        if setting.n > 1
+        else "one run, no interval"
+    )
+    said = [f"The {what} is {with_margin(setting.mean, setting.ci_half_width)}{unit} ({rests})."]
     reported = study.objective.reported
     if reported is not None:
-        apart = one.mean - reported.value
-        reach = one.ci_half_width if one.n > 1 else math.nan
+        apart = setting.mean - reported.value
+        reach = setting.ci_half_width if setting.n > 1 else math.nan
         spread = "" if math.isnan(reach) else f" ± {number(reach, 2)}{unit}"
         said.append(
             f"{reported.by} reports {number(reported.value)}{unit}: the difference is "
@@ -163,7 +167,7 @@ def _heaps(
     if not isinstance(scenario, Scenario) or scenario.gate is None or not scenario.gate.is_level:
         return ()
     values = finished_values(summary, verdict.measure).dropna().sort_values()
-    places = np.unique(np.linspace(0, len(values) - 1, SHOWN_HEAPS).round().astype(int))
+    places = np.unique(np.linspace(0, len(values) - 1, PICTURED_HEAPS).round().astype(int))
     heaps = []
     for index in [values.index[i] for i in places] if len(values) else []:
         run = str(summary.loc[index, RUN])
@@ -184,7 +188,7 @@ def _map_table(settings: Sequence[Setting], keys: tuple[str, str]) -> Table:
     at = {(s.values[keys[0]], s.values[keys[1]]): s for s in settings}
 
     def head(key: str, value: float) -> str:
-        return number(float(shown(key, np.array(value))))
+        return number(float(plotted(key, np.array(value))))
 
     unit = "°" if keys[1].endswith("rolling_arm_fraction") else ""
     columns = [Column(name_of(keys[0]))]

@@ -51,7 +51,7 @@ def cut_m(scenario: Scenario) -> float | None:
 
 def section_of(scenario: Scenario, height_m: float) -> SceneSection:
     """Outlines of the last stage's scene, cut where all pictures of the scenario are."""
-    return scene_section(scenario.scene_in(""), height_m, cut_m(scenario))
+    return scene_section(scenario.scene_in(), height_m, cut_m(scenario))
 
 
 def _draw_scene(scenario: Scenario, ax: Axes, height_m: float, at: Snapshot | str = "") -> None:

@@ -61,12 +61,12 @@ def filling_pages(
     if measure not in shaken or shaken.empty:
         return None
     keys = collected.keys
-    one_key = len(keys) == 1 and all(
+    is_on_a_scale = len(keys) == 1 and all(
         isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
     )
     settings = [s for s in verdict.settings if s.n]
     advice = (_drive(scenario, best), _time_to_fill(collected.summary, shaken, best, measure))
-    if not one_key or len(settings) < 3:
+    if not is_on_a_scale or len(settings) < 3:
         return FillingPages(advice, None, "")
     table = _fill_at_times(collected.summary, shaken, settings, keys[0], measure)
     return FillingPages(

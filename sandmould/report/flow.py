@@ -30,7 +30,7 @@ from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
-SHOWN = 6
+PICTURED_RUNS = 6
 """Runs whose histories and fields are drawn."""
 FILMED = 2
 COLOURS = tuple(to_hex(colormaps["viridis"](shade / SHADES)) for shade in range(SHADES + 1))
@@ -45,7 +45,7 @@ class FlowPages:
     noise: Table
     histories: str
     fields: str
-    shown: tuple[str, ...]
+    pictured_runs: tuple[str, ...]
     """Runs of histories and fields, the calmest first."""
     films: tuple[FlowFilm, ...]
     colours: tuple[str, ...]
@@ -54,7 +54,7 @@ class FlowPages:
 
 
 @dataclass(frozen=True)
-class _Shown:
+class _PicturedRun:
     """A run that is drawn."""
 
     run: str
@@ -83,9 +83,9 @@ def flow_pages(
         Most that all films together may weigh.
     """
     ranked = _ranked(scenario, collected.summary)
-    shown = _shown(ranked, collected.keys, study_folder)
+    pictured = _pictured_runs(ranked, collected.keys, study_folder)
     ideal_pa = scene.ideal_pa(scenario, scene.fluid_of(scenario))
-    filmed = [shown[0], shown[-1]][: min(FILMED, len(shown))] if shown else []
+    filmed = [pictured[0], pictured[-1]][: min(FILMED, len(pictured))] if pictured else []
     probes = [f"{name}_pa" for name in ideal_pa]
     return FlowPages(
         map=stability_map(ranked, collected.keys),
@@ -93,15 +93,15 @@ def flow_pages(
             *_sentences(scenario, ranked, ideal_pa), *_hopping(scenario, ranked, collected.keys)
         ),
         noise=_noise(scenario, ranked, collected.keys),
-        histories=_histories(shown, ideal_pa),
-        fields=_fields(shown, max(ideal_pa.values())),
-        shown=tuple(one.run for one in shown),
+        histories=_histories(pictured, ideal_pa),
+        fields=_fields(pictured, max(ideal_pa.values())),
+        pictured_runs=tuple(run.run for run in pictured),
         films=tuple(
             make_flow_film(
-                _load(one.folder), one.run, f"{one.label}: {one.verdict}", max(ideal_pa.values()),
+                _load(run.folder), run.run, f"{run.label}: {run.verdict}", max(ideal_pa.values()),
                 film_budget_bytes // len(filmed),
             )
-            for one in filmed
+            for run in filmed
         ),
         colours=COLOURS,
         curves=measure_curves(
@@ -126,21 +126,25 @@ def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _shown(ranked: pd.DataFrame, keys: Sequence[str], study_folder: Path) -> list[_Shown]:
+def _pictured_runs(
+    ranked: pd.DataFrame, keys: Sequence[str], study_folder: Path
+) -> list[_PicturedRun]:
     """Runs that left fields, evenly from the calmest to the worst."""
     drawable = []
     for _, row in ranked.iterrows():
         folder = study_folder / "runs" / str(row[RUN])
         if (folder / "fields.npz").is_file():
             label = condition_text({key: row[key] for key in keys})
-            drawable.append(_Shown(folder.name, label, folder, str(row[CLASSIFICATION])))
-    places = np.linspace(0, len(drawable) - 1, min(SHOWN, len(drawable))).round().astype(int)
+            drawable.append(_PicturedRun(folder.name, label, folder, str(row[CLASSIFICATION])))
+    places = (
+        np.linspace(0, len(drawable) - 1, min(PICTURED_RUNS, len(drawable))).round().astype(int)
+    )
     return [drawable[place] for place in np.unique(places).tolist()]
 
 
 def _load(folder: Path) -> dict[str, NDArray[np.float64]]:
-    with np.load(folder / "fields.npz") as kept:
-        return dict(kept)
+    with np.load(folder / "fields.npz") as archive:
+        return dict(archive)
 
 
 def _sentences(
@@ -180,8 +184,8 @@ def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> 
         where = [condition_text({key: row[key] for key in keys}) for _, row in own.iterrows()]
         if where:
             parts.append(f"it {verb} at {listed(where, most=6)}")
-    told = f"When the casting is full, metal that rises faster than {HOP_SPEED_M_S:g} m/s hops"
-    return (f"{told}: {'; '.join(parts)}.",) if parts else ()
+    sentence = f"When the casting is full, metal that rises faster than {HOP_SPEED_M_S:g} m/s hops"
+    return (f"{sentence}: {'; '.join(parts)}.",) if parts else ()
 
 
 def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Table:
@@ -194,13 +198,17 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
         for _, row in ranked.iterrows()
     ]
     columns = [Column("setting", False), Column("verdict", False)]
-    shown: list[tuple[str, int]] = []
+    value_columns: list[tuple[str, int]] = []
     for name in names:
         columns += [Column(f"{name}: mean, Pa"), Column(f"{name}: deviation, Pa")]
-        shown += [(f"{name}_mean_pa", 4), (f"{name}_sd_pa", 3)]
+        value_columns += [(f"{name}_mean_pa", 4), (f"{name}_sd_pa", 3)]
     window = f"{name_of(deepest)}: deviation of {1e3 * scenario.noise_window_s:g} ms means, Pa"
     columns += [Column(window), Column("fastest, m/s"), Column("mean speed, m/s")]
-    shown += [(f"{deepest}_window_sd_pa", 3), ("peak_speed_m_s", 2), ("average_speed_m_s", 2)]
+    value_columns += [
+        (f"{deepest}_window_sd_pa", 3),
+        ("peak_speed_m_s", 2),
+        ("average_speed_m_s", 2),
+    ]
     if any(said):
         columns.append(Column("paper's text", False))
     rows = []
@@ -208,28 +216,28 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
         label = condition_text({key: row[key] for key in keys})
         note = str(row[DETAIL]) if str(row[DETAIL]) != "nan" else ""
         cells = [Cell(label, label), Cell(str(row[CLASSIFICATION]), str(row["rank"]), note=note)]
-        values = [float(row.get(column, np.nan)) for column, _ in shown]
+        values = [float(row.get(column, np.nan)) for column, _ in value_columns]
         cells += [
             Cell(number(value, digits), str(value))
-            for value, (_, digits) in zip(values, shown, strict=True)
+            for value, (_, digits) in zip(values, value_columns, strict=True)
         ]
         rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
     failed = tuple(c == StabilityRating.FAILED.value for c in ranked[CLASSIFICATION])
     return Table(tuple(columns), tuple(rows), failed)
 
 
-def _histories(shown: Sequence[_Shown], ideal_pa: dict[str, float]) -> str:
+def _histories(runs: Sequence[_PicturedRun], ideal_pa: dict[str, float]) -> str:
     """Pressure at every step, as the paper's figure 5."""
-    if not shown:
+    if not runs:
         return ""
-    figure, panels = _grid(len(shown), 2.3)
-    for axes, one in zip(panels, shown, strict=False):
-        table = pd.read_csv(one.folder / "series.tsv", sep="\t")
+    figure, panels = _grid(len(runs), 2.3)
+    for axes, run in zip(panels, runs, strict=False):
+        table = pd.read_csv(run.folder / "series.tsv", sep="\t")
         for place, (name, ideal) in enumerate(ideal_pa.items()):
             colour = f"C{place}"
             axes.plot(table[TIME_S], table[f"{name}_pa"], lw=0.6, color=colour, label=name)
             axes.axhline(ideal, color=colour, lw=0.8, ls="--")
-        axes.set_title(f"{one.label}\n{one.verdict}", fontsize=8)
+        axes.set_title(f"{run.label}\n{run.verdict}", fontsize=8)
         highest = 3.0 * max(ideal_pa.values())
         axes.set_ylim(0.0, min(highest, max(1.05 * axes.get_ylim()[1], 1.0)))
         axes.tick_params(labelsize=8)
@@ -240,16 +248,16 @@ def _histories(shown: Sequence[_Shown], ideal_pa: dict[str, float]) -> str:
     return png(figure)
 
 
-def _fields(shown: Sequence[_Shown], highest_pa: float) -> str:
+def _fields(runs: Sequence[_PicturedRun], highest_pa: float) -> str:
     """Pressure over the particles at the end of each run, as the paper's figures 3 and 8."""
-    if not shown:
+    if not runs:
         return ""
-    figure, panels = _grid(len(shown), 4.2)
-    for axes, one in zip(panels, shown, strict=False):
-        fields = _load(one.folder)
+    figure, panels = _grid(len(runs), 4.2)
+    for axes, run in zip(panels, runs, strict=False):
+        fields = _load(run.folder)
         last = frame_of(fields, len(fields["count"]) - 1)
         discs = draw_frame(fields, last, axes, highest_pa)
-        axes.set_title(f"{one.label}\n{one.verdict}, {last.time_s:.3g} s", fontsize=8)
+        axes.set_title(f"{run.label}\n{run.verdict}, {last.time_s:.3g} s", fontsize=8)
         axes.tick_params(labelsize=8)
     figure.colorbar(discs, ax=panels, label="pressure, Pa", shrink=0.6, extend="max")
     return png(figure)

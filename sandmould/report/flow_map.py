@@ -87,9 +87,9 @@ def _parts(summary: pd.DataFrame, others: Sequence[str]) -> list[tuple[str, pd.D
         return [("", summary)]
     values = summary[list(others)].drop_duplicates().sort_values(list(others), ascending=False)
     parts = []
-    for _, one in values.iterrows():
-        title = setting_text({key: one[key] for key in others}).replace(", ", "\n")
-        parts.append((title, summary[(summary[list(others)] == one).all(axis=1)]))
+    for _, panel in values.iterrows():
+        title = setting_text({key: panel[key] for key in others}).replace(", ", "\n")
+        parts.append((title, summary[(summary[list(others)] == panel).all(axis=1)]))
     return parts
 
 

@@ -15,11 +15,11 @@ from sandmould.report.curves import reported_lines
 from sandmould.report.robustness import RobustnessPages, opening_sentences
 from sandmould.runs.columns import CPU_S
 from sandmould.runs.formatting import (
+    display_scale,
     listed,
     name_of,
     number,
     range_text,
-    shown_scale,
     unit_of,
     value_text,
     with_margin,
@@ -150,9 +150,9 @@ def _beside(optimum: Optimum, study: Study) -> list[str]:
     (key,) = optimum.keys
     low, high = optimum.interval(key)
     return [
-        f"{value_text(key, one.value)} by {one.by} "
-        f"{'lies' if low <= one.value <= high else 'does not lie'} in the interval."
-        for one in study.objective.reported_best
+        f"{value_text(key, reported.value)} by {reported.by} "
+        f"{'lies' if low <= reported.value <= high else 'does not lie'} in the interval."
+        for reported in study.objective.reported_best
     ]
 
 
@@ -160,9 +160,9 @@ def _effort(log: RoundLog, study: Study, summary: pd.DataFrame) -> str:
     added, swept = len(log.runs), study.sweep.number_of_points * study.replicates
     rounds = len(log.rounds)
     spent_h = float(summary[CPU_S].sum()) / 3600 if CPU_S in summary else math.nan
-    many = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
+    rounds_text = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
     return (
-        f"{many} added {added or 'any'} runs to the {swept} of the sweep, "
+        f"{rounds_text} added {added or 'any'} runs to the {swept} of the sweep, "
         f"{number(spent_h, 2)} h of processor time in all. "
         f"{log.ended or 'Rounds go on: sandmould run continues them.'}"
     )
@@ -171,7 +171,7 @@ def _effort(log: RoundLog, study: Study, summary: pd.DataFrame) -> str:
 def with_surface(chart: Chart, optimum: Optimum, study: Study) -> Chart:
     """The objective's chart over one key with fit, error, interval and what others found best."""
     mean, se = optimum.surface
-    factor = shown_scale(study.objective.measure)[0]
+    factor = display_scale(study.objective.measure)[0]
     x, tint = optimum.points[:, 0], tints(1, False)[0]
     lines = [Line(np.column_stack([x, factor * mean]), tint, "mean", title="fitted mean")]
     for sign in (-1.0, 1.0):

@@ -23,7 +23,7 @@ from sandmould.report.figure_files import numbered, write_figures
 from sandmould.report.method import Row, provenance_rows, statistics_method
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.robustness import robustness_pages
-from sandmould.report.sand import shown_runs
+from sandmould.report.sand import pictured_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
 from sandmould.runs.columns import RUN
@@ -102,7 +102,7 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     verdict = compare_settings(
         summary, keys, objective.measure, objective.better, notes, seeks_best
     )
-    shown = next(iter(shown_runs(study_folder, summary, verdict).values()), "")
+    pictured_run = next(iter(pictured_runs(study_folder, summary, verdict).values()), "")
     listed = {setting.label for setting in listed_settings(verdict)}
     by_setting = {}
     for values, rows in setting_rows(summary, keys):
@@ -110,10 +110,10 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
             by_setting[label] = _scenario_of(study_folder, summary[RUN].iloc[rows])
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
-    scenario = _scenario_of(study_folder, [shown] if shown else []) or any_scenario
+    scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario
     return _Page(
         study_folder, href, study, collected, verdict, scenario,
-        {label: found for label, found in by_setting.items() if found is not None},
+        {label: own for label, own in by_setting.items() if own is not None},
     )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ _BANDS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _MM = 1e3
 
 
-def shown(key: str, values: np.ndarray) -> np.ndarray:
+def plotted(key: str, values: np.ndarray) -> np.ndarray:
     """A swept key as a person reads it: the rolling arm as its angle in degrees."""
     if key.endswith("rolling_arm_fraction"):
         return np.degrees(np.arctan(values))
@@ -33,7 +33,7 @@ def shown(key: str, values: np.ndarray) -> np.ndarray:
 
 
 def axis_title(key: str) -> str:
-    """Title of the axis of a swept key as ``shown``."""
+    """Title of the axis of a swept key as ``plotted``."""
     if key.endswith("rolling_arm_fraction"):
         return "rolling angle α, °"
     if key.endswith("grain_grain.friction"):
@@ -94,23 +94,23 @@ def draw_map(
     figure = Figure(figsize=(7.6, 5.2), dpi=110, layout="constrained")
     ax = figure.add_subplot()
     first, second = axes_of(emulator)
-    x, y = shown(keys[1], second), shown(keys[0], first)
+    x, y = plotted(keys[1], second), plotted(keys[0], first)
     mean, _ = surface(emulator)
     filled = ax.contourf(x, y, mean, levels=12, cmap="cividis", alpha=0.85)
     lines = ax.contour(x, y, mean, levels=filled.levels, colors="white", linewidths=0.6)
     ax.clabel(lines, fmt="%g", fontsize=8)
     figure.colorbar(filled, ax=ax, label=title)
-    ax.plot(shown(keys[1], points[:, 1]), shown(keys[0], points[:, 0]), "k.", ms=4)
+    ax.plot(plotted(keys[1], points[:, 1]), plotted(keys[0], points[:, 0]), "k.", ms=4)
     for number, sand in enumerate(sands):
         line = sand.lines.get(emulator.measure)
         if line is None or np.isnan(line.first).all():
             continue
         colour = _BANDS[number % len(_BANDS)]
-        x_line = shown(keys[1], line.second)
-        ax.fill_between(x_line, shown(keys[0], line.low), shown(keys[0], line.high),
+        x_line = plotted(keys[1], line.second)
+        ax.fill_between(x_line, plotted(keys[0], line.low), plotted(keys[0], line.high),
                         color=colour, alpha=0.35, lw=0)  # fmt: skip
         value = sand.sand.targets[emulator.measure].value
-        ax.plot(x_line, shown(keys[0], line.first), color=colour, lw=2.2,
+        ax.plot(x_line, plotted(keys[0], line.first), color=colour, lw=2.2,
                 label=f"{sand.sand.name.replace('_', ' ')}: {value:g}")  # fmt: skip
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="upper right", fontsize=9)
@@ -126,7 +126,7 @@ def draw_posterior(sand: CalibratedSand, keys: tuple[str, str]) -> str:
     figure = Figure(figsize=(5.6, 4.6), dpi=110, layout="constrained")
     ax = figure.add_subplot()
     share = sand.posterior.share
-    x, y = shown(keys[1], sand.posterior.second), shown(keys[0], sand.posterior.first)
+    x, y = plotted(keys[1], sand.posterior.second), plotted(keys[0], sand.posterior.first)
     ax.contourf(x, y, share / share.max(), levels=np.linspace(0.02, 1.0, 12), cmap="Blues")
     more = len(sand.sand.targets) + len(sand.sand.assumed) > 1
     first = [(sand.by_first, "0.45", "first value alone")] if more else []
@@ -134,7 +134,7 @@ def draw_posterior(sand: CalibratedSand, keys: tuple[str, str]) -> str:
         ax.contour(x, y, posterior.region().astype(float), levels=[0.5], colors=colour)
         ax.plot([], [], color=colour, label=f"95 %, {label}")
     mode = sand.posterior.mode
-    ax.plot(shown(keys[1], np.array(mode[1])), shown(keys[0], np.array(mode[0])), "x",
+    ax.plot(plotted(keys[1], np.array(mode[1])), plotted(keys[0], np.array(mode[0])), "x",
             color=_LINE, ms=9, mew=2.5, label="most probable")  # fmt: skip
     ax.set_xlabel(axis_title(keys[1]))
     ax.set_ylabel(axis_title(keys[0]))

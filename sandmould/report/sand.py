@@ -50,8 +50,8 @@ class SandPages:
 
     scene: str
     scene_alt: str
-    shown_run: str
-    shown_as: str
+    pictured_run: str
+    role: str
     panels: tuple[Panel, ...]
     density_scale: figures.DensityScale
     density_conclusion: str
@@ -87,12 +87,12 @@ def sand_pages(
     SandPages
         Parts without data are empty.
     """
-    roles = shown_runs(study_folder, collected.summary, verdict)
+    roles = pictured_runs(study_folder, collected.summary, verdict)
     run = next(iter(roles.values()), "")
     moments = list_moments(study_folder / "runs" / run) if run else ()
     chosen = _chosen(moments, scenario)
     snapshots = [Snapshot.load(m.path) for _, m in chosen]
-    height_m = _shown_height_m(snapshots, scenario)
+    height_m = _picture_height_m(snapshots, scenario)
     layers = figures.draw_layers(snapshots, scenario, height_m)
     densities, scale, median_kg_m3 = figures.draw_densities(snapshots, scenario, height_m)
     films = _films(study_folder, roles, collected, verdict, film_budget_bytes)
@@ -101,8 +101,8 @@ def sand_pages(
     return SandPages(
         scene=figures.draw_dimensions(scenario, bed_m),
         scene_alt=_scene_alt(scenario, bed_m),
-        shown_run=run,
-        shown_as=_shown_as(next(iter(roles), ""), verdict),
+        pictured_run=run,
+        role=_role_text(next(iter(roles), ""), verdict),
         panels=tuple(
             Panel(
                 f"{heading}, {_clock_s(moment):.2f} s",
@@ -139,7 +139,7 @@ def _clock_s(moment: Moment) -> float:
     return moment.vibration_time_s if moment.vibration_time_s >= 0.0 else moment.time_s
 
 
-def shown_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
+def pictured_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
     """Runs to be looked at, by role: best, median and worst, or what there is.
 
     Where one run finished it is the only one. Where none did, that with most snapshots stands
@@ -156,7 +156,7 @@ def shown_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> d
     return {"longest": longest} if count.get(longest) else {}
 
 
-def _shown_as(role: str, verdict: Verdict) -> str:
+def _role_text(role: str, verdict: Verdict) -> str:
     """Why a run is the one to be looked at."""
     if role == "only":
         return "the only one that finished"
@@ -180,7 +180,7 @@ def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Mo
     return list(chosen.values()) or [("at its last snapshot", moments[-1])]
 
 
-def _shown_height_m(snapshots: Sequence[Snapshot], scenario: Scenario) -> float:
+def _picture_height_m(snapshots: Sequence[Snapshot], scenario: Scenario) -> float:
     """Height of the pictures: the sand and the tubes, not the empty space above."""
     tops = [float((s.position_m[:, -1] + s.radius_m).max()) for s in snapshots if len(s.id)]
     tops += [float(solid.corners()[:, -1].max()) for solid in scenario.scene.solids]

@@ -34,7 +34,7 @@ STAND_IN = "stand-in"
 class SolidPages:
     """What the sections show."""
 
-    shown_run: str
+    pictured_run: str
     fields: str
     """Picture; empty where no run left fields."""
     sentences: tuple[str, ...]
@@ -64,7 +64,7 @@ def solid_pages(
     scenario: Solidification,
     collected: Collected,
     verdict: Verdict,
-    shown: str,
+    pictured_run: str,
 ) -> SolidPages:
     """Draw everything that a study of solidification shows.
 
@@ -82,11 +82,11 @@ def solid_pages(
     """
     probes = [f"{probe.name}_k" for probe in scenario.probes]
     curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"], _silent)
-    fields, sentences, spots = _fields(study_folder / "runs" / shown, scenario)
+    fields, sentences, spots = _fields(study_folder / "runs" / pictured_run, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     return SolidPages(
-        shown_run=shown, fields=fields,
-        sentences=(*sentences, *_stand_ins(study_folder / "runs" / shown / "scenario.yaml")),
+        pictured_run=pictured_run, fields=fields,
+        sentences=(*sentences, *_stand_ins(study_folder / "runs" / pictured_run / "scenario.yaml")),
         spots=spots, curves=curves,
         reference=setting_text(reference)
         if reference
@@ -110,7 +110,7 @@ def _silent(collected: Collected, verdict: Verdict, measure: str) -> str:
     return ""
 
 
-def shown_run(reference: Point, collected: Collected, best: str) -> str:
+def choose_pictured_run(reference: Point, collected: Collected, best: str) -> str:
     """Run whose fields are shown: the best, else the reference, else the first that finished."""
     done = collected.summary[finished(collected.summary)]
     runs = [best, *_of_point(done, reference)[RUN].astype(str), *done[RUN].astype(str)]

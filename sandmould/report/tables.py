@@ -100,8 +100,8 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
     for what in ("grains", "elements", "particles"):
         count = _total(typical, what, "median")
         if count is not None:
-            shown = f"{count:,.0f}".replace(",", "\u202f")
-            numbers.append(KeyNumber(shown, f"{what} in a run"))
+            count_text = f"{count:,.0f}".replace(",", "\u202f")
+            numbers.append(KeyNumber(count_text, f"{what} in a run"))
     wall_s, cpu_s = _total(summary, WALL_S, "sum"), _total(summary, CPU_S, "sum")
     if wall_s is not None:
         note = "" if cpu_s is None else f"{seconds(cpu_s)} of processor time"
@@ -144,13 +144,13 @@ def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table
         against = verdict.against(setting)
         is_best = verdict.best is not None and setting.label == verdict.best.label
         interval, p, difference = "–", math.nan, math.nan
-        judged = "best mean" if is_best else "no run"
+        standing = "best mean" if is_best else "no run"
         if against is not None:
             difference, p = against.difference, against.p
-            judged = "too few runs"
+            standing = "too few runs"
             if against.tested:
                 interval = f"{number(against.ci[0], 2)} to {number(against.ci[1], 2)}"
-                judged = "worse" if against.separated else "undecided"
+                standing = "worse" if against.separated else "undecided"
         rows.append(
             (
                 Cell(setting.label, str(place)),
@@ -158,7 +158,7 @@ def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table
                 *_number_cells((difference, 2)),
                 Cell(interval, str(difference)),
                 Cell(_p_text(p), str(p)),
-                Cell(judged, judged),
+                Cell(standing, standing),
                 *_number_cells((setting.sd, 2)),
                 Cell(f"{setting.n} of {setting.planned}", str(setting.n)),
                 *_drive_cells(scenarios.get(setting.label), bool(drive)),
@@ -176,9 +176,9 @@ def _p_text(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
-def _drive_cells(scenario: Scenario | None, shown: bool) -> tuple[Cell, ...]:
+def _drive_cells(scenario: Scenario | None, shaken: bool) -> tuple[Cell, ...]:
     """Peak displacement, velocity and acceleration of the first stage of vibration."""
-    if not shown:
+    if not shaken:
         return ()
     if scenario is None or not scenario.vibration:
         return _number_cells(*[(math.nan, 3)] * 3)

@@ -86,6 +86,6 @@ def listed_runs(summary: pd.DataFrame, verdict: Verdict) -> pd.DataFrame:
     return summary.loc[sorted(order[:MOST_RUNS])]
 
 
-def listed_note(shown: int, of: int, what: str, how: str) -> str:
+def listed_note(listed: int, total: int, what: str, how: str) -> str:
     """Say what a table leaves out; empty where it lists everything."""
-    return f"Listed are {shown} of {of} {what}: {how}." if shown < of else ""
+    return f"Listed are {listed} of {total} {what}: {how}." if listed < total else ""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sandmould.report.chart import Chart
 from sandmould.report.curves import best_passage, time_chart
 from sandmould.report.thinning import drawn_part
-from sandmould.runs.formatting import name_of, number, shown_scale
+from sandmould.runs.formatting import display_scale, name_of, number
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
@@ -69,6 +69,6 @@ def whole_conclusion(collected: Collected, verdict: Verdict, measure: str) -> st
     passage = best_passage(collected, verdict, measure)
     if verdict.best is None or passage is None:
         return ""
-    first, _, last = (shown_scale(measure)[0] * v for v in passage)
+    first, _, last = (display_scale(measure)[0] * v for v in passage)
     way = "rose" if last > first else "fell"
     return f"At {verdict.best.label} it {way} from {number(first)} to {number(last)}."

@@ -103,7 +103,7 @@ def with_margin(mean: float, half_width: float) -> str:
     return f"{mean:.{places}f} ± {half_width:.{places}f}".replace("-", "−")
 
 
-def shown_scale(key: str) -> tuple[float, str]:
+def display_scale(key: str) -> tuple[float, str]:
     """Factor by which a measure is shown, and its name with the unit then: lengths in mm."""
     if unit_of(key) == "m":
         return 1e3, f"{name_of(key)}, mm"
@@ -113,7 +113,7 @@ def shown_scale(key: str) -> tuple[float, str]:
 def value_text(key: str, value: Any) -> str:
     """A swept value with its unit."""
     if isinstance(value, float | int) and not isinstance(value, bool):
-        factor, unit = _shown_unit(key, value)
+        factor, unit = _display_unit(key, value)
         text = f"{value / factor:.6g}"
     else:
         text, unit = str(value).replace("_", " "), unit_of(key)
@@ -122,11 +122,11 @@ def value_text(key: str, value: Any) -> str:
 
 def range_text(key: str, low: float, high: float) -> str:
     """Two swept values with one unit, that of the second: ``15 to 24.5 Hz``."""
-    factor, _ = _shown_unit(key, high)
+    factor, _ = _display_unit(key, high)
     return f"{number(low / factor)} to {value_text(key, high)}"
 
 
-def _shown_unit(key: str, value: float) -> tuple[float, str]:
+def _display_unit(key: str, value: float) -> tuple[float, str]:
     """What a value is divided by where it is shown, and its unit then."""
     unit = unit_of(key)
     large = (p for p in _PREFIXES if unit in _PREFIXED and abs(value) >= p[0])

@@ -43,14 +43,14 @@ class Progress:
         self._path = work / "progress.json"
         self._expected = math.inf if expected is None else max(expected, 1.0)
         self._unit = unit
-        self._shown = -LINE_EVERY_S
+        self._last_line_s = -LINE_EVERY_S
 
     def show(self, stage: str, time_s: float, done: float, rate: float, last: bool = False) -> None:
         """Show simulated time, percent, work per second and time left."""
         now = time.monotonic()
-        if not last and now - self._shown < LINE_EVERY_S:
+        if not last and now - self._last_line_s < LINE_EVERY_S:
             return
-        self._shown = now
+        self._last_line_s = now
         # Settling times are guesses: nothing is at 100 % before its end.
         percent = 100.0 if last else min(99.0, 100 * done / self._expected)
         left = max(0.0, self._expected - done) / rate if rate > 0 else float("inf")

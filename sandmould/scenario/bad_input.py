@@ -39,7 +39,7 @@ class BadInputError(Exception):
         super().__init__("\n".join(str(p) for p in self.problems))
 
 
-def shown_name(path: Path) -> str:
+def display_path(path: Path) -> str:
     """A file's name in messages: seen from here, else from the repository, else as given."""
     for folder in (Path.cwd(), ROOT):
         if path.is_absolute() and path.is_relative_to(folder):

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
+from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.geometry import Block
 from sandmould.scenario.mesh_file import MeshFileError, file_hash
 from sandmould.scenario.outline import Outline, outline_fault
@@ -161,9 +161,9 @@ class Pixels:
         place = np.floor((position_m - self.low_m) / self.pixel_m).astype(np.int64)
         shape = np.array(self.distance_in_pixels.shape)
         inside = ((place >= 0) & (place < shape)).all(axis=1)
-        found = np.full(len(place), float(shape.max()))
-        found[inside] = self.distance_in_pixels[tuple(place[inside].T)]
-        return self.pixel_m * found
+        distance = np.full(len(place), float(shape.max()))
+        distance[inside] = self.distance_in_pixels[tuple(place[inside].T)]
+        return self.pixel_m * distance
 
     def corners(self) -> Array:
         """Two corners of the rectangle round the solid's pixels."""
@@ -206,7 +206,7 @@ def _picture_solid(shape: CastPicture, key: str) -> Pixels:
             raise MeshFileError("the picture that the study was planned with; it has changed since")
         distance = _read_picture(shape.path, sha256_now)
     except MeshFileError as fault:
-        problem = Problem(f"{key}.file", shown_name(shape.path), str(fault))
+        problem = Problem(f"{key}.file", display_path(shape.path), str(fault))
         raise BadInputError([problem]) from fault
     return Pixels("the picture", distance, shape.pixel_m, np.array(shape.low_m))
 

@@ -164,9 +164,9 @@ def _shells(vertices: Array, triangles: Triangles) -> NDArray[np.int64]:
         (count > 2, "edges of two triangles", "belong to more", "belongs"),
         (way != 0.0, "triangles that all face one way", "lie between two that do not", "lies"),
     )
-    for bad, valid, many, one in faults:
+    for bad, valid, plural, singular in faults:
         if bad.any():
-            words = many if bad.sum() > 1 else " ".join([one, *many.split()[1:]])
+            words = plural if bad.sum() > 1 else " ".join([singular, *plural.split()[1:]])
             number = f"{bad.sum()} edge{'s' if bad.sum() > 1 else ''}"
             place = _at(vertices[edges[bad][0]].mean(axis=0))
             raise MeshFileError(f"{valid}; {number} {words}, {place}")

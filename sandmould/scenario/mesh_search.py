@@ -165,14 +165,14 @@ def _nearest_on_triangle(p, t, nearest):  # type: ignore[no-untyped-def]
 def _distances(points, reach, corners, normals, low, high):  # type: ignore[no-untyped-def]
     """Signed distance of each point; that of the root's box where it is beyond the reach."""
     leaves = (len(low) + 1) // 2
-    found = np.empty(len(points))
+    distance = np.empty(len(points))
     nodes, gaps = np.empty(_DEPTH, np.int64), np.empty(_DEPTH)
     here, best = np.empty(3), np.empty(3)
     for n in range(len(points)):
         p = points[n]
         gap2 = _box_gap2(p, low[0], high[0])
         if gap2 > reach * reach:
-            found[n] = math.sqrt(gap2)
+            distance[n] = math.sqrt(gap2)
             continue
         best2, triangle, part = np.inf, 0, 0
         nodes[0], gaps[0], waiting = 0, gap2, 1
@@ -208,8 +208,8 @@ def _distances(points, reach, corners, normals, low, high):  # type: ignore[no-u
         side = 0.0
         for i in range(3):
             side += (p[i] - best[i]) * normals[triangle, part, i]
-        found[n] = math.copysign(math.sqrt(best2), side)
-    return found
+        distance[n] = math.copysign(math.sqrt(best2), side)
+    return distance
 
 
 @njit()

@@ -87,9 +87,12 @@ class Revolved:
             # a vertex on the axis stands for its whole ring
             rings.append(np.broadcast_to(np.arange(start, len(vertices)), sides).copy())
         triangles = []
-        for one, two in zip(rings, rings[1:] + rings[:1], strict=True):
-            one_next, two_next = np.roll(one, -1), np.roll(two, -1)
-            triangles += [np.stack([one, two, two_next], 1), np.stack([one, two_next, one_next], 1)]
+        for ring, next_ring in zip(rings, rings[1:] + rings[:1], strict=True):
+            ring_turned, next_turned = np.roll(ring, -1), np.roll(next_ring, -1)
+            triangles += [
+                np.stack([ring, next_ring, next_turned], 1),
+                np.stack([ring, next_turned, ring_turned], 1),
+            ]
         every = np.concatenate(triangles)
         whole = (every != np.roll(every, 1, axis=1)).all(axis=1)
         return TriangleMesh(self.name, np.array(vertices), every[whole].astype(np.int64))

@@ -127,9 +127,9 @@ class Scenario(Section):
         """Geometry of the box and the obstacles."""
         return build_scene(self.box, self.obstacles, self.dimension)
 
-    def scene_in(self, stage: str) -> Scene:
-        """Geometry in a stage of the run: from the discharge on without its gate."""
-        if self.discharge is None or is_filling(stage):
+    def scene_in(self, stage: str = "") -> Scene:
+        """Geometry in a stage, the last where none is named: from the discharge on without gate."""
+        if self.discharge is None or (stage and is_filling(stage)):
             return self.scene
         return self.scene.without(self.discharge.gate)
 

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol, TypeVar
 import numpy as np
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
+from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.mesh_file import MeshFileError, file_hash, read_surface
 from sandmould.scenario.quantity import Section, quantity
@@ -131,7 +131,7 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     BadInputError
         When the file bounds no solid, or is not the one that the scenario was planned with.
     """
-    file_name = shown_name(solid.path)
+    file_name = display_path(solid.path)
     try:
         sha256_now = file_hash(solid.path)
         if solid.sha256 not in (None, sha256_now):

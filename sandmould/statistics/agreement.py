@@ -80,12 +80,12 @@ def compare_keys(
         over = [k for k in others if k in equivalence.over]
         for rest, alike in group_settings(summary, [k for k in others if k not in over]):
             for (a, rows), (b, other_rows) in combinations(group_settings(alike, [key]), 2):
-                pair = shown_value(key, a[key]), shown_value(key, b[key])
+                pair = value_label(key, a[key]), value_label(key, b[key])
                 comparisons += compare_pair(key, pair, rest, (rows, other_rows), equivalence, over)
     return tuple(sorted(comparisons, key=lambda c: list(equivalence.margins).index(c.measure)))
 
 
-def shown_value(key: str, value: Any) -> str:
+def value_label(key: str, value: Any) -> str:
     """A value by itself where it is a word, with what it is a value of where it is a number."""
     return value_text(key, value) if isinstance(value, str) else setting_text({key: value})
 
@@ -130,10 +130,10 @@ def agreement_sentences(compared: Sequence[Compared], confidence: float) -> tupl
         for verdict in ("equivalent", "different", "not resolved", "not tested")
     }
     different, open_ = by_verdict["different"], by_verdict["not resolved"]
-    untested, many = by_verdict["not tested"], len(compared)
+    untested, total = by_verdict["not tested"], len(compared)
     percent = f"{100 * confidence:g} %"
-    if len(by_verdict["equivalent"]) == many:
-        what = "The pair agrees" if many == 1 else f"All {many} comparisons agree"
+    if len(by_verdict["equivalent"]) == total:
+        what = "The pair agrees" if total == 1 else f"All {total} comparisons agree"
         return (f"{what} within the margins set beforehand, at {percent}.",)
     sentences = []
     if different:
@@ -146,7 +146,7 @@ def agreement_sentences(compared: Sequence[Compared], confidence: float) -> tupl
     if untested:
         sentences.append(f"Not tested: {_named(untested)}.")
     agreeing = len(by_verdict["equivalent"])
-    sentences.append(f"{agreeing} of {many} comparisons agree within the margins set beforehand.")
+    sentences.append(f"{agreeing} of {total} comparisons agree within the margins set beforehand.")
     return tuple(sentences)
 
 

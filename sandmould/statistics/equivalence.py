@@ -133,13 +133,13 @@ def _more(
     n : int
     paired : bool
     """
-    many = np.arange(n + 1, MOST_REPLICATES + 1)
-    freedom = (many - 1) * (1 if paired else 2)
-    error = spread / np.sqrt(many)
+    replicates = np.arange(n + 1, MOST_REPLICATES + 1)
+    freedom = (replicates - 1) * (1 if paired else 2)
+    error = spread / np.sqrt(replicates)
     need = stats.t.ppf(0.5 + confidence / 2, freedom)
     chance = stats.t.cdf((size - margin) / error - need, freedom)
     if size < margin:
         inside = stats.t.cdf((margin - size) / error - need, freedom)
         chance = inside + stats.t.cdf((margin + size) / error - need, freedom) - 1
     enough = np.flatnonzero(chance >= POWER)
-    return int(many[enough[0]]) - n if len(enough) else None
+    return int(replicates[enough[0]]) - n if len(enough) else None

@@ -51,7 +51,7 @@ def propose(
     chosen = []
     for pick in rng.choice(optimum.picks, size=runs, replace=False):
         values = _rounded(keys, optimum.points[int(pick)].tolist(), optimum, whole)
-        nearest = min(count, key=partial(_apart, optimum, other=values))
+        nearest = min(count, key=partial(_apart, optimum, second=values))
         if _apart(optimum, nearest, values) <= NEAR:
             values = nearest
         count[values] = count.get(values, 0) + 1
@@ -59,11 +59,11 @@ def propose(
     return chosen
 
 
-def _apart(optimum: Optimum, one: Sequence[float], other: Sequence[float]) -> float:
+def _apart(optimum: Optimum, first: Sequence[float], second: Sequence[float]) -> float:
     """Largest distance along a key, over its range; logarithms where the optimum takes them."""
     ends = optimum.points.min(axis=0), optimum.points.max(axis=0)
     far = 0.0
-    for a, b, low, high, log in zip(one, other, *ends, optimum.logs, strict=True):
+    for a, b, low, high, log in zip(first, second, *ends, optimum.logs, strict=True):
         share = math.log(b / a) / math.log(high / low) if log else (b - a) / (high - low)
         far = max(far, abs(share))
     return far

@@ -305,8 +305,8 @@ def _capital(text: str) -> str:
 
 def _difference_sentence(first: Comparison, best: Setting, others: int) -> str:
     how = f"{best.n} paired replicates" if first.paired else "independent replicates"
-    many = f", allowing for {others} comparisons" if others > 1 else ""
+    allowance = f", allowing for {others} comparisons" if others > 1 else ""
     return (
         f"The difference from {first.other} is {number(first.difference, 2)}, with a 95 % interval "
-        f"from {number(first.ci[0], 2)} to {number(first.ci[1], 2)} ({how}{many})."
+        f"from {number(first.ci[0], 2)} to {number(first.ci[1], 2)} ({how}{allowance})."
     )

@@ -148,17 +148,17 @@ def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> t
     """
     equivalence = study.equivalence
     swept = sweep_part(summary)
-    found = compare_keys(swept, keys, equivalence)
+    comparisons = compare_keys(swept, keys, equivalence)
     if study.cross_check is not None and PART in summary:
         checked = summary[summary[PART] == CROSS_CHECK]
         alike = swept
         for key, value in study.cross_check.at.items():
             alike = alike[alike[key] == value]
         engines = (study.scenario.engine.name, study.cross_check.engine)
-        found += compare_pair(
+        comparisons += compare_pair(
             "engine.name", engines, study.cross_check.at, (alike, checked), equivalence
         )
-    return found
+    return comparisons
 
 
 def read_study(study_folder: Path) -> Study:

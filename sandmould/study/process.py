@@ -20,7 +20,7 @@ from sandmould.runs.parent import end_with_parent
 
 RESTARTABLE_EXIT = 75
 """Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
-_ASKED_TO_END = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+_END_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 
 
 def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> None:
@@ -49,7 +49,7 @@ def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> Non
     """
     end_with_parent()
     command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
-    with log.open("a", encoding="utf-8") as log_file, _only_one(folder):
+    with log.open("a", encoding="utf-8") as log_file, _folder_lock(folder):
         if (folder / "outcome.json").exists():
             return  # finished meanwhile by a process that outlived its own snakemake
         status, tail = _watch(_under_mpi(command, ranks, mpi), log_file)
@@ -57,7 +57,7 @@ def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> Non
             return  # killed after its outcome was there: nothing is left to do
         if status == RESTARTABLE_EXIT:
             raise SystemExit(f"{folder} stopped early: the same command continues it.")
-        if -status in _ASKED_TO_END:
+        if -status in _END_SIGNALS:
             raise SystemExit(f"{folder} was killed: the same command continues it.")
         subprocess.run([*command, f"the process ended with status {status}: {tail}"], check=True)
 
@@ -72,7 +72,7 @@ def _under_mpi(command: list[str], ranks: int, mpi: str) -> list[str]:
 
 
 @contextlib.contextmanager
-def _only_one(folder: Path) -> Iterator[None]:
+def _folder_lock(folder: Path) -> Iterator[None]:
     """Wait for any other process that computes in a run's folder.
 
     One can outlive a killed snakemake; the next snakemake then finds what it finished.

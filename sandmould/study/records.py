@@ -55,8 +55,8 @@ def _computed_hash(run: Run) -> str:
 
 def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
     """All runs of a study, with those of the rounds that a folder keeps."""
-    ledger = read_rounds(folder, study.study)
-    return expand(study, ledger.runs, ledger.certified_hz)
+    log = read_rounds(folder, study.study)
+    return expand(study, log.runs, log.certified_hz)
 
 
 def record(path: Path, results: Path) -> Path:
@@ -80,7 +80,7 @@ def record(path: Path, results: Path) -> Path:
     names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
     names += [ROUNDS_FILE] if (folder / ROUNDS_FILE).exists() else []
     provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
-    kept: dict[str, Any] = {
+    record: dict[str, Any] = {
         "study": str(path),
         "study_sha256": study_hash(runs),
         "command": f"snakemake --configfile {path}",
@@ -103,7 +103,7 @@ def record(path: Path, results: Path) -> Path:
         shutil.copytree(
             folder / FIGURES, target / FIGURES, ignore=shutil.ignore_patterns(".snakemake*")
         )
-    (target / "record.json").write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    (target / "record.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     return target
 
 
@@ -128,23 +128,25 @@ def _compares(study: Study) -> bool:
 
 def stale_records() -> list[tuple[str, str]]:
     """Name every record with what is wrong with it, or an empty text where it stands."""
-    found = []
+    stale = []
     for path in sorted(RECORDS.glob("*/record.json")):
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        study = ROOT / kept["study"]
+        record = json.loads(path.read_text(encoding="utf-8"))
+        study = ROOT / record["study"]
         if not study.exists():
-            found.append((path.parent.name, f"its study {kept['study']} is gone"))
+            stale.append((path.parent.name, f"its study {record['study']} is gone"))
         else:
-            found.append((path.parent.name, _what_changed(open_study(study), kept, path.parent)))
-    return found
+            stale.append((path.parent.name, _what_changed(open_study(study), record, path.parent)))
+    return stale
 
 
-def _what_changed(study: OpenStudy, kept: dict[str, Any], folder: Path) -> str:
+def _what_changed(study: OpenStudy, record: dict[str, Any], folder: Path) -> str:
     """Say what parts a study from its record; margins count where the record has them."""
-    if study_hash(runs_in(study, folder)) != kept["study_sha256"]:
+    if study_hash(runs_in(study, folder)) != record["study_sha256"]:
         return "the study, its decks or our solver have changed since"
     margins = study.study.equivalence.margins
-    return "its margins were set after the runs" if kept.get("margins", margins) != margins else ""
+    return (
+        "its margins were set after the runs" if record.get("margins", margins) != margins else ""
+    )
 
 
 def recompute_smallest(results: Path) -> list[str]:

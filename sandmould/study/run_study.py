@@ -21,7 +21,7 @@ from sandmould.study.rounds.decide import decision_text, next_runs
 from sandmould.study.rounds.round_log import read_rounds, write_rounds
 
 
-def drive(path: Path, options: Sequence[str]) -> int:
+def run_study(path: Path, options: Sequence[str]) -> int:
     """Compute a study, all its rounds and its robustness checks.
 
     Parameters

@@ -22,7 +22,7 @@ from sandmould.study.rounds.round_log import read_rounds
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
-SHOWN = 12
+LISTED_RUNS = 12
 FRESH_S = 60.0
 """A run on another machine, whose lock is not seen here, has written its progress since."""
 
@@ -101,15 +101,15 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
     lines = [f"{plan.study.name}: {', '.join(parts)} of {len(plan.runs)} runs"]
     spent_s = sum(status.cpu_s for status in statuses.values())
     lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
-    ledger = read_rounds(folder, plan.study.study)
+    log = read_rounds(folder, plan.study.study)
     if plan.study.study.refine.rounds:
-        ended = ledger.ended or f"of at most {plan.study.study.refine.rounds}"
-        lines.append(f"rounds: {len(ledger.rounds)}, {ended}")
+        ended = log.ended or f"of at most {plan.study.study.refine.rounds}"
+        lines.append(f"rounds: {len(log.rounds)}, {ended}")
     for state in ("running", "stopped", "failed"):
         chosen = [status for status in statuses.values() if status.state == state]
-        lines += [f"  {state}: {s.run}  {s.said}".rstrip() for s in chosen[:SHOWN]]
-        if len(chosen) > SHOWN:
-            lines.append(f"  {state}: and {len(chosen) - SHOWN} more")
+        lines += [f"  {state}: {s.run}  {s.said}".rstrip() for s in chosen[:LISTED_RUNS]]
+        if len(chosen) > LISTED_RUNS:
+            lines.append(f"  {state}: and {len(chosen) - LISTED_RUNS} more")
     return "\n".join(lines)
 
 

@@ -26,20 +26,20 @@ def grid() -> PlatesRun:
 
 def test_finite_differences_find_the_known_time(grid: PlatesRun) -> None:
     # 2049.4 s by an independent program for the same stand-in, which counts whole steps of 4 s
-    assert grid.found.solidification_time_s == pytest.approx(2047.4, abs=2.0)
-    assert np.abs(grid.found.drift_percent).max() < 1e-10
+    assert grid.result.solidification_time_s == pytest.approx(2047.4, abs=2.0)
+    assert np.abs(grid.result.drift_percent).max() < 1e-10
 
 
 def test_faces_of_one_size_are_finite_differences(grid: PlatesRun) -> None:
     # two programs for the same sums, so that only their order differs
-    faces = run_plates(PLATES, "2-1", HeatMethod("faces", "explicit"), 0.01).found
+    faces = run_plates(PLATES, "2-1", HeatMethod("faces", "explicit"), 0.01).result
     for name, curve in faces.probe_k.items():
-        np.testing.assert_allclose(curve, grid.found.probe_k[name], rtol=1e-10)
-    assert faces.solidification_time_s == pytest.approx(grid.found.solidification_time_s, rel=1e-9)
+        np.testing.assert_allclose(curve, grid.result.probe_k[name], rtol=1e-10)
+    assert faces.solidification_time_s == pytest.approx(grid.result.solidification_time_s, rel=1e-9)
 
 
 def test_probes_cool_in_the_order_of_thickness(grid: PlatesRun) -> None:
-    below = {name: int(np.argmax(k < 1713.0)) for name, k in grid.found.probe_k.items()}
+    below = {name: int(np.argmax(k < 1713.0)) for name, k in grid.result.probe_k.items()}
     assert sorted(below, key=below.__getitem__) == ["A", "B", "C", "D", "E"]
 
 
@@ -51,9 +51,9 @@ def test_several_sizes_against_one(exchange: str) -> None:
     method = HeatMethod(exchange, "local")  # type: ignore[arg-type]
     adaptive = run_plates(PLATES, "2-2B", method, 0.005, until_s=400.0, progress=told.append)
     assert len(adaptive.elements.size_m) < 0.5 * len(uniform.elements.size_m)
-    error = curve_error_percent(PLATES, adaptive.found, uniform.found)
+    error = curve_error_percent(PLATES, adaptive.result, uniform.result)
     mean = max(mean for mean, _ in error.values())
-    lost = float(np.abs(adaptive.found.drift_percent).max())
+    lost = float(np.abs(adaptive.result.drift_percent).max())
     if exchange == "faces":
         assert lost < 1e-10
         # 0.24 measured

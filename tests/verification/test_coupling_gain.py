@@ -95,9 +95,9 @@ def test_measured_scheme_finds_its_factor_and_comes_to_rest(engine: str, tmp_pat
     session.close()
     assert left < 1e-4
     a, b = shares(5e4, 0.95)
-    ledger = read_convergence_log(tmp_path / CONVERGENCE_LOG)
-    assert ledger.gain.iloc[-1] == pytest.approx(a + 2.0 * b, rel=0.05)
-    np.testing.assert_allclose(ledger.factor, 0.5 * 2.0 / (1.0 + ledger.gain), rtol=1e-6)
+    log = read_convergence_log(tmp_path / CONVERGENCE_LOG)
+    assert log.gain.iloc[-1] == pytest.approx(a + 2.0 * b, rel=0.05)
+    np.testing.assert_allclose(log.factor, 0.5 * 2.0 / (1.0 + log.gain), rtol=1e-6)
 
 
 def test_engines_measure_the_same_gain(tmp_path: Path) -> None:

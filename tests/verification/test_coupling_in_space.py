@@ -169,8 +169,8 @@ def test_the_balances_of_a_bed_on_a_plank(engine: str, tmp_path: Path) -> None:
         session.advance()
     snapshot, walls = session.snapshot(), session.surface_loads()
     session.close()
-    ledger = read_convergence_log(tmp_path / CONVERGENCE_LOG)
-    last = ledger[ledger.time_s > 0.25]
+    log = read_convergence_log(tmp_path / CONVERGENCE_LOG)
+    last = log[log.time_s > 0.25]
     masses = [scenario.sand.grain_mass_kg(2 * r, 3) for r in snapshot.radius_m]
     weight_n = scenario.gravity_m_s2 * sum(masses)
     # what floor and plank carry is the weight of the grains; these still move a little
@@ -181,7 +181,7 @@ def test_the_balances_of_a_bed_on_a_plank(engine: str, tmp_path: Path) -> None:
     assert (last.imbalance_n < 1e-9 * last.load_n).all()
     assert (last.moment_left_n_m < 1e-9 * last.load_n * 0.06).all()
     assert (last.residual_m / last.displacement_m).median() < 0.1
-    verdict = classify_loop(ledger)
+    verdict = classify_loop(log)
     assert verdict is not None
     assert verdict.state == "holds"
     assert last.largest_m.iloc[-1] > 1e-5

@@ -131,11 +131,11 @@ def test_its_energies_make_up_the_work_of_the_sand(engine: str, tmp_path: Path) 
     for _ in range(20):
         session.advance(1e-4)
     session.close()
-    ledger = read_convergence_log(tmp_path / CONVERGENCE_LOG)
-    assert ledger.damped_j.iloc[-1] > 0.01 * ledger.work_j.max()
-    assert ledger.kinetic_j.max() > 0.0
+    log = read_convergence_log(tmp_path / CONVERGENCE_LOG)
+    assert log.damped_j.iloc[-1] > 0.01 * log.work_j.max()
+    assert log.kinetic_j.max() > 0.0
     # exact for central differences; what is left is round-off of some hundred sums
-    assert ledger.balance_j.abs().max() < 1e-11 * ledger.energy_j.max()
+    assert log.balance_j.abs().max() < 1e-11 * log.energy_j.max()
 
 
 def test_a_thrown_disc_moves_the_bar_as_in_the_monolithic_scheme(tmp_path: Path) -> None:

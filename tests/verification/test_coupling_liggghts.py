@@ -57,11 +57,11 @@ def test_plank_bends_as_on_the_reference_engine(tmp_path: Path) -> None:
     for engine in ("reference", "liggghts"):
         (folder := tmp_path / engine).mkdir()
         assert drive(plank_scene(engine), folder, driver).outcome is Outcome.FINISHED
-        ledger = read_convergence_log(folder / CONVERGENCE_LOG)
-        found = classify_loop(ledger)
+        log = read_convergence_log(folder / CONVERGENCE_LOG)
+        found = classify_loop(log)
         assert found is not None
         assert found.state == "holds"
-        ends.append(ledger.iloc[-4:].mean())
+        ends.append(log.iloc[-4:].mean())
     reference, liggghts = ends
     assert reference.largest_m > 1e-5
     # The walls' share of the weight depends on how the sand fell; 0.1 % measured.

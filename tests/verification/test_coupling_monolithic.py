@@ -88,10 +88,10 @@ def test_the_bars_energies_make_up_the_work_of_the_sand(
     for _ in range(20):
         session.advance(1e-4)
     session.close()
-    ledger = read_convergence_log(tmp_path / CONVERGENCE_LOG)
-    assert ledger.damped_j.iloc[-1] > 0.01 * ledger.work_j.max()
+    log = read_convergence_log(tmp_path / CONVERGENCE_LOG)
+    assert log.damped_j.iloc[-1] > 0.01 * log.work_j.max()
     # exact for central differences; what is left is round-off of some thousand sums
-    assert ledger.balance_j.abs().max() < 1e-12 * ledger.elastic_j.max()
+    assert log.balance_j.abs().max() < 1e-12 * log.elastic_j.max()
 
 
 def test_smaller_windows_lead_the_staggered_loop_to_the_monolithic_scheme(tmp_path: Path) -> None:

@@ -96,7 +96,7 @@ def test_the_plate_comes_to_rest_where_its_springs_carry_the_sand(
 ) -> None:
     session = coupled(tmp_path, engine)
     filled(session)
-    ledger, last = after(session, tmp_path)
+    log, last = after(session, tmp_path)
     weight_n = (session.snapshot().radius_m ** 2).sum() * np.pi * 2400 * 0.1 * 9.80665
     loads = session.surface_loads()
     assert loads is not None
@@ -109,15 +109,15 @@ def test_the_plate_comes_to_rest_where_its_springs_carry_the_sand(
     assert sunk_m[0] == pytest.approx(-loads["pattern"][1] / STIFFNESS_N_M, rel=0.05)
     assert last.residual_m < 0.05 * last.displacement_m
     # Damped sand loses what the plate does not store: falling sand works on it more than slow sand.
-    assert ledger.energy_j.iloc[-1] <= last.work_j
+    assert log.energy_j.iloc[-1] <= last.work_j
 
 
 def after(session: CoupledSession, folder: Path) -> tuple[pd.DataFrame, Any]:
     """Ledger up to now, and its last window."""
     session._log.size()
     session._shapes.flush()
-    ledger = read_convergence_log(folder / CONVERGENCE_LOG)
-    return ledger, ledger.iloc[-1]
+    log = read_convergence_log(folder / CONVERGENCE_LOG)
+    return log, log.iloc[-1]
 
 
 def test_windows_are_not_repeated_from_outside(tmp_path: Path) -> None:
@@ -209,25 +209,25 @@ def test_a_stopped_loop_goes_on_as_if_never_stopped(engine: str, tmp_path: Path)
 
 def test_repeated_windows_end_with_the_answer_that_was_shown(tmp_path: Path) -> None:
     plain, repeated = tmp_path / "plain", tmp_path / "repeated"
-    ledgers = []
+    logs = []
     for folder, repeats in ((plain, 0), (repeated, 12)):
         folder.mkdir()
         session = coupled(folder, scheme="quasi_newton", repeats=repeats)
         filled(session, records=12)
         session.close()
-        ledgers.append(read_convergence_log(folder / CONVERGENCE_LOG).iloc[20:])
-    within = [(ledger.residual_m <= 0.01 * ledger.displacement_m).mean() for ledger in ledgers]
+        logs.append(read_convergence_log(folder / CONVERGENCE_LOG).iloc[20:])
+    within = [(log.residual_m <= 0.01 * log.displacement_m).mean() for log in logs]
     assert within[1] > 0.9 > within[0]
-    assert ledgers[1].passes.max() > 1
+    assert logs[1].passes.max() > 1
 
 
 def test_loads_of_one_way_bend_a_pattern_that_the_sand_never_sees_move(tmp_path: Path) -> None:
     session = coupled(tmp_path, scheme="one_way", repeats=12)
     filled(session, records=8)
-    ledger, last = after(session, tmp_path)
+    log, last = after(session, tmp_path)
     session.close()
-    assert not ledger.displacement_m.any()
-    assert (ledger.passes == 1).all()
+    assert not log.displacement_m.any()
+    assert (log.passes == 1).all()
     sunk_m = -session.displacement_m[:, 1]
     assert sunk_m[0] == pytest.approx(last.residual_m)  # of a plate all of whose vertices sink
     assert sunk_m[0] > 0.0
@@ -245,10 +245,10 @@ def test_one_solve_a_layer_bends_the_pattern_after_it_and_moves_it_under_the_nex
             assert answers or not session.displacement_m.any()
             session.advance()
         answers.append(session._solved.copy())
-    ledger, last = after(session, tmp_path)
+    log, last = after(session, tmp_path)
     session.close()
-    first = ledger[ledger.displacement_m == 0.0]
-    second = ledger.drop(first.index)
+    first = log[log.displacement_m == 0.0]
+    second = log.drop(first.index)
     assert len(first) > 100
     assert len(second) > 100
     assert (second.displacement_m.diff().dropna() >= 0.0).all()

@@ -7,6 +7,6 @@ from sandmould.study.job_log import to_log
 from sandmould.study.plan.load_study import CALIBRATED
 
 with to_log(snakemake.log[0]):
-    not_found = write_calibration(Path(snakemake.input.table).parent, CALIBRATED)
-    if not_found:
-        raise SystemExit("\n".join(not_found))
+    problems = write_calibration(Path(snakemake.input.table).parent, CALIBRATED)
+    if problems:
+        raise SystemExit("\n".join(problems))

@@ -71,12 +71,12 @@ def contact_elements(case: str) -> Elements:
 
 def _one_sided(several: Elements, uniform: Elements, side: int) -> Elements:
     """Elements of several sizes on one side of the interface and of one size on the other."""
-    one, two = several.material == side, uniform.material != side
+    on_side, off_side = several.material == side, uniform.material != side
     return replace(
         several,
-        position_m=np.concatenate([several.position_m[one], uniform.position_m[two]]),
-        size_m=np.concatenate([several.size_m[one], uniform.size_m[two]]),
-        material=np.concatenate([several.material[one], uniform.material[two]]),
+        position_m=np.concatenate([several.position_m[on_side], uniform.position_m[off_side]]),
+        size_m=np.concatenate([several.size_m[on_side], uniform.size_m[off_side]]),
+        material=np.concatenate([several.material[on_side], uniform.material[off_side]]),
     )
 
 

@@ -96,11 +96,11 @@ def placed(raster: Raster, layers: Sequence[int] = ()) -> Elements:
 
 def _from_interface(material: Ints) -> Floats:
     """Distance, in cells, of each cell's centre to the nearest of another material."""
-    found = np.full(material.shape, np.inf)
+    distance = np.full(material.shape, np.inf)
     for number in np.unique(material):
         own = material == number
-        found[own] = _distance_to(~own)[own]
-    return found
+        distance[own] = _distance_to(~own)[own]
+    return distance
 
 
 def _distance_to(there: Flags) -> Floats:
@@ -117,11 +117,11 @@ def _blocks(values: NDArray[np.generic], side: int) -> NDArray[np.generic]:
 
 
 def _spread(of_block: Flags, side: int, shape: tuple[int, ...]) -> Flags:
-    found = np.zeros(shape, dtype=np.bool_)
+    of_cell = np.zeros(shape, dtype=np.bool_)
     for axis in range(len(shape)):
         of_block = np.repeat(of_block, side, axis=axis)
-    found[tuple(slice(0, n) for n in of_block.shape)] = of_block
-    return found
+    of_cell[tuple(slice(0, n) for n in of_block.shape)] = of_block
+    return of_cell
 
 
 def _all_in_block(good: Flags, side: int) -> Flags:

@@ -23,9 +23,9 @@ from sandmould.casting.arpm.exchange import Exchange, check_resistance, from_row
 class Faces:
     """Where elements touch."""
 
-    one: Ints
+    first: Ints
     """(f,) int64: the element on the low side of each face."""
-    two: Ints
+    second: Ints
     axis: Ints
     """(f,) int64: across which axis the face lies."""
     area_m2: Floats
@@ -58,14 +58,14 @@ def owners(elements: Elements) -> Ints:
             "elements at free positions come from a power diagram"
         )
     shape = np.round((elements.high_m - elements.low_m) / cell).astype(np.int64)
-    found = np.full(shape, -1, dtype=np.int64)
+    owner = np.full(shape, -1, dtype=np.int64)
     for width in np.unique(side):
         own = np.flatnonzero(side == width)
         for offset in np.ndindex(*[int(width)] * len(shape)):
-            found[tuple((corner[own] + np.array(offset)).T)] = own
-    if (found < 0).any() or int((side ** len(shape)).sum()) != found.size:
+            owner[tuple((corner[own] + np.array(offset)).T)] = own
+    if (owner < 0).any() or int((side ** len(shape)).sum()) != owner.size:
         raise ValueError("elements overlap or leave gaps; squares or cubes must fill the box")
-    return found
+    return owner
 
 
 def faces_of(elements: Elements) -> Faces:
@@ -89,8 +89,8 @@ def faces_of(elements: Elements) -> Faces:
         pair, count = np.unique(before[apart] * n + after[apart], return_counts=True)
         area = count * cell ** (owner.ndim - 1)
         parts.append((pair // n, pair % n, np.full(len(pair), axis), area))
-    one, two, across, areas = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Faces(one, two, across, areas.astype(np.float64))
+    first, second, across, areas = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return Faces(first, second, across, areas.astype(np.float64))
 
 
 def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float,
@@ -115,23 +115,23 @@ def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k
     check_resistance(resistance_m2k_w)
     faces = faces_of(elements)
     material, half = elements.material, 0.5 * elements.size_m
-    path = sum(half[i] / conductivity_w_m_k[material[i]] for i in (faces.one, faces.two))
-    differ = material[faces.one] != material[faces.two]
+    path = sum(half[i] / conductivity_w_m_k[material[i]] for i in (faces.first, faces.second))
+    differ = material[faces.first] != material[faces.second]
     conductance = faces.area_m2 / (path + np.where(differ, resistance_m2k_w, 0.0))
-    one, two = faces.one, faces.two
+    first, second = faces.first, faces.second
     if consistent:
         extra = _shared(elements, faces, conductance)
-        one, two = np.concatenate([one, extra[0]]), np.concatenate([two, extra[1]])
+        first, second = np.concatenate([first, extra[0]]), np.concatenate([second, extra[1]])
         conductance = np.concatenate([conductance, extra[2]])
-    return over_faces(one, two, conductance, elements.volume_m3)
+    return over_faces(first, second, conductance, elements.volume_m3)
 
 
-def over_faces(one: Ints, two: Ints, conductance_w_k: Floats, volume_m3: Floats) -> Exchange:
-    """Exchange of conductances between pairs: what one gains the other loses.
+def over_faces(first: Ints, second: Ints, conductance_w_k: Floats, volume_m3: Floats) -> Exchange:
+    """Exchange of conductances between pairs: what the first gains the second loses.
 
     Parameters
     ----------
-    one, two : (p,) int64
+    first, second : (p,) int64
     conductance_w_k : (p,) float64, W/K
     volume_m3 : (n,) float64, m3
 
@@ -139,7 +139,7 @@ def over_faces(one: Ints, two: Ints, conductance_w_k: Floats, volume_m3: Floats)
     -------
     Exchange
     """
-    row, column = np.concatenate([one, two]), np.concatenate([two, one])
+    row, column = np.concatenate([first, second]), np.concatenate([second, first])
     rate = np.concatenate([conductance_w_k, conductance_w_k]) / volume_m3[row]
     return from_rows(row, column, rate, volume_m3)
 
@@ -152,11 +152,11 @@ def _shared(elements: Elements, faces: Faces, conductance: Floats
     plain exchange this couples k and l by -a_k a_l times the conductance of the whole face.
     """
     size = elements.size_m
-    first_larger = size[faces.one] > size[faces.two] * (1.0 + 1e-9)
-    second_larger = size[faces.two] > size[faces.one] * (1.0 + 1e-9)
+    first_larger = size[faces.first] > size[faces.second] * (1.0 + 1e-9)
+    second_larger = size[faces.second] > size[faces.first] * (1.0 + 1e-9)
     jump = np.flatnonzero(first_larger | second_larger)
-    large = np.where(first_larger, faces.one, faces.two)[jump]
-    small = np.where(first_larger, faces.two, faces.one)[jump]
+    large = np.where(first_larger, faces.first, faces.second)[jump]
+    small = np.where(first_larger, faces.second, faces.first)[jump]
     side = 2 * faces.axis[jump] + first_larger[jump]
     key = large * (2 * elements.dimensions) + side
     order = np.argsort(key, kind="stable")
@@ -165,7 +165,7 @@ def _shared(elements: Elements, faces: Faces, conductance: Floats
     begin = np.flatnonzero(np.append(True, key[1:] != key[:-1]))
     count = np.diff(np.append(begin, len(key)))
     empty = np.empty(0, dtype=np.int64)
-    found = [(empty, empty, np.empty(0))]
+    pairs = [(empty, empty, np.empty(0))]
     for number in np.unique(count[count > 1]):
         rows = begin[count == number][:, None] + np.arange(number)
         whole = np.isclose(area[rows].sum(axis=1), size[large[rows[:, 0]]] ** (
@@ -175,6 +175,6 @@ def _shared(elements: Elements, faces: Faces, conductance: Floats
         k, other = np.triu_indices(number, 1)
         total = through[rows].sum(axis=1)[:, None]
         added = np.broadcast_to(-total / number**2, (len(rows), len(k)))
-        found.append((small[rows[:, k]].ravel(), small[rows[:, other]].ravel(), added.ravel()))
-    one, two, added = (np.concatenate(part) for part in zip(*found, strict=True))
-    return one, two, added
+        pairs.append((small[rows[:, k]].ravel(), small[rows[:, other]].ravel(), added.ravel()))
+    first, second, added = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    return first, second, added

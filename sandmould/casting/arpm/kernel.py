@@ -103,12 +103,12 @@ def neighbours(elements: Elements, kernel_size: float) -> tuple[Ints, Ints, Floa
                 cKDTree(place[smaller]), reach, output_type="ndarray"
             )
             pairs.append(np.stack([own[across["i"]], smaller[across["j"]]]))
-    one, two = np.concatenate(pairs, axis=1)
-    one, two = np.concatenate([one, two]), np.concatenate([two, one])
-    one, two = one[one < real], two[one < real]
-    distance = np.linalg.norm(place[one] - place[two], axis=1)
-    near = distance < kernel_size * np.maximum(size[one], size[two])
-    return one[near], number[two[near]], distance[near]
+    first, second = np.concatenate(pairs, axis=1)
+    first, second = np.concatenate([first, second]), np.concatenate([second, first])
+    first, second = first[first < real], second[first < real]
+    distance = np.linalg.norm(place[first] - place[second], axis=1)
+    near = distance < kernel_size * np.maximum(size[first], size[second])
+    return first[near], number[second[near]], distance[near]
 
 
 def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float,

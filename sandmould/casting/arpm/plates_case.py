@@ -98,10 +98,10 @@ def read_aluminium() -> ThermalMaterial:
 
 @dataclass(frozen=True)
 class PlatesRun:
-    """A layout of the plates and what it found."""
+    """A layout of the plates and how it solidifies."""
 
     elements: Elements
-    found: SolidificationResult
+    result: SolidificationResult
     steps_s: float
     """Longest time step."""
 

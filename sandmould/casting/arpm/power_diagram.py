@@ -45,24 +45,24 @@ def power_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2
     check_resistance(resistance_m2k_w)
     if elements.dimensions != 2:
         raise ValueError("elements at free positions are in 3D; power diagrams are drawn in 2D")
-    one, two, length, near_m, distance = _edges(elements)
+    first, second, length, near_m, distance = _edges(elements)
     n = len(elements.size_m)
-    real = two < n
-    volume = np.bincount(one, 0.5 * length * near_m, n).astype(np.float64)
+    real = second < n
+    volume = np.bincount(first, 0.5 * length * near_m, n).astype(np.float64)
     least_m = np.full(n, -1.0)
-    least_m[one] = np.inf
-    np.minimum.at(least_m, one, near_m)
+    least_m[first] = np.inf
+    np.minimum.at(least_m, first, near_m)
     if not (least_m > 0.0).all():
         place = elements.position_m[np.argmin(least_m)].tolist()
         raise ValueError(f"the element at {place} m lies in no cell of its own; it must stand "
                          "farther from larger ones")  # fmt: skip
-    one, two, length = one[real], two[real], length[real]
+    first, second, length = first[real], second[real], length[real]
     near_m, far_m = near_m[real], (distance - near_m)[real]
-    material, other = elements.material[one], elements.material[two]
+    material, other = elements.material[first], elements.material[second]
     path = near_m / conductivity_w_m_k[material] + far_m / conductivity_w_m_k[other]
     path += np.where(material != other, resistance_m2k_w, 0.0)
-    once = one < two
-    return over_faces(one[once], two[once], np.asarray(length / path)[once], volume)
+    once = first < second
+    return over_faces(first[once], second[once], np.asarray(length / path)[once], volume)
 
 
 def _edges(elements: Elements) -> tuple[Ints, Ints, Floats, Floats, Floats]:
@@ -86,9 +86,9 @@ def _edges(elements: Elements) -> tuple[Ints, Ints, Floats, Floats, Floats]:
     order = np.lexsort((ends[:, 1], ends[:, 0]))
     ends, triangle = ends[order], triangle[order]
     paired = np.flatnonzero((ends[1:] == ends[:-1]).all(axis=1))
-    one, two = ends[paired].T
+    first, second = ends[paired].T
     length = np.linalg.norm(vertex[triangle[paired]] - vertex[triangle[paired + 1]], axis=1)
-    own, other = np.concatenate([one, two]), np.concatenate([two, one])
+    own, other = np.concatenate([first, second]), np.concatenate([second, first])
     keep = (own < len(elements.size_m)) & (np.tile(length, 2) > 1e-9)
     own, other, length = own[keep], other[keep], np.tile(length, 2)[keep]
     distance = np.linalg.norm(at[own] - at[other], axis=1)

@@ -167,8 +167,8 @@ def expected_s(scenario: Solidification) -> float:
     )
     effusivity_2 = mould.conductivity_w_m_k * mould.density_kg_m3 * mould.heat_capacity_j_kg_k
     drop_k = metal.solidus_k - scenario.initial_k.mould
-    found_s = 0.25 * math.pi / effusivity_2 * (heat_j_m3 * modulus_m / drop_k) ** 2
-    return min(found_s, scenario.until_s)
+    solidified_s = 0.25 * math.pi / effusivity_2 * (heat_j_m3 * modulus_m / drop_k) ** 2
+    return min(solidified_s, scenario.until_s)
 
 
 def expected_element_steps(scenario: Solidification) -> float:

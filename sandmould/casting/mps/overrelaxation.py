@@ -120,7 +120,7 @@ def solve(
         nonlocal iterations
         iterations += 1
 
-    found, left = cg(
+    solution, left = cg(
         operator, rest, rtol=0.0, atol=tolerance * size, maxiter=MOST_ITERATIONS, callback=count
     )
-    return _added(system, begin, found), iterations, left == 0
+    return _added(system, begin, solution), iterations, left == 0

@@ -50,17 +50,17 @@ class Posterior:
     @property
     def sd(self) -> tuple[float, float]:
         """Standard deviation of each parameter."""
-        one, two = self.mean
+        first_mean, second_mean = self.mean
         return (
-            math.sqrt(float(self.share.sum(axis=1) @ (self.first - one) ** 2)),
-            math.sqrt(float(self.share.sum(axis=0) @ (self.second - two) ** 2)),
+            math.sqrt(float(self.share.sum(axis=1) @ (self.first - first_mean) ** 2)),
+            math.sqrt(float(self.share.sum(axis=0) @ (self.second - second_mean) ** 2)),
         )
 
     @property
     def correlation(self) -> float:
         """Of the two parameters."""
-        (one, two), (s, t) = self.mean, self.sd
-        product = float((self.first - one) @ self.share @ (self.second - two))
+        (first_mean, second_mean), (s, t) = self.mean, self.sd
+        product = float((self.first - first_mean) @ self.share @ (self.second - second_mean))
         return product / (s * t) if s * t > 0.0 else math.nan
 
     @property

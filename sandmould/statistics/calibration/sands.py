@@ -91,7 +91,7 @@ def calibrate(
             left_out.append(str(error))
             continue
         tables[measure] = table
-    sands = tuple(_calibrate_one(sand, emulators, keys) for sand in calibration.sands)
+    sands = tuple(_calibrate_sand(sand, emulators, keys) for sand in calibration.sands)
     first = next((next(iter(s.sand.targets)) for s in sands if s.posterior is not None), "")
     # What the runs that give the first measure tell besides costs nothing more.
     cpu_s = {
@@ -99,8 +99,8 @@ def calibrate(
         for measure, table in tables.items()
         if first
     }
-    found = tuple(worths(emulators, first, cpu_s)) if first else ()
-    return Calibrated(keys, emulators, sands, found, tuple(left_out))
+    worth_of_measures = tuple(worths(emulators, first, cpu_s)) if first else ()
+    return Calibrated(keys, emulators, sands, worth_of_measures, tuple(left_out))
 
 
 def _measures(
@@ -115,7 +115,7 @@ def _measures(
                 yield prefix + column, table, column
 
 
-def _calibrate_one(
+def _calibrate_sand(
     sand: TargetSand, emulators: Mapping[str, Emulator], keys: tuple[str, str]
 ) -> CalibratedSand:
     missing = [measure for measure in sand.targets if measure not in emulators]

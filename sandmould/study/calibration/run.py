@@ -47,4 +47,6 @@ def write_calibration(study_folder: Path, materials: Path) -> list[str]:
     run = str(summary[RUN].iloc[0])
     scenario = read_run(study_folder / "runs" / run / "scenario.yaml").scenario
     write_materials(result, scenario, study_folder.name, materials)
-    return [f"{one.sand.name}: {one.problem}" for one in result.sands if one.problem]
+    return [
+        f"{estimate.sand.name}: {estimate.problem}" for estimate in result.sands if estimate.problem
+    ]

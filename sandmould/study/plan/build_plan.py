@@ -125,13 +125,13 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         With one sentence a problem; a missing engine is one of them.
     """
     study = open_study(path)
-    ledger = read_rounds(results / study.name, study.study)
-    runs = expand(study, ledger.runs, ledger.certified_hz)
+    log = read_rounds(results / study.name, study.study)
+    runs = expand(study, log.runs, log.certified_hz)
     problems: dict[str, Problem] = {}
     # Controls come hours later, at frequencies that are not known yet: they are tried at others.
     certificate = study.study.certificate
     trial_hz = provisional_hz(certificate, study.study.sweep, study.study.scenario)
-    trial = expand(study, (), trial_hz) if trial_hz and not ledger.certified_hz else []
+    trial = expand(study, (), trial_hz) if trial_hz and not log.certified_hz else []
     planning = kind_named(study.study.kind).planning
     for run in (*runs, *trial):
         problem = planning.engine_problem(run.scenario)

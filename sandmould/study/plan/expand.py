@@ -169,8 +169,10 @@ class _AtPoint:
                 # Below a swept section the problem's own value says more than the section.
                 below = problem.key.removeprefix(f"{ROOT_KEY}.{key}")
                 inner = below if below.startswith(".") else ""
-                shown = problem.value if _holds(key, problem.key) else value
-                return Problem(self._file_key(key) + inner, shown, problem.valid, self.study.file)
+                wrong_value = problem.value if _holds(key, problem.key) else value
+                return Problem(
+                    self._file_key(key) + inner, wrong_value, problem.valid, self.study.file
+                )
         return problem
 
     def _file_key(self, key: str) -> str:
@@ -200,9 +202,9 @@ class _AtPoint:
             wrong = self._misfits(scenario)
         except BadInputError as error:
             wrong = list(error.problems)
-        key, shown = "certificate.controls", f"{case.control} {case.value}"
+        key, control_text = "certificate.controls", f"{case.control} {case.value}"
         return scenario, [
-            Problem(key, shown, f"one with which {p.key}, here {p.value}, is {p.valid}",
+            Problem(key, control_text, f"one with which {p.key}, here {p.value}, is {p.valid}",
                     self.study.file)
             for p in wrong
         ]  # fmt: skip

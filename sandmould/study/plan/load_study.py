@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError, Problem, shown_name
+from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.quantity import NAME, fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
 from sandmould.study.definition import calibration, certificate, comparing, refinement, sweep
@@ -47,7 +47,7 @@ class OpenStudy:
     @property
     def file(self) -> str:
         """Name of the study's file in messages."""
-        return shown_name(self.path)
+        return display_path(self.path)
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def open_study(path: Path) -> OpenStudy:
     BadInputError
         With one line a problem, each naming the file that holds the bad value.
     """
-    file_name = shown_name(path)
+    file_name = display_path(path)
     if not re.fullmatch(NAME, path.stem):
         valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
         raise BadInputError([Problem("file name", path.name, valid, file_name)])
@@ -171,7 +171,7 @@ def _material(files: list[_File]) -> _File | None:
 
 
 def _read(path: Path) -> _File:
-    name = shown_name(path)
+    name = display_path(path)
     return _File(path, name, _from_root(read_yaml(path, name), path.parent))
 
 

@@ -24,7 +24,7 @@ STUDY_FILE = "study.yaml"
 """The study as planned, with all that it rests on."""
 FIGURES = "figures"
 """Folder of a study that its report's main figures lie in."""
-SHOWN_POINTS = 20
+LISTED_POINTS = 20
 # libyaml writes a thousand scenarios in seconds where pure Python takes half a minute.
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
@@ -177,7 +177,7 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
         work += work_a_run * len(alike)
         core_s += wall_s * threads * len(alike)
         longest_s = max(longest_s, wall_s)
-        if len(rows) <= SHOWN_POINTS:
+        if len(rows) <= LISTED_POINTS:
             rows.append(
                 [
                     alike[0].run.rsplit("_r", 1)[0],
@@ -189,8 +189,8 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
             )
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows]
-    if len(points) > SHOWN_POINTS:
-        lines.append(f"... and {len(points) - SHOWN_POINTS} more points")
+    if len(points) > LISTED_POINTS:
+        lines.append(f"... and {len(points) - LISTED_POINTS} more points")
     # No schedule is shorter than its longest run.
     whole = duration_text(max(core_s / cores, longest_s))
     basis = "at the speed measured on this machine" if measured else "an estimate"

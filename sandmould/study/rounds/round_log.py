@@ -46,7 +46,7 @@ class RoundLog:
     @property
     def runs(self) -> list[tuple[Point, int]]:
         """Runs of all rounds."""
-        return [run for one in self.rounds for run in one.runs]
+        return [run for round_ in self.rounds for run in round_.runs]
 
 
 def basis_of(study: Study) -> str:
@@ -69,16 +69,16 @@ def read_rounds(folder: Path, study: Study) -> RoundLog:
         return RoundLog(basis)
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
-        found = RoundLog(
+        log = RoundLog(
             tree["basis"],
-            tuple(_round(one) for one in tree["rounds"]),
+            tuple(_round(round_) for round_ in tree["rounds"]),
             tree["ended"],
             tuple(float(f) for f in tree["certified_hz"]),
         )
     except (ValueError, KeyError, TypeError, AttributeError):
         valid = "a list of rounds as the study wrote it, or no such file: they then begin anew"
         raise BadInputError([Problem("rounds", "as it is", valid, str(path))]) from None
-    return found if found.basis == basis else RoundLog(basis)
+    return log if log.basis == basis else RoundLog(basis)
 
 
 def _round(tree: dict[str, Any]) -> Round:

@@ -63,7 +63,7 @@ def test_faces_between_unequal_squares() -> None:
     faces = faces_of(elements)
     assert elements.counts() == {0.5: 16, 1.0: 2}
     # by hand: 12 + 12 faces in the small part of 4 x 4, 4 on the large elements, 1 between these
-    assert len(faces.one) == 12 + 12 + 4 + 1
+    assert len(faces.first) == 12 + 12 + 4 + 1
     assert faces.area_m2.sum() == pytest.approx(28 * 0.5 + 1.0)
 
 

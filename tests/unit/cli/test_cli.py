@@ -122,11 +122,11 @@ def test_no_report_without_results(elsewhere: Path) -> None:
 def test_run_hands_options_on_to_snakemake(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[tuple[Path, list[str]]] = []
 
-    def drive(path: Path, options: list[str]) -> int:
+    def run_study(path: Path, options: list[str]) -> int:
         calls.append((path, options))
         return 7
 
-    monkeypatch.setattr("sandmould.study.run_study.drive", drive)
+    monkeypatch.setattr("sandmould.study.run_study.run_study", run_study)
     said = sandmould("run", "tube_demo", "--cores", "2", "--", "--quiet", "rules", "host")
     assert said.exit_code == 7
     assert sandmould("run", "tube_demo").exit_code == 7

@@ -1,4 +1,4 @@
-"""Whether a loop holds, on ledgers made up for each answer."""
+"""Whether a loop holds, on convergence logs made up for each answer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop, study_s
 WINDOWS = 200
 
 
-def ledger(**columns: object) -> pd.DataFrame:
+def convergence_log(**columns: object) -> pd.DataFrame:
     """Sand that has bent the pattern by 10 mm and given it what it stores."""
     time_s = 0.01 * np.arange(1, WINDOWS + 1)
     share = np.minimum(1.0, time_s)
@@ -24,7 +24,7 @@ def ledger(**columns: object) -> pd.DataFrame:
 
 
 def judged(**columns: object) -> LoopVerdict:
-    found = classify_loop(ledger(**columns))
+    found = classify_loop(convergence_log(**columns))
     assert found is not None
     return found
 
@@ -81,10 +81,10 @@ def test_a_loop_far_from_its_answer_lags_and_gives_nothing() -> None:
 
 
 def test_a_run_that_was_stopped_diverged() -> None:
-    found = classify_loop(ledger(), stopped=True)
+    found = classify_loop(convergence_log(), stopped=True)
     assert found is not None
     assert found.state == "diverged"
-    broken = ledger()
+    broken = convergence_log()
     broken.loc[WINDOWS - 1, "displacement_m"] = np.inf
     found = classify_loop(broken)
     assert found is not None
@@ -98,7 +98,11 @@ def test_one_way_loads_are_no_loop() -> None:
 
 
 def test_a_pattern_stepped_with_the_grains_has_no_residual() -> None:
-    told = ledger().rename(columns={"energy_j": "elastic_j"}).drop(columns=["residual_m", "factor"])
+    told = (
+        convergence_log()
+        .rename(columns={"energy_j": "elastic_j"})
+        .drop(columns=["residual_m", "factor"])
+    )
     found = classify_loop(told.assign(work_j=0.025))
     assert found is not None
     assert found.state == "holds"
@@ -106,8 +110,8 @@ def test_a_pattern_stepped_with_the_grains_has_no_residual() -> None:
 
 
 def test_without_sand_on_it_nothing_is_told() -> None:
-    assert classify_loop(ledger(load_n=0.0)) is None
-    assert classify_loop(ledger().iloc[:0]) is None
+    assert classify_loop(convergence_log(load_n=0.0)) is None
+    assert classify_loop(convergence_log().iloc[:0]) is None
 
 
 def test_a_study_counts_its_runs() -> None:

@@ -88,18 +88,18 @@ def test_the_page_tells_what_became_of_the_pattern(study: Path, text: str) -> No
 
 def test_a_loop_that_does_not_hold_is_not_held_against_the_paper(study: Path) -> None:
     collected, verdict = gathered(study)
-    ledger = study / "runs" / "one" / CONVERGENCE_LOG
-    told = ledger.read_text()
+    log = study / "runs" / "one" / CONVERGENCE_LOG
+    told = log.read_text()
     # All of the energy is from the loop itself: the sand's work is taken away.
-    table = pd.read_csv(ledger, sep="\t").assign(work_j=-1.0)
-    table.to_csv(ledger, sep="\t", index=False)
+    table = pd.read_csv(log, sep="\t").assign(work_j=-1.0)
+    table.to_csv(log, sep="\t", index=False)
     scenario = read_run(study / "runs" / "one" / "scenario.yaml").scenario
     pages = bending_pages(study, "", scenario, collected, verdict, "one")
-    ledger.write_text(told)
+    log.write_text(told)
     assert "cycles in 1 of 3 runs" in pages.sentences[0]
     assert "gave back a part of it, by a loop that does not hold" in pages.sentences[-1]
     assert pages.runs.marked == (True, False, False)
-    assert [c.chart.y_title for c in pages.ledger] == [
+    assert [c.chart.y_title for c in pages.convergence] == [
         "displacement, mm", "energy, J", "share of the residual"
     ]  # fmt: skip
 

@@ -10,13 +10,13 @@ from matplotlib.colors import to_rgb
 
 from sandmould.report.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
 from sandmould.runs.formatting import (
+    display_scale,
     listed,
     name_of,
     number,
     range_text,
     seconds,
     setting_text,
-    shown_scale,
     size,
     titled,
     unit_of,
@@ -121,7 +121,7 @@ def test_names_and_units_of_keys(key: str, name: str, unit: str) -> None:
 
 def test_words() -> None:
     assert titled("vibration.0.frequency_hz") == "frequency, Hz"
-    assert shown_scale("bed_height_m") == (1e3, "bed height, mm")
+    assert display_scale("bed_height_m") == (1e3, "bed height, mm")
     assert value_text("vibration.0.hold", "velocity") == "velocity"
     assert value_text("pattern.material.young_modulus_pa", 6.4e6) == "6.4 MPa"
     assert value_text("contact.grain_grain.normal_stiffness_n_m", 1e6) == "1 MN/m"

@@ -39,8 +39,8 @@ def write_refined(folder: Path, best_hz: float = BEST_HZ, width_hz: float = 40.0
 def test_the_report_begins_with_the_optimum(tmp_path: Path) -> None:
     folder = write_refined(tmp_path / "refined")
     study = read_study(folder)
-    ledger = RoundLog(basis_of(study), ended="All 2 rounds are done.")
-    write_rounds(ledger, folder)
+    log = RoundLog(basis_of(study), ended="All 2 rounds are done.")
+    write_rounds(log, folder)
     collect(folder)
     write_report(folder, folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")
@@ -95,8 +95,8 @@ def test_an_interval_at_the_end_of_the_sweep_is_not_resolved(tmp_path: Path) -> 
 def test_wider_than_asked_is_not_sound_and_the_cost_is_told(tmp_path: Path) -> None:
     folder = write_refined(tmp_path / "wide", width_hz=0.1)
     study, found = read_study(folder), gather(folder)
-    ledger = next_round(RoundLog(basis_of(study)), study, found.summary, [KEY])
-    write_rounds(replace(ledger, ended=""), folder)
+    log = next_round(RoundLog(basis_of(study)), study, found.summary, [KEY])
+    write_rounds(replace(log, ended=""), folder)
     pages = optimum_pages(folder, study, found.summary)
     assert pages is not None
     assert not pages.sound

@@ -75,6 +75,7 @@ def test_the_gate_is_gone_from_the_discharge_on() -> None:
         assert {block.name for block in after.blocks} == names - {"gate"}
         assert after.walls == scene.scene.walls
         assert after.clearance_m(middle)[0] == pytest.approx(0.016)
+    assert {block.name for block in scene.scene_in().blocks} == names - {"gate"}
     assert scene.scene.clearance_m(middle)[0] == pytest.approx(-WALL_M / 2)
     tube = tube_scene()
     assert tube.scene_in("vibrate_1") is tube.scene

@@ -293,13 +293,13 @@ def test_frequencies_are_chosen_round_the_optimum_and_anew_after_more_rounds(
 ) -> None:
     study = opened(tmp_path, refine={"rounds": 2, "runs": 3}).study
     table = planted(lambda part, f: hill(f, BEST_HZ), [], 0.002)
-    ledger = choose_controls(RoundLog(basis_of(study)), study, table, [FREQUENCY])
-    low, best, high = ledger.certified_hz
+    log = choose_controls(RoundLog(basis_of(study)), study, table, [FREQUENCY])
+    low, best, high = log.certified_hz
     assert best == pytest.approx(BEST_HZ, rel=0.06)
     assert (low, high) == pytest.approx((best / 1.4, best * 1.4), rel=0.01)
-    write_rounds(ledger, tmp_path)
-    assert read_rounds(tmp_path, study) == ledger
-    assert next_round(ledger, study, table, [FREQUENCY]).certified_hz == ()
+    write_rounds(log, tmp_path)
+    assert read_rounds(tmp_path, study) == log
+    assert next_round(log, study, table, [FREQUENCY]).certified_hz == ()
 
 
 def test_a_swept_frequency_is_found() -> None:

@@ -12,7 +12,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.contact import WALL_LAW
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.expand import expand
-from sandmould.study.plan.load_study import OpenStudy, open_study, shown_name
+from sandmould.study.plan.load_study import OpenStudy, display_path, open_study
 
 Opened = Callable[..., OpenStudy]
 SHIPPED = sorted((ROOT / "config" / "studies").glob("*.yaml"))
@@ -147,8 +147,8 @@ def test_names_in_messages_hide_the_machine(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     demo = ROOT / "config" / "studies" / "tube_demo.yaml"
-    assert shown_name(demo) == "config/studies/tube_demo.yaml"
+    assert display_path(demo) == "config/studies/tube_demo.yaml"
     monkeypatch.chdir(tmp_path)
-    assert shown_name(demo) == "config/studies/tube_demo.yaml"
-    assert shown_name(tmp_path / "a.yaml") == "a.yaml"
-    assert shown_name(Path("../a.yaml")) == "../a.yaml"
+    assert display_path(demo) == "config/studies/tube_demo.yaml"
+    assert display_path(tmp_path / "a.yaml") == "a.yaml"
+    assert display_path(Path("../a.yaml")) == "../a.yaml"

@@ -117,8 +117,8 @@ def test_record_of_a_study_with_rounds_rests_on_the_runs_they_added(
     folder = tmp_path / "tube_certified"
     folder.mkdir()
     one = Round((({"vibration.0.frequency_hz": 62.0}, 1),), {}, {}, 0.1)
-    ledger = RoundLog(basis_of(opened.study), (one,), "All is done.", (43.0, 60.0, 84.0))
-    write_rounds(ledger, folder)
+    log = RoundLog(basis_of(opened.study), (one,), "All is done.", (43.0, 60.0, 84.0))
+    write_rounds(log, folder)
     runs = records.runs_in(opened, folder)
     assert len(runs) > len(expand(opened)) + 1
     kept = {"study": study, "study_sha256": records.study_hash(runs)}

@@ -16,7 +16,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import NEAR, propose
-from sandmould.study import run_study as driving
+from sandmould.study import run_study
 from sandmould.study.collect import collect
 from sandmould.study.plan.build_plan import announce, open_plan
 from sandmould.study.plan.expand import expand
@@ -176,24 +176,22 @@ def test_rounds_are_appended_to_the_runs_and_redo_none(tmp_path: Path) -> None:
     assert new[1].seed == first[0].seed
 
 
-def test_a_ledger_is_read_back_and_another_studys_is_kept_aside(tmp_path: Path) -> None:
+def test_a_round_log_is_read_back_and_another_studys_is_kept_aside(tmp_path: Path) -> None:
     study = opened(tmp_path).study
     runs = table(list(COARSE), 2, 0.01)
-    ledger = next_round(RoundLog(basis_of(study)), study, runs, [FREQUENCY])
-    assert len(ledger.runs) == 4
-    assert decision_text(ledger, study).startswith(
-        "Round 1 of at most 3: best so far is frequency "
-    )
-    write_rounds(ledger, tmp_path)
-    assert read_rounds(tmp_path, study) == ledger
+    log = next_round(RoundLog(basis_of(study)), study, runs, [FREQUENCY])
+    assert len(log.runs) == 4
+    assert decision_text(log, study).startswith("Round 1 of at most 3: best so far is frequency ")
+    write_rounds(log, tmp_path)
+    assert read_rounds(tmp_path, study) == log
     # More rounds go on with those that are there; another scene begins anew and loses nothing.
     for more in ({"refine": {"rounds": 9}}, {"replicates": 4}):
-        assert read_rounds(tmp_path, opened(tmp_path, **more).study) == ledger
+        assert read_rounds(tmp_path, opened(tmp_path, **more).study) == log
     other = opened(tmp_path, scenario={"sand": {"size_scale": 9}}).study
     fresh = read_rounds(tmp_path, other)
     assert fresh.rounds == ()
     write_rounds(fresh, tmp_path)
-    kept = json.loads((tmp_path / f"rounds_{ledger.basis[:6]}.json").read_text())
+    kept = json.loads((tmp_path / f"rounds_{log.basis[:6]}.json").read_text())
     assert len(kept["rounds"]) == 1
     (tmp_path / ROUNDS_FILE).write_text('{"basis": 1}')
     with pytest.raises(BadInputError, match=r"rounds.json: rounds = .* as the study wrote it"):
@@ -255,14 +253,14 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
         collect(Path("results/trial"))
         return 0
 
-    monkeypatch.setattr(driving, "_snakemake", snakemake)
-    assert driving.drive(Path("trial.yaml"), []) == 0
+    monkeypatch.setattr(run_study, "_snakemake", snakemake)
+    assert run_study.run_study(Path("trial.yaml"), []) == 0
     # Three rounds of four runs after the ten of the sweep, then the controls, each computed once.
     assert calls == [["results/trial/summary.tsv"]] * 4 + [[]]
     assert len(computed) == len(set(computed))
-    ledger = json.loads((tmp_path / "results" / "trial" / ROUNDS_FILE).read_text())
-    assert ledger["ended"] == "All 3 rounds are done."
-    low, best, high = ledger["certified_hz"]
+    log = json.loads((tmp_path / "results" / "trial" / ROUNDS_FILE).read_text())
+    assert log["ended"] == "All 3 rounds are done."
+    low, best, high = log["certified_hz"]
     rows = pd.read_csv("results/trial/runs.tsv", sep="\t")
     assert rows["run"].tolist() == computed
     assert (rows["part"][:22] == "sweep").all()
@@ -272,5 +270,5 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
     assert all((swept[FREQUENCY] == f).sum() >= 2 for f in (low, best, high))
     # Again: nothing is left to compute.
     many = len(computed)
-    assert driving.drive(Path("trial.yaml"), []) == 0
+    assert run_study.run_study(Path("trial.yaml"), []) == 0
     assert len(computed) == many

@@ -1,4 +1,4 @@
-"""Measures of a run with a pattern, from snapshots and a ledger made up by hand."""
+"""Measures of a run with a pattern, from snapshots and a convergence log made up by hand."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_shape_and_answer_are_those_of_the_loads(folder: Path, body: FoamBody) -
     assert 0.0 < table.pattern_distance_rms_m.iloc[1] < table.pattern_distance_largest_m.iloc[1]
 
 
-def test_windows_of_the_ledger_go_to_the_snapshot_that_ends_them(folder: Path) -> None:
+def test_windows_of_the_log_go_to_the_snapshot_that_ends_them(folder: Path) -> None:
     table = measured(folder)
     assert table.pattern_windows.to_list() == [10, 20, 20, 30]
     assert table.pattern_passes.to_list() == [20, 40, 40, 60]
@@ -83,7 +83,7 @@ def test_a_run_stopped_by_its_loop_diverged(folder: Path) -> None:
     assert (found.state, before.state) == ("diverged", "lags")
 
 
-def test_a_run_without_a_ledger_has_its_shape_alone(folder: Path) -> None:
+def test_a_run_without_a_convergence_log_has_its_shape_alone(folder: Path) -> None:
     (folder / CONVERGENCE_LOG).unlink()
     table = measured(folder)
     assert "pattern_tip_deflection_m" in table

@@ -83,7 +83,7 @@ class BentPattern:
 
 
 def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
-    """Add to the measures of a run what its ledger tells of the windows up to each snapshot.
+    """Add to the measures of a run what its log tells of the windows up to each snapshot.
 
     Parameters
     ----------
@@ -97,52 +97,52 @@ def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        As given where the run has no ledger.
+        As given where the run has no convergence log.
     """
-    ledger = ledger_of(folder)
-    if ledger is None or "pattern_tip_deflection_m" not in table:
+    log = convergence_log_of(folder)
+    if log is None or "pattern_tip_deflection_m" not in table:
         return table
     filled_m = _filled_m(table)
     verdict = verdict_of(folder)
     return table.assign(
-        **_by_snapshot(ledger, table["time_s"], reach_m),
+        **_by_snapshot(log, table["time_s"], reach_m),
         pattern_tip_filled_m=filled_m,
         pattern_tip_recovered_m=filled_m - table["pattern_tip_deflection_m"],
-        pattern_outside_fraction=_outside_fraction(ledger, folder),
+        pattern_outside_fraction=_outside_fraction(log, folder),
         pattern_loop="untouched" if verdict is None else verdict.state,
     )
 
 
-def ledger_of(folder: Path) -> pd.DataFrame | None:
-    """The ledger of a run; None where it has none."""
+def convergence_log_of(folder: Path) -> pd.DataFrame | None:
+    """The convergence log of a run; None where it has none."""
     path = folder / CONVERGENCE_LOG
-    ledger = read_convergence_log(path) if path.is_file() else None
-    return None if ledger is None or ledger.empty else ledger
+    log = read_convergence_log(path) if path.is_file() else None
+    return None if log is None or log.empty else log
 
 
 def verdict_of(folder: Path, until_s: float = np.inf) -> LoopVerdict | None:
     """Judge the loop of a run, or its part up to a time; None where nothing can be told."""
-    ledger, outcome = ledger_of(folder), folder / "outcome.json"
-    if ledger is None:
+    log, outcome = convergence_log_of(folder), folder / "outcome.json"
+    if log is None:
         return None
     stopped = np.isinf(until_s) and outcome.is_file() and (
         RunOutcome.read(outcome).outcome is Outcome.COUPLING_DIVERGED
     )  # fmt: skip
-    return classify_loop(ledger[ledger["time_s"] <= until_s], stopped)
+    return classify_loop(log[log["time_s"] <= until_s], stopped)
 
 
-def _by_snapshot(ledger: pd.DataFrame, time_s: pd.Series[float], reach_m: float) -> dict[str, Any]:
-    """Columns of the ledger over the windows since the snapshot before, or the last known."""
+def _by_snapshot(log: pd.DataFrame, time_s: pd.Series[float], reach_m: float) -> dict[str, Any]:
+    """Columns of the log over the windows since the snapshot before, or the last known."""
     ends_s = time_s.dropna().to_numpy() * (1 + 1e-9)
-    rows = ledger.assign(energy_j=stored_energy_j(ledger))
-    if "residual_m" in ledger:
-        load_n = ledger["load_n"].where(ledger["load_n"] > 0.0)
-        rows["force_left"] = ledger["imbalance_n"] / load_n
-        rows["moment_left"] = ledger["moment_left_n_m"] / load_n
-    by = rows.groupby(np.searchsorted(ends_s, ledger["time_s"]))
+    rows = log.assign(energy_j=stored_energy_j(log))
+    if "residual_m" in log:
+        load_n = log["load_n"].where(log["load_n"] > 0.0)
+        rows["force_left"] = log["imbalance_n"] / load_n
+        rows["moment_left"] = log["moment_left_n_m"] / load_n
+    by = rows.groupby(np.searchsorted(ends_s, log["time_s"]))
     columns = {"pattern_work_j": by["work_j"].last(), "pattern_energy_j": by["energy_j"].mean()}
     columns["pattern_stored_fraction"] = columns["pattern_energy_j"] / columns["pattern_work_j"]
-    if "residual_m" in ledger:
+    if "residual_m" in log:
         columns |= {
             "pattern_residual_fraction": by["residual_m"].sum() / by["displacement_m"].sum(),
             "pattern_force_left_fraction": by["force_left"].max(),
@@ -168,9 +168,9 @@ def _filled_m(table: pd.DataFrame) -> float:
     return float(deflections_m.iloc[0]) if len(deflections_m) else np.nan
 
 
-def _outside_fraction(ledger: pd.DataFrame, folder: Path) -> float:
+def _outside_fraction(log: pd.DataFrame, folder: Path) -> float:
     """Share of the wall time that went into the pattern's own part."""
     path = folder / "cost.tsv"
-    if "solve_s" not in ledger or not path.is_file():
+    if "solve_s" not in log or not path.is_file():
         return np.nan
-    return float(ledger["solve_s"].sum() / pd.read_csv(path, sep="\t")["wall_s"].iloc[-1])
+    return float(log["solve_s"].sum() / pd.read_csv(path, sep="\t")["wall_s"].iloc[-1])

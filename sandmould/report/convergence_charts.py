@@ -1,4 +1,4 @@
-"""Charts of the ledger of one coupled run: residual, work and energy, factor and its limit."""
+"""Charts of the convergence log of a coupled run: residual, work, energy, factor, its limit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _POINTS = 400
 
 
 @dataclass(frozen=True)
-class LedgerChart:
+class ConvergenceChart:
     """A chart and what it shows."""
 
     chart: Chart
@@ -30,18 +30,18 @@ class _Curve:
     style: LineStyle = "run"
 
 
-def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, ...]:
-    """Draw the ledger of a run of any scheme.
+def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceChart, ...]:
+    """Draw the convergence log of a run of any scheme.
 
     Parameters
     ----------
-    ledger : DataFrame
+    log : DataFrame
     begins_s : float, s
         When vibration begins: zero of the charts.
     """
-    shown = _averaged(ledger)
-    shown[TIME_S] -= begins_s
-    found = [
+    windows = _averaged(log)
+    windows[TIME_S] -= begins_s
+    panels = [
         (
             "displacement, mm",
             (_Curve("displacement_m", "shown", 1e3, "mean"), _Curve("residual_m", "residual", 1e3)),
@@ -61,9 +61,9 @@ def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, .
             "energy above the work came from the loop itself.",
         ),
     ]
-    if "factor" in shown:
-        shown["limit"] = 2.0 / (1.0 + shown["gain"])
-        found.append(
+    if "factor" in windows:
+        windows["limit"] = 2.0 / (1.0 + windows["gain"])
+        panels.append(
             (
                 "share of the residual",
                 (_Curve("factor", "gone"), _Curve("limit", "limit")),
@@ -72,25 +72,25 @@ def ledger_charts(ledger: pd.DataFrame, begins_s: float) -> tuple[LedgerChart, .
             )
         )
     return tuple(
-        LedgerChart(chart, caption)
-        for title, curves, caption in found
-        if (chart := _chart(shown, title, curves)) is not None
+        ConvergenceChart(chart, caption)
+        for title, curves, caption in panels
+        if (chart := _chart(windows, title, curves)) is not None
     )
 
 
-def _averaged(ledger: pd.DataFrame) -> pd.DataFrame:
+def _averaged(log: pd.DataFrame) -> pd.DataFrame:
     """Means over so many windows that few points are left."""
-    together = -(-len(ledger) // _POINTS)
-    return ledger.groupby(np.arange(len(ledger)) // together).mean()
+    together = -(-len(log) // _POINTS)
+    return log.groupby(np.arange(len(log)) // together).mean()
 
 
-def _chart(shown: pd.DataFrame, title: str, curves: tuple[_Curve, ...]) -> Chart | None:
-    there = [c for c in curves if c.column in shown and shown[c.column].notna().any()]
+def _chart(windows: pd.DataFrame, title: str, curves: tuple[_Curve, ...]) -> Chart | None:
+    there = [c for c in curves if c.column in windows and windows[c.column].notna().any()]
     if not there:
         return None
     lines = tuple(
         Line(
-            np.column_stack([shown[TIME_S], curve.factor * shown[curve.column]]),
+            np.column_stack([windows[TIME_S], curve.factor * windows[curve.column]]),
             tint,
             curve.style,
             label=curve.label,
