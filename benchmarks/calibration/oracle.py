@@ -96,9 +96,7 @@ def read_map(path: Path, measure: str = ANGLE) -> Map:
     try:
         table = pd.read_csv(path, sep="\t")
     except FileNotFoundError:
-        raise NoMapError(
-            f"{path} is not there: make study STUDY=config/studies/{STUDY}.yaml computes one"
-        ) from None
+        raise NoMapError(f"{path} is not there: sandmould run {STUDY} computes one") from None
     except (ValueError, OSError) as error:
         raise NoMapError(f"{path} cannot be read as a table: {error}") from None
     lacking = [name for name in (*KEYS, measure, "outcome_code") if name not in table]

@@ -134,7 +134,7 @@ def test_the_map_is_read_with_its_noise(summary: Path) -> None:
 
 
 def test_a_map_that_cannot_be_used_is_told_in_a_sentence(summary: Path, tmp_path: Path) -> None:
-    with pytest.raises(NoMapError, match="is not there: make study STUDY=config/studies/repose"):
+    with pytest.raises(NoMapError, match="is not there: sandmould run repose_map"):
         read_map(tmp_path / "none.tsv")
     table = pd.read_csv(summary, sep="\t")
     bad = tmp_path / "bad.tsv"
