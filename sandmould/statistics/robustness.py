@@ -10,9 +10,10 @@ from typing import Literal
 import pandas as pd
 from scipy import stats
 
-from sandmould.runs.columns import CONTROL, PART, RUN, SWEEP, finished
+from sandmould.runs.columns import PART, RUN, SWEEP, finished
 from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective
+from sandmould.statistics.control_case import ControlCase
 from sandmould.statistics.settings import CONFIDENCE
 from sandmould.statistics.verdict import finished_values
 
@@ -26,28 +27,6 @@ SHARE = 0.05
 MUST_HOLD = ("hold", "stiffness", "time_step", "engine")
 """Controls that move nothing where the optimum belongs to the sand."""
 _SPECTRUM = "spectrum"
-
-
-@dataclass(frozen=True)
-class ControlCase:
-    """One case of a control: what is changed, and to what."""
-
-    control: str
-    value: str
-    """In words."""
-    factor: float | None
-    """What the property is multiplied by; None where a control does not multiply."""
-
-    @property
-    def part(self) -> str:
-        """What it is called in ``runs.tsv``."""
-        return f"{CONTROL}{self.control} {self.value}"
-
-    @property
-    def name(self) -> str:
-        """As sentences name it."""
-        what = self.control.replace("_", " ")
-        return f"{self.value} held" if self.control == "hold" else f"{what} {self.value}"
 
 
 @dataclass(frozen=True)

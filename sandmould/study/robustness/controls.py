@@ -12,7 +12,7 @@ from sandmould.scenario.box import Tube
 from sandmould.scenario.contact import Contact
 from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.statistics.robustness import ControlCase
+from sandmould.statistics.control_case import ControlCase
 from sandmould.study.robustness.config import RobustnessChecks
 
 SHAKEN_HZ = tuple(float(f"{f:.3g}") for f in np.geomspace(12.0, 400.0, 16))
