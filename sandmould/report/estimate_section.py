@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sandmould.engines.snapshot import Snapshot
 from sandmould.report.figure_files import pictures, strip
-from sandmould.report.repose_figures import draw_heap, draw_map, draw_posterior, plotted
+from sandmould.report.heaps import Heap
+from sandmould.report.kinds.registry import heaps_of
+from sandmould.report.repose_figures import draw_map, draw_posterior, plotted
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin
-from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
 from sandmould.statistics.settings import Setting
@@ -25,18 +25,6 @@ from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.kinds.sand.moments import list_moments
-
-PICTURED_HEAPS = 3
-
-
-@dataclass(frozen=True)
-class Heap:
-    """A picture of the sand at rest with the fitted lines."""
-
-    heading: str
-    picture: str
-    alt: str
 
 
 @dataclass(frozen=True)
@@ -94,7 +82,7 @@ def estimate_pages(
         title="Angle of repose" if verdict.measure == "heap_angle_deg" else what.capitalize(),
         sentences=tuple(sentences) or (f"No run has a {what} that could be measured.",),
         sound=bool(settings) and all(sand.posterior for sand in sands),
-        heaps=_heaps(study_folder, summary, verdict, scenario),
+        heaps=heaps_of(study_folder, summary, verdict, scenario),
         map=_map_table(settings, (keys[0], keys[1])) if is_map and settings else None,
         map_picture=_map_picture(summary, keys, verdict.measure, calibrated) if is_map else "",
         sands=sands,
@@ -158,27 +146,6 @@ def _touching(summary: pd.DataFrame) -> list[str]:
         f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and "
         f"so has no angle of repose: {listed(names)}. Widen the box or fill in less sand."
     ]
-
-
-def _heaps(
-    study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: AnyScenario
-) -> tuple[Heap, ...]:
-    """Runs with the least, the middle and the steepest slope."""
-    if not isinstance(scenario, Scenario) or scenario.gate is None or not scenario.gate.is_level:
-        return ()
-    values = finished_values(summary, verdict.measure).dropna().sort_values()
-    places = np.unique(np.linspace(0, len(values) - 1, PICTURED_HEAPS).round().astype(int))
-    heaps = []
-    for index in [values.index[i] for i in places] if len(values) else []:
-        run = str(summary.loc[index, RUN])
-        moments = list_moments(study_folder / "runs" / run)
-        if not moments:
-            continue
-        sand = Snapshot.load(moments[-1].path)
-        heading = f"{number(values[index])}°: {run}"
-        picture = draw_heap(sand, scenario, 1.02 * scenario.scene.top_m)
-        heaps.append(Heap(heading, picture, f"Heap and hopper of run {run} with fitted lines"))
-    return tuple(heaps)
 
 
 def _map_table(settings: Sequence[Setting], keys: tuple[str, str]) -> Table:

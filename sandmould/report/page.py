@@ -15,14 +15,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from sandmould import ROOT
 from sandmould.report.agreement import agreement_pages
 from sandmould.report.animation import BUDGET_BYTES
-from sandmould.report.by_kind import drives_of, kind_pages, notes_of
 from sandmould.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.report.curves import objective_charts
 from sandmould.report.estimate_section import estimate_figures, estimate_pages
 from sandmould.report.figure_files import numbered, write_figures
+from sandmould.report.kinds.registry import drives_of, kind_pages, notes_of, robustness_of
 from sandmould.report.method import Row, provenance_rows, statistics_method
 from sandmould.report.optimum import optimum_pages, with_surface
-from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import pictured_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
@@ -30,7 +29,6 @@ from sandmould.runs.columns import RUN
 from sandmould.runs.files import replaced
 from sandmould.runs.formatting import name_of, number, setting_text
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
@@ -146,9 +144,7 @@ def _render(
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
     estimate = estimate_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
-    robustness = None
-    if isinstance(page.scenario, Scenario):
-        robustness = robustness_pages(page.study_folder, page.study, page.collected, page.scenario)
+    robustness = robustness_of(page.study_folder, page.study, page.collected, page.scenario)
     optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, robustness)
     drawn, drawn_verdict = drawn_part(of_sweep, verdict)
     charts = objective_charts(drawn.summary, drawn_verdict, keys)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from sandmould.report.chart import Chart
 from sandmould.report.curves import best_passage, time_chart
+from sandmould.report.figure_files import numbered
 from sandmould.report.thinning import drawn_part
 from sandmould.runs.formatting import display_scale, name_of, number
 from sandmould.statistics.verdict import Verdict
@@ -46,6 +47,11 @@ def measure_curves(
         if chart is not None:
             curves.append(Curve(chart, measure, conclude(collected, verdict, measure)))
     return tuple(curves)
+
+
+def curve_figures(curves: Iterable[Curve]) -> dict[str, Chart]:
+    """Measures over time, as files."""
+    return numbered("curves", (curve.chart for curve in curves))
 
 
 def late_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:

@@ -1,0 +1,38 @@
+"""What the report of a study of a user's deck says and shows of its own."""
+
+from __future__ import annotations
+
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.method import deck_method
+from sandmould.report.time_series import Curve, curve_figures, measure_curves, whole_conclusion
+from sandmould.scenario.own_deck import OwnDeck
+from sandmould.statistics.verdict import Verdict
+from sandmould.study.collect import Collected
+
+
+def _deck_notes(
+    scenario: OwnDeck, collected: Collected, seeks_best: bool, is_controlled: bool
+) -> tuple[str, ...]:
+    return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
+
+
+def _deck_pages(findings: Findings[OwnDeck]) -> KindPages:
+    scenario, collected = findings.scenario, findings.collected
+    curves = _deck_curves(scenario, collected.of_sweep, findings.verdict)
+    return KindPages(
+        "deck.html",
+        deck_method(scenario, collected.keys, collected.summary),
+        "the end of the deck's log",
+        (),
+        {"curves": curves},
+        curve_figures(curves),
+    )
+
+
+def _deck_curves(scenario: OwnDeck, collected: Collected, verdict: Verdict) -> tuple[Curve, ...]:
+    """The objective first, then the other measures."""
+    measures = dict.fromkeys([verdict.measure, *scenario.measures])
+    return measure_curves(collected, verdict, list(measures), whole_conclusion)
+
+
+DECK_REPORT = KindReport(_deck_notes, _deck_pages)

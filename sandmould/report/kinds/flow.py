@@ -1,0 +1,43 @@
+"""What the report of a study of flow says and shows of its own."""
+
+from __future__ import annotations
+
+from sandmould.report.figure_files import pictures
+from sandmould.report.flow import flow_method, flow_pages
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.study.collect import Collected
+
+
+def _flow_notes(
+    scenario: MetalFlow, collected: Collected, seeks_best: bool, is_controlled: bool
+) -> tuple[str, ...]:
+    """What the paper leaves open."""
+    gradient = (
+        "The gradient as printed, eq. (3), points the wrong way and makes every run fail; the "
+        f"gradient used here, {scenario.gradient}, is a choice."
+    )
+    if isinstance(scenario.case, StillTank):
+        return (gradient,)
+    return (
+        gradient,
+        "The paper gives neither the particle size in space nor the speed of the stream.",
+    )
+
+
+def _flow_pages(findings: Findings[MetalFlow]) -> KindPages:
+    scenario, of_sweep = findings.scenario, findings.collected.of_sweep
+    pages = flow_pages(
+        findings.study_folder, scenario, of_sweep, findings.verdict, findings.film_budget_bytes
+    )
+    return KindPages(
+        "flow.html",
+        flow_method(scenario, findings.collected.keys),
+        "the end of the run",
+        (),
+        {"pages": pages},
+        pictures(stability_map=pages.map, histories=pages.histories, fields=pages.fields),
+    )
+
+
+FLOW_REPORT = KindReport(_flow_notes, _flow_pages)

@@ -1,0 +1,92 @@
+"""What the report of a study of sand says and shows of its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from sandmould.report.chart import Chart
+from sandmould.report.figure_files import pictures, strip
+from sandmould.report.filling import FillingPages, filling_pages
+from sandmould.report.heaps import steepest_heaps
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.method import sand_method
+from sandmould.report.robustness import robustness_pages
+from sandmould.report.sand import SandPages, sand_pages
+from sandmould.report.time_series import curve_figures
+from sandmould.runs.columns import LARGEST_OVERLAP_FRACTION
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.verdict import sand_notes
+from sandmould.study.collect import Collected
+
+if TYPE_CHECKING:
+    from sandmould.report.bending import BendingPages
+
+
+def _sand_notes(
+    scenario: Scenario, collected: Collected, seeks_best: bool, is_controlled: bool
+) -> tuple[str, ...]:
+    stage = scenario.vibration[0] if scenario.vibration else None
+    deepest = _deepest_overlap_fraction(collected.summary)
+    return sand_notes(collected.keys, stage, deepest, seeks_best, is_controlled)
+
+
+def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
+    column = LARGEST_OVERLAP_FRACTION
+    deepest = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
+    return float(deepest) if deepest > 0 else 0.0
+
+
+def _sand_pages(findings: Findings[Scenario]) -> KindPages:
+    folder, study, scenario = findings.study_folder, findings.study, findings.scenario
+    collected, verdict = findings.collected, findings.verdict
+    of_sweep = collected.of_sweep
+    filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
+    pages = sand_pages(folder, scenario, of_sweep, verdict, findings.film_budget_bytes)
+    bending = None
+    if scenario.pattern is not None:
+        from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
+
+        bending = bending_pages(
+            folder, findings.href, scenario, of_sweep, verdict, pages.pictured_run
+        )
+    return KindPages(
+        "sand.html",
+        sand_method(scenario, collected.keys, collected.summary),
+        "the end of vibration" if scenario.vibration else "the end",
+        filling.advice if filling else (),
+        {
+            "pages": pages,
+            "bending": bending,
+            "dimension": scenario.dimension,
+            "vibrates": bool(scenario.vibration),
+            "filling": filling,
+        },
+        _sand_figures(pages, filling, bending),
+    )
+
+
+def _sand_figures(
+    pages: SandPages, filling: FillingPages | None, bending: BendingPages | None
+) -> dict[str, Chart | bytes]:
+    """The sand at its moments, the pattern, filling over what is swept, and over time."""
+    files: dict[str, Chart | bytes] = {}
+    if pages.panels:
+        files["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
+    if filling and filling.chart:
+        files["filling"] = filling.chart
+    if bending:
+        files |= pictures(pattern=bending.outlines)
+    if bending and bending.deflection:
+        files["deflection"] = bending.deflection
+    return files | curve_figures(pages.tubes)
+
+
+SAND_REPORT = KindReport(
+    _sand_notes,
+    _sand_pages,
+    shows_drives=True,
+    robustness=robustness_pages,
+    heaps=steepest_heaps,
+)
