@@ -43,6 +43,16 @@ class Law(NamedTuple):
     torsion: bool
     """Whether rolling resistance also resists spin about the normal in 3D, as (31) reads."""
 
+    @property
+    def springs_n_m(self) -> tuple[float, float, float]:
+        """Normal, tangential and rolling stiffness of a contact that sticks, N/m.
+
+        0 where the law has no such spring.
+        """
+        k_t = self.k_t if self.friction > 0.0 else 0.0
+        k_roll = self.k_roll if self.rolling_arm > 0.0 else 0.0
+        return self.k_n, k_t, k_roll
+
 
 class PairCoefficients(NamedTuple):
     """What the law makes of the sizes of two bodies in contact, or of a grain at a surface."""

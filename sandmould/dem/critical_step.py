@@ -128,16 +128,15 @@ def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
     tangents = _tangents(n)
     turns = np.ones((c, 1, 1)) if d == 2 else np.cross(n[:, None], tangents)
     rolls = np.ones((c, 1, 1)) if d == 2 else np.concatenate([n[:, None], tangents], axis=1)
-    k_t = law.k_t if law.friction > 0.0 else 0.0
-    k_roll = law.k_roll * ends.effective**2 if law.rolling_arm > 0.0 else np.zeros(c)
-    roll = np.sqrt(k_roll)[:, None, None] * rolls
+    k_n, k_t, k_roll = law.springs_n_m
+    roll = np.sqrt(k_roll * ends.effective**2)[:, None, None] * rolls
     if d == 3 and not law.torsion:
         roll[:, 0] = 0.0
 
     def rows_of_side(side: int, grain: Ints) -> Floats:
         sign = 2.0 * side - 1.0
         moving = np.zeros((c, 3 * d - 3, d + rolls.shape[2]))
-        moving[:, 0, :d] = sign * math.sqrt(law.k_n) * n
+        moving[:, 0, :d] = sign * math.sqrt(k_n) * n
         moving[:, 1:d, :d] = sign * math.sqrt(k_t) * tangents
         moving[:, 1:d, d:] = -math.sqrt(k_t) * ends.arms[:, side, None, None] * turns
         moving[:, d:, d:] = sign * roll
@@ -145,9 +144,9 @@ def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
         moving[:, :, d:] /= np.sqrt(grains.inertia[grain])[:, None, None]
         return np.where((grain < 0)[:, None, None], 0.0, moving)
 
-    damping = 2.0 * law.damping_ratio * np.sqrt(ends.mass * law.k_n)
+    damping = 2.0 * law.damping_ratio * np.sqrt(ends.mass * k_n)
     rows = rows_of_side(0, ends.first), rows_of_side(1, ends.second)
-    return ActiveContacts(ends.first, ends.second, *rows, damping / law.k_n, len(grains.id))
+    return ActiveContacts(ends.first, ends.second, *rows, damping / k_n, len(grains.id))
 
 
 def active_contacts(solver: Solver) -> ActiveContacts:

@@ -59,7 +59,7 @@ class Bridge(NamedTuple):
     names: IntLine
     """(6,) int64: addresses of the names in ``GRAIN_ARRAYS``."""
     law: Line
-    """(8,) float64: the fields of ``Law``."""
+    """(f,) float64: the f fields of ``Law``."""
     constants: Line
     """(4,) float64: the fields of ``Constants``."""
     direction: Rows

@@ -106,7 +106,7 @@ def pair_tables(
         ),
         table("friction", "coefficientFriction", "-", "Coulomb mu", **constant("friction")),
     ]  # fmt: skip
-    if rolls(contact):
+    if rolling_model(contact) is not None:
         tables.append(
             table(
                 "rolling", "coefficientRollingFriction", "-",
@@ -118,9 +118,21 @@ def pair_tables(
     return tables
 
 
-def rolls(contact: Contact) -> bool:
-    """Whether any contact has a rolling moment."""
-    return contact.grain_grain.rolling_arm_fraction + contact.grain_wall.rolling_arm_fraction > 0
+@dataclass(frozen=True)
+class RollingModel:
+    """How LIGGGHTS says the rolling moment."""
+
+    name: str
+    """After ``rolling_friction``."""
+    twists: bool
+    """Whether twist about the normal is resisted too, its switch ``torsionTorque``."""
+
+
+def rolling_model(contact: Contact) -> RollingModel | None:
+    """Give the rolling model of all contacts; None where no contact has a rolling moment."""
+    if contact.grain_grain.rolling_arm_fraction + contact.grain_wall.rolling_arm_fraction > 0:
+        return RollingModel("epsd2", contact.rolling_axes == "all")
+    return None
 
 
 def refuse_law(contact: Contact) -> None:

@@ -13,7 +13,7 @@ from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines, simulation_box
 from sandmould.engines.liggghts import OLDEST_VERSION
-from sandmould.engines.liggghts.contact_model import pair_tables, rolls
+from sandmould.engines.liggghts.contact_model import pair_tables, rolling_model
 from sandmould.engines.liggghts.mesh_files import (
     largest_motion_m,
     surface_triangles,
@@ -86,7 +86,7 @@ def render_deck(
         "tables": pair_tables(
             scenario.contact, context["classes"], lines, scenario.discharge is not None
         ),
-        "rolls": rolls(scenario.contact),
+        "rolling_model": rolling_model(scenario.contact),
         "simulation_box": bounds_m(program),
         "surfaces": list(surface_meshes(program)),
         "wall_names": [wall.name for wall in scenario.scene.walls],
