@@ -38,7 +38,7 @@ class JsonlPipe:
 
         Raises
         ------
-        StopAskedError
+        StopRequestedError
         """
         self.say({"ask": [float(x) for x in point]})
         answer = json.loads(sys.stdin.readline() or '{"stop": true}')

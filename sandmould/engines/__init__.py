@@ -1,1 +1,1 @@
-"""One interface, several engines: sessions, outcomes, snapshots and the driver of a run."""
+"""One interface, several engines: decks, sessions, snapshots and the driver of a run."""

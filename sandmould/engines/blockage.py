@@ -33,7 +33,7 @@ def what_blocks(scenario: Scenario, snapshot: Snapshot) -> str:
     below = (centre[-1] - half[-1] - width, centre[-1] - half[-1])
     if _sand(scenario, snapshot, centre, 0.8 * half, above) < stuck:
         return ""
-    largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
+    largest_m = scenario.largest_diameter_m
     if _sand(scenario, snapshot, centre, 0.8 * half, below) >= stuck:
         return "the heap has grown up to the outlet: raise the hopper or fill in less sand"
     return (

@@ -53,7 +53,7 @@ class Lines:
 
 def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, float]]:
     """Bounds (m) along each axis, with a margin of two largest grains round the moulding box."""
-    margin = 2 * scenario.sand.classes(scenario.dimension)[-1].diameter_m
+    margin = 2 * scenario.largest_diameter_m
     across = [scenario.box.width_m, scenario.box.depth_m][: scenario.dimension - 1]
     bed = predicted_bed_height_m(scenario, list(program.counts))
     column = max(layer.height_m for layer in program.layers)

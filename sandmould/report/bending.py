@@ -78,7 +78,7 @@ def bending_pages(
         Of the run that is shown.
     collected : Collected
     verdict : Verdict
-    shown : str
+    pictured_run : str
         Name of that run.
     """
     verdicts: dict[str, LoopVerdict] = {}

@@ -77,7 +77,7 @@ def solid_pages(
         Of the run that is shown.
     collected : Collected
     verdict : Verdict
-    shown : str
+    pictured_run : str
         Name of that run; the reference where the study names one.
     """
     probes = [f"{probe.name}_k" for probe in scenario.probes]

@@ -96,7 +96,7 @@ def _tube(s: Scenario, tube: Tube, key: str) -> Iterator[Problem]:
         yield Problem(
             f"{key}.axis_height_m", tube.axis_height_m, f"a tube inside the box, {_size(s)}"
         )
-    largest = s.sand.classes(s.dimension)[-1].diameter_m
+    largest = s.largest_diameter_m
     if largest >= tube.diameter_m:
         yield Problem(
             f"{key}.diameter_m",
@@ -172,7 +172,7 @@ def _discharge(s: Scenario) -> Iterator[Problem]:
 def _pouring(s: Scenario) -> Iterator[Problem]:
     if s.dimension == 2 and s.fill.over_y_m is not None:
         yield Problem("fill.over_y_m", list(s.fill.over_y_m), "absent in 2D")
-    largest = s.sand.classes(s.dimension)[-1].diameter_m
+    largest = s.largest_diameter_m
     sizes = (("over_x_m", s.box.width_m, "width_m"), ("over_y_m", s.box.depth_m, "depth_m"))
     for (key, size_m, name), (low, high) in zip(sizes, s.pouring_m, strict=False):
         if not (low >= 0.0 and high <= size_m and high - low >= 3 * largest):
@@ -184,7 +184,7 @@ def _pouring(s: Scenario) -> Iterator[Problem]:
 
 
 def _grains(s: Scenario) -> Iterator[Problem]:
-    largest = s.sand.classes(s.dimension)[-1].diameter_m
+    largest = s.largest_diameter_m
     narrowest = min(s.box.width_m, s.box.depth_m) if s.dimension == 3 else s.box.width_m
     if largest * 3 > narrowest:
         key = "box.width_m" if narrowest == s.box.width_m else "box.depth_m"

@@ -134,6 +134,11 @@ class Scenario(Section):
         return self.scene.without(self.discharge.gate)
 
     @property
+    def largest_diameter_m(self) -> float:
+        """Diameter of the grains of the largest class."""
+        return self.sand.classes(self.dimension)[-1].diameter_m
+
+    @property
     def gate(self) -> Plate | None:
         """The plate that the discharge takes away."""
         plates = (o for o in self.obstacles if isinstance(o, Plate))

@@ -1,1 +1,1 @@
-"""Studies: what is swept, how it becomes runs, and what the runs say together."""
+"""Studies: what is swept, how it becomes runs, and how these are computed."""

@@ -18,7 +18,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.process import _only_one, launch
+from sandmould.study.process import _folder_lock, launch
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import computed, drive, last_snapshot, run_folder
 
@@ -150,7 +150,7 @@ def test_a_second_process_waits_for_the_first_and_takes_its_outcome(tmp_path: Pa
             file.close()
 
         threading.Timer(0.5, finish_and_release).start()
-        with _only_one(folder):
+        with _folder_lock(folder):
             assert RunOutcome.read(folder / "outcome.json").detail == "by the first"
     launch(folder, tmp_path / "log")
     assert RunOutcome.read(folder / "outcome.json").detail == "by the first"

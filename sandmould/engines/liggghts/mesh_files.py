@@ -37,7 +37,7 @@ def surface_triangles(
     """
     low, high = np.array(simulation_box).T
     # A quarter of the margin round the moulding box, and all that the box may move.
-    inset = _largest_diameter_m(scenario) / 2 + largest_motion_m(scenario)
+    inset = scenario.largest_diameter_m / 2 + largest_motion_m(scenario)
     low, high = low + inset, high - inset
     scene, span = scenario.scene, (low[2], high[2])
     surfaces = {wall.name: _wall(wall, low, high) for wall in scene.walls}
@@ -61,10 +61,6 @@ def largest_motion_m(scenario: Scenario) -> float:
     between = scenario.fill.vibration_between_layers
     stages = [*scenario.vibration, *([between] if between else [])]
     return max((stage.amplitude_m for stage in stages), default=0.0)
-
-
-def _largest_diameter_m(scenario: Scenario) -> float:
-    return scenario.sand.classes(scenario.dimension)[-1].diameter_m
 
 
 def _rectangle(corner: Array, first: Array, second: Array) -> Array:

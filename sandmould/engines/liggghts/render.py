@@ -32,7 +32,7 @@ def bounds_m(program: Program) -> list[tuple[float, float]]:
     bounds = simulation_box(scenario, program)
     motion = largest_motion_m(scenario)
     if scenario.dimension == 2:
-        half = 2 * scenario.sand.classes(2)[-1].diameter_m
+        half = 2 * scenario.largest_diameter_m
         bounds.append((-half, half))
     return [(low - motion, high + motion) for low, high in bounds]
 

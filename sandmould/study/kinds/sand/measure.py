@@ -123,7 +123,7 @@ def write_profile(scenario: Scenario, folder: Path, out: Path) -> None:
 
     Slabs are as high as the largest grain; where a slab lies above the bed it holds little.
     """
-    slab_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
+    slab_m = scenario.largest_diameter_m
     edges_m = np.arange(0.0, scenario.box.height_m + slab_m / 2, slab_m)
     moments = list_moments(folder)
     rows = []

@@ -38,7 +38,7 @@ def slopes(scenario: Scenario, snapshot: Snapshot) -> tuple[Slope, Slope]:
     gate = scenario.gate
     assert gate is not None
     axis = np.array(gate.centre_m[:-1])
-    width_m = COLUMN_WIDTH[scenario.dimension] * _largest_m(scenario)
+    width_m = COLUMN_WIDTH[scenario.dimension] * scenario.largest_diameter_m
     pouring = np.array(scenario.pouring_m)
     hopper = free_surface(
         snapshot.position_m,
@@ -63,7 +63,7 @@ def _heap(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, Any]
     """What fell through an outlet, and what stayed round it."""
     heap, stayed = slopes(scenario, snapshot)
     surface = _heap_surface(scenario, gate, snapshot)
-    touched = walls_touched(surface, *_floor(scenario), HEAP_DEPTH * _largest_m(scenario))
+    touched = walls_touched(surface, *_floor(scenario), HEAP_DEPTH * scenario.largest_diameter_m)
     row: dict[str, Any] = {
         "outflow_fraction": _share(snapshot, _fallen(gate, snapshot)),
         "heap_angle_deg": heap.angle_deg,
@@ -86,7 +86,7 @@ def _run_out(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, A
     way = 1.0 if sum(scenario.pouring_m[0]) < 2 * gate.centre_m[0] else -1.0
     far_side = way * gate.centre_m[0] + gate.size_m[0] / 2
     surface = _surface_of(scenario, snapshot, np.ones(len(snapshot.id), dtype=bool))
-    deep = surface.height_m > HEAP_DEPTH * _largest_m(scenario)
+    deep = surface.height_m > HEAP_DEPTH * scenario.largest_diameter_m
     reach = float((way * surface.point_m[deep, 0]).max(initial=far_side)) - far_side
     out = way * snapshot.position_m[:, 0] > far_side
     return {"outflow_fraction": _share(snapshot, out), "run_out_m": reach}
@@ -117,10 +117,6 @@ def _surface_of(
     """Top of some grains over the whole floor."""
     position, radius = snapshot.position_m[chosen], snapshot.radius_m[chosen]
     return free_surface(position, radius, *_floor(scenario), 0.0)
-
-
-def _largest_m(scenario: Scenario) -> float:
-    return scenario.sand.classes(scenario.dimension)[-1].diameter_m
 
 
 def outflow_time_s(table: pd.DataFrame) -> float:
