@@ -22,9 +22,10 @@ from sandmould.report.figures import png
 from sandmould.report.flow_film import SHADES, FlowFilm, make_flow_film
 from sandmould.report.flow_map import condition_text, said_of, stability_map
 from sandmould.report.method import Row
+from sandmould.report.pressure_histories import History, pressure_history
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
-from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN, TIME_S
+from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
 from sandmould.runs.formatting import listed, name_of, number
 from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.statistics.verdict import Verdict
@@ -43,7 +44,7 @@ class FlowPages:
     map: str
     sentences: tuple[str, ...]
     noise: Table
-    histories: str
+    histories: tuple[History, ...]
     fields: str
     pictured_runs: tuple[str, ...]
     """Runs of histories and fields, the calmest first."""
@@ -93,7 +94,9 @@ def flow_pages(
             *_sentences(scenario, ranked, ideal_pa), *_hopping(scenario, ranked, collected.keys)
         ),
         noise=_noise(scenario, ranked, collected.keys),
-        histories=_histories(pictured, ideal_pa),
+        histories=tuple(
+            pressure_history(run.folder, run.label, run.verdict, ideal_pa) for run in pictured
+        ),
         fields=_fields(pictured, max(ideal_pa.values())),
         pictured_runs=tuple(run.run for run in pictured),
         films=tuple(
@@ -224,28 +227,6 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
         rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
     failed = tuple(c == StabilityRating.FAILED.value for c in ranked[CLASSIFICATION])
     return Table(tuple(columns), tuple(rows), failed)
-
-
-def _histories(runs: Sequence[_PicturedRun], ideal_pa: dict[str, float]) -> str:
-    """Pressure at every step, as the paper's figure 5."""
-    if not runs:
-        return ""
-    figure, panels = _grid(len(runs), 2.3)
-    for axes, run in zip(panels, runs, strict=False):
-        table = pd.read_csv(run.folder / "series.tsv", sep="\t")
-        for place, (name, ideal) in enumerate(ideal_pa.items()):
-            colour = f"C{place}"
-            axes.plot(table[TIME_S], table[f"{name}_pa"], lw=0.6, color=colour, label=name)
-            axes.axhline(ideal, color=colour, lw=0.8, ls="--")
-        axes.set_title(f"{run.label}\n{run.verdict}", fontsize=8)
-        highest = 3.0 * max(ideal_pa.values())
-        axes.set_ylim(0.0, min(highest, max(1.05 * axes.get_ylim()[1], 1.0)))
-        axes.tick_params(labelsize=8)
-        axes.set_xlabel("time, s", fontsize=8)
-    figure.supylabel("pressure, Pa", fontsize=9)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center",
-                  ncols=len(ideal_pa), fontsize=8)  # fmt: skip
-    return png(figure)
 
 
 def _fields(runs: Sequence[_PicturedRun], highest_pa: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sandmould.report.figure_files import pictures
+from sandmould.report.figure_files import numbered, pictures
 from sandmould.report.flow import flow_method, flow_pages
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.scenario.flow import MetalFlow, StillTank
@@ -36,7 +36,10 @@ def _flow_pages(findings: Findings[MetalFlow]) -> KindPages:
         "the end of the run",
         (),
         {"pages": pages},
-        pictures(stability_map=pages.map, histories=pages.histories, fields=pages.fields),
+        {
+            **pictures(stability_map=pages.map, fields=pages.fields),
+            **numbered("histories", (history.chart for history in pages.histories)),
+        },
     )
 
 
