@@ -19,6 +19,8 @@ PACKAGE = "sandmould"
 FOLDERS = ("analysis", "pattern_fe", "workflow", "benchmarks")
 """Rooms beside it."""
 CODE = (".py", ".smk")
+OTHERS = "peers"
+"""Folder of programs that run in other tools' environments, as their users write them."""
 CONTRACT = "imports point one way"
 """Name of the import contract between rooms."""
 
@@ -120,7 +122,8 @@ def rooms_at(root: Path, commit: str) -> dict[str, Room]:
 
 
 def _code(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.rglob("*") if path.suffix in CODE)
+    files = (path for path in folder.rglob("*") if path.suffix in CODE)
+    return sorted(path for path in files if OTHERS not in path.relative_to(folder).parts)
 
 
 def _text(path: Path) -> str:

@@ -68,7 +68,8 @@ def test_rooms_imports_and_floors(tree: Path) -> None:
         ("sandmould.engines", "sandmould.dem"): 1,
         ("workflow", "sandmould.cli"): 1,
     }
-    above = ("workflow", "benchmarks")
+    # Programs of other tools are no room of the house.
+    above = ("workflow",)
     siblings = ("analysis", "sandmould.engines")
     assert house.floors == (above, ("sandmould.cli",), siblings, ("sandmould.dem",))
     assert house.upward == []
@@ -106,4 +107,4 @@ def test_page_of_this_house(tmp_path: Path) -> None:
     for change in read_changes():
         assert f"| {change.change} |" in page
     kept = json.loads(architecture.BEFORE.read_text(encoding="utf-8"))
-    assert sum(room["lines"] for room in kept["rooms"]) == 46843
+    assert sum(room["lines"] for room in kept["rooms"]) == 46367
