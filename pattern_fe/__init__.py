@@ -7,7 +7,7 @@ are in N. The vertical axis is the last one.
 
 from pathlib import Path
 
-from sandmould.digest import sources_digest
+from sandmould.digest import code_digest
 
 
 def source_files() -> list[Path]:
@@ -16,5 +16,5 @@ def source_files() -> list[Path]:
 
 
 def source_hash() -> str:
-    """Hash of this room's sources, which results of bent patterns depend on."""
-    return sources_digest(source_files())
+    """Hash of what this room computes, which results of bent patterns depend on."""
+    return code_digest(source_files())

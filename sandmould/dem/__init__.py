@@ -4,13 +4,17 @@ It knows no scenario: ``sandmould.engines.reference`` hands it arrays. The numbe
 its arrays says whether it computes discs (2) or spheres (3); nothing else differs.
 """
 
+from importlib.metadata import version
 from pathlib import Path
 
-import numba
+from sandmould.digest import code_digest
 
-from sandmould.digest import sources_digest
+
+def source_files() -> list[Path]:
+    """Files of this room."""
+    return sorted(Path(__file__).parent.glob("*.py"))
 
 
 def source_hash() -> str:
-    """Hash of this room's sources: what a compiled kernel, and so a result, depends on."""
-    return sources_digest(Path(__file__).parent.glob("*.py"), numba.__version__)
+    """Hash of what this room computes: what a compiled kernel, and so a result, depends on."""
+    return code_digest(source_files(), version("numba"))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol, cast
 
 from sandmould import ROOT
-from sandmould.dem import source_hash
-from sandmould.digest import digest
+from sandmould.digest import code_digest, digest
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
 from sandmould.engines.program import Program, build_program
@@ -18,6 +18,13 @@ from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.scenario import Scenario
+
+_OF_EVERY_ENGINE = (
+    "scenario/placement.py", "engines/program.py", "engines/step_counts.py",
+    "engines/box_motion.py", "engines/staged_session.py", "engines/deck_session.py",
+    "engines/driver.py", "engines/guard.py",
+)  # fmt: skip
+"""Where grains begin, how stages follow each other, when they end, what stops a run."""
 
 
 class EngineModule(Protocol):
@@ -52,8 +59,8 @@ class EngineModule(Protocol):
         """Write ``deck.in`` and ``layers/``; the deck last."""
 
     @staticmethod
-    def uses_own_solver(scenario: Scenario) -> bool:
-        """Whether kernels of ``sandmould.dem`` compute some of the forces."""
+    def session_sources(scenario: Scenario) -> list[Path]:
+        """Files of ours that compute beside what the deck commands: its session, our kernels."""
 
     @staticmethod
     def open_session(
@@ -127,28 +134,33 @@ def mpi_ranks(scenario: Scenario) -> int:
 
 
 def deck_hash(scenario: Scenario) -> str:
-    """Hash of all that turns a scenario into a deck, and of our solver where it takes part."""
-    ours = source_hash() if engine_of(scenario).uses_own_solver(scenario) else ""
-    return ours + dialect_hash(scenario.engine.name)
+    """Hash of all that turns a scenario into a deck, and of our code that computes beside it."""
+    return _code_hash(scenario) + dialect_hash(scenario.engine.name)
 
 
 def deck_sources(scenario: Scenario) -> list[Path]:
     """Files of the repository that ``deck_hash`` is made from."""
-    files = [*(ROOT / "templates" / scenario.engine.name).glob("*.j2")]
-    if engine_of(scenario).uses_own_solver(scenario):
-        files += (ROOT / "sandmould" / "dem").glob("*.py")
-    return sorted(files)
+    templates = (ROOT / "templates" / scenario.engine.name).glob("*.j2")
+    return sorted([*templates, *_code_files(scenario)])
 
 
 def computed_hash(scenario: Scenario) -> str:
-    """Hash of what the engine is told to compute, and of our solver where it takes part.
+    """Hash of what the engine is told to compute, and of our code that computes beside it.
 
     Other templates, comments or keys that leave a deck's commands alone do not change it.
     """
-    engine = engine_of(scenario)
-    deck = engine.render_deck(build_program(scenario), {}, "run", "study")
-    ours = source_hash() if engine.uses_own_solver(scenario) else ""
-    return digest(deck.commands, ours)
+    deck = engine_of(scenario).render_deck(build_program(scenario), {}, "run", "study")
+    return digest(deck.commands, _code_hash(scenario))
+
+
+def _code_hash(scenario: Scenario) -> str:
+    return code_digest(_code_files(scenario), version("numba"))
+
+
+def _code_files(scenario: Scenario) -> list[Path]:
+    """Files that decide what is computed on any engine, and those of the scenario's engine."""
+    return [*(ROOT / "sandmould" / name for name in _OF_EVERY_ENGINE),
+            *engine_of(scenario).session_sources(scenario)]  # fmt: skip
 
 
 def engine_problem(scenario: Scenario) -> Problem | None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from sandmould import ROOT
 from sandmould.arrays import Flags
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.elements import Elements
@@ -21,7 +23,7 @@ from sandmould.casting.arpm.solidification import (
     UnstableError,
     solidify,
 )
-from sandmould.digest import sources_digest
+from sandmould.digest import code_digest
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -49,13 +51,17 @@ class ElementCost(Cost):
 
 
 def source_files() -> list[Path]:
-    """Files of the solver."""
-    return sorted(Path(__file__).parent.glob("*.py"))
+    """Files of the solver, and those of the scenario that compute for it."""
+    shared = (
+        ROOT / "sandmould" / "scenario" / name
+        for name in ("casting_shapes.py", "outline.py", "solidification.py")
+    )
+    return sorted([*Path(__file__).parent.glob("*.py"), *shared])
 
 
 def source_hash() -> str:
     """State of the solver, which stands in place of a version."""
-    return sources_digest(source_files())
+    return code_digest(source_files(), version("numba"))
 
 
 def computed_hash(scenario: Solidification) -> str:

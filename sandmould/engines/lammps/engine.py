@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import metadata
 from pathlib import Path
 
+from sandmould.dem import source_files
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
@@ -47,9 +48,14 @@ def installation_problem() -> str | None:
     return None
 
 
-def uses_own_solver(scenario: Scenario) -> bool:
-    """LAMMPS is given the forces of surfaces and damping that it lacks."""
-    return needs_callback(scenario)
+def session_sources(scenario: Scenario) -> list[Path]:
+    """The session, and our solver where LAMMPS is given forces of surfaces and damping by it."""
+    here = Path(__file__).parent
+    session = [here / "session.py", here / "wall_loads.py"]
+    if not needs_callback(scenario):
+        return session
+    callback = [here / name for name in ("bridge.py", "callback.py", "surface_kernel.py")]
+    return [*source_files(), *session, *callback, here.parent / "solid_surfaces.py"]
 
 
 def open_session(

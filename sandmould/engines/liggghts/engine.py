@@ -47,9 +47,11 @@ def _numbers(version: str) -> list[int]:
     return [int(part) for part in version.split(".")]
 
 
-def uses_own_solver(scenario: Scenario) -> bool:
-    """LIGGGHTS computes all forces itself."""
-    return False
+def session_sources(scenario: Scenario) -> list[Path]:
+    """The session and the files that pass between it and the engine."""
+    names = ("session.py", "process.py", "grains_file.py", "mesh_files.py", "bending_mesh.py",
+             "vtk_stress.py")  # fmt: skip
+    return [Path(__file__).with_name(name) for name in names]
 
 
 def open_session(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from sandmould.dem import source_hash
+from sandmould.dem import source_files, source_hash
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
@@ -45,9 +45,11 @@ def refuse(scenario: Scenario) -> None:
     """Refuse nothing: every term of the paper is there."""
 
 
-def uses_own_solver(scenario: Scenario) -> bool:
-    """All forces are its own."""
-    return True
+def session_sources(scenario: Scenario) -> list[Path]:
+    """The solver, and how it is given a scene."""
+    here = Path(__file__).parent
+    session = [here / name for name in ("model.py", "moved_solver.py", "session.py")]
+    return [*source_files(), *session, here.parent / "solid_surfaces.py"]
 
 
 def render_deck(program: Program, sources: Mapping[str, str], run: str, study: str) -> Deck:

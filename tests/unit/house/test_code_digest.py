@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from sandmould import ROOT
+import pattern_fe
+from sandmould import ROOT, dem
+from sandmould.casting.arpm import computation as arpm
+from sandmould.casting.mps import computation as mps
 from sandmould.digest import code_digest
+from sandmould.engines.registry import deck_sources
+from tests.scenes import tube_scene
 
 SOURCE = '''"""A law."""
 
@@ -125,6 +132,41 @@ def test_versions_and_every_file_count(tmp_path: Path) -> None:
     states = {state, code_digest([law], "0.61"), code_digest([law, other])}
     assert len(states) == 3
     assert code_digest([law, other]) == code_digest([other, law])
+
+
+def test_a_pattern_is_hashed_by_what_its_room_computes() -> None:
+    assert pattern_fe.source_hash() == code_digest((ROOT / "pattern_fe").rglob("*.py"))
+
+
+@pytest.mark.parametrize(
+    ("solver", "files"),
+    [
+        (arpm, ["casting/arpm/local_steps.py", "casting/arpm/material.py", "scenario/outline.py"]),
+        (mps, ["casting/mps/pressure.py", "scenario/flow.py"]),
+        (dem, ["dem/contact_law.py", "dem/solver.py"]),
+    ],
+)
+def test_a_solver_is_hashed_by_all_that_computes_for_it(solver: Any, files: list[str]) -> None:
+    sources = solver.source_files()
+    assert {ROOT / "sandmould" / name for name in files} <= set(sources)
+    assert solver.source_hash() == code_digest(sources, version("numba"))
+
+
+def engine_files(name: str, **changes: Any) -> set[str]:
+    scenario = tube_scene(engine={"name": name}, **changes)
+    ours = (path for path in deck_sources(scenario) if path.suffix == ".py")
+    return {path.relative_to(ROOT / "sandmould").as_posix() for path in ours}
+
+
+def test_a_run_is_hashed_by_the_code_beside_its_deck() -> None:
+    every = {"engines/driver.py", "engines/staged_session.py", "scenario/placement.py"}
+    lammps = engine_files("lammps", background_damping={"form": "none"})
+    isotropic = engine_files("lammps", background_damping={"form": "nonviscous_isotropic"})
+    assert every | {"engines/lammps/session.py"} <= lammps
+    assert "engines/lammps/callback.py" not in lammps
+    assert {"engines/lammps/callback.py", "dem/surface_contacts.py"} <= isotropic
+    assert every | {"engines/reference/moved_solver.py"} <= engine_files("reference")
+    assert every | {"engines/liggghts/process.py"} <= engine_files("liggghts")
 
 
 def test_a_whole_room_is_hashed() -> None:
