@@ -22,7 +22,7 @@ from sandmould.report.figures import png
 from sandmould.report.flow_film import SHADES, FlowFilm, make_flow_film
 from sandmould.report.flow_map import condition_text, said_of, stability_map
 from sandmould.report.method import Row
-from sandmould.report.pressure_histories import History, pressure_history
+from sandmould.report.pressure_histories import PressureHistory, pressure_history
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
@@ -44,7 +44,7 @@ class FlowPages:
     map: str
     sentences: tuple[str, ...]
     noise: Table
-    histories: tuple[History, ...]
+    histories: tuple[PressureHistory, ...]
     fields: str
     pictured_runs: tuple[str, ...]
     """Runs of histories and fields, the calmest first."""

@@ -20,7 +20,7 @@ HIGHEST = 3.0
 
 
 @dataclass(frozen=True)
-class History:
+class PressureHistory:
     """The pressure of one run in time."""
 
     chart: Chart
@@ -30,7 +30,7 @@ class History:
 
 def pressure_history(
     folder: Path, setting: str, rating: str, ideal_pa: Mapping[str, float]
-) -> History:
+) -> PressureHistory:
     """Draw the pressure at each probe of a run, with its hydrostatic value.
 
     Parameters
@@ -53,7 +53,7 @@ def pressure_history(
             Line(level, tint, "joined", title=f"hydrostatic at {name}: {ideal:.0f} Pa"),
         ]
     alt = f"Pressure at {', '.join(ideal_pa)} against time at {setting}: {rating}."
-    return History(Chart("time, s", "pressure, Pa", alt, tuple(lines)), setting, rating)
+    return PressureHistory(Chart("time, s", "pressure, Pa", alt, tuple(lines)), setting, rating)
 
 
 def extremes(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
