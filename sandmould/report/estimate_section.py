@@ -133,7 +133,7 @@ def _value_sentences(settings: Sequence[Setting], measure: str, study: Study) ->
 
 
 def _touching(summary: pd.DataFrame) -> list[str]:
-    """Name runs whose heap leans on a wall: they have no angle of repose."""
+    """Name runs whose heap leans on a wall: neither its slope nor its front is the sand's own."""
     if "heap_touches" not in summary:
         return []
     # An empty cell is read as NaN.
@@ -142,9 +142,10 @@ def _touching(summary: pd.DataFrame) -> list[str]:
         return []
     walls = sorted({str(w) for w in leaning["heap_touches"]})
     names = [str(run) for run in leaning[RUN]]
+    nothing = "no run-out" if "run_out_m" in summary else "no angle of repose"
     return [
-        f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and "
-        f"so has no angle of repose: {listed(names)}. Widen the box or fill in less sand."
+        f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and so "
+        f"has {nothing}: {listed(names)}. Widen the box or fill in less sand."
     ]
 
 
