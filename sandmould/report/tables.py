@@ -33,6 +33,7 @@ from sandmould.runs.formatting import name_of, number, seconds, size, titled, wi
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
+from sandmould.study.collect import CHECKS, CURVES, SUMMARY
 from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE
 
 
@@ -300,8 +301,10 @@ class DataFile:
 _FILES = (
     (STUDY_FILE, "the study as planned"),
     ("runs.tsv", "the plan: every run, its parameters, replicate and seed"),
-    ("summary.tsv", "one row a run: parameters, outcome, final measures, cost"),
-    ("curves.tsv", "one row a snapshot: all measures of all runs against time"),
+    (SUMMARY, "one row a run of the sweep: parameters, outcome, final measures, cost"),
+    (CURVES, "one row a snapshot of the sweep: all measures against time"),
+    (CHECKS[0], "the runs that check the sweep, on another engine or as controls: a row a run"),
+    (CHECKS[1], "the same runs: a row a snapshot"),
     (FIGURES, "main figures as files: charts as SVG, sand as PNG"),
     ("agreement.tsv", "one row a pair of settings and measure that the study compares"),
     ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "

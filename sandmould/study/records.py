@@ -23,6 +23,7 @@ from sandmould.runs.columns import ENGINE, OUTCOME, RUN, VERSION, finished
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
+from sandmould.study.collect import CHECKS, read_summary
 from sandmould.study.definition.run import Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import kind_of
@@ -75,10 +76,10 @@ def record(path: Path, results: Path) -> Path:
     missing = [r for r in runs if not (folder / "runs" / r.run / "outcome.json").exists()]
     if missing or not (folder / "report.html").exists():
         raise SystemExit(f"{folder} is not whole, {len(missing)} runs are missing: run the study.")
-    summary = pd.read_csv(folder / "summary.tsv", sep="\t")
+    summary = read_summary(folder)
     failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
     names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
-    names += [ROUNDS_FILE] if (folder / ROUNDS_FILE).exists() else []
+    names += [name for name in (ROUNDS_FILE, CHECKS[0]) if (folder / name).exists()]
     provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
     record: dict[str, Any] = {
         "study": str(path),
@@ -185,8 +186,7 @@ def _recompute(name: str, study: str, results: Path) -> list[str]:
     snakemake = Path(sys.executable).parent / "snakemake"
     command = [str(snakemake), "--cores", "all", "--configfile", study, "--quiet", "rules"]
     subprocess.run(command, cwd=ROOT, check=True)
-    old = pd.read_csv(RECORDS / name / "summary.tsv", sep="\t")
-    new = pd.read_csv(results / name / "summary.tsv", sep="\t")
+    old, new = read_summary(RECORDS / name), read_summary(results / name)
     return [
         f"{name}: mean {column} is {new[column].mean():.4f}, recorded {old[column].mean():.4f}"
         for column, margin in SAME.items()
