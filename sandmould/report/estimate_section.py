@@ -19,8 +19,9 @@ from sandmould.runs.columns import CPU_S, RUN
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
+from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting
-from sandmould.statistics.verdict import Verdict, finished_values
+from sandmould.statistics.verdict import Verdict
 from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
@@ -176,7 +177,7 @@ def _map_picture(
     summary: pd.DataFrame, keys: Sequence[str], measure: str, calibrated: Calibrated | None
 ) -> str:
     pair, points = (keys[0], keys[1]), summary[list(keys)].to_numpy(dtype=np.float64)
-    values = np.asarray(finished_values(summary, measure), dtype=np.float64)
+    values = np.asarray(usable_values(summary, measure), dtype=np.float64)
     emulator = calibrated.emulators.get(measure) if calibrated else None
     try:
         emulator = emulator or fit_emulator(measure, points, values)
