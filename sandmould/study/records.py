@@ -172,8 +172,8 @@ def recompute_smallest(results: Path) -> list[str]:
         One sentence a difference beyond its margin.
     """
     old = {name for name, why in stale_records() if why == OLD_DEFAULTS}
-    studies = {path.parent.name: json.loads(path.read_text())["study"]
-               for path in RECORDS.glob("*/record.json") if path.parent.name not in old}  # fmt: skip
+    kept = [path for path in RECORDS.glob("*/record.json") if path.parent.name not in old]
+    studies = {path.parent.name: json.loads(path.read_text())["study"] for path in kept}
     cheapest: dict[str, tuple[float, str]] = {}
     for name, study in studies.items():
         runs = runs_in(open_study(ROOT / study), RECORDS / name)
