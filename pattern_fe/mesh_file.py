@@ -58,27 +58,48 @@ def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
         valid = "one kind among triangles, quadrilaterals, tetrahedra and hexahedra"
         raise ValueError(f"mesh file {path.name} has elements {present}, valid is {valid}")
     points = np.asarray(content.points, dtype=np.float64)
+    _check_numbers(path, content, points)
     if not solid and points.shape[1] == 3 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points):
         raise ValueError(
             f"mesh file {path.name} has a surface in space, not closed round a solid; valid are "
             "tetrahedra or hexahedra, or triangles or quadrilaterals in a plane of constant z"
         )
-    mesh = _straight(_with_groups(content), unit_m)
+    try:
+        mesh = _straight(_with_groups(content), unit_m)
+    except (IndexError, KeyError, TypeError) as error:
+        raise ValueError(
+            f"mesh file {path.name} has elements and groups that do not fit together"
+        ) from error
     check_mesh(mesh)
     return with_sides(mesh)
 
 
+def _check_numbers(path: Path, content: meshio.Mesh, points: NDArray[np.float64]) -> None:
+    """Refuse elements between points that are not there, and points that are nowhere."""
+    for block in content.cells:
+        nodes = np.asarray(block.data)
+        if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(points):
+            raise ValueError(
+                f"mesh file {path.name} has elements between points that it does not have; it has "
+                f"{len(points)} points"
+            )
+    if not np.isfinite(points).all():
+        raise ValueError(f"mesh file {path.name} has points that are no finite numbers")
+
+
 def _parsed(path: Path) -> meshio.Mesh:
     printed = io.StringIO()
+    # meshio tries Ansys's format first on this ending, and never ends at some damaged files
+    known = "gmsh" if path.suffix.lower() == ".msh" else None
     try:
         # meshio prints and ends the process at a file that it cannot read; of a text file it takes
         # some bytes for a number of triangles, which may overflow
         hushed = contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed)
         with hushed[0], hushed[1], np.errstate(over="ignore"):
-            return meshio.read(path)
+            return meshio.read(path, file_format=known)
     except (Exception, SystemExit) as error:
         reason = str(error) if isinstance(error, meshio.ReadError | OSError) else "not readable"
-        valid = "a mesh that meshio reads, such as .msh, .vtu or .inp"
+        valid = "a mesh that meshio reads, such as .msh of Gmsh, .vtu or .inp"
         raise ValueError(f"mesh file {path} cannot be read ({reason}), valid is {valid}") from error
 
 

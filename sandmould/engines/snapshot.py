@@ -61,11 +61,11 @@ class Snapshot:
         try:
             with np.load(path, allow_pickle=False) as data:
                 values = {f.name: data[f.name] for f in fields(cls) if f.name in data}
+            for scalar, kind in (("time_s", float), ("vibration_time_s", float), ("stage", str)):
+                values[scalar] = kind(values[scalar])
+            return cls(**values)
         except Exception as error:
             raise ValueError(f"{path}: not a readable snapshot ({error})") from error
-        for scalar, kind in (("time_s", float), ("vibration_time_s", float), ("stage", str)):
-            values[scalar] = kind(values[scalar])
-        return cls(**values)
 
 
 def scene_at(scenario: Scenario, snapshot: Snapshot) -> Scene:

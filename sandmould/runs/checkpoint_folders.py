@@ -82,6 +82,6 @@ def newest_checkpoint(work: Path) -> tuple[tuple[Path, CheckpointMark] | None, l
             if sealed["sha256"] != _digests(folder):
                 raise ValueError("its files do not match their hashes")
             whole.append((folder, CheckpointMark(**sealed["mark"])))
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             damaged.append(f"checkpoint {folder.name} cannot be used: {error}")
     return max(whole, key=lambda item: item[1].steps, default=None), damaged

@@ -21,7 +21,8 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
 def _mapping(loader: Any, node: yaml.MappingNode) -> Tree:
-    keys = [loader.construct_object(k, deep=True) for k, _ in node.value]
+    merge = "tag:yaml.org,2002:merge"
+    keys = [loader.construct_object(k, deep=True) for k, _ in node.value if k.tag != merge]
     for key in keys:
         if not isinstance(key, str):
             fault = f"key {key!r} is no text: put it in quotes"

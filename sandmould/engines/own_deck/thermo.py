@@ -11,7 +11,8 @@ import pandas as pd
 
 STEP = "Step"
 _LOOP = re.compile(
-    r"^Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+) atoms", re.MULTILINE
+    r"^Loop time of (\d+\.?\d*(?:e[-+]?\d+)?) on \d+ procs for (\d+) steps with (\d+) atoms",
+    re.MULTILINE,
 )
 
 

@@ -1,0 +1,153 @@
+"""Readers of foreign files: what each may say no with, and how it is called on one file.
+
+A reader gives back a value or raises one of its refusals, which its callers turn into one sentence.
+Anything else is a finding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sandmould.scenario.bad_input import BadInputError
+
+CORPUS = Path(__file__).with_name("corpus")
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One reader of the project; the folder of ``corpus`` with its name holds files for it."""
+
+    read: Callable[[Path], object]
+    refusals: tuple[type[Exception], ...] = ()
+
+    def seeds(self, name: str) -> list[Path]:
+        """Files that mutations begin from, in a fixed order."""
+        return sorted(path for path in (CORPUS / name).iterdir() if path.is_file())
+
+
+def _study(path: Path) -> object:
+    from sandmould.study.plan.expand import expand
+    from sandmould.study.plan.load_study import open_study
+
+    return expand(open_study(path))
+
+
+def _planned_run(path: Path) -> object:
+    from sandmould.study.plan.plan_files import read_run
+
+    return read_run(path)
+
+
+def _surface(path: Path) -> object:
+    from sandmould.scenario.mesh_file import read_surface
+
+    return read_surface(path)
+
+
+def _picture(path: Path) -> object:
+    from sandmould.scenario.casting_shapes import CastPicture, solid_of
+
+    shape = CastPicture.model_validate(
+        {"kind": "image", "file": str(path), "pixel_m": 1e-3, "low_m": [0.0, 0.0]}
+    )
+    return solid_of(shape, "shapes.0")
+
+
+def _pattern_mesh(path: Path) -> object:
+    from pattern_fe.mesh_file import read_mesh
+
+    return read_mesh(path)
+
+
+def _casting_checkpoint(path: Path) -> object:
+    from sandmould.runs.checkpoint_file import CheckpointFile
+
+    return CheckpointFile(path, "of this run").read()
+
+
+def _checkpoint_mark(path: Path) -> object:
+    from sandmould.runs.checkpoint_folders import newest_checkpoint
+
+    folder = path.parent / "checkpoint_a"
+    folder.mkdir(exist_ok=True)
+    path.replace(folder / "mark.json")
+    return newest_checkpoint(path.parent)
+
+
+def _snapshot(path: Path) -> object:
+    from sandmould.engines.snapshot import Snapshot
+
+    return Snapshot.load(path)
+
+
+def _exchange_pattern(path: Path) -> object:
+    from pattern_fe.coupling.exchange import PATTERN, read_pattern
+
+    path.replace(path.parent / PATTERN)
+    return read_pattern(path.parent)
+
+
+def _exchange_loads(path: Path) -> object:
+    from pattern_fe.coupling.exchange import read_loads
+    from pattern_fe.scene import pattern_of
+    from sandmould.scenario.scenario import Scenario
+    from tests.bent_run import SCENE
+
+    return read_loads(path, pattern_of(Scenario.model_validate(SCENE)).surface.outer)
+
+
+def _grains(path: Path) -> object:
+    from sandmould.engines.liggghts.grains_file import read_grains
+
+    return read_grains(path)
+
+
+def _stress(path: Path) -> object:
+    from sandmould.engines.liggghts.vtk_stress import read_triangle_loads
+
+    return read_triangle_loads(path)
+
+
+def _log(path: Path) -> object:
+    from sandmould.engines.own_deck.thermo import read_thermo
+
+    return read_thermo([path])
+
+
+def _tables(path: Path) -> object:
+    from sandmould.study.collect import gather
+
+    run = path.parent / "runs" / "one"
+    run.mkdir(parents=True, exist_ok=True)
+    (path.parent / "runs.tsv").write_text("run\treplicate\tseed\none\t1\t7\n")
+    path.replace(run / "measures.tsv")
+    return gather(path.parent)
+
+
+READERS: dict[str, Reader] = {
+    "study": Reader(_study, (BadInputError,)),
+    "planned_run": Reader(_planned_run, (BadInputError, OSError)),
+    "surface": Reader(_surface, (ValueError,)),
+    "picture": Reader(_picture, (BadInputError,)),
+    "pattern_mesh": Reader(_pattern_mesh, (ValueError,)),
+    "casting_checkpoint": Reader(_casting_checkpoint),
+    "checkpoint_mark": Reader(_checkpoint_mark),
+    "snapshot": Reader(_snapshot, (ValueError,)),
+    "exchange_pattern": Reader(_exchange_pattern, (ValueError,)),
+    "exchange_loads": Reader(_exchange_loads, (ValueError,)),
+    "grains": Reader(_grains, (ValueError,)),
+    "stress": Reader(_stress, (ValueError,)),
+    "log": Reader(_log),
+    "tables": Reader(_tables, (OSError, ValueError)),
+}
+
+
+def _probe(path: Path) -> object:
+    """Do what a file says: to see whether the watch sees it."""
+    exec(path.read_text(encoding="utf-8"), {"path": path})
+    return None
+
+
+PROBE = Reader(_probe, (ValueError,))
