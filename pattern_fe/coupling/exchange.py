@@ -90,7 +90,7 @@ def read_pattern(folder: Path) -> tuple[Pattern, bool]:
         raise ValueError(
             f"{path} has no key {error}; valid is what the sand's run wrote"
         ) from error
-    except (TypeError, yaml.YAMLError) as error:
+    except (TypeError, RecursionError, yaml.YAMLError) as error:
         raise ValueError(f"{path} is not a list of keys and values") from error
     return Pattern(read_mesh(mesh), supports, foam, order, thickness_m), large
 

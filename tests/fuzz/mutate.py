@@ -19,8 +19,8 @@ ODD_NUMBERS = (
     b"18446744073709551616", b"0x10", b"1_000", b"1e", b"", b"1.5.2", b"\xd9\xa3",
 )  # fmt: skip
 ODD_WORDS = (
-    b"null", b"true", b"[]", b"{}", b"''", b"!!python/object/apply:os.system ['true']", b"&a", b"*a",
-    b"<<: *a", b"- ", b": ", b"\t", b"\x00", b"\r\n", b"../../../../../etc/passwd", b"\xff\xfe",
+    b"null", b"true", b"[]", b"{}", b"''", b"!!python/object/apply:os.system ['true']", b"&a",
+    b"*a", b"<<: *a", b"- ", b": ", b"\t", b"\x00", b"\r\n", b"../../../../../etc/passwd", b"\xff\xfe",
     b"{{ 7*7 }}", b"$(true)", b"<script>", b"%n%s", "\u202e\U0001f4a5".encode(),
 )  # fmt: skip
 ODD_BYTES = (0, 1, 0x7F, 0x80, 0xFF)

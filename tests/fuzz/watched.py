@@ -1,4 +1,4 @@
-"""Run readers in a process that is watched: it may not write elsewhere, hang, or take all memory."""
+"""Readers in a watched process: it may not write elsewhere, hang, or take all memory."""
 
 from __future__ import annotations
 
