@@ -20,8 +20,8 @@ ODD_NUMBERS = (
 )  # fmt: skip
 ODD_WORDS = (
     b"null", b"true", b"[]", b"{}", b"''", b"!!python/object/apply:os.system ['true']", b"&a",
-    b"*a", b"<<: *a", b"- ", b": ", b"\t", b"\x00", b"\r\n", b"../../../../../etc/passwd", b"\xff\xfe",
-    b"{{ 7*7 }}", b"$(true)", b"<script>", b"%n%s", "\u202e\U0001f4a5".encode(),
+    b"*a", b"<<: *a", b"- ", b": ", b"\t", b"\x00", b"\r\n", b"../../../../../etc/passwd",
+    b"\xff\xfe", b"{{ 7*7 }}", b"$(true)", b"<script>", b"%n%s", "\u202e\U0001f4a5".encode(),
 )  # fmt: skip
 ODD_BYTES = (0, 1, 0x7F, 0x80, 0xFF)
 _NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
