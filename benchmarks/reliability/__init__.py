@@ -1,0 +1,1 @@
+"""What becomes of a study when processes are killed and disks fail."""
