@@ -11,6 +11,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
+from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from sandmould import ROOT
 from sandmould.digest import sources_digest
@@ -39,7 +40,7 @@ def environment(dialect: str) -> jinja2.Environment:
 
     Snakemake's own template engine has neither a loader nor this strictness.
     """
-    env = jinja2.Environment(
+    env = ImmutableSandboxedEnvironment(
         loader=jinja2.FileSystemLoader(TEMPLATES / dialect),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
