@@ -18,6 +18,8 @@ from sandmould.digest import sources_digest
 from sandmould.runs.files import write_text
 
 TEMPLATES = ROOT / "templates"
+_LONGEST_REMARK = 200
+"""Characters; LIGGGHTS reads lines of 2048."""
 _BLOCK = re.compile(r"^#--- block: (\w+) ---.*?\n(.*?)^#--- end: \1 ---$", re.M | re.S)
 _RUN = re.compile(r"^run (\d+)\b[^\n]*$", re.M)
 
@@ -32,6 +34,16 @@ def vector(components: Any) -> str:
     """Three numbers for an engine that is always in 3D; a missing one is 0."""
     padded = [*np.asarray(components, dtype=float), 0.0, 0.0][:3]
     return " ".join(exact(c + 0.0) for c in padded)
+
+
+def remark(text: str) -> str:
+    """A text from a file as part of a deck's comment, which it neither ends nor goes on with.
+
+    Line breaks, a ``&`` at the end and triple quotes would do so in LAMMPS and LIGGGHTS.
+    """
+    printable = "".join(c if c.isprintable() else " " for c in text)
+    words = " ".join(printable.replace('"', "'").replace("&", "and").split())
+    return words if len(words) <= _LONGEST_REMARK else f"{words[: _LONGEST_REMARK - 3]}..."
 
 
 @functools.cache
