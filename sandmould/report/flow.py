@@ -146,7 +146,7 @@ def _pictured_runs(
 
 
 def _load(folder: Path) -> dict[str, NDArray[np.float64]]:
-    with np.load(folder / "fields.npz") as archive:
+    with np.load(folder / "fields.npz", allow_pickle=False) as archive:
         return dict(archive)
 
 
