@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from sandmould import ROOT
 from sandmould.runs.formatting import listed
@@ -59,6 +60,29 @@ def check_trust(study: OpenStudy, runs: Sequence[Run]) -> None:
             f"{study.file} (sandmould plan names lines to look at)"
         )
         raise BadInputError([Problem("trust_deck", False, valid, study.file)])
+
+
+def check_places(study: OpenStudy) -> None:
+    """See that no folder's name would be more than a name to a shell or to an engine.
+
+    Snakemake hands a job's command to Slurm in double quotes, where a shell executes ``$(...)``;
+    engines put variables, times and ranks in place of ``$``, ``*`` and ``%``.
+
+    Raises
+    ------
+    BadInputError
+    """
+    places = {"STUDY": study.path.absolute(), "working folder": Path.cwd(), "installation": ROOT}
+    problems = [
+        Problem(key, str(path), f"a path without quotes, {' '.join(_SPECIAL)} and line breaks")
+        for key, path in places.items()
+        if not str(path).isprintable() or set(str(path)) & {*_SPECIAL, "'", '"'}
+    ]
+    if problems:
+        raise BadInputError(problems)
+
+
+_SPECIAL = "$`\\*%"
 
 
 def reading_help(study: OpenStudy, runs: Sequence[Run]) -> str:
