@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import re
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
@@ -11,7 +13,9 @@ from typing import Any
 import pandas as pd
 import pytest
 import yaml
+from PIL import Image
 
+from sandmould.report.figure_files import strip
 from sandmould.report.page import write_report
 from sandmould.runs.columns import RUN
 from sandmould.scenario.bad_input import BadInputError
@@ -139,6 +143,13 @@ def _check_tables(results: Path, plain: Path, runs: list[str]) -> None:
         assert sorted(read[RUN]) == sorted(runs)
         assert list(read) == list(pd.read_csv(plain / table, sep="\t"))
         assert read["values.word"].nunique() == 2
+
+
+def test_a_heading_of_a_picture_is_no_formula() -> None:
+    file = io.BytesIO()
+    Image.new("RGB", (40, 20)).save(file, "png")
+    address = "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
+    assert strip([("mesh $\\frac$ 2", address)]).startswith(b"\x89PNG")
 
 
 PATHS = ("../up", "/etc/up", "a/b", "up.yaml", "a b", "A", "", ".", "a\\n", "\u00e4", "$(up)")
