@@ -65,7 +65,7 @@ def run_study(path: Path, options: Sequence[str]) -> int:
 
 def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> int:
     cores = [] if any(o in ("--cores", "-c", "--jobs", "-j") for o in options) else _all_cores()
-    workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path)]
+    workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path.absolute())]
     command = [sys.executable, "-m", "snakemake", *cores, *workflow, *options]
     return subprocess.run([*command, *(["--", *targets] if targets else [])]).returncode
 

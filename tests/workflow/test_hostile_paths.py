@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
@@ -85,6 +86,24 @@ def test_slurm_is_handed_no_command(tmp_path: Path) -> None:
     )  # fmt: skip
     assert said.returncode == 1
     assert "valid is a path without quotes, $ ` \\ * % and line breaks" in said.stderr
+    assert not (tmp_path / "HIT").exists()
+
+
+def test_names_of_files_and_swept_texts_are_no_wildcards(tmp_path: Path) -> None:
+    name = "p{x}$(touch HIT);`touch HIT`'\"a.in.j2"
+    (tmp_path / name).write_text("# {{ word }}\nunits si\n")
+    study = {
+        "kind": "deck", "trust_deck": True, "scenario": {"template": name, "values": {"word": "a"}},
+        "sweep": {"keys": {"values.word": ["{wildcards.run} {x} $(touch HIT) %s {0}", "b"]}},
+    }  # fmt: skip
+    (tmp_path / "trial.yaml").write_text(yaml.safe_dump(study))
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile")]
+    said = subprocess.run(
+        [*command, "--configfile", "trial.yaml", "--cores", "1", "--dry-run"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert said.returncode == 0, said.stderr[-2000:]
+    assert "render" in said.stdout + said.stderr
     assert not (tmp_path / "HIT").exists()
 
 

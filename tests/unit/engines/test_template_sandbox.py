@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,18 @@ def test_a_template_starts_no_program(tmp_path: Path) -> None:
         with pytest.raises(TemplateError, match=r"line 1: .*(unsafe|undefined)"):
             rendered(text, {"x": "text"})
     assert not proof.exists()
+
+
+def test_the_process_may_do_no_more_than_render() -> None:
+    rendered("{{ a }}", {"a": 1})
+    of_process = Path("/proc") / str(template._process_of(os.getpid())._process.pid)
+    limits = (of_process / "limits").read_text()
+    for name, most in (("open files", 3), ("processes", 0), ("file size", 0)):
+        assert re.search(rf"^Max {name} +{most} +{most} ", limits, re.M)
+    assert re.search(rf"^Max address space +{template.MEMORY_BYTES} ", limits, re.M)
+    environment_names = (of_process / "environ").read_text().split("=")[0]
+    assert environment_names in ("", "LD_LIBRARY_PATH")
+    assert (of_process / "cwd").readlink() == Path("/")
 
 
 def test_what_is_given_is_not_changed() -> None:
