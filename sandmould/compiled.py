@@ -3,12 +3,17 @@
 Numba notices a change in a kernel's own file, not in the files of what it calls. So the folder's
 name is a hash of every source file that kernels can reach, of the versions of numba and llvmlite,
 and of the processor: nodes of a cluster that share a home may differ in what they can run.
+
+What numba keeps there is executed when it is read. So the folder must be one that nobody else can
+write to; without such a folder nothing is kept.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import stat
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -87,7 +92,9 @@ def cache_key(sources: Iterable[bytes], versions: Iterable[str], processor: Iter
 
 def cache_folder() -> Path:
     """Where the machine code of this state of the house lies on this processor."""
-    caches = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    # A relative one would lie in the folder that happens to be worked in; so it counts as none.
+    stated = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    caches = stated if stated.is_absolute() else Path.home() / ".cache"
     key = cache_key(
         kernel_sources(Path(__file__).parents[1]).values(),
         (numba.__version__, llvmlite.__version__),
@@ -96,8 +103,38 @@ def cache_folder() -> Path:
     return caches / "sandmould" / f"kernels-{key}"
 
 
+def is_own(folder: Path) -> bool:
+    """Make a folder and the one that it lies in, and say whether nobody else can write to them.
+
+    Parameters
+    ----------
+    folder : Path
+        One that others can write to is not used again, since it may hold what they have written.
+    """
+    above = folder.parent
+    try:
+        above.mkdir(parents=True, exist_ok=True)
+        if above.stat().st_mode & _BY_OTHERS:
+            above.chmod(stat.S_IRWXU)
+        folder.mkdir(mode=stat.S_IRWXU, exist_ok=True)
+        states = [each.stat() for each in (above, folder)]
+    except OSError:
+        return False
+    return all(s.st_uid == os.getuid() and not s.st_mode & _BY_OTHERS for s in states)
+
+
+_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_FOLDER = cache_folder()
+KEEPS = is_own(_FOLDER)
+"""Whether machine code is kept for the next process."""
+if not KEEPS:
+    print(
+        f"kernels are compiled anew in every process: {_FOLDER} cannot be made, or others can "
+        "write to it; XDG_CACHE_HOME names a folder of your own",
+        file=sys.stderr,
+    )
 # Numba reads it where a function is decorated: nothing else may set it.
-numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]
+numba.config.CACHE_DIR = str(_FOLDER)  # type: ignore[attr-defined]
 # Functions begin lines of the processor's cache, 64 bytes: taken from the disk they lie elsewhere
 # than freshly compiled, and the same instructions were a quarter slower where they began in the
 # middle of a line.
@@ -106,11 +143,11 @@ binding.set_option("sandmould", "-align-all-functions=6")
 
 def njit(**options: Any) -> Callable[[_Function], _Function]:
     """Compile a function for compiled code and for Python; options are those of ``numba.njit``."""
-    compiled: Callable[[_Function], _Function] = numba.njit(cache=True, **options)
+    compiled: Callable[[_Function], _Function] = numba.njit(cache=KEEPS, **options)
     return compiled
 
 
 def cfunc(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function that C code calls by its ``address``; options as ``numba.cfunc``."""
-    compiled: Callable[[Callable[..., Any]], Any] = numba.cfunc(signature, cache=True, **options)
+    compiled: Callable[[Callable[..., Any]], Any] = numba.cfunc(signature, cache=KEEPS, **options)
     return compiled

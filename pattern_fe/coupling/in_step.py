@@ -78,7 +78,7 @@ class InStepSession(DelegatingSession):
         self._load = np.zeros_like(foam.vertices_m)
         log_bytes, rows = None, 0
         if checkpoint is not None:
-            with np.load(checkpoint / CHECKPOINT) as saved:
+            with np.load(checkpoint / CHECKPOINT, allow_pickle=False) as saved:
                 foam.restore({name: saved[name] for name in saved.files})
                 self._load = saved["mean_load"]
                 log_bytes, rows = (int(number) for number in saved["trusted"])

@@ -272,7 +272,7 @@ class CoupledSession(DelegatingSession):
 
     def _take_up(self, folder: Path) -> tuple[int, int]:
         """Read what ``write_checkpoint`` wrote; give the trusted parts of the tables."""
-        with np.load(folder / CHECKPOINT) as saved:
+        with np.load(folder / CHECKPOINT, allow_pickle=False) as saved:
             self._interface, self._next, self._load = saved["shown"], saved["next"], saved["load"]
             self._solved = saved["answered"]
             self._work_j = float(saved["work_j"])

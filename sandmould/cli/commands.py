@@ -74,8 +74,12 @@ def sandmould(
 def plan(study: StudyFile, cores: Cores = None) -> None:
     """Check a study and print its runs and their price; nothing starts."""
     from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
+    from sandmould.study.plan.trust import reading_help
 
-    typer.echo(announce(open_plan(study), RESULTS, cores or _all_cores(), measure=True))
+    opened = open_plan(study)
+    typer.echo(announce(opened, RESULTS, cores or _all_cores(), measure=True))
+    if said := reading_help(opened.study, opened.runs):
+        typer.echo(said)
 
 
 @app.command()

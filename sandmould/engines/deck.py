@@ -11,12 +11,15 @@ from typing import Any
 
 import jinja2
 import numpy as np
+from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from sandmould import ROOT
 from sandmould.digest import sources_digest
 from sandmould.runs.files import write_text
 
 TEMPLATES = ROOT / "templates"
+_LONGEST_REMARK = 200
+"""Characters; LIGGGHTS reads lines of 2048."""
 _BLOCK = re.compile(r"^#--- block: (\w+) ---.*?\n(.*?)^#--- end: \1 ---$", re.M | re.S)
 _RUN = re.compile(r"^run (\d+)\b[^\n]*$", re.M)
 
@@ -33,13 +36,23 @@ def vector(components: Any) -> str:
     return " ".join(exact(c + 0.0) for c in padded)
 
 
+def remark(text: str) -> str:
+    """A text from a file as part of a deck's comment, which it neither ends nor goes on with.
+
+    Line breaks, a ``&`` at the end and triple quotes would do so in LAMMPS and LIGGGHTS.
+    """
+    printable = "".join(c if c.isprintable() else " " for c in text)
+    words = " ".join(printable.replace('"', "'").replace("&", "and").split())
+    return words if len(words) <= _LONGEST_REMARK else f"{words[: _LONGEST_REMARK - 3]}..."
+
+
 @functools.cache
 def environment(dialect: str) -> jinja2.Environment:
     """Strict Jinja environment of one dialect: a misspelt name is an error, never empty text.
 
     Snakemake's own template engine has neither a loader nor this strictness.
     """
-    env = jinja2.Environment(
+    env = ImmutableSandboxedEnvironment(
         loader=jinja2.FileSystemLoader(TEMPLATES / dialect),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from sandmould.engines.deck import remark
 from sandmould.engines.deck_lines import (
     SKIN,
     Lines,
@@ -32,8 +33,8 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
     classes = size_classes(scenario)
     critical = scenario.critical_step
     return {
-        "run": run,
-        "study": study,
+        "run": remark(run),
+        "study": remark(study),
         "scenario": scenario,
         "program": program,
         "classes": classes,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from sandmould.engines.deck import exact
+from sandmould.engines.deck import exact, remark
 from sandmould.engines.program import Program, Stage
 from sandmould.scenario.placement import predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
@@ -25,10 +25,10 @@ class Lines:
         self.sources = sources
 
     def source(self, key: str) -> str:
-        """Where a key's value came from, or the keys below or above it."""
+        """Where a key's value came from, or the keys below or above it: a remark of the deck."""
         if key in self.sources:
-            return self.sources[key]
-        below = {v for k, v in self.sources.items() if k.startswith(key + ".")}
+            return remark(self.sources[key])
+        below = {remark(v) for k, v in self.sources.items() if k.startswith(key + ".")}
         if below:
             return " and ".join(sorted(below)[:2])
         return self.source(key.rsplit(".", 1)[0]) if "." in key else "default"

@@ -77,7 +77,7 @@ def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingM
         _draw(axes, part)
         named = zip(others, values, strict=True)
         title = [f"{name_of(key)} {setting_text({key: value})}" for key, value in named]
-        axes.set_title("\n".join(title), fontsize=8)
+        axes.set_title("\n".join(title), fontsize=8, parse_math=False)
     for axes in grid[:, 0]:
         axes.set_ylabel("share of the residual")
     for axes in grid[-1]:

@@ -38,7 +38,7 @@ def strip(panels: Sequence[tuple[str, str]]) -> bytes:
     for place, (heading, image) in enumerate(images):
         axes = figure.add_axes((place * share, 0.0, share, picture_in / tall_in))
         axes.imshow(image.convert("RGB"), interpolation="antialiased")
-        axes.set_title(heading, fontsize=11)
+        axes.set_title(heading, fontsize=11, parse_math=False)
         axes.set_axis_off()
     return png_bytes(figure)
 

@@ -146,7 +146,7 @@ def _pictured_runs(
 
 
 def _load(folder: Path) -> dict[str, NDArray[np.float64]]:
-    with np.load(folder / "fields.npz") as archive:
+    with np.load(folder / "fields.npz", allow_pickle=False) as archive:
         return dict(archive)
 
 
@@ -238,7 +238,8 @@ def _fields(runs: Sequence[_PicturedRun], highest_pa: float) -> str:
         fields = _load(run.folder)
         last = frame_of(fields, len(fields["count"]) - 1)
         discs = draw_frame(fields, last, axes, highest_pa)
-        axes.set_title(f"{run.label}\n{run.verdict}, {last.time_s:.3g} s", fontsize=8)
+        heading = f"{run.label}\n{run.verdict}, {last.time_s:.3g} s"
+        axes.set_title(heading, fontsize=8, parse_math=False)
         axes.tick_params(labelsize=8)
     figure.colorbar(discs, ax=panels, label="pressure, Pa", shrink=0.6, extend="max")
     return png(figure)

@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from sandmould import ROOT
 from sandmould.report.agreement import agreement_pages
@@ -124,7 +125,7 @@ def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
 
 
 def _environment() -> Environment:
-    environment = Environment(
+    environment = ImmutableSandboxedEnvironment(
         loader=FileSystemLoader(TEMPLATES),
         undefined=StrictUndefined,
         autoescape=True,

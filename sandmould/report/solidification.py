@@ -131,7 +131,7 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
     """Picture of a run's fields, what it says in words, and its hot spots."""
     if not (folder / "fields.npz").is_file():
         return "", ("No run has left fields.",), None
-    with np.load(folder / "fields.npz") as file:
+    with np.load(folder / "fields.npz", allow_pickle=False) as file:
         fields = dict(file)
     melts = fields["melts"]
     frozen = freezing(

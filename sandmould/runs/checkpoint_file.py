@@ -56,7 +56,7 @@ class CheckpointFile:
         body = whole[_DIGEST_BYTES:]
         if digest(body) != whole[:_DIGEST_BYTES].hex():
             raise ValueError("its bytes do not match their hash")
-        with np.load(io.BytesIO(body)) as file:
+        with np.load(io.BytesIO(body), allow_pickle=False) as file:
             arrays = dict(file)
         if arrays.pop("computed_hash") != self._hash:
             raise ValueError("it is of another scenario or solver")

@@ -17,6 +17,7 @@ from sandmould import ROOT
 from sandmould.statistics.agreement import sweep_part
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.build_plan import RESULTS, open_plan
+from sandmould.study.plan.trust import check_places, check_trust
 from sandmould.study.rounds.decide import decision_text, next_runs
 from sandmould.study.rounds.round_log import read_rounds, write_rounds
 
@@ -42,6 +43,8 @@ def run_study(path: Path, options: Sequence[str]) -> int:
         Before anything starts.
     """
     plan = open_plan(path)
+    check_places(plan.study)
+    check_trust(plan.study, plan.runs)
     folder, study = RESULTS / plan.study.name, plan.study.study
     while study.refine.rounds or study.certificate.controls:
         if _snakemake(path, options, [str(folder / "summary.tsv")]):
@@ -62,7 +65,7 @@ def run_study(path: Path, options: Sequence[str]) -> int:
 
 def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> int:
     cores = [] if any(o in ("--cores", "-c", "--jobs", "-j") for o in options) else _all_cores()
-    workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path)]
+    workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path.absolute())]
     command = [sys.executable, "-m", "snakemake", *cores, *workflow, *options]
     return subprocess.run([*command, *(["--", *targets] if targets else [])]).returncode
 

@@ -17,6 +17,7 @@ from sandmould.study.plan.build_plan import (
     study_path,
 )
 from sandmould.study.definition.run import RUN_NAME
+from sandmould.study.plan.trust import check_places, check_trust
 
 OVERRIDES = dict(workflow.config_settings.config)
 # Set by a profile: how long a job should last at least, where jobs cost more than short runs, how
@@ -29,6 +30,8 @@ MPI = OVERRIDES.pop("mpi", "mpiexec")
 CORES = workflow._cores or os.cpu_count()
 try:
     PLAN = open_plan(study_path(workflow.configfiles, OVERRIDES))
+    check_places(PLAN.study)
+    check_trust(PLAN.study, PLAN.runs)
     BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
     if workflow.is_main_process and "--lint" not in sys.argv:
         print(announce(PLAN, RESULTS, CORES), file=sys.stderr)

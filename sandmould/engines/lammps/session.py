@@ -88,7 +88,7 @@ class LammpsSession(DeckSession):
         if needs_callback(self._scenario):
             self._kernel = self._start_kernel()
             if checkpoint is not None:
-                with np.load(checkpoint / "kernel.npz") as saved:
+                with np.load(checkpoint / "kernel.npz", allow_pickle=False) as saved:
                     self._kernel.restore(saved)
         if checkpoint is not None:
             self.grains = int(self._lmp.get_natoms())

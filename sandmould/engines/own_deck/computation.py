@@ -56,7 +56,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     is_root = world is None or world.rank == 0
     work = folder / "work"
     output = work / OUTPUT
-    candidates = _restarts(scenario, work)
+    candidates = _restarts(scenario, work) if is_root else []
     if world is not None:
         candidates = world.bcast(candidates)
     begun, cpu_begun = time.monotonic(), cpu_time_s()

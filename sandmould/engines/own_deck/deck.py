@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import jinja2
-from jinja2 import meta
-
 from sandmould.digest import file_digest
+from sandmould.engines.own_deck.template import MOST_CHARACTERS, names_in, rendered
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.registry import engine_module
 from sandmould.scenario.bad_input import BadInputError, Problem
@@ -60,14 +58,11 @@ def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
     try:
         used = names_used(scenario)
         render(scenario, "run", "study", "restart")
-    except (jinja2.TemplateError, TypeError, ValueError, ArithmeticError) as error:
-        line = getattr(error, "lineno", None)
-        where = f"line {line}: " if line else ""
+    except ValueError as error:
         given = ", ".join(sorted({*scenario.values, *RESERVED}))
         yield Problem(
-            "template", scenario.template, f"a template that renders ({where}{error}); it is "
-            f"given {given}"
-        )  # fmt: skip
+            "template", scenario.template, f"a template that renders ({error}); it is given {given}"
+        )
         return
     for name in scenario.values:
         if name not in used:
@@ -80,10 +75,9 @@ def names_used(scenario: OwnDeck) -> set[str]:
 
     Raises
     ------
-    jinja2.TemplateSyntaxError
+    TemplateError
     """
-    text = scenario.paths[scenario.template].read_text(encoding="utf-8")
-    return meta.find_undeclared_variables(_environment().parse(text))
+    return names_in(template_text(scenario))
 
 
 def render(scenario: OwnDeck, run: str, study: str, restart: str = "") -> str:
@@ -98,17 +92,30 @@ def render(scenario: OwnDeck, run: str, study: str, restart: str = "") -> str:
 
     Raises
     ------
-    jinja2.TemplateError
+    TemplateError
     """
-    text = scenario.paths[scenario.template].read_text(encoding="utf-8")
-    return _environment().from_string(text).render(
-        **scenario.values,
-        seed=scenario.seed,
-        run=run,
-        study=study,
-        restart=restart,
-        restart_files=" ".join(f"../{name}" for name in RESTART_FILES),
-    )  # fmt: skip
+    given = {
+        "seed": scenario.seed,
+        "run": run,
+        "study": study,
+        "restart": restart,
+        "restart_files": " ".join(f"../{name}" for name in RESTART_FILES),
+    }
+    return rendered(template_text(scenario), scenario.values | given)
+
+
+def template_text(scenario: OwnDeck) -> str:
+    """Text of the template.
+
+    Raises
+    ------
+    ValueError
+        When it is no text, or longer than any template.
+    """
+    path = scenario.paths[scenario.template]
+    if path.stat().st_size > 4 * MOST_CHARACTERS:
+        raise ValueError(f"it is larger than {4 * MOST_CHARACTERS:,} bytes")
+    return path.read_text(encoding="utf-8")
 
 
 def check_unchanged(scenario: OwnDeck) -> None:
@@ -123,10 +130,3 @@ def check_unchanged(scenario: OwnDeck) -> None:
     if changed:
         valid = "the file as it was planned: plan the study again to run it as it is now"
         raise BadInputError([Problem("file", name, valid) for name in changed])
-
-
-def _environment() -> jinja2.Environment:
-    # Without a loader: what a template includes from elsewhere no hash would know.
-    return jinja2.Environment(
-        undefined=jinja2.StrictUndefined, keep_trailing_newline=True, autoescape=False
-    )

@@ -74,7 +74,7 @@ class ReferenceSession(StagedSession):
             self.solver.surfaces.remove(gate)
 
     def _restore(self, checkpoint: Path) -> None:
-        with np.load(checkpoint / "solver.npz") as arrays:
+        with np.load(checkpoint / "solver.npz", allow_pickle=False) as arrays:
             self.solver.restore(dict(arrays))
 
     def _begin_stage(self) -> None:

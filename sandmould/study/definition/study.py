@@ -92,6 +92,16 @@ class Study(Section):
         """Whether the study looks for the best setting, not for agreement or for a value."""
         return not self.equivalence.keys and self.objective.better != "neither"
 
+    @property
+    def trusts_program(self) -> bool:
+        """Whether the user lets its runs execute a program that is not shipped."""
+        return False
+
+    @property
+    def more_folders(self) -> tuple[str, ...]:
+        """Folders, seen from ROOT, that such a program's files may lie in beside its own."""
+        return ()
+
     def problems(self) -> Iterable[Problem]:
         """What is wrong with the sections that only its kind has, where the sweep is sound."""
         return ()

@@ -103,7 +103,7 @@ def read_fields(folder: Path) -> dict[str, Any] | None:
     path = folder / "fields.npz"
     if not path.exists():
         return None
-    with np.load(path) as arrays:
+    with np.load(path, allow_pickle=False) as arrays:
         return dict(arrays)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -34,6 +34,20 @@ class MachineSpeed(Generic[ScenarioT]):
     """As measured before; None where it was not. Starts nothing."""
     measured: Callable[[ScenarioT, Path], float | None]
     """As measured before, or measured now and stored; None where the engine cannot run."""
+
+
+@dataclass(frozen=True)
+class UserProgram(Generic[ScenarioT]):
+    """What a kind says of programs of the user's that its runs execute."""
+
+    shipped: Path
+    """Folder of those that come with us."""
+    files: Callable[[ScenarioT], Mapping[str, Path]]
+    """Its files by key: they must lie in folders that the study allows."""
+    foreign: Callable[[ScenarioT], str]
+    """Why it is not one of those shipped, in a few words; empty where it is."""
+    to_read: Callable[[Sequence[ScenarioT]], list[str]]
+    """Lines of it that a person should read before running it."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +90,8 @@ class Planning(Generic[ScenarioT]):
     """What the plan says of a run, by heading."""
     speed: MachineSpeed[ScenarioT] | None = None
     """None where ``predicted_s`` is all that is known."""
+    program: UserProgram[ScenarioT] | None = None
+    """None where all that a run executes is shipped."""
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,9 @@ class Plan:
         """
         files = self.kind.planning.sources(self._by_name[name].scenario)
         # As seen from here: another place of the repository is no reason to compute again.
-        return [os.path.relpath(path) for path in files]
+        names = [os.path.relpath(path) for path in files]
+        # Braces would be wildcards; the hash of such a file of the user's stands in scenario.yaml.
+        return [name for name in names if "{" not in name]
 
     def memory_mb(self, name: str) -> int:
         """Memory to ask for."""

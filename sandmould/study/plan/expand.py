@@ -21,6 +21,7 @@ from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.labels import letters, run_label
 from sandmould.study.plan.load_study import OpenStudy
+from sandmould.study.plan.trust import outside
 from sandmould.study.robustness.controls import Case, cases
 
 MOST_PROBLEMS = 10
@@ -124,6 +125,9 @@ class _AtPoint:
         for key, value in point.items():
             tree = _put(tree, key.split("."), value, origin, f"sweep of {self.study.file}")
         scenario = validated(self.kind.scenario, tree, origin, ROOT_KEY)
+        # before any of its files is opened
+        if beyond := outside(self.study, scenario):
+            raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in beyond])
         try:
             return self.kind.planning.resolved(scenario)
         except BadInputError as error:

@@ -27,7 +27,7 @@ MATERIALS = (ROOT / "config" / "materials", CALIBRATED)
 _OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
 _FILE_KEY = (
     r"(\b(obstacles|shapes)(\.\d+)+\.file|\b(scenario|sweep\.keys|sweep\.points\.\d+)\.template"
-    r"|\bscenario\.files\.\d+)(\.value)?$"
+    r"|\bscenario\.files\.\d+|\ballowed_folders\.\d+)(\.value)?$"
 )
 
 

@@ -120,10 +120,13 @@ def _table_text(runs: Sequence[Run]) -> str:
 
 
 def _cell(value: Any) -> str:
-    """A value as text of one line; whole numbers without a decimal point."""
+    """A value as text of one line and one cell; whole numbers without a decimal point."""
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
         return str(int(value))
-    return value if isinstance(value, str) else json.dumps(value)
+    text = value if isinstance(value, str) else json.dumps(value)
+    text = text if text.isprintable() else text.encode("unicode_escape").decode()
+    # as tables quote; lists of texts have quotes inside, which need none
+    return '"' + text.replace('"', '""') + '"' if text.startswith('"') else text
 
 
 def read_run(path: Path) -> Run:

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from sandmould import ROOT, compiled
-from sandmould.compiled import PACKAGES, cache_folder, cache_key, kernel_sources
+from sandmould.compiled import PACKAGES, cache_folder, cache_key, is_own, kernel_sources
 
 
 @pytest.fixture
@@ -148,6 +148,66 @@ def test_the_folder_lies_where_caches_belong(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache_folder().parent == tmp_path / "sandmould"
+
+
+def test_a_relative_place_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    # it would lie in the folder worked in, which may hold results from elsewhere
+    monkeypatch.setenv("XDG_CACHE_HOME", "results/cache")
+    assert cache_folder().parent == Path.home() / ".cache" / "sandmould"
+
+
+def test_the_folder_is_made_for_oneself_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "cache" / "sandmould" / "kernels-1"
+    before = os.umask(0)
+    try:
+        assert is_own(folder)
+    finally:
+        os.umask(before)
+    assert [p.stat().st_mode & 0o777 for p in (folder, folder.parent)] == [0o700, 0o700]
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o1777])
+def test_a_folder_that_others_write_to_is_not_used(tmp_path: Path, mode: int) -> None:
+    folder = tmp_path / "sandmould" / "kernels-1"
+    folder.mkdir(parents=True)
+    folder.chmod(mode)
+    assert not is_own(folder)
+    assert not is_own(folder)  # it may hold what they wrote
+
+
+@pytest.mark.parametrize("whose", ["kernels-1", ""])
+def test_a_folder_of_another_user_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whose: str
+) -> None:
+    folder = tmp_path / "sandmould" / "kernels-1"
+    folder.mkdir(parents=True)
+    theirs = (tmp_path / "sandmould" / whose).stat()
+    real = Path.stat
+
+    def stat(path: Path, **options: bool) -> os.stat_result:
+        state = real(path, **options)
+        if os.path.samestat(state, theirs):
+            return os.stat_result((*state[:4], os.getuid() + 1, *state[5:10]))
+        return state
+
+    monkeypatch.setattr(Path, "stat", stat)
+    assert not is_own(folder)
+
+
+@pytest.mark.parametrize("of_others", [True, False])
+def test_without_such_a_folder_nothing_is_kept(house: Path, of_others: bool) -> None:
+    place = house / "cache"
+    if of_others:
+        folder = place / "sandmould" / cache_folder().name  # of the same sources
+        folder.mkdir(parents=True)
+        folder.chmod(0o777)
+    else:
+        place.write_text("a file")
+    script = (
+        "from numba.core.caching import NullCache; from sandmould.casting.arpm import super_steps;"
+        "print(isinstance(super_steps._stage._cache, NullCache))"
+    )
+    assert printed(house, script) == "True"
 
 
 def test_every_kernel_of_the_house_is_compiled_in_this_one_way() -> None:

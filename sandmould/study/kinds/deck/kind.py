@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.quantity import quantity
+from sandmould.scenario.sand import ARGUED
 from sandmould.study.definition.study import Study, kind_key
 from sandmould.study.kinds.kind import Execution, Kind, Planning
 
@@ -18,6 +20,28 @@ class DeckStudy(Study):
     scenario: OwnDeck = Field(
         ..., description="What the template is given, and what is read from its log."
     )
+    trust_deck: bool = quantity(
+        False,
+        "true lets the runs execute a deck that is not shipped: it is a program that can read and "
+        "change your files.",
+        source=ARGUED,
+    )
+    allowed_folders: tuple[Annotated[str, Field(min_length=1)], ...] = quantity(
+        (),
+        "Folders, seen from the study's file, that template and files may lie in beside the "
+        "study's own folder.",
+        source="user",
+    )
+
+    @property
+    def trusts_program(self) -> bool:
+        """As the user states it."""
+        return self.trust_deck
+
+    @property
+    def more_folders(self) -> tuple[str, ...]:
+        """As the user states them."""
+        return self.allowed_folders
 
 
 def _planning() -> Planning[OwnDeck]:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from sandmould import ROOT
 from sandmould.digest import SHORT, digest
 from sandmould.engines.own_deck import deck as own_deck
 from sandmould.engines.registry import engine_module
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
-from sandmould.study.kinds.kind import Planning, SpeedClass
+from sandmould.study.kinds.kind import Planning, SpeedClass, UserProgram
 
+SHIPPED = ROOT / "config" / "decks"
+"""Decks that come with us."""
 _ALLOWED = 3.0
 """Wall time to ask for over what the user expects."""
 
@@ -89,6 +93,37 @@ def plan_cells(scenario: OwnDeck) -> Mapping[str, str]:
     return {"template": Path(scenario.template).name, "steps": steps}
 
 
+def files(scenario: OwnDeck) -> Mapping[str, Path]:
+    """Template and files by key."""
+    keys = ["template", *(f"files.{i}" for i in range(len(scenario.files)))]
+    names = (scenario.template, *scenario.files)
+    return {key: scenario.paths[name] for key, name in zip(keys, names, strict=True)}
+
+
+def foreign(scenario: OwnDeck) -> str:
+    """Say what of a deck is not shipped: a file, or text that would stand among its commands."""
+    for path in scenario.paths.values():
+        if not path.resolve().is_relative_to(SHIPPED.resolve()):
+            return f"{path.name} is not shipped"
+    for name, value in scenario.values.items():
+        if not _is_numbers(value):
+            return f"values.{name} gives {Path(scenario.template).name} text, not numbers"
+    return ""
+
+
+def _is_numbers(value: Any) -> bool:
+    if isinstance(value, list):
+        return all(map(_is_numbers, value))
+    return value is None or isinstance(value, int | float)
+
+
+def to_read(scenarios: Sequence[OwnDeck]) -> list[str]:
+    """Lines of the decks to look at."""
+    from sandmould.engines.own_deck import scan
+
+    return scan.to_read(scenarios)
+
+
 PLANNING = Planning[OwnDeck](
     work_unit="core-seconds",
     resolved=own_deck.with_hashes,
@@ -107,4 +142,5 @@ PLANNING = Planning[OwnDeck](
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
+    program=UserProgram[OwnDeck](shipped=SHIPPED, files=files, foreign=foreign, to_read=to_read),
 )

@@ -1,0 +1,115 @@
+"""What a study may read and execute that is not shipped: its folders, its word for a program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from sandmould import ROOT
+from sandmould.runs.formatting import listed
+from sandmould.scenario.bad_input import BadInputError, Problem, display_path
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.kind import AnyScenario
+from sandmould.study.kinds.registry import kind_named
+from sandmould.study.plan.load_study import OpenStudy
+
+
+def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
+    """Files of a user's program that lie where the study does not allow; links are followed.
+
+    Parameters
+    ----------
+    study : OpenStudy
+    scenario : scenario of the study's kind
+        Of any point: files can be swept.
+
+    Returns
+    -------
+    list of Problem
+        Keys from the study's root.
+    """
+    program = kind_named(study.study.kind).planning.program
+    if program is None:
+        return []
+    own = study.path.parent
+    folders = [own, program.shipped, *(ROOT / name for name in study.study.more_folders)]
+    allowed = [folder.resolve() for folder in folders]
+    valid = (
+        f"a file below the study's folder ({display_path(own.resolve())}) or below one of its "
+        "allowed_folders"
+    )
+    return [
+        Problem(f"scenario.{key}", display_path(path), valid)
+        for key, path in program.files(scenario).items()
+        if not any(path.resolve().is_relative_to(folder) for folder in allowed)
+    ]
+
+
+def check_trust(study: OpenStudy, runs: Sequence[Run]) -> None:
+    """See that the user has allowed what the runs would execute.
+
+    Raises
+    ------
+    BadInputError
+    """
+    foreign = _foreign(study, runs)
+    if foreign and not study.study.trusts_program:
+        valid = (
+            "true, once you have read the deck: one that is not shipped is a program that can read "
+            f"and change your files ({listed(foreign)}); to run it write trust_deck: true in "
+            f"{study.file} (sandmould plan names lines to look at)"
+        )
+        raise BadInputError([Problem("trust_deck", False, valid, study.file)])
+
+
+def check_places(study: OpenStudy) -> None:
+    """See that no folder's name would be more than a name to a shell or to an engine.
+
+    Snakemake hands a job's command to Slurm in double quotes, where a shell executes ``$(...)``;
+    engines put variables, times and ranks in place of ``$``, ``*`` and ``%``.
+
+    Raises
+    ------
+    BadInputError
+    """
+    places = {"STUDY": study.path.absolute(), "working folder": Path.cwd(), "installation": ROOT}
+    problems = [
+        Problem(key, str(path), f"a path without quotes, {' '.join(_SPECIAL)} and line breaks")
+        for key, path in places.items()
+        if not str(path).isprintable() or set(str(path)) & {*_SPECIAL, "'", '"'}
+    ]
+    if problems:
+        raise BadInputError(problems)
+
+
+_SPECIAL = "$`\\*%"
+
+
+def reading_help(study: OpenStudy, runs: Sequence[Run]) -> str:
+    """What a person should know of a program before running it; empty where all is shipped."""
+    program = kind_named(study.study.kind).planning.program
+    foreign = _foreign(study, runs)
+    if program is None or not foreign:
+        return ""
+    points = {str(run.parameters): run.scenario for run in runs}
+    lines = program.to_read(list(points.values())) or ["none was found"]
+    trusted = study.study.trusts_program
+    return "\n".join(
+        [
+            f"This study runs a program: {listed(foreign)}. Lines to look at before you run it:",
+            *(f"  {line}" for line in lines),
+            "The list helps to read it and protects from nothing (docs/trust.md).",
+            f"{study.file} allows it to run (trust_deck: true)."
+            if trusted
+            else f"To run it, write trust_deck: true in {study.file}.",
+        ]
+    )
+
+
+def _foreign(study: OpenStudy, runs: Sequence[Run]) -> list[str]:
+    """Why what the runs execute is not shipped: each reason once."""
+    program = kind_named(study.study.kind).planning.program
+    if program is None:
+        return []
+    reasons = (program.foreign(run.scenario) for run in runs)
+    return list(dict.fromkeys(reason for reason in reasons if reason))
