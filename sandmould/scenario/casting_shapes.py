@@ -16,6 +16,7 @@ from pydantic_core import PydanticCustomError
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.geometry import Block
+from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.mesh_file import MeshFileError, file_hash
 from sandmould.scenario.outline import Outline, outline_fault
 from sandmould.scenario.quantity import Section, quantity
@@ -192,6 +193,16 @@ def solid_of(shape: Any, key: str) -> Body:
         return _picture_solid(shape, key)
     solid: Body = shape.solid
     return solid
+
+
+def held_by(body: Body, position_m: Array) -> NDArray[np.bool_]:
+    """Which points a body holds, (n,) bool; ``position_m`` is (n, d) float64, m.
+
+    A mesh counts how often it goes round each point, which costs a fortieth of a distance.
+    """
+    if isinstance(body, TriangleMesh):
+        return body.holds(position_m)
+    return np.asarray(body.distance_m(position_m) < 0.0)
 
 
 def with_file_hash(shape: Any) -> Any:

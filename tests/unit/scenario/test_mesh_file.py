@@ -47,7 +47,7 @@ def test_vertices_that_round_off_keeps_apart_are_one(tmp_path: Path) -> None:
 def test_cavity_faces_inwards_and_a_second_solid_outwards(tmp_path: Path) -> None:
     inner, beside = 0.25 + 0.5 * CORNERS, CORNERS + np.array([3, 0, 0])
     vertices = np.concatenate([CORNERS, inner, beside])
-    facets = np.concatenate([FACETS, FACETS + 8, FACETS[:, ::-1] + 16])
+    facets = np.concatenate([FACETS, FACETS[:, ::-1] + 8, FACETS[:, ::-1] + 16])
     mesh = TriangleMesh("two", *read_surface(write_stl(tmp_path / "two.stl", vertices, facets)))
     assert mesh.measure == pytest.approx(1 - 0.125 + 1)
     np.testing.assert_array_equal(
@@ -67,8 +67,8 @@ def test_solids_that_meet_in_a_vertex(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.distance_m(point), expected, atol=1e-7)
 
 
-TWO_ON_AN_EDGE = (
-    np.concatenate([CORNERS, CORNERS + np.array([1, 1, 0])]), np.concatenate([FACETS, FACETS + 8])
+FIN = (
+    np.concatenate([CORNERS, [[0.5, -1.0, 0.5]]]), np.concatenate([FACETS, [[0, 8, 4], [0, 4, 8]]])
 )  # fmt: skip
 TURNED = np.concatenate([FACETS[:1, ::-1], FACETS[1:]])
 SLIVER = (
@@ -88,7 +88,15 @@ FAULTS: dict[str, tuple[np.ndarray, np.ndarray, str]] = {
         "triangles that differ; 1 triangle is given more than once, one at (",
     ),
     "degenerate": (*SLIVER, "triangles with an area; 1 triangle is degenerate, one at ("),
-    "edge of four": (*TWO_ON_AN_EDGE, "edges of two triangles; 1 edge belongs to more, one at ("),
+    "fin": (
+        CORNERS,
+        np.concatenate([FACETS, [[0, 3, 4]]]),
+        "a closed surface; 1 edge belongs to one triangle only, one at (",
+    ),
+    "fin without a volume": (
+        *FIN,
+        "triangles that differ; 1 triangle is given more than once, one at (",
+    ),
     "turned": (
         CORNERS,
         TURNED,
