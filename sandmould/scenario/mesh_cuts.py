@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from sandmould.scenario.mesh_search import MeshSearch
-from sandmould.scenario.mesh_shells import SAME, MeshFileError, extent
 from sandmould.scenario.plane_triangulation import triangulated
 
 Array = NDArray[np.float64]
@@ -35,7 +34,7 @@ class Pieces:
     """(mt,) int64: the shell that each was cut from."""
 
 
-def cut(vertices: Array, triangles: Ints, shell: Ints) -> Pieces:
+def cut(vertices: Array, triangles: Ints, shell: Ints, near: float) -> Pieces:
     """Cut shells where they meet.
 
     Parameters
@@ -43,17 +42,13 @@ def cut(vertices: Array, triangles: Ints, shell: Ints) -> Pieces:
     vertices : (nv, 3) float64
     triangles : (nt, 3) int64
     shell : (nt,) int64
+    near : float
+        Points nearer than this are one.
 
     Returns
     -------
     Pieces
-
-    Raises
-    ------
-    MeshFileError
-        When the lines in which they meet cross more often than can be followed.
     """
-    near = SAME * extent(vertices)
     pairs = _meeting(vertices, triangles, shell, near)
     if not len(pairs):
         return Pieces(vertices, triangles, shell)
@@ -62,9 +57,9 @@ def cut(vertices: Array, triangles: Ints, shell: Ints) -> Pieces:
         scene = _Lines(points, triangles, pairs, 2.0 * near)
         more = scene.crossings()
         if not len(more):
-            return scene.pieces(shell)
+            break
         points = _with(points, more, near)
-    raise MeshFileError("shells that overlap or touch clearly, or lie apart")
+    return scene.pieces(shell)
 
 
 def _meeting(vertices: Array, triangles: Ints, shell: Ints, near: float) -> Ints:
@@ -235,7 +230,7 @@ class _Lines:
         spread = np.linalg.svd(place - place.mean(axis=0), full_matrices=False)
         if len(common) == 2 or spread[1][1] <= 2.0 * self.near:
             line = [common[k] for k in np.argsort(place @ spread[2][0])]
-            sides = set(zip(line, line[1:], strict=False))
+            sides = set(pairwise(line))
             self.sides[i] |= sides
             self.sides[j] |= sides
             return
@@ -244,7 +239,7 @@ class _Lines:
             corner = self.triangles[other].tolist()
             for k in range(3):
                 line = [n for n in self.side(corner[k], corner[(k + 1) % 3]) if n in self.on[t]]
-                self.sides[t] |= set(zip(line, line[1:], strict=False))
+                self.sides[t] |= set(pairwise(line))
 
     def crossings(self) -> Array:
         """Points in which lines of a triangle cross, (k, 3) float64."""
@@ -271,7 +266,7 @@ class _Lines:
     def _rim(self, t: int) -> set[Side]:
         corner = self.triangles[t].tolist()
         lines = [self.side(corner[k], corner[(k + 1) % 3]) for k in range(3)]
-        return {(min(s), max(s)) for line in lines for s in zip(line, line[1:], strict=False)}
+        return {(min(s), max(s)) for line in lines for s in pairwise(line)}
 
     def pieces(self, shell: Ints) -> Pieces:
         """Cut every triangle at the points and lines on it."""

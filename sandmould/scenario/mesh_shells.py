@@ -21,8 +21,8 @@ BESIDE = 8.0 * SAME
 """Share of the extent by which points beside a surface lie off it: clear of all that touches it."""
 LEAST_VOLUME = 1e-9
 """A surface around less than this share of its extent cubed encloses nothing."""
-_ONE_ANGLE = 1e-6
-"""Triangles round an edge nearer than this (rad) lie in one plane."""
+_LARGEST_ANGLE = 0.1
+"""Of triangles round an edge (rad) that may still lie in one plane, however small they are."""
 
 
 class MeshFileError(ValueError):
@@ -102,10 +102,12 @@ def _round_an_edge(
     away = vertices[triangles[sides // 3, (sides + 2) % 3]] - vertices[edge[0]]
     away -= np.outer(away @ along, along)
     angle = np.arctan2(np.cross(away[0], away) @ along, away @ away[0])
+    reach = float(np.linalg.norm(away, axis=1).min())
+    one_plane = min(4.0 * SAME * extent(vertices) / reach, _LARGEST_ANGLE)
     order = np.argsort(angle)
     # the first may lie at either end of the circle
-    group = np.concatenate([[0], np.cumsum(np.diff(angle[order]) > _ONE_ANGLE)])
-    if angle[order[-1]] - angle[order[0]] > 2.0 * np.pi - _ONE_ANGLE:
+    group = np.concatenate([[0], np.cumsum(np.diff(angle[order]) > one_plane)])
+    if angle[order[-1]] - angle[order[0]] > 2.0 * np.pi - one_plane:
         group[group == group[-1]] = 0
     # round the edge a side upwards ends a solid and one downwards begins it; of those in one
     # plane the ends come first, so that solids which touch are apart

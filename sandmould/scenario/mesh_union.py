@@ -16,6 +16,7 @@ from sandmould.scenario.mesh_cuts import Pieces, cut
 from sandmould.scenario.mesh_search import MeshSearch
 from sandmould.scenario.mesh_shells import (
     BESIDE,
+    SAME,
     MeshFileError,
     extent,
     joined_sides,
@@ -24,6 +25,11 @@ from sandmould.scenario.mesh_shells import (
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+NEAR = (SAME, 4.0 * SAME, 16.0 * SAME, 64.0 * SAME)
+"""Shares of the extent below which points of different shells are one. Faces that meet at a small
+angle cross at places that rounding of the file moves by many times its own size, so that wider
+ones are tried where the first leave the union open."""
 
 
 def united(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Array, Ints]:
@@ -48,19 +54,21 @@ def united(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Array, Ints]:
     MeshFileError
         When shells meet so nearly that their union cannot be told.
     """
-    pieces = cut(vertices, triangles, shell)
+    size = extent(vertices)
     search = MeshSearch(vertices, triangles)
-    stays = _bounds(pieces, search, shell, BESIDE * extent(vertices))
-    kept = pieces.triangles[stays]
-    try:
-        joined = joined_sides(pieces.vertices, kept)
-    except MeshFileError as fault:
-        place = str(fault).rsplit(", ", 3)
-        where = ", ".join(place[1:])
-        raise MeshFileError(
-            f"shells that overlap or touch clearly, or lie apart: their union is not closed, {where}"
-        ) from fault
-    return with_own_vertices(pieces.vertices, kept, joined)
+    for near in NEAR:
+        pieces = cut(vertices, triangles, shell, near * size)
+        stays = _bounds(pieces, search, shell, max(BESIDE, 4.0 * near) * size)
+        kept = pieces.triangles[stays]
+        try:
+            joined = joined_sides(pieces.vertices, kept)
+        except MeshFileError as fault:
+            problem = fault
+        else:
+            return with_own_vertices(pieces.vertices, kept, joined)
+    where = "one at" + str(problem).rsplit("one at", 1)[-1]
+    valid = "shells that overlap or touch clearly, or lie apart"
+    raise MeshFileError(f"{valid}; their union leaves open edges, {where}")
 
 
 def _bounds(pieces: Pieces, search: MeshSearch, shell: Ints, beside: float) -> NDArray[np.bool_]:
