@@ -42,6 +42,10 @@ class Body(Protocol):
     def corners(self) -> Array:
         """Points whose hull holds it, (k, d) float64, m."""
 
+    @property
+    def measure(self) -> float:
+        """Area (m2) in 2D, volume (m3) in 3D."""
+
 
 class Rectangle(Section):
     """An upright rectangle; with three coordinates a block."""
@@ -165,6 +169,11 @@ class Pixels:
         distance = np.full(len(place), float(shape.max()))
         distance[inside] = self.distance_in_pixels[tuple(place[inside].T)]
         return self.pixel_m * distance
+
+    @property
+    def measure(self) -> float:
+        """Area of the dark pixels, m2."""
+        return float((self.distance_in_pixels < 0.0).sum()) * self.pixel_m**2
 
     def corners(self) -> Array:
         """Two corners of the rectangle round the solid's pixels."""

@@ -54,7 +54,19 @@ def source_files() -> list[Path]:
     """Files of the solver, and those of the scenario that compute for it."""
     shared = (
         ROOT / "sandmould" / "scenario" / name
-        for name in ("casting_shapes.py", "outline.py", "solidification.py")
+        for name in (
+            "casting_shapes.py",
+            "mesh.py",
+            "mesh_cuts.py",
+            "mesh_file.py",
+            "mesh_search.py",
+            "mesh_shells.py",
+            "mesh_union.py",
+            "mesh_winding.py",
+            "outline.py",
+            "plane_triangulation.py",
+            "solidification.py",
+        )
     )
     return sorted([*Path(__file__).parent.glob("*.py"), *shared])
 
