@@ -179,9 +179,7 @@ def _steel(tree: dict[str, Any]) -> Any:
             return node["value"] if "value" in node else {k: values(v) for k, v in node.items()}
         return node
 
-    return Solidification.model_validate(
-        {**values(tree), **around(0.04, 0.06), "element_m": 0.004}
-    )
+    return Solidification.model_validate({**values(tree), **around(0.04, 0.06), "element_m": 0.004})
 
 
 def test_a_shell_that_is_no_cavity_is_told(tmp_path: Path) -> None:
