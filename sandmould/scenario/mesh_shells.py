@@ -191,7 +191,7 @@ def facing(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Ints, Sequenc
     if (way[~lies_in] < 0).all():
         turn[:] = -1
     around = (round_it * turn).sum(axis=1)
-    for number in np.flatnonzero(way * turn < 0):
+    for number in np.flatnonzero(way * turn < 0).tolist():
         solid = around[shell == number] > 0
         if not solid.any():
             turn[number] *= -1

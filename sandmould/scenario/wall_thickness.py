@@ -141,7 +141,8 @@ def _of_pixels(body: Pixels) -> tuple[Array, Array, Array]:
     from scipy.ndimage import gaussian_filter
 
     dark = np.pad(body.distance_in_pixels < 0.0, 1)
-    slope = np.stack(np.gradient(gaussian_filter(dark.astype(np.float64), 1.0)), axis=-1)
+    smooth = gaussian_filter(dark.astype(np.float64), 1.0)
+    slope = np.stack([np.gradient(smooth, axis=k) for k in (0, 1)], axis=-1)
     places, normals = [], []
     for axis in (0, 1):
         low, high = np.moveaxis(dark, axis, 0)[:-1], np.moveaxis(dark, axis, 0)[1:]

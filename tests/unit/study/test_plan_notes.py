@@ -20,6 +20,7 @@ from sandmould.scenario.wall_thickness import thinnest_wall
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
+from tests.scenes import TUBE_SCENE
 from tests.unit.scenario.test_mesh_union import CUBE, box, file_of
 from tests.unit.study.test_solidification_study import opened
 
@@ -215,3 +216,20 @@ def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
         told[distance] = plan_table(expand(open_study(path)), {}, 1)
     assert "Note: Metal is poured with collision_distance 0." in told[0.0]
     assert "Note:" not in told[0.8]
+
+
+def test_obstacles_thinner_than_a_grain_are_told(tmp_path: Path) -> None:
+    def table(thickness_m: float) -> str:
+        vertices = [[0.02, 0.02], [0.06, 0.02], [0.06, 0.02 + thickness_m],
+                    [0.02, 0.02 + thickness_m]]  # fmt: skip
+        obstacle = {"kind": "polygon", "name": "shelf", "vertices_m": vertices}
+        scene = {**TUBE_SCENE, "obstacles": [obstacle]}
+        path = tmp_path / "shelf.yaml"
+        path.write_text(yaml.safe_dump({"scenario": scene}))
+        return plan_table(expand(open_study(path)), {}, 1)
+
+    told = [line for line in table(0.0005).splitlines() if line.startswith("Note: ")]
+    assert len(told) == 1
+    assert told[0].startswith("Note: shelf has walls thinner than the smallest grain of ")
+    assert "the thinnest measures 0.500 mm" in told[0]
+    assert "Note: " not in table(0.01)

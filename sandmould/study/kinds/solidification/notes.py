@@ -15,9 +15,8 @@ from sandmould.casting.arpm.estimates import (
     sand_takes_j_m3,
 )
 from sandmould.runs.formatting import number
-from sandmould.scenario.mesh_file import filled_shells
 from sandmould.scenario.solidification import Solidification
-from sandmould.scenario.solids import SolidMesh
+from sandmould.scenario.solids import SolidMesh, filled_note
 from sandmould.scenario.wall_thickness import ThinWall, thinnest_wall
 from sandmould.study.kinds.kind import Note
 
@@ -115,10 +114,5 @@ def _volume(scenario: Solidification) -> Iterator[Note]:
 
 def _filled(scenario: Solidification) -> Iterator[Note]:
     for n, shape in enumerate(scenario.shapes):
-        if isinstance(shape, SolidMesh) and (count := filled_shells(shape.path)):
-            shells = "1 shell that lies" if count == 1 else f"{count} shells that lie"
-            yield Note(
-                f"filled {n}",
-                f"shapes.{n} has {shells} in another one with its faces outwards, and is part of "
-                "the solid there. A cavity faces inwards.",
-            )
+        if isinstance(shape, SolidMesh) and (text := filled_note(shape, f"shapes.{n}")):
+            yield Note(f"filled {n}", text)
