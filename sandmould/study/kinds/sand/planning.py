@@ -12,6 +12,8 @@ from sandmould.engines import registry
 from sandmould.engines.program import build_program
 from sandmould.runs.formatting import number
 from sandmould.scenario import checks
+from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.outline import Outline
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, filled_note, with_hash
@@ -129,7 +131,8 @@ def notes(scenario: Scenario) -> list[Note]:
     """Obstacles drawn with walls thinner than a grain, and shells that were no cavities."""
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
     told = []
-    for solid in (*scenario.scene.outlines, *scenario.scene.meshes):
+    solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
+    for solid in solids:
         wall = thinnest_wall([solid], smallest_m)
         if wall is not None:
             place = ", ".join(number(float(x)) for x in wall.place_m)

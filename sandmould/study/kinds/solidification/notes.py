@@ -107,8 +107,9 @@ def _volume(scenario: Solidification) -> Iterator[Note]:
         factor, unit = (1e6, "mm2") if scenario.dimensions == 2 else (1e9, "mm3")
         yield Note(
             "volume",
-            f"The elements hold {held / drawn - 1.0:+.1%} of the drawn casting: "
-            f"{number(factor * held)} instead of {number(factor * drawn)} {unit}.",
+            f"The elements hold {abs(held / drawn - 1.0):.1%} {'more' if held > drawn else 'less'} "
+            f"than the drawn casting: {number(factor * held, 4)} instead of "
+            f"{number(factor * drawn, 4)} {unit}.",
         )
 
 
