@@ -24,6 +24,11 @@ LEAST_VOLUME = 1e-9
 _LARGEST_ANGLE = 0.1
 """Of triangles round an edge (rad) that may still lie in one plane, however small they are."""
 
+MOST_SHELLS = 1000
+"""Shells of one file: what each triangle lies in is asked of all of them."""
+_HELD = 5_000_000
+"""Winding numbers held in memory together."""
+
 
 class MeshFileError(ValueError):
     """A file that bounds no solid; its text says what would be valid."""
@@ -171,6 +176,8 @@ def facing(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Ints, Sequenc
         When a shell encloses nothing, or one that faces inwards sticks out of the solid round it.
     """
     count = int(shell.max()) + 1
+    if count > MOST_SHELLS:
+        raise MeshFileError(f"at most {MOST_SHELLS} shells in one file; here are {count}")
     volume = np.bincount(shell, weights=signed_volumes_m3(vertices, triangles), minlength=count)
     for number in range(count):
         own = vertices[triangles[shell == number].ravel()]
@@ -184,13 +191,13 @@ def facing(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Ints, Sequenc
     normal *= (way[shell] / np.linalg.norm(normal, axis=1))[:, None]
     # just inside each triangle's own shell
     place = corners.mean(axis=1) - BESIDE * extent(vertices) * normal
-    round_it = MeshSearch(vertices, triangles).windings(place, shell)
-    round_it[np.arange(len(place)), shell] = 0
-    lies_in = np.array([(round_it[shell == n] != 0).any(axis=1).all() for n in range(count)])
+    search = MeshSearch(vertices, triangles)
+    lies_in = np.ones(count, dtype=np.bool_)
+    np.logical_and.at(lies_in, shell, _of_others(search, place, shell, None) != 0)
     turn = np.ones(count, dtype=np.int64)
     if (way[~lies_in] < 0).all():
         turn[:] = -1
-    around = (round_it * turn).sum(axis=1)
+    around = _of_others(search, place, shell, turn)
     for number in np.flatnonzero(way * turn < 0).tolist():
         solid = around[shell == number] > 0
         if not solid.any():
@@ -203,3 +210,17 @@ def facing(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Ints, Sequenc
     facing_out = np.flatnonzero(way * turn > 0)
     filled = [int(n) for n in facing_out if (around[shell == n] > 0).all()]
     return np.where((turn[shell] < 0)[:, None], triangles[:, ::-1], triangles), filled
+
+
+def _of_others(search: MeshSearch, place: Array, shell: Ints, turn: Ints | None) -> Ints:
+    """Winding number of all shells but its own at a place on each triangle, (nt,) int64.
+
+    Each shell's counts as often as ``turn`` says, and without it by its size.
+    """
+    found = np.empty(len(place), dtype=np.int64)
+    blocks = -(-len(place) * (int(shell.max()) + 1) // _HELD)
+    for part in np.array_split(np.arange(len(place)), blocks):
+        counts = search.windings(place[part], shell)
+        counts[np.arange(len(part)), shell[part]] = 0
+        found[part] = np.abs(counts).sum(axis=1) if turn is None else counts @ turn
+    return found

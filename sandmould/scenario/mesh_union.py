@@ -31,6 +31,9 @@ NEAR = (SAME, 4.0 * SAME, 16.0 * SAME, 64.0 * SAME)
 angle cross at places that rounding of the file moves by many times its own size, so that wider
 ones are tried where the first leave the union open."""
 
+_BLOCK = 5000
+"""Places asked together."""
+
 
 def united(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Array, Ints]:
     """Surface of the union of shells.
@@ -84,12 +87,14 @@ def _bounds(pieces: Pieces, search: MeshSearch, shell: Ints, beside: float) -> N
     asked = order[np.unique(patch[order], return_index=True)[1]]
     off = beside * normal[asked] / area[asked, None]
     place = corners[asked].mean(axis=1)
-    before, behind = search.windings(place + off, shell), search.windings(place - off, shell)
-    bounds = (before.sum(axis=1) <= 0) & (behind.sum(axis=1) > 0)
-    # where several shells have one face, the first of them keeps it
-    begins = behind > before
-    first = begins.argmax(axis=1)
-    bounds &= first == pieces.shell[asked]
+    bounds = np.empty(len(asked), dtype=np.bool_)
+    # a block of places at a time: each is asked of every shell
+    for part in np.array_split(np.arange(len(asked)), -(-len(asked) // _BLOCK)):
+        before = search.windings((place + off)[part], shell)
+        behind = search.windings((place - off)[part], shell)
+        bounds[part] = (before.sum(axis=1) <= 0) & (behind.sum(axis=1) > 0)
+        # where several shells have one face, the first of them keeps it
+        bounds[part] &= (behind > before).argmax(axis=1) == pieces.shell[asked[part]]
     return np.asarray(bounds[patch])
 
 

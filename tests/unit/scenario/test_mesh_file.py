@@ -125,3 +125,11 @@ def test_file_that_is_no_stl_is_refused(content: bytes, tmp_path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(MeshFileError, match="an STL file"):
         read_surface(path)
+
+
+def test_more_shells_than_can_be_told_apart_are_refused(tmp_path: Path) -> None:
+    at = np.arange(1001)[:, None, None] * np.array([2.0, 0.0, 0.0])
+    facets = FACETS + 8 * np.arange(1001)[:, None, None]
+    path = write_stl(tmp_path / "many.stl", (CORNERS + at).reshape(-1, 3), facets.reshape(-1, 3))
+    with pytest.raises(MeshFileError, match="at most 1000 shells in one file; here are 1001"):
+        read_surface(path)
