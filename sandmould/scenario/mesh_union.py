@@ -22,6 +22,7 @@ from sandmould.scenario.mesh_shells import (
     joined_sides,
     with_own_vertices,
 )
+from sandmould.scenario.mesh_simplify import simplified
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,10 +69,19 @@ def united(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Array, Ints]:
         except MeshFileError as fault:
             problem = fault
         else:
-            return with_own_vertices(pieces.vertices, kept, joined)
+            return _without_cuts(*with_own_vertices(pieces.vertices, kept, joined), vertices, near)
     where = "one at" + str(problem).rsplit("one at", 1)[-1]
     valid = "shells that overlap or touch clearly, or lie apart"
     raise MeshFileError(f"{valid}; their union leaves open edges, {where}")
+
+
+def _without_cuts(
+    cut_vertices: Array, triangles: Ints, vertices: Array, near: float
+) -> tuple[Array, Ints]:
+    """Take away vertices that only a line on a flat face has left."""
+    drawn = set(map(tuple, vertices.tolist()))
+    new = [n for n, place in enumerate(cut_vertices.tolist()) if tuple(place) not in drawn]
+    return simplified(cut_vertices, triangles, new, near * extent(vertices))
 
 
 def _bounds(pieces: Pieces, search: MeshSearch, shell: Ints, beside: float) -> NDArray[np.bool_]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -123,3 +124,27 @@ def test_cavity_that_sticks_out_is_refused(tmp_path: Path) -> None:
 def test_shell_that_changes_nothing_is_counted(tmp_path: Path) -> None:
     assert filled_shells(file_of(SCENES["one in the other"][0], tmp_path)) == 1
     assert filled_shells(file_of(SCENES["hollow"][0], tmp_path)) == 0
+
+
+def test_union_has_no_narrower_triangles_than_its_parts(tmp_path: Path) -> None:
+    """Lines of a fan across a lid left triangles of 0.06 degrees, which LIGGGHTS refuses."""
+    mesh = mesh_of([CUBE, cylinder(40, 6, [14, 14, 19], 15), cylinder(30, 3, [14, 14, 21], 25)],
+                   tmp_path)  # fmt: skip
+    a, b, c = mesh.corners_m.transpose(1, 0, 2)
+    sides = np.sort([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
+    double = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    least_deg = np.degrees(np.arcsin(double / (sides[1] * sides[2])))
+    assert least_deg.min() > 0.5
+    discs = 20 * math.sin(2 * math.pi / 40) * 36, 15 * math.sin(2 * math.pi / 30) * 9
+    assert mesh.measure == pytest.approx(8000 + 10 * discs[0] + 12 * discs[1], rel=1e-5)
+
+
+def cylinder(sides: int, radius: float, low: Sequence[float], height: float) -> Part:
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(sides)])
+    ends = np.array([[0, 0, 0], [0, 0, height]])
+    k, following, n = np.arange(sides), (np.arange(sides) + 1) % sides, sides
+    fans = [[k, following, n + following], [k, n + following, n + k],
+            [np.full(n, 2 * n), following, k], [np.full(n, 2 * n + 1), n + k, n + following]]  # fmt: skip
+    facets = np.concatenate([np.stack(fan, axis=1) for fan in fans])
+    return np.concatenate([ring, ring + ends[1], ends]) + np.array(low), facets
