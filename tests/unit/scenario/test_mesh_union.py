@@ -144,7 +144,11 @@ def cylinder(sides: int, radius: float, low: Sequence[float], height: float) -> 
     ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(sides)])
     ends = np.array([[0, 0, 0], [0, 0, height]])
     k, following, n = np.arange(sides), (np.arange(sides) + 1) % sides, sides
-    fans = [[k, following, n + following], [k, n + following, n + k],
-            [np.full(n, 2 * n), following, k], [np.full(n, 2 * n + 1), n + k, n + following]]  # fmt: skip
+    fans = [
+        [k, following, n + following],
+        [k, n + following, n + k],
+        [np.full(n, 2 * n), following, k],
+        [np.full(n, 2 * n + 1), n + k, n + following],
+    ]
     facets = np.concatenate([np.stack(fan, axis=1) for fan in fans])
     return np.concatenate([ring, ring + ends[1], ends]) + np.array(low), facets
