@@ -101,8 +101,7 @@ def _walls(scenario: Solidification) -> Iterator[Note]:
 
 def _volume(scenario: Solidification) -> Iterator[Note]:
     drawn = sum(abs(solid.measure) for solid in scene.solids_of(scenario))
-    elements = scene.elements_of(scenario)
-    held = float(elements.volume_m3[elements.material == scene.CASTING].sum())
+    held = scene.held_volume_m3(scenario)
     if abs(held / drawn - 1.0) > VOLUME_OFF:
         factor, unit = (1e6, "mm2") if scenario.dimensions == 2 else (1e9, "mm3")
         yield Note(
