@@ -77,12 +77,6 @@ def elements_of(scenario: Solidification) -> Elements:
     return _elements(scenario.box, scenario.shapes, scenario.element_m, scenario.layers)
 
 
-def held_volume_m3(scenario: Solidification) -> float:
-    """Volume of the elements that are casting; area in m2 in 2D."""
-    elements = elements_of(scenario)
-    return float(elements.volume_m3[elements.material == CASTING].sum())
-
-
 def filling_of(scenario: Solidification) -> Filling:
     """Materials: the mould, then the metal."""
     mould = ThermalMaterial(**scenario.mould.model_dump())
@@ -185,6 +179,12 @@ def expected_s(scenario: Solidification) -> float:
     """
     it = cooled_of(scenario)
     return min(freezes_s(scenario, it, it.sand_depth_m), scenario.until_s)
+
+
+def held_volume_m3(scenario: Solidification) -> float:
+    """Volume of the elements that are casting; area in m2 in 2D."""
+    elements = elements_of(scenario)
+    return float(elements.volume_m3[elements.material == CASTING].sum())
 
 
 def expected_element_steps(scenario: Solidification) -> float:
