@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+from sandmould.digest import digest
 
 # Longest first: _m_s2 must be found before _m_s, and that before _s.
 _UNITS = (
@@ -42,6 +45,12 @@ _OF_PROBE = {
 _PREFIXES = ((1e9, "G"), (1e6, "M"))
 _PREFIXED = ("Pa", "N/m")
 """Units in which moduli and stiffnesses of millions are common."""
+
+
+_LONGEST_LIST = 40
+"""Letters of a list that is written out."""
+_ONE_NUMBER = 1e-9
+"""Numbers that differ by less, as a share, are one: round-off of a unit."""
 
 
 def unit_of(key: str) -> str:
@@ -114,10 +123,27 @@ def value_text(key: str, value: Any) -> str:
     """A swept value with its unit."""
     if isinstance(value, float | int) and not isinstance(value, bool):
         factor, unit = _display_unit(key, value)
-        text = f"{value / factor:.6g}"
+        shown = value / factor
+        text = f"{shown:.6g}"
+        if not math.isclose(float(text), shown, rel_tol=_ONE_NUMBER):
+            text = f"{shown:.12g}"
     else:
-        text, unit = str(value).replace("_", " "), unit_of(key)
+        text, unit = _text(value), unit_of(key)
     return f"{text} {unit}" if unit else text
+
+
+def mark(value: Any) -> str:
+    """Four letters and digits that stand for a value too long to be written."""
+    text = value if isinstance(value, str) else json.dumps(value, sort_keys=True)
+    return digest(text)[:4]
+
+
+def _text(value: Any) -> str:
+    """A value that is no number: short ones in full, so that no two look alike."""
+    text = value if isinstance(value, str) else json.dumps(value)
+    if isinstance(value, list | dict | tuple) or text[:1] in ("[", "{"):
+        return text if len(text) <= _LONGEST_LIST else f"no. {mark(text)}"
+    return text.replace("_", " ")
 
 
 def range_text(key: str, low: float, high: float) -> str:
@@ -142,7 +168,20 @@ def setting_text(values: Mapping[str, Any]) -> str:
         ((key, value),) = values.items()
         text = value_text(key, value)
         return text if unit_of(key) else f"{name_of(key)} {text}"
-    return ", ".join(f"{name_of(k)} {value_text(k, v)}" for k, v in values.items())
+    names = _distinct_names(list(values))
+    return ", ".join(f"{names[k]} {value_text(k, v)}" for k, v in values.items())
+
+
+def _distinct_names(keys: Sequence[str]) -> dict[str, str]:
+    """Names of keys; those with one name get their section's before it."""
+    names = {key: name_of(key) for key in keys}
+    several = {name for name in names.values() if list(names.values()).count(name) > 1}
+    return {
+        key: f"{key.rpartition('.')[0].replace('.', ' ').replace('_', ' ')} {name}".strip()
+        if name in several
+        else name
+        for key, name in names.items()
+    }
 
 
 def seconds(value_s: float) -> str:

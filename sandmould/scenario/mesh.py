@@ -48,6 +48,22 @@ class TriangleMesh:
         """
         return self._search.distance_m(position_m, reach_m)
 
+    def holds(self, position_m: Array) -> NDArray[np.bool_]:
+        """Whether points are inside: where the surface goes round them once or more.
+
+        Far quicker than the sign of a distance.
+
+        Parameters
+        ----------
+        position_m : (n, 3) float64, m
+
+        Returns
+        -------
+        (n,) bool
+        """
+        one = np.zeros(len(self.triangles), dtype=np.int64)
+        return np.asarray(self._search.windings(position_m, one)[:, 0] > 0)
+
     def near_triangles(
         self, position_m: Array, radius_m: Array
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -13,17 +13,20 @@ from scipy.spatial import cKDTree
 
 from sandmould.digest import file_digest
 from sandmould.scenario.mesh import signed_volumes_m3
+from sandmould.scenario.mesh_shells import (
+    SAME,
+    MeshFileError,
+    at,
+    extent,
+    facing,
+    joined_sides,
+    shells_of,
+    with_own_vertices,
+)
+from sandmould.scenario.mesh_union import united
 
 Array = NDArray[np.float64]
 Triangles = NDArray[np.int64]
-SAME = 1e-6
-"""Vertices nearer than this share of the mesh's extent are one; STL holds seven digits."""
-LEAST_VOLUME = 1e-9
-"""A surface around less than this share of its extent cubed encloses nothing."""
-
-
-class MeshFileError(ValueError):
-    """A file that bounds no solid; its text says what would be valid."""
 
 
 def file_hash(path: Path) -> str:
@@ -44,8 +47,10 @@ def file_hash(path: Path) -> str:
 def read_surface(path: Path) -> tuple[Array, Triangles]:
     """Read an STL file, ASCII or binary, as a closed surface seen from outside.
 
-    Vertices are merged within a millionth of the extent. A surface that is closed and oriented
-    alike throughout but faces inwards is turned round; a cavity faces inwards, as it must.
+    Vertices are merged within a millionth of the extent. Inside is where the winding number of all
+    shells is above 1/2: shells that touch or overlap are one solid, and one that faces inwards
+    takes away from the solid round it. A shell that faces inwards with no solid round it was drawn
+    inside out and is turned.
 
     Parameters
     ----------
@@ -56,22 +61,43 @@ def read_surface(path: Path) -> tuple[Array, Triangles]:
     vertices : (nv, 3) float64
         In the file's unit.
     triangles : (nt, 3) int64
+        The surface of the union alone: nothing inside it is left.
 
     Raises
     ------
     MeshFileError
         When the file is missing or no STL, or its triangles bound no solid.
     """
-    return _read(path, file_hash(path))
+    return _read(path, file_hash(path))[:2]
+
+
+def filled_shells(path: Path) -> int:
+    """How many shells of an STL file change nothing: they lie in another and face outwards.
+
+    Raises
+    ------
+    MeshFileError
+        As :func:`read_surface`.
+    """
+    return _read(path, file_hash(path))[2]
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, sha256: str) -> tuple[Array, Triangles]:
+def _read(path: Path, sha256: str) -> tuple[Array, Triangles, int]:
     """Read a file once for each state of it: a sweep asks for the same one at every point."""
     vertices, triangles = _merged(*_parsed(path))
     _check_triangles(vertices, triangles)
-    shell = _shells(vertices, triangles)
-    return _outward(vertices, triangles, shell)
+    # from the lowest vertex on: shells that touch may have one triangle in both ways
+    start = triangles.argmin(axis=1)[:, None]
+    way = np.take_along_axis(triangles, (start + np.arange(3)) % 3, axis=1)
+    _check_doubles(vertices, triangles, way)
+    joined = joined_sides(vertices, triangles)
+    shell = shells_of(joined, len(triangles))
+    _check_doubles(vertices, triangles, np.column_stack([np.sort(triangles, axis=1), shell]))
+    triangles, filled = facing(vertices, triangles, shell)
+    if shell.any():
+        return *united(vertices, triangles, shell), len(filled)
+    return *with_own_vertices(vertices, triangles, joined_sides(vertices, triangles)), 0
 
 
 def check_surface(vertices: Array, triangles: Triangles) -> None:
@@ -89,7 +115,8 @@ def check_surface(vertices: Array, triangles: Triangles) -> None:
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise MeshFileError(f"triangles between its {len(vertices)} vertices, counted from 0")
     _check_triangles(vertices, triangles)
-    _shells(vertices, triangles)
+    _check_doubles(vertices, triangles, np.sort(triangles, axis=1))
+    joined_sides(vertices, triangles, most=2)
     if not signed_volumes_m3(vertices, triangles).sum() > 0.0:
         raise MeshFileError("triangles that run counter-clockwise seen from outside")
 
@@ -116,7 +143,7 @@ def _parsed(path: Path) -> tuple[Array, Triangles]:
 
 def _merged(points: Array, triangles: Triangles) -> tuple[Array, Triangles]:
     """Join vertices that only round-off of the file keeps apart."""
-    near_m = SAME * _extent(points)
+    near_m = SAME * extent(points)
     pairs = cKDTree(points).query_pairs(near_m, output_type="ndarray")
     n = len(points)
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
@@ -125,96 +152,27 @@ def _merged(points: Array, triangles: Triangles) -> tuple[Array, Triangles]:
     return points[first], group[triangles].astype(np.int64)
 
 
-def _extent(points: Array) -> float:
-    return float(np.ptp(points, axis=0).max())
-
-
 def _check_triangles(vertices: Array, triangles: Triangles) -> None:
     a, b, c = vertices[triangles].transpose(1, 0, 2)
     area2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.max([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
-    flat = area2 <= SAME * _extent(vertices) * longest
+    flat = area2 <= SAME * extent(vertices) * longest
     if flat.any():
         raise MeshFileError(
             f"triangles with an area; {_counted(flat, 'triangle')} degenerate, "
-            f"{_at(vertices[triangles[flat][0]].mean(axis=0))}"
+            f"{at(vertices[triangles[flat][0]].mean(axis=0))}"
         )
-    _, index, count = np.unique(
-        np.sort(triangles, axis=1), axis=0, return_index=True, return_counts=True
-    )
+
+
+def _check_doubles(vertices: Array, triangles: Triangles, rows: Triangles) -> None:
+    """Refuse triangles whose rows are equal."""
+    _, index, count = np.unique(rows, axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
         raise MeshFileError(
             f"triangles that differ; {_counted(count > 1, 'triangle')} given more than once, "
-            f"{_at(vertices[triangles[index[count > 1][0]]].mean(axis=0))}"
+            f"{at(vertices[triangles[index[count > 1][0]]].mean(axis=0))}"
         )
-
-
-def _shells(vertices: Array, triangles: Triangles) -> NDArray[np.int64]:
-    """Number of the connected shell of each triangle, (nt,) int64.
-
-    Each edge must belong to two triangles, which run along it in opposite ways.
-    """
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges, inverse, count = np.unique(
-        np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    way = np.bincount(inverse.ravel(), weights=np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0))
-    faults = (
-        (count == 1, "a closed surface", "belong to one triangle only", "belongs"),
-        (count > 2, "edges of two triangles", "belong to more", "belongs"),
-        (way != 0.0, "triangles that all face one way", "lie between two that do not", "lies"),
-    )
-    for bad, valid, plural, singular in faults:
-        if bad.any():
-            words = plural if bad.sum() > 1 else " ".join([singular, *plural.split()[1:]])
-            number = f"{bad.sum()} edge{'s' if bad.sum() > 1 else ''}"
-            place = _at(vertices[edges[bad][0]].mean(axis=0))
-            raise MeshFileError(f"{valid}; {number} {words}, {place}")
-    beside = (np.argsort(inverse.ravel(), kind="stable") // 3).reshape(-1, 2)
-    n = len(triangles)
-    links = coo_array((np.ones(len(beside)), (beside[:, 0], beside[:, 1])), shape=(n, n))
-    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
 def _counted(bad: NDArray[np.bool_], what: str) -> str:
     return f"{bad.sum()} {what}s are" if bad.sum() > 1 else f"1 {what} is"
-
-
-def _at(place: Array) -> str:
-    return "one at ({}) in the file's unit".format(", ".join(f"{x:.4g}" for x in place))
-
-
-def _outward(
-    vertices: Array, triangles: Triangles, shell: NDArray[np.int64]
-) -> tuple[Array, Triangles]:
-    """Turn every shell that faces the wrong way; a shell inside another is a cavity."""
-    count = int(shell.max()) + 1
-    volume = np.bincount(shell, weights=signed_volumes_m3(vertices, triangles), minlength=count)
-    for number in range(count):
-        own = triangles[shell == number]
-        if abs(volume[number]) <= LEAST_VOLUME * _extent(vertices[own.ravel()]) ** 3:
-            raise MeshFileError("a surface that encloses a volume")
-        around = [
-            other
-            for other in range(count)
-            if other != number
-            and _surrounds(vertices[triangles[shell == other]], vertices[own[0, 0]])
-        ]
-        if (volume[number] > 0.0) != (len(around) % 2 == 0):
-            triangles = np.where((shell == number)[:, None], triangles[:, ::-1], triangles)
-    # shells that meet in a vertex have one each, or its normal would mix theirs
-    own, corner = np.unique(triangles * count + shell[:, None], return_inverse=True)
-    return vertices[own // count], corner.reshape(-1, 3).astype(np.int64)
-
-
-def _surrounds(corners: Array, point: Array) -> bool:
-    """Whether a closed surface goes round a point: its solid angle there is all or nothing.
-
-    Van Oosterom and Strackee, IEEE Transactions on Biomedical Engineering 30, 1983.
-    """
-    a, b, c = (corners - point).transpose(1, 0, 2)
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    triple = np.sum(a * np.cross(b, c), axis=1)
-    ab, bc, ca = np.sum(a * b, axis=1), np.sum(b * c, axis=1), np.sum(c * a, axis=1)
-    angle = 2.0 * np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb)
-    return bool(abs(angle.sum()) > 2.0 * np.pi)

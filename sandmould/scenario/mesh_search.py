@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.compiled import njit
+from sandmould.scenario.mesh_winding import windings
 
 Array = NDArray[np.float64]
 _LEAF = 4
@@ -46,6 +47,26 @@ class MeshSearch:
         return _distances(
             point_m, reach_m, self._corners_m, self._normals, self._low_m, self._high_m
         )
+
+    def windings(self, position_m: Array, shell: NDArray[np.int64]) -> NDArray[np.int64]:
+        """How often each shell goes round each point.
+
+        Parameters
+        ----------
+        position_m : (n, 3) float64, m
+        shell : (nt,) int64
+            Number of the shell of each triangle, from 0.
+
+        Returns
+        -------
+        (n, shells) int64
+            1 inside a shell whose triangles run counter-clockwise seen from outside, -1 inside
+            one that faces inwards.
+        """
+        point_m = np.ascontiguousarray(position_m, dtype=np.float64)
+        count = int(shell.max()) + 1
+        tree = (self._low_m, self._high_m)
+        return windings(point_m, self._corners_m, shell[self._original], count, *tree)
 
     def near_triangles(
         self, position_m: Array, radius_m: Array

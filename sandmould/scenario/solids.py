@@ -13,7 +13,7 @@ import numpy as np
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.mesh_file import MeshFileError, file_hash, read_surface
+from sandmould.scenario.mesh_file import MeshFileError, file_hash, filled_shells, read_surface
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.revolved import Revolved
 
@@ -144,6 +144,26 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     placed_m = solid.unit_m * vertices @ turn.T + np.array(solid.position_m)
     return TriangleMesh(solid.name, placed_m, triangles)
+
+
+def filled_note(solid: SolidMesh, key: str) -> str:
+    """What to tell of shells that may have been meant as cavities; empty without any.
+
+    Parameters
+    ----------
+    solid : SolidMesh
+        Whose file can be read.
+    key : str
+        Key path, for the sentence.
+    """
+    count = filled_shells(solid.path)
+    if not count:
+        return ""
+    shells = "1 shell that lies" if count == 1 else f"{count} shells that lie"
+    return (
+        f"{key} has {shells} in another one with its faces outwards, and is part of the solid "
+        "there. A cavity faces inwards."
+    )
 
 
 def with_hash(solid: Named) -> Named:

@@ -16,6 +16,7 @@ from sandmould import ROOT
 from sandmould.arrays import Flags
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.estimates import least_sand_share
 from sandmould.casting.arpm.solidification import (
     Cooling,
     CoolingProgress,
@@ -54,7 +55,19 @@ def source_files() -> list[Path]:
     """Files of the solver, and those of the scenario that compute for it."""
     shared = (
         ROOT / "sandmould" / "scenario" / name
-        for name in ("casting_shapes.py", "outline.py", "solidification.py")
+        for name in (
+            "casting_shapes.py",
+            "mesh.py",
+            "mesh_cuts.py",
+            "mesh_file.py",
+            "mesh_search.py",
+            "mesh_shells.py",
+            "mesh_union.py",
+            "mesh_winding.py",
+            "outline.py",
+            "plane_triangulation.py",
+            "solidification.py",
+        )
     )
     return sorted([*Path(__file__).parent.glob("*.py"), *shared])
 
@@ -130,7 +143,10 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     cost.peak_memory_bytes = peak_memory_bytes()
     detail = ""
     if math.isnan(result.solidification_time_s):
-        detail = f"some of the casting is still liquid at {end_s:g} s: raise until_s"
+        advice = "raise until_s"
+        if least_sand_share(scenario, scene.cooled_of(scenario)) >= 1.0:
+            advice = "the box has too little sand ever to freeze it"
+        detail = f"some of the casting is still liquid at {end_s:g} s: {advice}"
     return Computed(RunOutcome(Outcome.FINISHED, detail, end_s, planned_s), cost, is_root=True)
 
 

@@ -161,6 +161,17 @@ def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m
     return from_rows(own[apart], other[apart], rate[apart], elements.volume_m3)
 
 
+def check_sizes(elements: Elements, kernel_size: float) -> None:
+    """Refuse elements smaller than 1/c_k of one within whose reach they lie (section 4.3.2).
+
+    Raises
+    ------
+    ValueError
+    """
+    own, other, _ = neighbours(elements, kernel_size)
+    _check_ratio(elements.size_m[own], elements.size_m[other], kernel_size)
+
+
 def _check_ratio(size_1: Floats, size_2: Floats, kernel_size: float) -> None:
     small, large = np.minimum(size_1, size_2), np.maximum(size_1, size_2)
     beyond = small * kernel_size < large * (1.0 - 1e-9)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sandmould.arrays import Flags, Floats, Ints
-from sandmould.scenario.casting_shapes import Body
+from sandmould.scenario.casting_shapes import Body, held_by
 
 MOULD = 0
 """Material of all that is not painted."""
@@ -100,5 +100,5 @@ def _inside(solid: Body, position_m: Floats) -> Flags:
     corners = solid.corners()
     low_m, high_m = corners.min(axis=0), corners.max(axis=0)
     inside = ((position_m >= low_m) & (position_m <= high_m)).all(axis=1)
-    inside[inside] = solid.distance_m(position_m[inside]) < 0.0
+    inside[inside] = held_by(solid, position_m[inside])
     return inside

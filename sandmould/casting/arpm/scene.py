@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
@@ -11,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from sandmould.casting.arpm.elements import Elements, placed
+from sandmould.casting.arpm.estimates import Cooled, cooled, freezes_s
 from sandmould.casting.arpm.filling import Filling, check_casting
+from sandmould.casting.arpm.kernel import check_sizes
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster, painted
@@ -54,6 +55,16 @@ def _elements(
     box: Rectangle, shapes: tuple[Any, ...], element_m: float, layers: tuple[int, ...]
 ) -> Elements:
     return placed(_raster(box, shapes, element_m), layers)
+
+
+@lru_cache(maxsize=8)
+def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Cooled:
+    return cooled(_raster(box, shapes, element_m))
+
+
+def cooled_of(scenario: Solidification) -> Cooled:
+    """The casting as its sand sees it; ValueErrors are those of ``painted``."""
+    return _cooled(scenario.box, scenario.shapes, scenario.element_m)
 
 
 def raster_of(scenario: Solidification) -> Raster:
@@ -135,18 +146,27 @@ def _places(scenario: Solidification) -> Iterator[Problem]:
 def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
     try:
         check_casting(elements_of(scenario), filling_of(scenario))
+        yield from _ratio(scenario)
     except ValueError as error:
         kinds = [shape.kind for shape in scenario.shapes]
         valid = f"a casting that elements of {scenario.element_m:g} m can fill in its mould"
         yield Problem("shapes", kinds, f"{valid} ({error})")
 
 
+def _ratio(scenario: Solidification) -> Iterator[Problem]:
+    """Sizes of elements that a kernel's rule forbids."""
+    if scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.refuse_ratio:
+        try:
+            check_sizes(elements_of(scenario), scenario.kernel_size)
+        except ValueError as error:
+            valid = f"layers whose sizes keep the rule of 1/c_k ({error})"
+            yield Problem("layers", list(scenario.layers), valid)
+
+
 def expected_s(scenario: Solidification) -> float:
     """Estimate when a casting is solid.
 
-    Chvorinov's rule with the flux of a half space of mould at the solidus (Chvorinov, Giesserei 27
-    (1940) 177-186); its modulus is the radius of the largest circle or
-    sphere in a part of the casting.
+    As :func:`sandmould.casting.arpm.estimates.freezes_s`, with the sand that the box holds.
 
     Parameters
     ----------
@@ -157,18 +177,14 @@ def expected_s(scenario: Solidification) -> float:
     float, s
         Not beyond the time at which the run is stopped.
     """
-    mould, metal = scenario.mould, scenario.casting
-    raster = raster_of(scenario)
-    inside = raster.centre_m[raster.material.reshape(-1) > 0]
-    modulus_m = max(float(-solid.distance_m(inside).min()) for solid in solids_of(scenario))
-    superheat_k = scenario.initial_k.casting - metal.solidus_k
-    heat_j_m3 = metal.density_kg_m3 * (
-        metal.latent_heat_j_kg + metal.heat_capacity_j_kg_k * superheat_k
-    )
-    effusivity_2 = mould.conductivity_w_m_k * mould.density_kg_m3 * mould.heat_capacity_j_kg_k
-    drop_k = metal.solidus_k - scenario.initial_k.mould
-    solidified_s = 0.25 * math.pi / effusivity_2 * (heat_j_m3 * modulus_m / drop_k) ** 2
-    return min(solidified_s, scenario.until_s)
+    it = cooled_of(scenario)
+    return min(freezes_s(scenario, it, it.sand_depth_m), scenario.until_s)
+
+
+def held_volume_m3(scenario: Solidification) -> float:
+    """Volume of the elements that are casting; area in m2 in 2D."""
+    elements = elements_of(scenario)
+    return float(elements.volume_m3[elements.material == CASTING].sum())
 
 
 def expected_element_steps(scenario: Solidification) -> float:

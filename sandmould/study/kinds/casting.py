@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -12,7 +12,7 @@ from sandmould.runs.files import replaced, write_text
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.study.definition.run import LAST_MEASURED, Run
-from sandmould.study.kinds.kind import Execution, Planning, ScenarioT, SpeedClass
+from sandmould.study.kinds.kind import Execution, Note, Planning, ScenarioT, SpeedClass
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,6 +57,7 @@ def casting_planning(
     planned_s: Callable[[ScenarioT], float],
     speed_class: Callable[[ScenarioT], SpeedClass],
     plan_cells: Callable[[ScenarioT], Mapping[str, str]],
+    notes: Callable[[ScenarioT], Sequence[Note]],
 ) -> Planning[ScenarioT]:
     """Plan runs whose solver is our own: no engine can be missing, nothing runs under MPI.
 
@@ -81,6 +82,7 @@ def casting_planning(
         planned_s=planned_s,
         speed_class=speed_class,
         plan_cells=plan_cells,
+        notes=notes,
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
@@ -21,6 +21,20 @@ SpeedClass = tuple[str, int]
 """Engine and dimension: what the speed of a core depends on most."""
 OF_SAND = ("cross_check", "calibration", "certificate")
 """Sections of a study that speak of sand."""
+
+
+class Note(NamedTuple):
+    """What a plan tells of a run beside its figures."""
+
+    about: str
+    """Notes of several points about one thing are told once."""
+    text: str
+    """One sentence or two, with figures."""
+
+
+def no_notes(scenario: Any) -> Sequence[Note]:
+    """Nothing to tell."""
+    return ()
 
 
 @dataclass(frozen=True)
@@ -88,6 +102,8 @@ class Planning(Generic[ScenarioT]):
     """Scenarios of one class are computed at one speed."""
     plan_cells: Callable[[ScenarioT], Mapping[str, str]]
     """What the plan says of a run, by heading."""
+    notes: Callable[[ScenarioT], Sequence[Note]] = no_notes
+    """What a user should know of a run before it starts, though it can be run."""
     speed: MachineSpeed[ScenarioT] | None = None
     """None where ``predicted_s`` is all that is known."""
     program: UserProgram[ScenarioT] | None = None

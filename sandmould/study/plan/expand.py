@@ -19,7 +19,7 @@ from sandmould.study.definition.run import Part, Run
 from sandmould.study.definition.sweep import Point, points, value_at
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.kinds.registry import kind_named
-from sandmould.study.plan.labels import letters, run_label
+from sandmould.study.plan.labels import Labels, letters
 from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.plan.trust import outside
 from sandmould.study.robustness.controls import Case, cases
@@ -68,6 +68,8 @@ def expand(
     base = study.study.scenario.model_dump(mode="json")
     problems: dict[str, Problem] = {}
     runs: dict[str, Run] = {}
+    kind = kind_named(study.study.kind)
+    labels = Labels(kind.scenario, kind.labels_have_units)
     every = range(1, study.study.replicates + 1)
     swept = [(point, every) for point in points(study.study.sweep, study.study.scenario)]
     added = [(point, range(replicate, replicate + 1)) for point, replicate in more]
@@ -77,7 +79,7 @@ def expand(
     seeds = range(1, certificate.replicates + 1)
     added += [(point, seeds) for point in controlled]
     for point, replicates in (*swept, *added):
-        at_point = _AtPoint(study, base, point)
+        at_point = _AtPoint(study, base, point, labels)
         for problem in at_point.problems:
             problems[str(problem)] = problem
         if len(problems) >= MOST_PROBLEMS:
@@ -94,7 +96,7 @@ def expand(
                 break
             runs[run.run] = run
     for place, point in enumerate(controlled):
-        at_point = _AtPoint(study, base, point)
+        at_point = _AtPoint(study, base, point, labels)
         for case in cases(certificate, study.study.scenario, certified_hz[1]):
             if place not in case.places:
                 continue
@@ -109,8 +111,8 @@ def expand(
 class _AtPoint:
     """The scenario of one point of a sweep."""
 
-    def __init__(self, study: OpenStudy, base: Tree, point: Point) -> None:
-        self.study, self.base, self.point = study, base, point
+    def __init__(self, study: OpenStudy, base: Tree, point: Point, labels: Labels) -> None:
+        self.study, self.base, self.point, self.labels = study, base, point, labels
         self.kind = kind_named(study.study.kind)
         self.origin = Origin(dict(study.origin.file), dict(study.origin.source))
         try:
@@ -224,9 +226,10 @@ class _AtPoint:
         dump = base.model_dump(mode="json")
         parameters = {key: value_at(dump, key) for key in self.point}
         engine = {ENGINE: self.kind.planning.speed_class(base)[0]} if source else {}
-        label = self._label({**engine, **parameters})
         if part.startswith("control"):
-            label = f"{letters(part)}_{self._label(parameters)}"
+            label = f"{letters(part)}_{self.labels.of(parameters)}"
+        else:
+            label = self.labels.of({**engine, **parameters})
         sources = {**dict(_sources(base, self.origin)), **source}
         own = base.seed
         for replicate in replicates:
@@ -240,9 +243,6 @@ class _AtPoint:
                 {**sources, "seed": f"replicate {replicate} of seed {own} ({sources['seed']})"},
                 part,
             )
-
-    def _label(self, parameters: Point) -> str:
-        return run_label(parameters, self.kind.scenario, self.kind.labels_have_units)
 
 
 def swept_key(study: OpenStudy, point: Point, key: str) -> str:

@@ -4,9 +4,34 @@ from __future__ import annotations
 
 import re
 
+from sandmould.runs.formatting import mark
 from sandmould.scenario.quantity import Section, fields_at
 from sandmould.study.definition.comparing import ENGINE
 from sandmould.study.definition.sweep import Point
+
+
+class Labels:
+    """Labels of a study's points, each its own."""
+
+    def __init__(self, scenario: type[Section], has_units: bool) -> None:
+        """Begin with none.
+
+        Parameters
+        ----------
+        scenario : type of Section
+            That of the scenario, which says what unit a key ends with.
+        has_units : bool
+            Whether the unit stands in the label.
+        """
+        self._scenario, self._has_units = scenario, has_units
+        self._point: dict[str, Point] = {}
+
+    def of(self, point: Point) -> str:
+        """Label of a point; a mark of its values ends one that another point has already."""
+        label = run_label(point, self._scenario, self._has_units)
+        if self._point.setdefault(label, point) == point:
+            return label
+        return f"{label}_{mark(point)}"
 
 
 def run_label(parameters: Point, scenario: type[Section], has_units: bool) -> str:
@@ -36,6 +61,8 @@ def run_label(parameters: Point, scenario: type[Section], has_units: bool) -> st
             words.append(_digits(value))
         elif isinstance(value, str):
             words.append(letters(value)[:12])
+        elif value is not None:
+            words.append(mark(value))
     return "_".join(words) or "base"
 
 

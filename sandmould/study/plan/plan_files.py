@@ -166,6 +166,7 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
     points: dict[str, list[Run]] = {}
     for run in runs:
         points.setdefault(f"{run.part} {json.dumps(run.parameters)}", []).append(run)
+    notes: dict[str, list[tuple[str, str]]] = {}
     planning = kind_of(runs[0].scenario).planning
     heads = [*planning.plan_cells(runs[0].scenario), planning.work_unit]
     rows = [["point", "runs", *heads, "wall time a run"]]
@@ -180,6 +181,8 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
         work += work_a_run * len(alike)
         core_s += wall_s * threads * len(alike)
         longest_s = max(longest_s, wall_s)
+        for note in planning.notes(scenario):
+            notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note.text))
         if len(rows) <= LISTED_POINTS:
             rows.append(
                 [
@@ -201,4 +204,14 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
         f"{len(runs)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} cores: {whole}, "
         f"{basis}"
     )
+    lines += [_note_line(told, len(points)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _note_line(told: Sequence[tuple[str, str]], points: int) -> str:
+    """One line of what was found at some of a study's points, in the words of the first."""
+    label, text = told[0]
+    if points == 1:
+        return f"Note: {text}"
+    alike = "" if len({each for _, each in told}) == 1 else ", with other figures at others"
+    return f"Note: {text} (At {len(told)} of {points} points{alike}; first at {label}.)"

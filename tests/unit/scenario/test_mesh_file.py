@@ -47,7 +47,7 @@ def test_vertices_that_round_off_keeps_apart_are_one(tmp_path: Path) -> None:
 def test_cavity_faces_inwards_and_a_second_solid_outwards(tmp_path: Path) -> None:
     inner, beside = 0.25 + 0.5 * CORNERS, CORNERS + np.array([3, 0, 0])
     vertices = np.concatenate([CORNERS, inner, beside])
-    facets = np.concatenate([FACETS, FACETS + 8, FACETS[:, ::-1] + 16])
+    facets = np.concatenate([FACETS, FACETS[:, ::-1] + 8, FACETS[:, ::-1] + 16])
     mesh = TriangleMesh("two", *read_surface(write_stl(tmp_path / "two.stl", vertices, facets)))
     assert mesh.measure == pytest.approx(1 - 0.125 + 1)
     np.testing.assert_array_equal(
@@ -67,8 +67,8 @@ def test_solids_that_meet_in_a_vertex(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.distance_m(point), expected, atol=1e-7)
 
 
-TWO_ON_AN_EDGE = (
-    np.concatenate([CORNERS, CORNERS + np.array([1, 1, 0])]), np.concatenate([FACETS, FACETS + 8])
+FIN = (
+    np.concatenate([CORNERS, [[0.5, -1.0, 0.5]]]), np.concatenate([FACETS, [[0, 8, 4], [0, 4, 8]]])
 )  # fmt: skip
 TURNED = np.concatenate([FACETS[:1, ::-1], FACETS[1:]])
 SLIVER = (
@@ -88,7 +88,15 @@ FAULTS: dict[str, tuple[np.ndarray, np.ndarray, str]] = {
         "triangles that differ; 1 triangle is given more than once, one at (",
     ),
     "degenerate": (*SLIVER, "triangles with an area; 1 triangle is degenerate, one at ("),
-    "edge of four": (*TWO_ON_AN_EDGE, "edges of two triangles; 1 edge belongs to more, one at ("),
+    "fin": (
+        CORNERS,
+        np.concatenate([FACETS, [[0, 3, 4]]]),
+        "a closed surface; 1 edge belongs to one triangle only, one at (",
+    ),
+    "fin without a volume": (
+        *FIN,
+        "triangles that differ; 1 triangle is given more than once, one at (",
+    ),
     "turned": (
         CORNERS,
         TURNED,
@@ -116,4 +124,12 @@ def test_file_that_is_no_stl_is_refused(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "fault.stl"
     path.write_bytes(content)
     with pytest.raises(MeshFileError, match="an STL file"):
+        read_surface(path)
+
+
+def test_more_shells_than_can_be_told_apart_are_refused(tmp_path: Path) -> None:
+    at = np.arange(1001)[:, None, None] * np.array([2.0, 0.0, 0.0])
+    facets = FACETS + 8 * np.arange(1001)[:, None, None]
+    path = write_stl(tmp_path / "many.stl", (CORNERS + at).reshape(-1, 3), facets.reshape(-1, 3))
+    with pytest.raises(MeshFileError, match="at most 1000 shells in one file; here are 1001"):
         read_surface(path)

@@ -190,11 +190,12 @@ def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:
     assert np.isnan(last["solidification_time_s"])
 
 
-def test_sizes_that_break_the_rule_are_an_outcome(tmp_path: Path) -> None:
-    folder = one_run(tmp_path, exchange="corrected", layers=[2, 1], element_m=0.00125)
-    outcome = RunOutcome.read(folder / "outcome.json")
-    assert outcome.outcome is Outcome.BAD_INPUT
-    assert "the smaller must measure at least 1/c_k" in outcome.detail
+def test_sizes_that_break_the_rule_are_refused(tmp_path: Path) -> None:
+    path = opened(
+        tmp_path, exchange="corrected", layers=[2, 1], element_m=0.00125, heat_transfer_w_m2_k=None
+    )
+    with pytest.raises(BadInputError, match="the smaller must measure at least 1/c_k"):
+        expand(open_study(path))
 
 
 def test_hot_spots_are_the_latest_within_reach() -> None:

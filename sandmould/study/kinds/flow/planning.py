@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from sandmould.casting.mps import computation, scene
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.flow import MetalFlow, ShoulderedCylinder, StillTank
 from sandmould.study.kinds.casting import casting_planning
-from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.kind import Note, SpeedClass
 
 BASE_MEMORY_MB = 600
 PARTICLES_PER_MB = 300
@@ -61,6 +61,18 @@ def plan_cells(scenario: MetalFlow) -> Mapping[str, str]:
     }
 
 
+def notes(scenario: MetalFlow) -> Sequence[Note]:
+    """Poured metal whose particles may pass through each other."""
+    poured = isinstance(scenario.case, ShoulderedCylinder) and scenario.case.starts == "empty"
+    if not poured or scenario.collision_distance > 0.0:
+        return ()
+    text = (
+        "Metal is poured with collision_distance 0. Both settings of shoulder_pour broke off so "
+        "before a quarter was poured; with 0.8 they ran to their end."
+    )
+    return (Note("collisions", text),)
+
+
 PLANNING = casting_planning(
     computation,
     work_unit=computation.WORK,
@@ -73,4 +85,5 @@ PLANNING = casting_planning(
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
+    notes=notes,
 )

@@ -10,11 +10,15 @@ import pattern_fe
 from sandmould.digest import digest
 from sandmould.engines import registry
 from sandmould.engines.program import build_program
+from sandmould.runs.formatting import number
 from sandmould.scenario import checks
+from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.outline import Outline
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import SolidMesh, with_hash
-from sandmould.study.kinds.kind import MachineSpeed, Planning, SpeedClass
+from sandmould.scenario.solids import SolidMesh, filled_note, with_hash
+from sandmould.scenario.wall_thickness import thinnest_wall
+from sandmould.study.kinds.kind import MachineSpeed, Note, Planning, SpeedClass
 from sandmould.study.kinds.sand import speed
 
 BASE_MEMORY_MB = 600
@@ -123,6 +127,28 @@ def plan_cells(scenario: Scenario) -> Mapping[str, str]:
     }
 
 
+def notes(scenario: Scenario) -> list[Note]:
+    """Obstacles drawn with walls thinner than a grain, and shells that were no cavities."""
+    smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
+    told = []
+    solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
+    for solid in solids:
+        wall = thinnest_wall([solid], smallest_m)
+        if wall is not None:
+            place = ", ".join(number(float(x)) for x in wall.place_m)
+            text = (
+                f"{solid.name} has walls thinner than the smallest grain of "
+                f"{number(1e3 * smallest_m)} mm: the thinnest measures "
+                f"{number(1e3 * wall.thickness_m)} mm, at ({place}) m. A grain pressed in by half "
+                "of that leaves on the other side."
+            )
+            told.append(Note(f"walls of {solid.name}", text))
+    for i, obstacle in enumerate(scenario.obstacles):
+        if isinstance(obstacle, SolidMesh) and (text := filled_note(obstacle, f"obstacles.{i}")):
+            told.append(Note(f"filled {i}", text))
+    return told
+
+
 PLANNING = Planning[Scenario](
     work_unit="grain-steps",
     resolved=resolved,
@@ -141,5 +167,6 @@ PLANNING = Planning[Scenario](
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
+    notes=notes,
     speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
 )

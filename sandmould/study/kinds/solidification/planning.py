@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from sandmould.casting.arpm import computation, scene
+from sandmould.casting.arpm.estimates import least_sand_share
 from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.kinds.casting import casting_planning
 from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.solidification.notes import notes
 
 BASE_MEMORY_MB = 600
 ELEMENTS_PER_MB = 500
@@ -60,9 +62,10 @@ def _speed(scenario: Solidification) -> float:
 
 def plan_cells(scenario: Solidification) -> Mapping[str, str]:
     """Elements, and the time at which all should be solid."""
+    never = least_sand_share(scenario, scene.cooled_of(scenario)) >= 1.0
     return {
         "elements": f"{len(scene.elements_of(scenario).size_m):,}",
-        "solid at about": f"{scene.expected_s(scenario):.0f} s",
+        "solid at about": "never" if never else f"{scene.expected_s(scenario):.0f} s",
     }
 
 
@@ -78,4 +81,5 @@ PLANNING = casting_planning(
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
+    notes=notes,
 )

@@ -1,0 +1,56 @@
+"""Labels of runs and settings: what differs looks different, whatever its kind."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sandmould.runs.formatting import setting_text
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import plan_table
+from tests.unit.study.test_solidification_study import opened
+
+
+def corner(far: float) -> list[list[float]]:
+    return [[0.03, 0.02], [0.05, 0.02], [far, 0.06], [0.03, 0.06]]
+
+
+def test_points_of_one_study_have_labels_of_their_own(tmp_path: Path) -> None:
+    """Two polygons, a fourth key and a fifth digit were one label each."""
+    polygon = {"kind": "polygon", "vertices_m": corner(0.05)}
+    tables: dict[str, list[Any]] = {
+        "shapes.0.vertices_m": [corner(0.05), corner(0.055)],
+        "until_s": [300.0, 300.01],
+    }
+    for key, values in tables.items():
+        sweep = {"sweep": {"design": "list", "points": [
+            {"element_m": 0.005, key: value} for value in values]}}  # fmt: skip
+        runs = expand(open_study(opened(tmp_path, sweep, shapes=[polygon])))
+        labels = {run.run.rsplit("_r", 1)[0] for run in runs}
+        assert len(labels) == 2
+        rows = plan_table(runs, {}, 1).splitlines()[1:3]
+        assert {row.split()[0] for row in rows} == labels
+        assert all(re.fullmatch("[a-z0-9_]+", label) for label in labels)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ({"until_s": 300.0}, {"until_s": 300.0001}),
+        ({"shapes.0.vertices_m": corner(0.05)}, {"shapes.0.vertices_m": corner(0.055)}),
+    ],
+)
+def test_settings_that_differ_read_differently(first: dict, second: dict) -> None:
+    assert setting_text(first) != setting_text(second)
+    assert len(setting_text(first)) < 60
+    assert setting_text(first) == setting_text(dict(first))
+
+
+def test_a_setting_names_sections_of_keys_that_end_alike() -> None:
+    text = setting_text({"casting.density_kg_m3": 7200.0, "mould.density_kg_m3": 1600.0})
+    assert text == "casting density 7200 kg/m³, mould density 1600 kg/m³"
+    assert setting_text({"time_s": 0.1 + 0.2}) == "0.3 s"

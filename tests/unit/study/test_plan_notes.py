@@ -1,0 +1,237 @@
+"""What the plan tells before anything is computed: thin walls, volumes, sand, symmetry."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+from sandmould.casting.arpm import scene
+from sandmould.casting.arpm.estimates import cooled, freezes_s
+from sandmould.casting.arpm.raster import Raster
+from sandmould.casting.arpm.solidification import solidify
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.casting_shapes import Rectangle
+from sandmould.scenario.wall_thickness import thinnest_wall
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import plan_table
+from tests.scenes import TUBE_SCENE
+from tests.unit.scenario.test_mesh_union import CUBE, box, file_of
+from tests.unit.study.test_solidification_study import opened
+
+DISC = [[0.04 + 0.02 * math.cos(t), 0.04 + 0.02 * math.sin(t)]
+        for t in np.linspace(0, 2 * np.pi, 65)[:-1]]  # fmt: skip
+
+
+def square(low: float, side: float) -> dict[str, Any]:
+    return {"kind": "rectangle", "low_m": [low, low], "high_m": [low + side, low + side]}
+
+
+def around(side: float, sand: float) -> dict[str, Any]:
+    size = side + 2 * sand
+    return {"box": {"low_m": [0.0, 0.0], "high_m": [size, size]}, "shapes": [square(sand, side)],
+            "probes": []}  # fmt: skip
+
+
+def plan_of(folder: Path, top: dict[str, Any] | None = None, /, **scenario: Any) -> str:
+    return plan_table(expand(open_study(opened(folder, top, **scenario))), {}, 1)
+
+
+def notes_of(folder: Path, **scenario: Any) -> list[str]:
+    lines = plan_of(folder, **scenario).splitlines()
+    return [line.removeprefix("Note: ") for line in lines if line.startswith("Note: ")]
+
+
+def test_a_sound_casting_has_no_notes(tmp_path: Path) -> None:
+    assert notes_of(tmp_path, **around(0.04, 0.04), element_m=0.004) == []
+
+
+def test_a_fin_thinner_than_an_element_is_told(tmp_path: Path) -> None:
+    fin = {"kind": "polygon", "vertices_m": [
+        [0.04, 0.04], [0.08, 0.04], [0.08, 0.08], [0.0608, 0.08], [0.0608, 0.12],
+        [0.0592, 0.12], [0.0592, 0.08], [0.04, 0.08]]}  # fmt: skip
+    room = {"low_m": [0.0, 0.0], "high_m": [0.12, 0.16]}
+    walls, *_ = notes_of(tmp_path, shapes=[fin], box=room, probes=[], element_m=0.004)
+    assert walls.startswith("The casting has walls thinner than 2 elements of 4 mm: the thinnest "
+                            "measures 1.60 mm, at (0.0")  # fmt: skip
+    assert "33% of the surface" in walls
+    assert "missing from the run" in walls
+    resolved = notes_of(tmp_path, shapes=[fin], box=room, probes=[], element_m=0.0008)
+    assert resolved == []
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_thickness_of_walls_off_the_axes(dimension: int) -> None:
+    """A disc and a cube have none; a slanting plate of 3 mm has, whatever its direction."""
+    from scipy.spatial.transform import Rotation
+
+    from sandmould.scenario.geometry import Block
+    from sandmould.scenario.outline import Outline
+
+    turn = Rotation.random(random_state=4).as_matrix() if dimension == 3 else np.array(
+        [[0.8, 0.6], [-0.6, 0.8]])  # fmt: skip
+    half = np.array([0.02, 0.0015, 0.03][:dimension])
+    plate = Block("plate", np.zeros(dimension), half, turn)
+    wall = thinnest_wall([plate], 0.004)
+    assert wall is not None
+    assert wall.thickness_m == pytest.approx(0.003, rel=1e-4)
+    assert wall.surface_share == pytest.approx(
+        0.04 / 0.043 if dimension == 2 else 0.0024 / 0.00282, rel=0.05)  # fmt: skip
+    assert thinnest_wall([plate], 0.0029) is None
+    # two plates on each other are twice as thick
+    beside = Block("beside", 0.003 * turn[1], half, turn)
+    assert thinnest_wall([plate, beside], 0.0055) is None
+    assert thinnest_wall([Outline("disc", np.array(DISC))], 0.035) is None
+    assert thinnest_wall([Block("c", np.zeros(3), np.full(3, 0.5), np.eye(3))], 0.9) is None
+
+
+def test_walls_of_a_picture(tmp_path: Path) -> None:
+    rows = np.full((60, 60), 255, dtype=np.uint8)
+    y, x = np.indices(rows.shape)
+    rows[(x - 20) ** 2 + (y - 30) ** 2 <= 15**2] = 0
+    Image.fromarray(rows).save(tmp_path / "disc.png")
+    picture = {"kind": "image", "file": "disc.png", "pixel_m": 0.001, "low_m": [0.01, 0.01]}
+    room = {"low_m": [0.0, 0.0], "high_m": [0.08, 0.08]}
+    assert notes_of(tmp_path, shapes=[picture], box=room, probes=[], element_m=0.001) == []
+    rows[28:31, 30:58] = 0
+    Image.fromarray(rows).save(tmp_path / "disc.png")
+    walls, *_ = notes_of(tmp_path, shapes=[picture], box=room, probes=[], element_m=0.002)
+    assert "the thinnest measures 3" in walls
+
+
+def test_elements_that_hold_another_volume_than_drawn_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A square of 38.4 mm in elements that hold 40 mm, as 1600 of 1474.56 mm2."""
+    assert notes_of(tmp_path, **around(0.04, 0.04), element_m=0.004) == []
+    drawn = [Rectangle(low_m=(0.0, 0.0), high_m=(0.0384, 0.0384)).solid]
+    monkeypatch.setattr(scene, "solids_of", lambda scenario: drawn)
+    assert notes_of(tmp_path, **around(0.04, 0.04), element_m=0.004) == [
+        "The elements hold 8.5% more than the drawn casting: 1\u202f600 instead of 1\u202f475 mm2."
+    ]
+
+
+def test_too_little_sand_is_told(tmp_path: Path) -> None:
+    (little,) = notes_of(tmp_path, **around(0.04, 0.01), element_m=0.002)
+    # 40 mm squared gives 0.79 of what 60 mm squared less it can take
+    assert little.startswith("There is too little sand: 13.")
+    assert "gives 79% of what this sand can take" in little
+    assert notes_of(tmp_path, **around(0.04, 0.02), element_m=0.002) == []
+
+
+def test_a_box_that_can_never_freeze_the_casting_is_told(tmp_path: Path) -> None:
+    shape = {"kind": "rectangle", "low_m": [0.01, 0.01], "high_m": [0.11, 0.07]}
+    room = {"low_m": [0.0, 0.0], "high_m": [0.12, 0.08]}
+    scenario = {"shapes": [shape], "box": room, "probes": [], "element_m": 0.01}
+    (never,) = notes_of(tmp_path, **scenario)
+    # by hand: 7200 (272000 + 711 110) J/m3 of 0.006 m2 over 1600 1130 1420 J/m3 of 0.0036 m2
+    assert never.startswith("The casting never freezes in this box, whatever until_s is")
+    assert "gives 1.64 times the heat" in never
+    assert "more than 0.00589" in never
+    assert "never" in plan_of(tmp_path, **scenario).splitlines()[1]
+    # true: the run ends liquid with all at one temperature above the solidus
+    (run,) = expand(open_study(opened(tmp_path, **scenario)))
+    it = run.scenario
+    elements, filling = scene.elements_of(it), scene.filling_of(it)
+    marching = scene.method_of(it).marching(elements, filling, scene.raster_of(it))
+    result = solidify(elements, filling, marching, record_s=1000.0, until_s=20000.0)
+    assert math.isnan(result.solidification_time_s)
+    assert result.heat.temperature_k.min() > it.casting.solidus_k
+
+
+def test_sides_of_the_box_that_the_casting_touches_are_told(tmp_path: Path) -> None:
+    half = {"kind": "rectangle", "low_m": [0.0, 0.02], "high_m": [0.02, 0.06]}
+    (note,) = notes_of(tmp_path, shapes=[half], probes=[], element_m=0.005)
+    assert note == ("The casting touches the box at its side of low x: it is a plane of symmetry, "
+                    "through which no heat passes.")  # fmt: skip
+
+
+@pytest.mark.parametrize("element_m", [0.004, 0.002, 0.001])
+def test_estimate_sees_symmetry_and_is_near_the_run(element_m: float) -> None:
+    """A square of 40 mm freezes after 155 s, and so do its half and its quarter on the box's sides.
+
+    The rule knows no more than one depth of a casting: 30 %. Five elements to the middle leave 15 %
+    between the three.
+    """
+    size = round(0.16 / element_m)
+    side = round(0.04 / element_m)
+    whole = np.zeros((size, size), dtype=np.int64)
+    a = (size - side) // 2
+    whole[a : a + side, a : a + side] = 1
+    steel = yaml.safe_load(Path("config/materials/hirata_2019.yaml").read_text())
+    scenario = _steel(steel)
+    both = [
+        freezes_s(scenario, cooled(Raster(material, element_m, np.zeros(2))))
+        for material in (whole, whole[size // 2 :], whole[size // 2 :, size // 2 :])
+    ]
+    assert both == pytest.approx([155.0] * 3, rel=0.3)
+    assert both[1:] == pytest.approx(both[:1] * 2, rel=0.15)
+
+
+def _steel(tree: dict[str, Any]) -> Any:
+    from sandmould.scenario.solidification import Solidification
+
+    def values(node: Any) -> Any:
+        if isinstance(node, dict):
+            return node["value"] if "value" in node else {k: values(v) for k, v in node.items()}
+        return node
+
+    return Solidification.model_validate({**values(tree), **around(0.04, 0.06), "element_m": 0.004})
+
+
+def test_a_shell_that_is_no_cavity_is_told(tmp_path: Path) -> None:
+    file_of([CUBE, box([8, 8, 8], [16, 16, 16])], tmp_path)
+    mesh = {"kind": "mesh", "file": "parts.stl", "unit_m": 0.001}
+    room = {"low_m": [0.0, 0.0, 0.0], "high_m": [0.028, 0.028, 0.028]}
+    notes = notes_of(tmp_path, shapes=[mesh], box=room, probes=[], element_m=0.002)
+    assert any(note.startswith("shapes.0 has 1 shell that lies in another one") for note in notes)
+
+
+def test_layers_that_break_the_kernels_rule_are_refused_by_the_plan(tmp_path: Path) -> None:
+    path = opened(tmp_path, **around(0.04, 0.06), element_m=0.001, exchange="corrected",
+                  heat_transfer_w_m2_k=None, layers=[1] * 5)  # fmt: skip
+    with pytest.raises(BadInputError, match=r"layers = \[1, 1, 1, 1, 1\] .* the rule of 1/c_k"):
+        expand(open_study(path))
+
+
+def test_a_note_of_several_points_is_told_once(tmp_path: Path) -> None:
+    sweep = {"sweep": {"keys": {"element_m": [0.002, 0.001]}}}
+    lines = plan_of(tmp_path, sweep, **around(0.04, 0.01)).splitlines()
+    (note,) = [line for line in lines if line.startswith("Note: ")]
+    assert "(At 2 of 2 points" in note
+    assert note.endswith("first at element_m_0p002.)")
+
+
+def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
+    study: dict[str, Any] = {"kind": "flow", "scenario": {"case": {"kind": "shoulder"}}}
+    told = {}
+    for distance in (0.0, 0.8):
+        study["scenario"]["collision_distance"] = distance
+        path = tmp_path / "pour.yaml"
+        path.write_text(yaml.safe_dump(study))
+        told[distance] = plan_table(expand(open_study(path)), {}, 1)
+    assert "Note: Metal is poured with collision_distance 0." in told[0.0]
+    assert "Note:" not in told[0.8]
+
+
+def test_obstacles_thinner_than_a_grain_are_told(tmp_path: Path) -> None:
+    def table(thickness_m: float) -> str:
+        vertices = [[0.02, 0.02], [0.06, 0.02], [0.06, 0.02 + thickness_m],
+                    [0.02, 0.02 + thickness_m]]  # fmt: skip
+        obstacle = {"kind": "polygon", "name": "shelf", "vertices_m": vertices}
+        scene = {**TUBE_SCENE, "obstacles": [obstacle]}
+        path = tmp_path / "shelf.yaml"
+        path.write_text(yaml.safe_dump({"scenario": scene}))
+        return plan_table(expand(open_study(path)), {}, 1)
+
+    told = [line for line in table(0.0005).splitlines() if line.startswith("Note: ")]
+    assert len(told) == 1
+    assert told[0].startswith("Note: shelf has walls thinner than the smallest grain of ")
+    assert "the thinnest measures 0.500 mm" in told[0]
+    assert "Note: " not in table(0.01)
