@@ -36,7 +36,9 @@ onstart:
 rule all:
     default_target: True
     input:
-        rules.report.output.html,
+        # All of them: a missing table is written again, too.
+        rules.collect.output,
+        rules.report.output,
         rules.check.output.done,
         [rules.calibrate.output.done] if STUDY.study.calibration.sands else [],
     message:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+from sandmould.digest import file_digest
 from sandmould.runs.files import write_text
 
 MANIFEST_FILE = "products.json"
+DECK_FILE = "deck.in"
+Manifest = dict[str, dict[str, Any]]
 Step = Literal["computed", "measured"]
 
 
@@ -38,14 +41,20 @@ def _files(place: Path) -> Iterator[Path]:
 
 
 def write_manifest(folder: Path, step: Step, sizes: Mapping[str, int]) -> None:
-    """Write down what a step of a run left; ``computed`` begins anew, ``measured`` adds to it."""
-    earlier = read_manifest(folder) or {} if step == "measured" else {}
-    earlier = {name: files for name, files in earlier.items() if name != step}
-    write_text(folder / MANIFEST_FILE, json.dumps({**earlier, step: sizes}, indent=1) + "\n")
+    """Write down what a step of a run left.
+
+    ``computed`` begins anew, with the hash of the deck that was computed; ``measured`` adds to it.
+    """
+    if step == "computed":
+        deck = folder / DECK_FILE
+        tree: Manifest = {"deck": {DECK_FILE: file_digest(deck)}} if deck.is_file() else {}
+    else:
+        tree = read_manifest(folder) or {}
+    write_text(folder / MANIFEST_FILE, json.dumps({**tree, step: sizes}, indent=1) + "\n")
 
 
-def read_manifest(folder: Path) -> dict[str, dict[str, int]] | None:
-    """Sizes of the files of each step; None for a run of a time that wrote none.
+def read_manifest(folder: Path) -> Manifest | None:
+    """Files of each step with their sizes; None for a run of a time that wrote none.
 
     Raises
     ------
@@ -61,7 +70,17 @@ def read_manifest(folder: Path) -> dict[str, dict[str, int]] | None:
     return tree
 
 
-def damage(folder: Path, sizes: Mapping[str, int]) -> str:
+def deck_damage(folder: Path, manifest: Manifest) -> str:
+    """Say that the deck is missing or was changed since it was computed; empty where it is not."""
+    deck = folder / DECK_FILE
+    if not deck.is_file():
+        return f"{DECK_FILE} is missing"
+    known = manifest.get("deck", {}).get(DECK_FILE)
+    changed = known is not None and known != file_digest(deck)
+    return f"{DECK_FILE} was changed by hand" if changed else ""
+
+
+def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
     """Say which file is missing or has another size; empty where all are as they were left.
 
     Parameters

@@ -26,5 +26,6 @@ def failed_runs(summary: Path) -> None:
     failed = [row for row in rows if row["outcome"] != Outcome.FINISHED.label]
     if failed:
         lines = [f"  {row['run']}: {row['outcome']}. {row['detail']}".rstrip() for row in failed]
-        said = "\n".join([f"{len(failed)} of {len(rows)} runs did not finish:", *lines])
+        again = "A failed run is computed once more by: sandmould again RUN"
+        said = "\n".join([f"{len(failed)} of {len(rows)} runs did not finish:", *lines, again])
         raise SystemExit(said)

@@ -91,6 +91,26 @@ def _folder_lock(folder: Path) -> Iterator[TextIO]:
         yield file
 
 
+def is_locked(folder: Path) -> bool:
+    """Whether a process of this machine computes in a run's folder."""
+    try:
+        with (folder / "lock").open() as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
+    return False
+
+
+def computed_elsewhere(folder: Path) -> bool:
+    """Whether another machine computed in a run's folder last."""
+    with contextlib.suppress(OSError, ValueError):
+        host = (folder / "lock").read_text(encoding="utf-8").strip()
+        return host not in ("", socket.gethostname())
+    return False
+
+
 def _watch(command: list[str], log: TextIO, lock: TextIO) -> tuple[int, str]:
     """Run a command, pass on what it prints, and keep its last words.
 

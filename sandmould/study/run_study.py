@@ -8,7 +8,6 @@ go on to Snakemake.
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.rounds.decide import decision_text, next_runs
 from sandmould.study.rounds.round_log import read_rounds, write_rounds
+from sandmould.study.stopping import Stopped, run_snakemake, stopping
 
 
 def run_study(path: Path, options: Sequence[str]) -> int:
@@ -34,13 +34,23 @@ def run_study(path: Path, options: Sequence[str]) -> int:
     Returns
     -------
     int
-        Exit status of the last call of Snakemake: not 0 where a run failed.
+        Exit status of the last call of Snakemake: not 0 where a run failed, or that of a shell
+        after Ctrl-C or kill.
 
     Raises
     ------
     BadInputError
         Before anything starts.
     """
+    try:
+        with stopping():
+            return _run_study(path, options)
+    except Stopped as stopped:
+        print(f"\n{path.stem} was stopped: the same command goes on with it.", file=sys.stderr)
+        return stopped.status
+
+
+def _run_study(path: Path, options: Sequence[str]) -> int:
     plan = open_plan(path)
     folder, study = RESULTS / plan.study.name, plan.study.study
     while study.refine.rounds or study.certificate.controls:
@@ -64,7 +74,7 @@ def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> in
     cores = [] if any(o in ("--cores", "-c", "--jobs", "-j") for o in options) else _all_cores()
     workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path)]
     command = [sys.executable, "-m", "snakemake", *cores, *workflow, *options]
-    return subprocess.run([*command, *(["--", *targets] if targets else [])]).returncode
+    return run_snakemake([*command, *(["--", *targets] if targets else [])])
 
 
 def _all_cores() -> list[str]:

@@ -1,6 +1,6 @@
 # One run: its deck, its computation, its measures; or several runs in one job.
-# What a run lacks is decided by what lies in its folder, not by times: its scenario and deck are
-# "ancient", and a note that is newer than its products asks for them again (study/plan/lacking.py).
+# What a run lacks is decided by what lies in its folder, not by times: its scenario is "ancient",
+# and a note that is newer than its products asks for them again (study/plan/lacking.py).
 
 
 rule render:
@@ -26,7 +26,7 @@ rule render:
 rule simulate:
     input:
         scenario=rules.render.input.scenario,
-        deck=ancient(rules.render.output.deck),
+        deck=rules.render.output.deck,
         note=compute_note_of,
     output:
         outcome=f"{FOLDER}/runs/{{run}}/outcome.json",

@@ -12,7 +12,7 @@ from typing import Any
 
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.manifest import MANIFEST_FILE, damage, read_manifest
+from sandmould.runs.manifest import MANIFEST_FILE, Manifest, damage, deck_damage, read_manifest
 from sandmould.runs.outcome import RunOutcome
 from sandmould.study.definition.run import LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
@@ -81,11 +81,12 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     return _lack_of_files(folder, manifest)
 
 
-def _lack_of_files(folder: Path, manifest: dict[str, dict[str, int]] | None) -> Lack:
+def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
     """What is lost of the files of a run that ended; a run of older times has no manifest."""
     sizes = (manifest or {}).get("computed")
-    needed = ["deck.in", *(_OF_ANY_COMPUTED if sizes is None else ())]
-    why = _empty(folder, needed) or damage(folder, sizes or {})
+    why = deck_damage(folder, manifest or {}) or (
+        _empty(folder, _OF_ANY_COMPUTED) if sizes is None else damage(folder, sizes)
+    )
     if why:
         return Lack(Need.COMPUTE, why)
     if manifest is None:
