@@ -33,6 +33,15 @@ onstart:
         print(price(PLAN, RESULTS, CORES), file=sys.stderr)
 
 
+onerror:
+    # After Ctrl-C too; "sandmould run" says it by itself.
+    if workflow.is_main_process and (left := len(PLAN.lacks(RESULTS))):
+        print(
+            f"{left} of {len(PLAN.runs)} runs are left: the same command goes on with them.",
+            file=sys.stderr,
+        )
+
+
 rule all:
     default_target: True
     input:

@@ -91,6 +91,25 @@ def _folder_lock(folder: Path) -> Iterator[TextIO]:
         yield file
 
 
+def take_turn(study_folder: Path) -> TextIO | None:
+    """Wait for any other Snakemake that computes a study; ends with the file that it gives.
+
+    Two would remove and compute again what the other has just finished. None where the folder
+    takes no file: the plan says so then.
+    """
+    try:
+        study_folder.mkdir(parents=True, exist_ok=True)
+        file = (study_folder / "lock").open("a")
+    except OSError:
+        return None
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        print(f"{study_folder}: waiting for the command that computes it already", file=sys.stderr)
+        fcntl.flock(file, fcntl.LOCK_EX)
+    return file
+
+
 def is_locked(folder: Path) -> bool:
     """Whether a process of this machine computes in a run's folder."""
     try:

@@ -13,9 +13,11 @@ from sandmould.study.plan.build_plan import (
     open_plan,
     prepare,
     price,
+    starts_jobs,
     study_path,
 )
 from sandmould.study.plan.lacking import Need, notes_of
+from sandmould.study.process import take_turn
 from sandmould.study.definition.run import RUN_NAME
 
 OVERRIDES = dict(workflow.config_settings.config)
@@ -31,6 +33,8 @@ try:
     PLAN = open_plan(study_path(workflow.configfiles, OVERRIDES))
     BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
     if workflow.is_main_process and "--lint" not in sys.argv:
+        # Held until this process ends.
+        turn = starts_jobs(sys.argv) and take_turn(RESULTS / PLAN.study.name)
         print(announce(PLAN, RESULTS, CORES), file=sys.stderr)
         if said := prepare(PLAN, RESULTS):
             print(f"{said}\n", file=sys.stderr)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -86,6 +87,26 @@ class Plan:
         run = self._by_name[name]
         labels = {key: str(value) for key, value in run.parameters.items()}
         return labels | {"replicate": str(run.replicate)}
+
+
+_LOOKS = (
+    *("--dry-run", "--dryrun", "--lint", "--report", "--dag", "--rulegraph", "--filegraph"),
+    *("--d3dag", "--summary", "--detailed-summary", "--list-rules", "--list-target-rules"),
+    *("--list-changes", "--list-untracked", "--archive", "--cleanup-metadata", "--unlock"),
+)
+
+
+def starts_jobs(arguments: Sequence[str]) -> bool:
+    """Whether Snakemake called with these arguments computes, or only looks.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        The command line.
+    """
+    short = [a for a in arguments if re.fullmatch("-[a-zA-Z]+", a)]
+    looks = any(a.split("=")[0] in _LOOKS for a in arguments)
+    return not looks and not any(set(a) & set("nSDl") for a in short)
 
 
 def study_path(configfiles: Sequence[Path], overrides: Mapping[str, Any]) -> Path:
@@ -208,7 +229,7 @@ def prepare(plan: Plan, results: Path) -> str:
     """
     folder = results / plan.study.name
     with _writing(folder):
-        return note_lacks(plan.lacks(results), folder)
+        return note_lacks([run.run for run in plan.runs], plan.lacks(results), folder)
 
 
 @contextlib.contextmanager

@@ -133,16 +133,19 @@ def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
     return {run: lack for run, lack in found.items() if lack.need}
 
 
-def note_lacks(found: dict[str, Lack], folder: Path) -> str:
+def note_lacks(runs: Iterable[str], found: dict[str, Lack], folder: Path) -> str:
     """Write for Snakemake which runs of a study need what, where it would not see that by itself.
 
     What is missing before anything was collected it sees. Later it takes no notice of a missing
-    file whose successors are there, and never of a damaged one.
+    file whose successors are there, and never of a damaged one. A note of a run that lacks nothing
+    any more is removed: it may be newer than a deck that was rendered before it.
 
     Parameters
     ----------
+    runs : iterable of str
+        Names of all runs.
     found : dict
-        See ``lacks``.
+        What those that are not whole lack, see ``lacks``.
     folder : Path
         ``results/<study>``.
 
@@ -152,8 +155,13 @@ def note_lacks(found: dict[str, Lack], folder: Path) -> str:
         Which runs are computed or measured again, and why; empty where none is.
     """
     begun = (folder / "summary.tsv").exists() or (folder / "batches").exists()
-    for name, lack in found.items():
-        run = folder / "runs" / name
+    for name in runs:
+        run, lack = folder / "runs" / name, found.get(name, WHOLE)
+        for need, note in _NOTE.items():
+            if need is not lack.need:
+                (run / note).unlink(missing_ok=True)
+        if not lack.need:
+            continue
         if begun or any((run / file).exists() for file in ("deck.in", "outcome.json")):
             # The time makes each note differ: an input that says the same is no reason to compute.
             now = datetime.now(UTC).isoformat()
