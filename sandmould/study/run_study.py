@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from sandmould import ROOT
@@ -18,7 +19,7 @@ from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.rounds.decide import decision_text, next_runs
 from sandmould.study.rounds.round_log import read_rounds, write_rounds
-from sandmould.study.stopping import Stopped, run_snakemake, stopping
+from sandmould.study.stopping import run_snakemake, until_stopped
 
 
 def run_study(path: Path, options: Sequence[str]) -> int:
@@ -42,12 +43,7 @@ def run_study(path: Path, options: Sequence[str]) -> int:
     BadInputError
         Before anything starts.
     """
-    try:
-        with stopping():
-            return _run_study(path, options)
-    except Stopped as stopped:
-        print(f"\n{path.stem} was stopped: the same command goes on with it.", file=sys.stderr)
-        return stopped.status
+    return until_stopped(partial(_run_study, path, options), path.stem)
 
 
 def _run_study(path: Path, options: Sequence[str]) -> int:

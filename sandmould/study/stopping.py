@@ -6,7 +6,8 @@ import contextlib
 import os
 import signal
 import subprocess
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from types import FrameType
 
@@ -28,8 +29,31 @@ class Stopped(BaseException):
         super().__init__(number)
 
 
+def until_stopped(work: Callable[[], int], name: str) -> int:
+    """Do a command's work; at Ctrl-C or kill say that the same command goes on.
+
+    Parameters
+    ----------
+    work : callable
+        Gives the exit status.
+    name : str
+        What the command computes.
+
+    Returns
+    -------
+    int
+        The exit status of the work, or that of a shell after the signal.
+    """
+    try:
+        with _stopping():
+            return work()
+    except Stopped as stopped:
+        print(f"\n{name} was stopped: the same command goes on with it.", file=sys.stderr)
+        return stopped.status
+
+
 @contextlib.contextmanager
-def stopping() -> Iterator[None]:
+def _stopping() -> Iterator[None]:
     """Raise ``Stopped`` at signals that ask to end; ignored ones, as under nohup, stay so."""
     before = {number: signal.getsignal(number) for number in _SIGNALS}
 
