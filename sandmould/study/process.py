@@ -80,12 +80,13 @@ def _folder_lock(folder: Path) -> Iterator[TextIO]:
     names this machine, since a lock may not be seen from another.
     """
     (folder / "work").mkdir(exist_ok=True)
-    with (folder / "lock").open("w") as file:
+    with (folder / "lock").open("a") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             print(f"{folder}: waiting for the process that computes it already", file=sys.stderr)
             fcntl.flock(file, fcntl.LOCK_EX)
+        file.truncate(0)
         file.write(f"{socket.gethostname()}\n")
         file.flush()
         yield file
