@@ -33,10 +33,21 @@ onstart:
         print(price(PLAN, RESULTS, CORES), file=sys.stderr)
 
 
+onerror:
+    # After Ctrl-C too; "sandmould run" says it by itself.
+    if workflow.is_main_process and (left := len(PLAN.lacks(RESULTS))):
+        print(
+            f"{left} of {len(PLAN.runs)} runs are left: the same command goes on with them.",
+            file=sys.stderr,
+        )
+
+
 rule all:
     default_target: True
     input:
-        rules.report.output.html,
+        # All of them: a missing table is written again, too.
+        rules.collect.output,
+        rules.report.output,
         rules.check.output.done,
         [rules.calibrate.output.done] if STUDY.study.calibration.sands else [],
     message:

@@ -6,6 +6,7 @@ core, and all else is what any run does. No code is swapped.
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
+from sandmould.runs.hashing import scenario_hash
 from sandmould.study.plan.build_plan import open_plan
 
 REPLICATES = 5
@@ -157,6 +159,13 @@ def graft(place: Place, study: Path, source: Path) -> int:
         for product in products[like]:
             os.link(finished[like] / product, target / product)
             linked += 1
+        # Its origin is its own: a run of another scenario would be computed again.
+        origin = target / "provenance.json"
+        text = json.dumps(
+            json.loads(origin.read_text("utf-8")) | {"scenario_sha256": scenario_hash(run.scenario)}
+        )
+        origin.unlink()
+        origin.write_text(text, encoding="utf-8")
     # Products are older than the plan; links share their times, so the plan is dated back.
     oldest = min(p.stat().st_mtime for p in (source / "runs").rglob("*") if p.is_file())
     for path in (*folder.glob("runs/*/scenario.yaml"), folder / "runs.tsv", folder / "study.yaml"):

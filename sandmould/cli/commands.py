@@ -31,6 +31,12 @@ Cores = Annotated[
 ]
 
 
+Adopt = Annotated[
+    bool,
+    typer.Option("--adopt", help="Take over results that belong to another file of its name."),
+]
+
+
 class _Verbs(TyperGroup):
     """Verbs that say what is wrong with an input in one sentence a problem."""
 
@@ -71,11 +77,13 @@ def sandmould(
 
 
 @app.command()
-def plan(study: StudyFile, cores: Cores = None) -> None:
+def plan(study: StudyFile, cores: Cores = None, adopt: Adopt = False) -> None:
     """Check a study and print its runs and their price; nothing starts."""
     from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
     from sandmould.study.plan.trust import reading_help
 
+    if adopt:
+        _adopt(study)
     opened = open_plan(study)
     typer.echo(announce(opened, RESULTS, cores or _all_cores(), measure=True))
     if said := reading_help(opened.study, opened.runs):
@@ -92,12 +100,37 @@ def run(
         ),
     ] = None,
     cores: Cores = None,
+    adopt: Adopt = False,
 ) -> None:
     """Compute a study, or what is missing of it; write its report."""
     from sandmould.study.run_study import run_study
 
-    of_cores = [] if cores is None else ["--cores", str(cores)]
-    raise typer.Exit(run_study(study, [*of_cores, *(options or [])]))
+    if adopt:
+        _adopt(study)
+    raise typer.Exit(run_study(study, [*_cores_option(cores), *(options or [])]))
+
+
+@app.command()
+def again(
+    runs: Annotated[
+        list[str],
+        typer.Argument(metavar="RUN...", help="Names of runs, or STUDY/RUN; any study's."),
+    ],
+    cores: Cores = None,
+    later: Annotated[
+        bool, typer.Option("--later", help="Leave computing them to the next run of the study.")
+    ] = False,
+) -> None:
+    """Compute runs once more, such as failed ones."""
+    from sandmould.study.again import forget
+    from sandmould.study.plan.build_plan import RESULTS
+    from sandmould.study.run_study import run_study
+
+    studies = forget(runs, RESULTS)
+    if not later:
+        raise typer.Exit(max(run_study(study, _cores_option(cores)) for study in studies))
+    for study in studies:
+        typer.echo(f"sandmould run {study} computes them again.")
 
 
 @app.command()
@@ -110,12 +143,38 @@ def status(study: StudyFile, cores: Cores = None) -> None:
 
 
 @app.command()
+def tidy(
+    study: StudyFile,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask first.")] = False,
+) -> None:
+    """Remove run folders that a study no longer lists."""
+    from sandmould.study.plan.build_plan import RESULTS, open_plan
+    from sandmould.study.tidy import leftovers, remove, size_text
+
+    opened = open_plan(study)
+    found = leftovers(opened, RESULTS)
+    for folder, why in found.kept.items():
+        typer.echo(f"stays: {folder.name}, since {why}")
+    if not found.removable:
+        typer.echo(f"{opened.study.name}: no run folder to remove")
+        return
+    for folder in found.removable:
+        typer.echo(f"  {folder.name}")
+    number, size = len(found.removable), size_text(found.freed_bytes)
+    if yes or typer.confirm(f"Remove {number} run folders and free {size}?"):
+        remove(opened, RESULTS, found.removable)
+        typer.echo(f"{number} run folders removed, {size} freed")
+
+
+@app.command()
 def report(study: StudyFile) -> None:
     """Write the report of a study again from its results."""
     from sandmould.report.page import write_report
     from sandmould.study.plan.build_plan import RESULTS
+    from sandmould.study.plan.ownership import check_owner
 
     folder = RESULTS / study.stem
+    check_owner(study, folder)
     if not (folder / "runs.tsv").is_file():
         valid = f"a study with results: sandmould run {study.stem} comes first"
         raise BadInputError([Problem("STUDY", study.stem, valid)])
@@ -126,6 +185,19 @@ def report(study: StudyFile) -> None:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("results", str(folder), valid)]) from error
     typer.echo(f"The report: {page}")
+
+
+def _adopt(study: Path) -> None:
+    """Let results belong to a study that is sound."""
+    from sandmould.study.plan.build_plan import RESULTS
+    from sandmould.study.plan.load_study import open_study
+    from sandmould.study.plan.ownership import write_owner
+
+    write_owner(study, RESULTS / open_study(study).name)
+
+
+def _cores_option(cores: int | None) -> list[str]:
+    return [] if cores is None else ["--cores", str(cores)]
 
 
 def _all_cores() -> int:

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sandmould.runs.manifest import files_below, write_manifest
 from sandmould.runs.outcome import RunOutcome
 
 
@@ -89,7 +90,8 @@ def finish(
     """Move a run's products from its work folder into place.
 
     A finished run's work folder is removed, a failed one's renamed: asked for again, that run
-    begins anew, since its tables are no longer beside its checkpoint.
+    begins anew, since its tables are no longer beside its checkpoint. The sizes of all products
+    are written down, so that what is lost or cut short later is seen.
 
     Parameters
     ----------
@@ -115,6 +117,8 @@ def finish(
         writer.writerow(row)
     text = json.dumps(provenance, indent=1) + "\n"
     (folder / "provenance.json").write_text(text, encoding="utf-8")
+    left = (*products, "cost.tsv", "provenance.json")
+    write_manifest(folder, "computed", files_below(folder, left))
     shutil.rmtree(folder / LAST_WORK, ignore_errors=True)
     if outcome.outcome == 0:
         shutil.rmtree(work)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import multiprocessing
 import signal
 import sys
@@ -11,29 +10,15 @@ from collections.abc import Callable, Sequence
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 from sandmould.runs.formatting import listed
-from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.parent import end_with_parent
-from sandmould.study.definition.run import LAST_MEASURED, Run
-from sandmould.study.kinds.registry import kind_of
+from sandmould.study.definition.run import LAST_MEASURED
 from sandmould.study.plan.batches import is_done
+from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.process import launch
 from sandmould.study.simulate import measure, render
-
-
-def is_current(run: Run, folder: Path) -> bool:
-    """Whether a run's folder holds an outcome, of its scenario and deck as they are now."""
-    try:
-        origin: dict[str, Any] = json.loads((folder / "provenance.json").read_text("utf-8"))
-        there = (folder / "outcome.json").exists()
-    except (OSError, ValueError):
-        return False
-    template_hash = kind_of(run.scenario).planning.template_hash
-    wanted = scenario_hash(run.scenario), template_hash(run.scenario)
-    return there and (origin.get("scenario_sha256"), origin.get("template_sha256")) == wanted
 
 
 def compute_batch(
@@ -117,12 +102,13 @@ class _Stop:
 def _compute(folder: Path, log: Path, ranks: int, mpi: str) -> None:
     """Do what is missing of one run."""
     run = read_run(folder / "scenario.yaml")
-    if is_current(run, folder):
-        print(f"{folder.name}: computed already", file=sys.stderr)
-    else:
+    need = lack_of(run, folder).need
+    if need is Need.COMPUTE:
         for old in ("outcome.json", LAST_MEASURED):
-            (folder / old).unlink(missing_ok=True)  # of another scenario or deck
+            (folder / old).unlink(missing_ok=True)  # damaged, or of another scenario or deck
         render(run, folder)
         launch(folder, log, ranks, mpi)
-    if not (folder / LAST_MEASURED).exists():
+    else:
+        print(f"{folder.name}: computed already", file=sys.stderr)
+    if lack_of(run, folder).need is not Need.NOTHING:
         measure(run, folder)

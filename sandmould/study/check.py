@@ -25,5 +25,6 @@ def failed_runs(study_folder: Path) -> None:
     failed = summary[~finished(summary)].to_dict("records")
     if failed:
         lines = [f"  {row[RUN]}: {row[OUTCOME]}. {row[DETAIL]}".rstrip() for row in failed]
-        said = "\n".join([f"{len(failed)} of {len(summary)} runs did not finish:", *lines])
+        again = "A failed run is computed once more by: sandmould again RUN"
+        said = "\n".join([f"{len(failed)} of {len(summary)} runs did not finish:", *lines, again])
         raise SystemExit(said)

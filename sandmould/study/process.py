@@ -9,6 +9,7 @@ import collections
 import contextlib
 import fcntl
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ from sandmould.runs.parent import end_with_parent
 
 RESTARTABLE_EXIT = 75
 """Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
-_END_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+_END_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> None:
@@ -49,10 +50,10 @@ def launch(folder: Path, log: Path, ranks: int = 1, mpi: str = "mpiexec") -> Non
     """
     end_with_parent()
     command = [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
-    with log.open("a", encoding="utf-8") as log_file, _folder_lock(folder):
+    with log.open("a", encoding="utf-8") as log_file, _folder_lock(folder) as lock:
         if (folder / "outcome.json").exists():
             return  # finished meanwhile by a process that outlived its own snakemake
-        status, tail = _watch(_under_mpi(command, ranks, mpi), log_file)
+        status, tail = _watch(_under_mpi(command, ranks, mpi), log_file, lock)
         if status == 0 or (folder / "outcome.json").exists():
             return  # killed after its outcome was there: nothing is left to do
         if status == RESTARTABLE_EXIT:
@@ -72,29 +73,76 @@ def _under_mpi(command: list[str], ranks: int, mpi: str) -> list[str]:
 
 
 @contextlib.contextmanager
-def _folder_lock(folder: Path) -> Iterator[None]:
+def _folder_lock(folder: Path) -> Iterator[TextIO]:
     """Wait for any other process that computes in a run's folder.
 
-    One can outlive a killed snakemake; the next snakemake then finds what it finished.
+    One can outlive a killed snakemake; the next snakemake then finds what it finished. The file
+    names this machine, since a lock may not be seen from another.
     """
     (folder / "work").mkdir(exist_ok=True)
-    with (folder / "lock").open("w") as file:
+    with (folder / "lock").open("a") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             print(f"{folder}: waiting for the process that computes it already", file=sys.stderr)
             fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+        file.truncate(0)
+        file.write(f"{socket.gethostname()}\n")
+        file.flush()
+        yield file
 
 
-def _watch(command: list[str], log: TextIO) -> tuple[int, str]:
-    """Run a command, pass on what it prints, and keep its last words."""
+def take_turn(study_folder: Path) -> TextIO | None:
+    """Wait for any other Snakemake that computes a study; ends with the file that it gives.
+
+    Two would remove and compute again what the other has just finished. None where the folder
+    takes no file: the plan says so then.
+    """
+    try:
+        study_folder.mkdir(parents=True, exist_ok=True)
+        file = (study_folder / "lock").open("a")
+    except OSError:
+        return None
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        print(f"{study_folder}: waiting for the command that computes it already", file=sys.stderr)
+        fcntl.flock(file, fcntl.LOCK_EX)
+    return file
+
+
+def is_locked(folder: Path) -> bool:
+    """Whether a process of this machine computes in a run's folder."""
+    try:
+        with (folder / "lock").open() as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
+    return False
+
+
+def computed_elsewhere(folder: Path) -> bool:
+    """Whether another machine computed in a run's folder last."""
+    with contextlib.suppress(OSError, ValueError):
+        host = (folder / "lock").read_text(encoding="utf-8").strip()
+        return host not in ("", socket.gethostname())
+    return False
+
+
+def _watch(command: list[str], log: TextIO, lock: TextIO) -> tuple[int, str]:
+    """Run a command, pass on what it prints, and keep its last words.
+
+    It holds the run's lock, too: killed, this process may end before it.
+    """
     process = subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         preexec_fn=end_with_parent,
+        pass_fds=(lock.fileno(),),
     )
     with _passed_on(process):
         return _listen(process, log)

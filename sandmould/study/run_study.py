@@ -8,9 +8,9 @@ go on to Snakemake.
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from sandmould import ROOT
@@ -20,6 +20,7 @@ from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.plan.trust import check_places, check_trust
 from sandmould.study.rounds.decide import decision_text, next_runs
 from sandmould.study.rounds.round_log import read_rounds, write_rounds
+from sandmould.study.stopping import run_snakemake, until_stopped
 
 
 def run_study(path: Path, options: Sequence[str]) -> int:
@@ -35,13 +36,18 @@ def run_study(path: Path, options: Sequence[str]) -> int:
     Returns
     -------
     int
-        Exit status of the last call of Snakemake: not 0 where a run failed.
+        Exit status of the last call of Snakemake: not 0 where a run failed, or that of a shell
+        after Ctrl-C or kill.
 
     Raises
     ------
     BadInputError
         Before anything starts.
     """
+    return until_stopped(partial(_run_study, path, options), path.stem)
+
+
+def _run_study(path: Path, options: Sequence[str]) -> int:
     plan = open_plan(path)
     check_places(plan.study)
     check_trust(plan.study, plan.runs)
@@ -67,7 +73,7 @@ def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> in
     cores = [] if any(o in ("--cores", "-c", "--jobs", "-j") for o in options) else _all_cores()
     workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path.absolute())]
     command = [sys.executable, "-m", "snakemake", *cores, *workflow, *options]
-    return subprocess.run([*command, *(["--", *targets] if targets else [])]).returncode
+    return run_snakemake([*command, *(["--", *targets] if targets else [])])
 
 
 def _all_cores() -> list[str]:

@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import sys
 from pathlib import Path
 from typing import Any
 
+from sandmould.runs.manifest import write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Cost, finish
 from sandmould.runs.provenance import provenance_of
@@ -36,8 +38,15 @@ def render(run: Run, folder: Path) -> None:
 
 
 def measure(run: Run, folder: Path) -> None:
-    """The same of a run that is read already."""
+    """The same of a run that is read already; what it writes is written down."""
+    earlier = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
     kind_of(run.scenario).execution.measure(run, folder)
+    written = {
+        path.relative_to(folder).as_posix(): path.stat().st_size
+        for path in folder.rglob("*")
+        if path.is_file() and earlier.get(path) != path.stat().st_mtime_ns
+    }
+    write_manifest(folder, "measured", written)
 
 
 def provenance(scenario: Any) -> dict[str, Any]:
@@ -93,4 +102,5 @@ def main(folder: Path, crash: str | None = None) -> int:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it as a kill does, silently
     raise SystemExit(main(Path(sys.argv[1]), *sys.argv[2:]))

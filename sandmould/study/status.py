@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import math
 import time
@@ -18,13 +17,16 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.plan.build_plan import Plan
+from sandmould.study.plan.lacking import WHOLE, Lack, Need
+from sandmould.study.process import computed_elsewhere, is_locked
 from sandmould.study.rounds.round_log import read_rounds
+from sandmould.study.tidy import freed_bytes, orphans, size_text
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
 LISTED_RUNS = 12
 FRESH_S = 60.0
-"""A run on another machine, whose lock is not seen here, has written its progress since."""
+"""A run of another machine, whose lock may not be seen here, has written its progress since."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class RunStatus:
     run: str
     state: State
     said: str = ""
-    """How it failed, or how far it is."""
+    """How it failed, how far it is, or what of it is lost."""
     cpu_s: float = 0.0
     left_s: float = math.nan
     """Of a run that is being computed."""
@@ -42,46 +44,46 @@ class RunStatus:
     """Of a run that is done."""
 
 
-def run_status(folder: Path) -> RunStatus:
+def run_status(folder: Path, lack: Lack) -> RunStatus:
     """See where a run stands from what it has written.
 
     Parameters
     ----------
     folder : Path
         ``results/<study>/runs/<run>``.
+    lack : Lack
+        What a start would do for it.
     """
     name = folder.name
-    with contextlib.suppress(OSError, ValueError, KeyError):
-        outcome = RunOutcome.read(folder / "outcome.json")
-        cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[-1]
-        state: State = "done" if outcome.outcome is Outcome.FINISHED else "failed"
-        said = "" if state == "done" else f"{outcome.outcome.label}. {outcome.detail}".strip()
-        wall_s = float(cost["wall_s"]) if state == "done" else math.nan
-        return RunStatus(name, state, said, float(cost["cpu_s"]), 0.0, wall_s)
+    if lack.need is Need.NOTHING:
+        return _ended(folder)
     path = folder / "work" / "progress.json"
     progress: dict[str, Any] = {}
     fresh = False
     with contextlib.suppress(OSError, ValueError):
         progress = json.loads(path.read_text(encoding="utf-8"))
         fresh = time.time() - path.stat().st_mtime < FRESH_S
+    running = is_locked(folder) or (fresh and computed_elsewhere(folder))
     if not progress:
-        return RunStatus(name, "running" if _locked(folder) else "waiting")
+        return RunStatus(name, "running" if running else "waiting", "" if running else lack.why)
     said = f"{progress['percent']:.0f} %, {progress['stage']}, {progress['time_s']:.3g} s simulated"
-    if _locked(folder) or fresh:
+    if running:
         return RunStatus(name, "running", said, left_s=float(progress["left_s"]))
     return RunStatus(name, "stopped", said)
 
 
-def _locked(folder: Path) -> bool:
-    """Whether a process of this machine computes in a run's folder."""
-    try:
-        with (folder / "lock").open() as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except FileNotFoundError:
-        return False
-    except OSError:
-        return True
-    return False
+def _ended(folder: Path) -> RunStatus:
+    """A run with all that it leaves behind."""
+    outcome = RunOutcome.read(folder / "outcome.json")
+    cpu_s = wall_s = math.nan
+    with contextlib.suppress(OSError, ValueError, KeyError, IndexError):
+        cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[-1]
+        cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
+    cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
+    if outcome.outcome is Outcome.FINISHED:
+        return RunStatus(folder.name, "done", "", cpu_s, 0.0, wall_s)
+    said = f"{outcome.outcome.label}. {outcome.detail}".strip()
+    return RunStatus(folder.name, "failed", said, cpu_s, 0.0)
 
 
 def status_text(plan: Plan, results: Path, cores: int) -> str:
@@ -95,7 +97,11 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
         That share what is left.
     """
     folder = results / plan.study.name
-    statuses = {run.run: run_status(folder / "runs" / run.run) for run in plan.runs}
+    lacks = plan.lacks(results)
+    statuses = {
+        run.run: run_status(folder / "runs" / run.run, lacks.get(run.run, WHOLE))
+        for run in plan.runs
+    }
     count = Counter(status.state for status in statuses.values())
     parts = [f"{count[state]} {state}" for state in STATES if count[state]]
     lines = [f"{plan.study.name}: {', '.join(parts)} of {len(plan.runs)} runs"]
@@ -105,12 +111,29 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
     if plan.study.study.refine.rounds:
         ended = log.ended or f"of at most {plan.study.study.refine.rounds}"
         lines.append(f"rounds: {len(log.rounds)}, {ended}")
-    for state in ("running", "stopped", "failed"):
-        chosen = [status for status in statuses.values() if status.state == state]
+    for state in ("running", "stopped", "failed", "waiting"):
+        # Of those that wait only what they lack is worth a line.
+        chosen = [
+            s for s in statuses.values() if s.state == state and (s.said or state != "waiting")
+        ]
         lines += [f"  {state}: {s.run}  {s.said}".rstrip() for s in chosen[:LISTED_RUNS]]
         if len(chosen) > LISTED_RUNS:
             lines.append(f"  {state}: and {len(chosen) - LISTED_RUNS} more")
-    return "\n".join(lines)
+    if count["failed"]:
+        lines.append("a failed run is computed once more by: sandmould again RUN")
+    return "\n".join([*lines, *_orphans(plan, results)])
+
+
+def _orphans(plan: Plan, results: Path) -> list[str]:
+    """Runs whose folders are there and that the study does not list."""
+    found = orphans(plan, results)
+    if not found:
+        return []
+    size = size_text(freed_bytes(found))
+    lines = [f"no longer of the study: {len(found)} run folders of {size}, which "
+             f"sandmould tidy {plan.study.name} removes"]  # fmt: skip
+    lines += [f"  {folder.name}" for folder in found[:LISTED_RUNS]]
+    return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
 
 
 def _left(plan: Plan, statuses: dict[str, RunStatus], cores: int) -> str:

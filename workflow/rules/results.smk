@@ -47,6 +47,7 @@ rule calibrate:
         done=touch(f"{FOLDER}/sands_calibrated"),
     log:
         f"{FOLDER}/logs/calibrate.log",
+    retries: 0
     conda:
         "../envs/sandmould.yaml"
     threads: 1
@@ -96,6 +97,8 @@ rule check:
         done=touch(f"{FOLDER}/all_runs_finished"),
     log:
         f"{FOLDER}/logs/check.log",
+    # A run that failed fails again: only "sandmould again" has it computed once more.
+    retries: 0
     conda:
         "../envs/sandmould.yaml"
     threads: 1

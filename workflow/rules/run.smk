@@ -1,10 +1,12 @@
 # One run: its deck, its computation, its measures; or several runs in one job.
+# What a run lacks is decided by what lies in its folder, not by times: its scenario is "ancient",
+# and a note that is newer than its products asks for them again (study/plan/lacking.py).
 
 
 rule render:
     input:
-        scenario=f"{FOLDER}/runs/{{run}}/scenario.yaml",
-        sources=deck_sources_of,
+        scenario=ancient(f"{FOLDER}/runs/{{run}}/scenario.yaml"),
+        note=compute_note_of,
     output:
         deck=f"{FOLDER}/runs/{{run}}/deck.in",
     log:
@@ -25,6 +27,7 @@ rule simulate:
     input:
         scenario=rules.render.input.scenario,
         deck=rules.render.output.deck,
+        note=compute_note_of,
     output:
         outcome=f"{FOLDER}/runs/{{run}}/outcome.json",
         provenance=f"{FOLDER}/runs/{{run}}/provenance.json",
@@ -53,6 +56,7 @@ rule measure:
     input:
         scenario=rules.render.input.scenario,
         series=rules.simulate.output.series,
+        note=measure_note_of,
     output:
         measures=report(
             f"{FOLDER}/runs/{{run}}/measures.tsv",
@@ -84,8 +88,8 @@ rule measure:
 
 rule batch:
     input:
-        scenarios=scenarios_of,
-        sources=batch_sources_of,
+        scenarios=ancient(scenarios_of),
+        notes=batch_notes_of,
     output:
         done=touch(f"{FOLDER}/batches/{{batch}}.done"),
     log:

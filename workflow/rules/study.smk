@@ -13,9 +13,13 @@ from sandmould.study.plan.build_plan import (
     announce,
     measure_speeds,
     open_plan,
+    prepare,
     price,
+    starts_jobs,
     study_path,
 )
+from sandmould.study.plan.lacking import Need, notes_of
+from sandmould.study.process import take_turn
 from sandmould.study.definition.run import RUN_NAME
 from sandmould.study.plan.trust import check_places, check_trust
 
@@ -34,7 +38,11 @@ try:
     check_trust(PLAN.study, PLAN.runs)
     BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
     if workflow.is_main_process and "--lint" not in sys.argv:
+        # Held until this process ends.
+        turn = starts_jobs(sys.argv) and take_turn(RESULTS / PLAN.study.name)
         print(announce(PLAN, RESULTS, CORES), file=sys.stderr)
+        if said := prepare(PLAN, RESULTS):
+            print(f"{said}\n", file=sys.stderr)
 except BadInputError as error:
     sys.exit(str(error))
 
@@ -56,8 +64,12 @@ TEMPLATES = ROOT / "templates" / "report"
 REPORT_TEMPLATES = sorted(os.path.relpath(path) for path in TEMPLATES.iterdir())
 
 
-def deck_sources_of(wildcards):
-    return PLAN.deck_sources(wildcards.run)
+def compute_note_of(wildcards):
+    return notes_of(f"{FOLDER}/runs/{wildcards.run}", Need.COMPUTE)
+
+
+def measure_note_of(wildcards):
+    return notes_of(f"{FOLDER}/runs/{wildcards.run}", Need.MEASURE)
 
 
 def threads_of(wildcards):
@@ -94,8 +106,9 @@ def scenarios_of(wildcards):
     return [f"{FOLDER}/runs/{run}/scenario.yaml" for run in BATCHES[wildcards.batch]]
 
 
-def batch_sources_of(wildcards):
-    return PLAN.deck_sources(wildcards.batch)
+def batch_notes_of(wildcards):
+    runs = [f"{FOLDER}/runs/{run}" for run in BATCHES[wildcards.batch]]
+    return [note for run in runs for note in notes_of(run, Need.COMPUTE, Need.MEASURE)]
 
 
 def side_by_side_of(wildcards):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import sandmould.runs.silent_interrupt  # noqa: F401
 from sandmould.study.batch_job import compute_batch
 
 compute_batch(

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import sandmould.runs.silent_interrupt  # noqa: F401
 from sandmould.report.page import write_report
 from sandmould.study.job_log import to_log
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +20,9 @@ from sandmould.study.kinds.kind import AnyScenario, Kind, SpeedClass
 from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.batches import Batch, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
+from sandmould.study.plan.lacking import Lack, lacks, note_lacks
 from sandmould.study.plan.load_study import OpenStudy, open_study
+from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import plan_table, write_plan, write_study
 from sandmould.study.rounds.round_log import read_rounds
 
@@ -64,18 +67,6 @@ class Plan:
         """MPI ranks of a run."""
         return self.kind.planning.ranks(self._by_name[name].scenario)
 
-    def deck_sources(self, name: str) -> list[str]:
-        """Files of the repository that a run's deck is made from, and its solver if it is ours.
-
-        Decks name the state of the solver, so a changed kernel changes the decks of its runs and
-        they are computed again.
-        """
-        files = self.kind.planning.sources(self._by_name[name].scenario)
-        # As seen from here: another place of the repository is no reason to compute again.
-        names = [os.path.relpath(path) for path in files]
-        # Braces would be wildcards; the hash of such a file of the user's stands in scenario.yaml.
-        return [name for name in names if "{" not in name]
-
     def memory_mb(self, name: str) -> int:
         """Memory to ask for."""
         return self.kind.planning.memory_mb(self._by_name[name].scenario)
@@ -87,11 +78,35 @@ class Plan:
         seconds = sum(each_s) / side_by_side + (max(each_s) if side_by_side > 1 else 0.0)
         return 10 + math.ceil(seconds / 60)
 
+    def lacks(self, results: Path) -> dict[str, Lack]:
+        """What a start would compute or measure: what each run lacks, whole ones left out."""
+        return lacks(self.runs, results / self.study.name)
+
     def labels(self, name: str) -> dict[str, str]:
         """Labels of a run in Snakemake's own report."""
         run = self._by_name[name]
         labels = {key: str(value) for key, value in run.parameters.items()}
         return labels | {"replicate": str(run.replicate)}
+
+
+_LOOKS = (
+    *("--dry-run", "--dryrun", "--lint", "--report", "--dag", "--rulegraph", "--filegraph"),
+    *("--d3dag", "--summary", "--detailed-summary", "--list-rules", "--list-target-rules"),
+    *("--list-changes", "--list-untracked", "--archive", "--cleanup-metadata", "--unlock"),
+)
+
+
+def starts_jobs(arguments: Sequence[str]) -> bool:
+    """Whether Snakemake called with these arguments computes, or only looks.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        The command line.
+    """
+    short = [a for a in arguments if re.fullmatch("-[a-zA-Z]+", a)]
+    looks = any(a.split("=")[0] in _LOOKS for a in arguments)
+    return not looks and not any(set(a) & set("nSDl") for a in short)
 
 
 def study_path(configfiles: Sequence[Path], overrides: Mapping[str, Any]) -> Path:
@@ -124,9 +139,11 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
     Raises
     ------
     BadInputError
-        With one sentence a problem; a missing engine is one of them.
+        With one sentence a problem; a missing engine is one of them, and results that belong to
+        another study file of the same name.
     """
     study = open_study(path)
+    check_owner(path, results / study.name)
     log = read_rounds(results / study.name, study.study)
     runs = expand(study, log.runs, log.certified_hz)
     problems: dict[str, Problem] = {}
@@ -187,16 +204,42 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
         When the results cannot be written.
     """
     folder = results / plan.study.name
-    try:
+    with _writing(folder):
+        write_owner(plan.study.path, folder)
         write_plan(plan.runs, folder)
         write_study(plan.study.study, folder)
-    except OSError as error:
-        valid = f"a folder that takes files: {error.filename} does not ({error.strerror})"
-        raise BadInputError([Problem("results", str(folder), valid)]) from None
     if measure:
         measure_speeds(plan, results)
     title = plan.study.study.title or plan.study.name
     return f"\n{title}\n{price(plan, results, cores)}"
+
+
+def prepare(plan: Plan, results: Path) -> str:
+    """Note for Snakemake what each run lacks.
+
+    Returns
+    -------
+    str
+        Which runs are computed or measured again, and why.
+
+    Raises
+    ------
+    BadInputError
+        When the results cannot be written.
+    """
+    folder = results / plan.study.name
+    with _writing(folder):
+        return note_lacks([run.run for run in plan.runs], plan.lacks(results), folder)
+
+
+@contextlib.contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Say in one sentence that results cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        valid = f"a folder that takes files: {error.filename} does not ({error.strerror})"
+        raise BadInputError([Problem("results", str(folder), valid)]) from None
 
 
 def price(plan: Plan, results: Path, cores: int) -> str:

@@ -13,12 +13,15 @@ import yaml
 
 from sandmould.engines.registry import deck_hash
 from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import write_manifest
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study import batch_job
-from sandmould.study.batch_job import compute_batch, is_current
+from sandmould.study.batch_job import compute_batch
 from sandmould.study.definition.run import LAST_MEASURED, Run
 from sandmould.study.plan.batches import START_S, alone, is_done, plan_batches, planned_wall_s
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand
+from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import write_plan
 
@@ -93,9 +96,12 @@ class Jobs:
         self.computed: list[str] = []
         self.measured: list[str] = []
         self.stops = stops
-        monkeypatch.setattr(batch_job, "render", lambda run, folder: None)
+        monkeypatch.setattr(batch_job, "render", self.render)
         monkeypatch.setattr(batch_job, "launch", self.launch)
         monkeypatch.setattr(batch_job, "measure", self.measure)
+
+    def render(self, run: Run, folder: Path) -> None:
+        (folder / "deck.in").write_text("run 1\n")
 
     def launch(self, folder: Path, log: Path, ranks: int, mpi: str) -> None:
         if folder.name == self.stops:
@@ -105,11 +111,13 @@ class Jobs:
         origin = {"scenario_sha256": scenario_hash(run.scenario),
                   "template_sha256": deck_hash(run.scenario)}  # fmt: skip
         (folder / "provenance.json").write_text(json.dumps(origin))
-        (folder / "outcome.json").write_text("{}")
+        write_manifest(folder, "computed", {})
+        RunOutcome(Outcome.FINISHED, "", 1.0, 1.0).write(folder / "outcome.json")
 
     def measure(self, run: Run, folder: Path) -> None:
         self.measured.append(folder.name)
         (folder / LAST_MEASURED).touch()
+        write_manifest(folder, "measured", {LAST_MEASURED: 0})
 
 
 def planned(folder: Path, **changes: Any) -> list[Path]:
@@ -192,13 +200,13 @@ def test_a_changed_scenario_or_solver_is_computed_again(
 ) -> None:
     folder = planned(tmp_path)[0]
     run = batch_job.read_run(folder / "scenario.yaml")
-    assert not is_current(run, folder)
+    assert lack_of(run, folder) == Lack(Need.COMPUTE)
     jobs = Jobs(monkeypatch)
     compute_batch([folder], tmp_path, 1, "mpiexec")
-    assert is_current(run, folder)
+    assert lack_of(run, folder) == WHOLE
     origin = json.loads((folder / "provenance.json").read_text())
     for key in ("scenario_sha256", "template_sha256"):
         (folder / "provenance.json").write_text(json.dumps(origin | {key: "another"}))
-        assert not is_current(run, folder)
+        assert lack_of(run, folder).need is Need.COMPUTE
     compute_batch([folder], tmp_path, 1, "mpiexec")
     assert jobs.computed == jobs.measured == [folder.name] * 2

@@ -217,7 +217,9 @@ def test_ranks_are_threads_on_the_reference_engine(planned: Planned) -> None:
 def test_deck_is_made_from_its_own_dialect_and_solver(planned: Planned) -> None:
     sweep = {"keys": {"engine.name": ["lammps", "reference"]}}
     plan = planned(sweep=sweep)
-    lammps, reference = (plan.deck_sources(run.run) for run in plan.runs)
+    lammps, reference = (
+        [path.as_posix() for path in plan.kind.planning.sources(run.scenario)] for run in plan.runs
+    )
     assert any(path.endswith("templates/lammps/deck.in.j2") for path in lammps)
     assert not any("/dem/" in path for path in lammps)
     assert any(path.endswith("sandmould/dem/contact_law.py") for path in reference)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import socket
 from pathlib import Path
 
 import pytest
 import yaml
 
+from sandmould.engines.registry import deck_hash
+from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.kinds.sand.planning import planned_work
 from sandmould.study.plan.build_plan import Plan, open_plan
+from sandmould.study.plan.lacking import Lack, Need
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.status import run_status, status_text
 
@@ -34,9 +38,14 @@ def plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Plan:
 
 
 def ended(plan: Plan, place: int, outcome: Outcome, wall_s: float) -> None:
-    """Let a run end; it took so long."""
+    """Let a run end with all that it leaves; it took so long."""
     run = plan.runs[place]
     folder = Path("results/trial/runs") / run.run
+    for name in ("deck.in", "series.tsv", "measures.tsv", "final.png"):
+        (folder / name).write_text("so\n")
+    origin = {"scenario_sha256": scenario_hash(run.scenario),
+              "template_sha256": deck_hash(run.scenario)}  # fmt: skip
+    (folder / "provenance.json").write_text(json.dumps(origin))
     RunOutcome(outcome, "why it is so", 1.0, 1.0).write(folder / "outcome.json")
     steps = planned_work(run.scenario)
     (folder / "cost.tsv").write_text(f"wall_s\tcpu_s\tgrain_steps\n{wall_s}\t{wall_s}\t{steps}\n")
@@ -63,8 +72,11 @@ def test_nothing_begun_has_no_time_left_that_is_known(plan: Plan) -> None:
 def test_every_state_is_told(plan: Plan) -> None:
     ended(plan, 0, Outcome.FINISHED, 600.0)
     ended(plan, 1, Outcome.OVERLAP_TOO_LARGE, 300.0)
-    running, stopped = begun(plan, 2, ago_s=500.0), begun(plan, 3, ago_s=500.0)
+    # A free lock of this machine: stopped, however fresh its progress is.
+    running, stopped = begun(plan, 2, ago_s=500.0), begun(plan, 3, ago_s=1.0)
+    (stopped / "lock").write_text(f"{socket.gethostname()}\n")
     elsewhere = begun(plan, 4, ago_s=1.0)
+    (elsewhere / "lock").write_text("another machine\n")
     with (running / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         said = status_text(plan, Path("results"), 2)
@@ -77,7 +89,16 @@ def test_every_state_is_told(plan: Plan) -> None:
         f"  running: {elsewhere.name}  40 %, settle_1, 0.5 s simulated",
         f"  stopped: {stopped.name}  40 %, settle_1, 0.5 s simulated",
         f"  failed: {plan.runs[1].run}  overlap too large. why it is so",
+        "a failed run is computed once more by: sandmould again RUN",
     ]
+
+
+def test_progress_alone_is_no_run_that_goes_on(plan: Plan) -> None:
+    folder = begun(plan, 0, ago_s=500.0)
+    (folder / "lock").write_text("another machine\n")
+    assert run_status(folder, Lack(Need.COMPUTE)).state == "stopped"
+    (folder / "lock").unlink()
+    assert run_status(begun(plan, 1, ago_s=0.0), Lack(Need.COMPUTE)).state == "stopped"
 
 
 def test_a_finished_study_has_nothing_left(plan: Plan) -> None:
@@ -89,9 +110,11 @@ def test_a_finished_study_has_nothing_left(plan: Plan) -> None:
 
 def test_broken_files_count_as_not_there(plan: Plan) -> None:
     ended(plan, 0, Outcome.FINISHED, 60.0)
-    folder = Path("results/trial/runs") / plan.runs[0].run
-    (folder / "cost.tsv").write_text("")
-    assert run_status(folder).state == "waiting"
+    run = plan.runs[0].run
+    (Path("results/trial/runs") / run / "cost.tsv").write_text("")
+    said = status_text(plan, Path("results"), 2).splitlines()
+    assert said[0] == "trial: 6 waiting of 6 runs"
+    assert said[2:] == [f"  waiting: {run}  cost.tsv is missing or empty"]
     progress = begun(plan, 1, ago_s=0.0) / "work" / "progress.json"
     progress.write_text("{")
-    assert run_status(progress.parents[1]).state == "waiting"
+    assert run_status(progress.parents[1], Lack(Need.COMPUTE)).state == "waiting"

@@ -1,0 +1,99 @@
+"""What a run left behind, file by file with its size: what is lost or cut short later is seen."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from sandmould.digest import file_digest
+from sandmould.runs.files import write_text
+
+MANIFEST_FILE = "products.json"
+DECK_FILE = "deck.in"
+Manifest = dict[str, dict[str, Any]]
+Step = Literal["computed", "measured"]
+
+
+def files_below(folder: Path, names: tuple[str, ...] | None = None) -> dict[str, int]:
+    """Size of every file, in bytes, by its path from the folder.
+
+    Parameters
+    ----------
+    folder : Path
+    names : tuple of str, optional
+        Files and folders that count; all unless given.
+    """
+    places = folder.iterdir() if names is None else (folder / name for name in names)
+    return {
+        file.relative_to(folder).as_posix(): file.stat().st_size
+        for place in places
+        for file in _files(place)
+    }
+
+
+def _files(place: Path) -> Iterator[Path]:
+    if place.is_dir():
+        yield from (path for path in place.rglob("*") if path.is_file())
+    elif place.is_file():
+        yield place
+
+
+def write_manifest(folder: Path, step: Step, sizes: Mapping[str, int]) -> None:
+    """Write down what a step of a run left.
+
+    ``computed`` begins anew, with the hash of the deck that was computed; ``measured`` adds to it.
+    """
+    if step == "computed":
+        deck = folder / DECK_FILE
+        tree: Manifest = {"deck": {DECK_FILE: file_digest(deck)}} if deck.is_file() else {}
+    else:
+        tree = read_manifest(folder) or {}
+    write_text(folder / MANIFEST_FILE, json.dumps({**tree, step: sizes}, indent=1) + "\n")
+
+
+def read_manifest(folder: Path) -> Manifest | None:
+    """Files of each step with their sizes; None for a run of a time that wrote none.
+
+    Raises
+    ------
+    OSError, ValueError
+        When it cannot be read.
+    """
+    try:
+        tree = json.loads((folder / MANIFEST_FILE).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    if not (isinstance(tree, dict) and all(isinstance(files, dict) for files in tree.values())):
+        raise ValueError("no list of files by step")
+    return tree
+
+
+def deck_damage(folder: Path, manifest: Manifest) -> str:
+    """Say that the deck is missing or was changed since it was computed; empty where it is not."""
+    deck = folder / DECK_FILE
+    if not deck.is_file():
+        return f"{DECK_FILE} is missing"
+    known = manifest.get("deck", {}).get(DECK_FILE)
+    changed = known is not None and known != file_digest(deck)
+    return f"{DECK_FILE} was changed by hand" if changed else ""
+
+
+def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
+    """Say which file is missing or has another size; empty where all are as they were left.
+
+    Parameters
+    ----------
+    folder : Path
+    sizes : mapping of str to int
+        Bytes of each file, by its path from the folder.
+    """
+    for name, size in sizes.items():
+        try:
+            now = (folder / name).stat().st_size
+        except OSError:
+            return f"{name} is missing"
+        if now != size:
+            return f"{name} has {now} of {size} bytes"
+    return ""

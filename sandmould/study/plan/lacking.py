@@ -1,0 +1,183 @@
+"""What a run lacks: the one answer by which starts and batches compute, and status counts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+from sandmould.runs.files import write_text
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import MANIFEST_FILE, Manifest, damage, deck_damage, read_manifest
+from sandmould.runs.outcome import RunOutcome
+from sandmould.study.definition.run import LAST_MEASURED, Run
+from sandmould.study.kinds.registry import kind_of
+
+UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError)
+"""What reading a broken file may raise."""
+LISTED = 12
+_OF_ANY_COMPUTED = ("cost.tsv", "series.tsv")
+_OF_ANY_MEASURED = ("measures.tsv", LAST_MEASURED)
+
+
+class Need(IntEnum):
+    """What a run needs; the larger includes the smaller."""
+
+    NOTHING = 0
+    MEASURE = 1
+    COMPUTE = 2
+
+
+@dataclass(frozen=True)
+class Lack:
+    """What a run needs and why."""
+
+    need: Need
+    why: str = ""
+    """Empty for a run that was never at its end."""
+
+
+WHOLE = Lack(Need.NOTHING)
+_NOTE = {Need.COMPUTE: "compute_again.txt", Need.MEASURE: "measure_again.txt"}
+"""File of a run's folder that tells Snakemake: a job runs again when one of its inputs is newer."""
+
+
+def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None = None) -> Lack:
+    """Say what a run lacks, from what lies in its folder.
+
+    A failed run lacks nothing: it has its outcome, and only ``sandmould again`` forgets that.
+
+    Parameters
+    ----------
+    run : Run
+    folder : Path
+        ``results/<study>/runs/<run>``.
+    template_hash : callable, optional
+        Hash of what turns a run into its deck, for a caller that keeps it; see ``Planning``.
+    """
+    wanted = template_hash or _template_hash
+    try:
+        RunOutcome.read(folder / "outcome.json")
+    except FileNotFoundError:
+        known = (folder / MANIFEST_FILE).exists()
+        return Lack(Need.COMPUTE, "outcome.json is missing" if known else "")
+    except UNREADABLE:
+        return Lack(Need.COMPUTE, "outcome.json cannot be read")
+    try:
+        origin: dict[str, Any] = json.loads((folder / "provenance.json").read_text("utf-8"))
+        if origin["scenario_sha256"] != scenario_hash(run.scenario):
+            return Lack(Need.COMPUTE, "it is of another scenario")
+        if origin["template_sha256"] != wanted(run):
+            return Lack(Need.COMPUTE, "its deck or its solver has changed since")
+        manifest = read_manifest(folder)
+    except FileNotFoundError:
+        return Lack(Need.COMPUTE, "provenance.json is missing")
+    except UNREADABLE:
+        return Lack(Need.COMPUTE, f"provenance.json or {MANIFEST_FILE} cannot be read")
+    return _lack_of_files(folder, manifest)
+
+
+def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
+    """What is lost of the files of a run that ended; a run of older times has no manifest."""
+    sizes = (manifest or {}).get("computed")
+    why = deck_damage(folder, manifest or {}) or (
+        _empty(folder, _OF_ANY_COMPUTED) if sizes is None else damage(folder, sizes)
+    )
+    if why:
+        return Lack(Need.COMPUTE, why)
+    if manifest is None:
+        why = _empty(folder, _OF_ANY_MEASURED)
+    elif "measured" not in manifest:
+        why = "it is not measured"
+    else:
+        why = damage(folder, manifest["measured"])
+    return Lack(Need.MEASURE, why) if why else WHOLE
+
+
+def _empty(folder: Path, names: Iterable[str]) -> str:
+    """Say which of some files is missing or empty."""
+    for name in names:
+        path = folder / name
+        if not path.is_file() or not path.stat().st_size:
+            return f"{name} is missing or empty"
+    return ""
+
+
+def _template_hash(run: Run) -> str:
+    return kind_of(run.scenario).planning.template_hash(run.scenario)
+
+
+def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
+    """What each of some runs lacks, by its name; whole ones are left out.
+
+    Parameters
+    ----------
+    runs : iterable of Run
+    folder : Path
+        ``results/<study>``.
+    """
+    hashes: dict[tuple[Path, ...], str] = {}
+
+    def template_hash(run: Run) -> str:
+        # By the files that it is made from: reading them for each run took longer than all else.
+        sources = tuple(kind_of(run.scenario).planning.sources(run.scenario))
+        if sources not in hashes:
+            hashes[sources] = _template_hash(run)
+        return hashes[sources]
+
+    found = {run.run: lack_of(run, folder / "runs" / run.run, template_hash) for run in runs}
+    return {run: lack for run, lack in found.items() if lack.need}
+
+
+def note_lacks(runs: Iterable[str], found: dict[str, Lack], folder: Path) -> str:
+    """Write for Snakemake which runs of a study need what, where it would not see that by itself.
+
+    What is missing before anything was collected it sees. Later it takes no notice of a missing
+    file whose successors are there, and never of a damaged one. A note of a run that lacks nothing
+    any more is removed: it may be newer than a deck that was rendered before it.
+
+    Parameters
+    ----------
+    runs : iterable of str
+        Names of all runs.
+    found : dict
+        What those that are not whole lack, see ``lacks``.
+    folder : Path
+        ``results/<study>``.
+
+    Returns
+    -------
+    str
+        Which runs are computed or measured again, and why; empty where none is.
+    """
+    begun = (folder / "summary.tsv").exists() or (folder / "batches").exists()
+    for name in runs:
+        run, lack = folder / "runs" / name, found.get(name, WHOLE)
+        for need, note in _NOTE.items():
+            if need is not lack.need:
+                (run / note).unlink(missing_ok=True)
+        if not lack.need:
+            continue
+        if begun or any((run / file).exists() for file in ("deck.in", "outcome.json")):
+            # The time makes each note differ: an input that says the same is no reason to compute.
+            now = datetime.now(UTC).isoformat()
+            write_text(run / _NOTE[lack.need], f"{now} {lack.why or 'it was not at its end'}\n")
+    return _told(found)
+
+
+def notes_of(run_folder: str, *needs: Need) -> list[str]:
+    """Notes that a job takes as inputs, those that are there: of what it does for a run."""
+    notes = (Path(run_folder) / _NOTE[need] for need in needs)
+    return [str(note) for note in notes if note.exists()]
+
+
+def _told(found: dict[str, Lack]) -> str:
+    """Which runs are computed or measured again, and why; runs never at their end left out."""
+    verbs = {Need.COMPUTE: "computed again", Need.MEASURE: "measured again"}
+    lines = [f"{verbs[lack.need]}: {name} ({lack.why})" for name, lack in found.items() if lack.why]
+    more = [f"... and {len(lines) - LISTED} more"] if len(lines) > LISTED else []
+    return "\n".join([*lines[:LISTED], *more])
