@@ -19,6 +19,7 @@ from sandmould.study.definition.run import Part, Run
 from sandmould.study.definition.sweep import Point, points, value_at
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.kinds.registry import kind_named
+from sandmould.study.plan import measured
 from sandmould.study.plan.labels import letters, run_label
 from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.robustness.controls import Case, cases
@@ -136,11 +137,8 @@ class _AtPoint:
         """What is wrong with a well-typed scenario of this study, keys from the study's root."""
         planning = self.kind.planning
         misfits = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in planning.problems(scenario)]
-        at, vibration_s = self.study.study.objective.at_vibration_s, planning.vibration_s(scenario)
-        if at is not None and at > vibration_s:
-            valid = f"at most {vibration_s:g} s, the end of the vibration"
-            misfits.append(Problem("objective.at_vibration_s", at, valid))
-        return misfits
+        # What a scene can be measured by is told of one that can be computed.
+        return misfits or [*measured.problems(self.study.study, self.kind, scenario)]
 
     def _at_changed_key(self, problem: Problem) -> Problem:
         """A misfit told at the key that the user has to change."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from sandmould.casting.mps import computation, scene
 from sandmould.scenario.flow import MetalFlow, StillTank
 from sandmould.study.kinds.casting import casting_planning
+from sandmould.study.kinds.flow.measures import MEASURES
 from sandmould.study.kinds.kind import SpeedClass
 
 BASE_MEMORY_MB = 600
@@ -66,6 +67,7 @@ PLANNING = casting_planning(
     work_unit=computation.WORK,
     resolved=lambda scenario: scenario,  # it names no files
     problems=scene.problems,
+    measures=MEASURES,
     threads=threads,
     memory_mb=memory_mb,
     planned_work=planned_work,

@@ -16,6 +16,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, with_hash
 from sandmould.study.kinds.kind import MachineSpeed, Planning, SpeedClass
 from sandmould.study.kinds.sand import speed
+from sandmould.study.kinds.sand.measures import MEASURES
 
 BASE_MEMORY_MB = 600
 GRAINS_PER_MB = 50
@@ -128,6 +129,7 @@ PLANNING = Planning[Scenario](
     resolved=resolved,
     problems=checks.problems,
     engine_problem=registry.engine_problem,
+    measures=MEASURES,
     vibration_s=vibration_s,
     sources=sources,
     template_hash=template_hash,

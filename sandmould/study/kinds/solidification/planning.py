@@ -9,6 +9,7 @@ from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.kinds.casting import casting_planning
 from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.solidification.measures import MEASURES
 
 BASE_MEMORY_MB = 600
 ELEMENTS_PER_MB = 500
@@ -71,6 +72,7 @@ PLANNING = casting_planning(
     work_unit="element-steps",
     resolved=resolved,
     problems=scene.problems,
+    measures=MEASURES,
     threads=threads,
     memory_mb=memory_mb,
     planned_work=planned_work,

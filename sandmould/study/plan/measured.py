@@ -1,0 +1,76 @@
+"""Names of measures that a study asks for, against those that its scenes will have."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from sandmould.runs.measures import Measure, measures_of
+from sandmould.scenario.bad_input import Problem
+from sandmould.study.definition.study import Study
+from sandmould.study.kinds.kind import AnyScenario, Kind
+
+NEAREST = 3
+
+
+def measured_in(kind: Kind[Any], scenario: AnyScenario) -> list[Measure]:
+    """Measures that the runs of a scenario will have."""
+    return measures_of(kind.planning.measures, scenario)
+
+
+def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[Problem]:
+    """List the measures and times asked for that a scene of a study will not have.
+
+    Parameters
+    ----------
+    study : Study
+    kind : Kind
+    scenario : scenario of any kind
+        At one point of the sweep.
+    """
+    has = [measure.name for measure in measured_in(kind, scenario) if measure.is_number]
+    for key, name in _asked(study):
+        if name not in has:
+            yield Problem(key, name, _valid(name, has, kind))
+    at, vibration_s = study.objective.at_vibration_s, kind.planning.vibration_s(scenario)
+    if at is not None and vibration_s == 0.0:
+        yield Problem("objective.at_vibration_s", at, "absent: nothing vibrates in this scene")
+    elif at is not None and at > vibration_s:
+        valid = f"at most {vibration_s:g} s, the end of the vibration"
+        yield Problem("objective.at_vibration_s", at, valid)
+
+
+def _asked(study: Study) -> Iterator[tuple[str, str]]:
+    """Key and name of every measure that a study names of its own runs."""
+    yield "objective.measure", study.objective.measure
+    for name in study.equivalence.margins:
+        yield "equivalence.margins", name
+    others = tuple(f"{name}__" for name in study.calibration.also)
+    for i, sand in enumerate(study.calibration.sands):
+        for name in sand.targets:
+            if not name.startswith(others):
+                yield f"calibration.sands.{i}.targets", name
+
+
+def _valid(name: str, has: list[str], kind: Kind[Any]) -> str:
+    comes = _comes_with(name, kind)
+    why = f" (this one comes {comes})" if comes else ""
+    near = difflib.get_close_matches(name, has, n=NEAREST, cutoff=0.5)
+    names = f"nearest are {', '.join(near)}" if len(near) > 1 else f"nearest is {''.join(near)}"
+    if not near:
+        names = f"such as {', '.join(has[:NEAREST])}" if has else "it has none"
+    return f"a measure that this scene will have{why}; {names}; sandmould measures lists all"
+
+
+def _comes_with(name: str, kind: Kind[Any]) -> str:
+    """Scenes that have a measure of this name, in words; nothing where no scene has."""
+    for group in kind.planning.measures:
+        for measure in group.measures:
+            if not measure.is_number and measure.name == name:
+                return "in words, which cannot be compared"
+            pattern = re.sub(r"<\w+>", "[a-z][a-z0-9_]*", measure.name)
+            if pattern != "[a-z][a-z0-9_]*" and re.fullmatch(pattern, name):
+                return group.when
+    return ""
