@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,6 +17,7 @@ from pydantic_core import PydanticCustomError
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.geometry import Block
+from sandmould.scenario.limits import PIXELS
 from sandmould.scenario.mesh_file import MeshFileError, file_hash
 from sandmould.scenario.outline import Outline, outline_fault
 from sandmould.scenario.quantity import Section, quantity
@@ -218,10 +220,18 @@ def _read_picture(path: Path, sha256: str) -> Array:
     from scipy.ndimage import distance_transform_edt
 
     try:
-        with Image.open(path) as picture:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # told below
+            picture = Image.open(path)
+        with picture:
+            width, height = picture.size
+            if width * height > PIXELS.most:
+                raise MeshFileError(f"a picture {PIXELS.sentence(width * height)}")
             white = Image.new("RGBA", picture.size, "white")  # shows where it is transparent
             rows = np.asarray(Image.alpha_composite(white, picture.convert("RGBA")).convert("L"))
-    except (UnidentifiedImageError, OSError) as error:
+    except Image.DecompressionBombError as error:  # beyond twice what PIL warns of
+        raise MeshFileError(f"a picture with at most {PIXELS.most:,} pixels: {error}") from error
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
         raise MeshFileError("a picture, such as a PNG file") from error
     dark = (rows <= GREY)[::-1].T
     if dark.all() or not dark.any():

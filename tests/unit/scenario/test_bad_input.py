@@ -140,8 +140,9 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "layer of a count that no memory holds": (
         "based_on: tube\nscenario: {fill: {layers: [{count: 10000000, repeat: 100}]}}",
-        "trial.yaml: scenario.fill.layers = '1000000000 grains' cannot be used: "
-        "valid is at most 20 million grains.",
+        "trial.yaml: scenario.fill.layers = '1,000,000,000 grains' cannot be used: "
+        "valid is at most 20,000,000 grains: fewer or thinner layers, or a larger "
+        "sand.size_scale.",
     ),
     "gate that is not there": (
         "based_on: hopper\nscenario: {discharge: {gate: sluice}}",

@@ -89,12 +89,12 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "key twice": (
         "based_on: tube\nreplicates: 2\nreplicates: 3",
-        "trial.yaml: file = \"line 1: key 'replicates' stands twice\" cannot be used: "
-        "valid is YAML text.",
+        "trial.yaml: file = \"line 3: key 'replicates' stands twice, first in line 2\" "
+        "cannot be used: valid is YAML text.",
     ),
     "key that is no text": (
         "based_on: tube\n5: 2",
-        "trial.yaml: file = 'line 1: key 5 is no text: put it in quotes' cannot be used: "
+        "trial.yaml: file = 'line 2: key 5 is no text: put it in quotes' cannot be used: "
         "valid is YAML text.",
     ),
     "broken YAML": (
@@ -104,7 +104,8 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "nested without end": (
         "[" * 1500,
-        "trial.yaml: file = 'nested too deeply' cannot be used: valid is YAML text.",
+        "trial.yaml: file = '51 levels of YAML' cannot be used: valid is at most 50 levels of "
+        "YAML: fewer levels.",
     ),
     "not UTF-8": (
         b"title: Gr\xf6\xdfe",
@@ -117,7 +118,7 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "empty file": (
         "",
-        "trial.yaml: file = None cannot be used: valid is a mapping of keys to values.",
+        "trial.yaml: file = 'nothing' cannot be used: valid is a mapping of keys to values.",
     ),
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pattern_fe
@@ -11,6 +11,8 @@ from sandmould.digest import digest
 from sandmould.engines import registry
 from sandmould.engines.program import build_program
 from sandmould.scenario import checks
+from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.limits import FRAMES, RECORDS
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, with_hash
@@ -40,6 +42,20 @@ def resolved(scenario: Scenario) -> Scenario:
         scenario = with_surface(scenario)
     obstacles = tuple(with_hash(o) if isinstance(o, SolidMesh) else o for o in scenario.obstacles)
     return scenario.model_copy(update={"obstacles": obstacles})
+
+
+def problems(scenario: Scenario) -> list[Problem]:
+    """What keeps a scene from being computed, and more records of it than anyone can use."""
+    return checks.problems(scenario) or [*_records(scenario)]
+
+
+def _records(scenario: Scenario) -> Iterator[Problem]:
+    lasts_s, record = planned_s(scenario), scenario.record
+    for key, limit in (
+        ("series_every_s", RECORDS), ("checkpoint_every_s", RECORDS), ("snapshot_every_s", FRAMES),
+    ):  # fmt: skip
+        every_s = getattr(record, key)
+        yield from limit.problems(f"record.{key}", lasts_s / every_s, every_s)
 
 
 def sources(scenario: Scenario) -> list[Path]:
@@ -127,7 +143,7 @@ def plan_cells(scenario: Scenario) -> Mapping[str, str]:
 PLANNING = Planning[Scenario](
     work_unit="grain-steps",
     resolved=resolved,
-    problems=checks.problems,
+    problems=problems,
     engine_problem=registry.engine_problem,
     measures=MEASURES,
     vibration_s=vibration_s,
