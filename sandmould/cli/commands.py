@@ -106,6 +106,15 @@ def status(study: StudyFile, cores: Cores = None) -> None:
 
 
 @app.command()
+def measures(study: StudyFile) -> None:
+    """List what runs of a study can be measured by, with units."""
+    from sandmould.study.plan.load_study import open_study
+    from sandmould.study.reference import measures_text
+
+    typer.echo(measures_text(open_study(study)))
+
+
+@app.command()
 def report(study: StudyFile) -> None:
     """Write the report of a study again from its results."""
     from sandmould.report.page import write_report

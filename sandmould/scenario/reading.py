@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.limits import YAML_BYTES
-from sandmould.scenario.standing_keys import standing_keys, standing_kinds
+from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
 from sandmould.scenario.yaml_text import fault_of, load_planned, load_users
 
 Tree = dict[str, Any]
@@ -165,12 +165,15 @@ def validated(model: type[ModelT], tree: Tree, origin: Origin, above: str = "") 
         findings = [(item, _problem(model, tree, item, origin, above)) for item in error.errors()]
         problems: dict[str, Problem] = {}
         for item, problem in findings:
-            if _is_beside_the_point(item, problem.key, findings):
+            if not problem.valid or _is_beside_the_point(item, problem.key, findings):
                 continue
             before = problems.get(problem.key)
             # Each branch of a union that fits nowhere has its own finding.
-            valid = f"{before.valid} or {problem.valid}" if before else problem.valid
-            problems[problem.key] = replace(problem, valid=valid)
+            if before is None or before.valid == problem.valid:
+                problems[problem.key] = problem
+            else:
+                valid = f"{before.valid} or {problem.valid}"
+                problems[problem.key] = replace(problem, valid=valid)
         raise BadInputError(list(problems.values())) from None
 
 
@@ -202,14 +205,20 @@ def _key_parts(tree: Any, location: tuple[int | str, ...], is_missing: bool) -> 
 
 def _problem(model: type[BaseModel], tree: Tree, item: Any, origin: Origin, above: str) -> Problem:
     context, is_missing = item.get("ctx", {}), item["type"] == "missing"
-    parts = _key_parts(tree, item["loc"], is_missing)
+    lacks_entry = is_missing and isinstance(item["loc"][-1], int)
+    parts = _key_parts(tree, item["loc"], is_missing and not lacks_entry)
     key = ".".join(([above] if above else []) + parts) or "file"
-    value = None if is_missing else item.get("input")
+    value = None if is_missing and not lacks_entry else item.get("input")
     return Problem(key, value, _valid(model, tree, context, item, parts), origin.file_of(key))
 
 
 def _valid(model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: list[str]) -> str:
     kind = item["type"]
+    if kind == "too_long" or (kind == "missing" and isinstance(item["loc"][-1], int)):
+        lengths = standing_lengths(model, tree, parts)
+        if lengths:  # nothing where another branch of a union takes as many
+            several = f"a list of {' or '.join(map(str, lengths))} entries"
+            return "" if len(item["input"]) in lengths else several
     if kind == "extra_forbidden":
         keys = standing_keys(model, tree, parts[:-1])
         near = difflib.get_close_matches(parts[-1], keys, n=1, cutoff=0.5)
@@ -242,7 +251,7 @@ def _valid(model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: l
         "too_long": f"a list of at most {context.get('max_length')} entries",
         "literal_error": f"one of {context.get('expected')}",
         "union_tag_invalid": f"a kind among {context.get('expected_tags')}",
-        "union_tag_not_found": f"a mapping with a kind: {' or '.join(kinds)}",
+        "union_tag_not_found": f"a mapping with a kind: {', '.join(kinds)}",
         "string_pattern_mismatch": f"text of the pattern {context.get('pattern')}",
     }
     return words.get(kind, str(item["msg"]))

@@ -33,6 +33,15 @@ def standing_kinds(model: type[BaseModel], tree: Any, parts: list[str]) -> list[
     return [str(kind) for field in fields for kind in get_args(field.annotation)]
 
 
+def standing_lengths(model: type[BaseModel], tree: Any, parts: list[str]) -> list[int]:
+    """Lengths that the list at a path can have; none where any length will do."""
+    here: list[Any] = [model]
+    for part in parts:
+        here = [inner for outer in here for inner in _below(outer, part)]
+    lists = [get_args(a) for a in here if get_origin(a) is tuple]
+    return sorted({len(entries) for entries in lists if Ellipsis not in entries})
+
+
 def _standing(model: type[BaseModel], tree: Any, parts: list[str]) -> list[type[BaseModel]]:
     """Models that can stand at a path of a tree."""
     here: list[Any] = [model]

@@ -9,6 +9,7 @@ import jinja2
 from jinja2 import meta
 
 from sandmould.digest import file_digest
+from sandmould.engines.own_deck.columns import column_problems
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.registry import engine_module
 from sandmould.scenario.bad_input import BadInputError, Problem
@@ -60,6 +61,7 @@ def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
     try:
         used = names_used(scenario)
         render(scenario, "run", "study", "restart")
+        deck = render(scenario, "run", "study")
     except (jinja2.TemplateError, TypeError, ValueError, ArithmeticError) as error:
         line = getattr(error, "lineno", None)
         where = f"line {line}: " if line else ""
@@ -73,6 +75,7 @@ def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
         if name not in used:
             valid = f"a name that the template uses: {', '.join(sorted(used - set(RESERVED)))}"
             yield Problem(f"values.{name}", scenario.values[name], valid)
+    yield from column_problems(scenario, deck)
 
 
 def names_used(scenario: OwnDeck) -> set[str]:

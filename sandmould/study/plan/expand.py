@@ -106,6 +106,22 @@ def expand(
     return list(runs.values())
 
 
+def scenes(study: OpenStudy) -> Iterator[AnyScenario]:
+    """The scenario of each point of a sweep, whether or not it can be computed.
+
+    Raises
+    ------
+    BadInputError
+        At a point whose values have a wrong type.
+    """
+    base = study.study.scenario.model_dump(mode="json")
+    for point in points(study.study.sweep, study.study.scenario):
+        at_point = _AtPoint(study, base, point)
+        if at_point.scenario is None:
+            raise BadInputError(at_point.problems)
+        yield at_point.scenario
+
+
 class _AtPoint:
     """The scenario of one point of a sweep."""
 
@@ -113,6 +129,7 @@ class _AtPoint:
         self.study, self.base, self.point = study, base, point
         self.kind = kind_named(study.study.kind)
         self.origin = Origin(dict(study.origin.file), dict(study.origin.source))
+        self.scenario: Any = None
         try:
             self.scenario = self._scenario(point, self.origin)
         except BadInputError as error:

@@ -56,7 +56,7 @@ def _asked(study: Study) -> Iterator[tuple[str, str]]:
 
 def _valid(name: str, has: list[str], kind: Kind[Any]) -> str:
     comes = _comes_with(name, kind)
-    why = f" (this one comes {comes})" if comes else ""
+    why = f" ({name}: {comes})" if comes else ""
     near = difflib.get_close_matches(name, has, n=NEAREST, cutoff=0.5)
     names = f"nearest are {', '.join(near)}" if len(near) > 1 else f"nearest is {''.join(near)}"
     if not near:
@@ -69,7 +69,7 @@ def _comes_with(name: str, kind: Kind[Any]) -> str:
     for group in kind.planning.measures:
         for measure in group.measures:
             if not measure.is_number and measure.name == name:
-                return "in words, which cannot be compared"
+                return "words cannot be compared"
             pattern = re.sub(r"<\w+>", "[a-z][a-z0-9_]*", measure.name)
             if pattern != "[a-z][a-z0-9_]*" and re.fullmatch(pattern, name):
                 return group.when

@@ -79,8 +79,8 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "missing material": (
         "based_on: tube\nmaterial: silica",
-        "trial.yaml: material = 'silica' cannot be used: valid is the name of a material: "
-        "hirata_2019, hirata_2019_aluminium, rojek_2004.",
+        "trial.yaml: material = 'silica' cannot be used: valid is the name of a material of "
+        "kind sand: rojek_2004.",
     ),
     "measure after the end": (
         "based_on: tube\nobjective: {at_vibration_s: 60}",
