@@ -72,7 +72,7 @@ def sandmould(
 
 @app.command()
 def plan(study: StudyFile, cores: Cores = None) -> None:
-    """Check a study and print its runs and their price; nothing starts."""
+    """Check a study, print its runs and their price; nothing starts."""
     from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
 
     typer.echo(announce(open_plan(study), RESULTS, cores or _all_cores(), measure=True))

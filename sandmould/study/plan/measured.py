@@ -9,6 +9,7 @@ from typing import Any
 
 from sandmould.runs.measures import Measure, measures_of
 from sandmould.scenario.bad_input import Problem
+from sandmould.statistics.config import Objective
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario, Kind
 
@@ -31,8 +32,10 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
         At one point of the sweep.
     """
     has = [measure.name for measure in measured_in(kind, scenario) if measure.is_number]
+    # A deck that nothing is read from is run for the files that it writes.
+    nothing_asked = not has and study.objective == Objective()
     for key, name in _asked(study):
-        if name not in has:
+        if name not in has and not nothing_asked:
             yield Problem(key, name, _valid(name, has, kind))
     at, vibration_s = study.objective.at_vibration_s, kind.planning.vibration_s(scenario)
     if at is not None and vibration_s == 0.0:
@@ -61,7 +64,7 @@ def _valid(name: str, has: list[str], kind: Kind[Any]) -> str:
     names = f"nearest are {', '.join(near)}" if len(near) > 1 else f"nearest is {''.join(near)}"
     if not near:
         names = f"such as {', '.join(has[:NEAREST])}" if has else "it has none"
-    return f"a measure that this scene will have{why}; {names}; sandmould measures lists all"
+    return f"a measure that this scene will have{why}: {names}; sandmould measures lists all"
 
 
 def _comes_with(name: str, kind: Kind[Any]) -> str:
