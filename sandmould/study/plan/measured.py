@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from sandmould.runs.measures import Measure, measures_of
@@ -43,6 +44,34 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
     elif at is not None and at > vibration_s:
         valid = f"at most {vibration_s:g} s, the end of the vibration"
         yield Problem("objective.at_vibration_s", at, valid)
+
+
+def problems_elsewhere(study: Study, results: Path) -> Iterator[Problem]:
+    """List what keeps a study from calibrating with the results of others.
+
+    Parameters
+    ----------
+    study : Study
+    results : Path
+        Folder of all results.
+    """
+    for i, name in enumerate(study.calibration.also):
+        summary = results / name / "summary.tsv"
+        if not summary.is_file():
+            valid = f"a study with results: sandmould run {name} comes first"
+            yield Problem(f"calibration.also.{i}", name, valid)
+            continue
+        with summary.open(encoding="utf-8", errors="replace") as file:
+            has = file.readline().rstrip("\n").split("\t")
+        for j, sand in enumerate(study.calibration.sands):
+            for target in sand.targets:
+                column = target.removeprefix(f"{name}__")
+                if column != target and column not in has:
+                    near = difflib.get_close_matches(column, has, n=NEAREST, cutoff=0.5)
+                    names = ", ".join(f"{name}__{n}" for n in near)
+                    hint = f": nearest are {names}" if near else ""
+                    valid = f"a column of the results of {name}{hint}"
+                    yield Problem(f"calibration.sands.{j}.targets", target, valid)
 
 
 def _asked(study: Study) -> Iterator[tuple[str, str]]:
