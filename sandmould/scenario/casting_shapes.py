@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -219,20 +218,22 @@ def _read_picture(path: Path, sha256: str) -> Array:
     from PIL import Image, UnidentifiedImageError
     from scipy.ndimage import distance_transform_edt
 
+    of_library, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # ours is told below
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # told below
-            picture = Image.open(path)
-        with picture:
-            width, height = picture.size
-            if width * height > PIXELS.most:
-                raise MeshFileError(f"a picture {PIXELS.sentence(width * height)}")
-            white = Image.new("RGBA", picture.size, "white")  # shows where it is transparent
-            rows = np.asarray(Image.alpha_composite(white, picture.convert("RGBA")).convert("L"))
-    except Image.DecompressionBombError as error:  # beyond twice what PIL warns of
-        raise MeshFileError(f"a picture with at most {PIXELS.most:,} pixels: {error}") from error
+        picture = Image.open(path)
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
         raise MeshFileError("a picture, such as a PNG file") from error
+    finally:
+        Image.MAX_IMAGE_PIXELS = of_library
+    with picture:
+        pixels = picture.width * picture.height
+        if pixels > PIXELS.most:
+            raise MeshFileError(f"a picture {PIXELS.sentence(pixels)}")
+        white = Image.new("RGBA", picture.size, "white")  # shows where it is transparent
+        try:
+            rows = np.asarray(Image.alpha_composite(white, picture.convert("RGBA")).convert("L"))
+        except (OSError, SyntaxError, ValueError) as error:
+            raise MeshFileError("a picture, such as a PNG file") from error
     dark = (rows <= GREY)[::-1].T
     if dark.all() or not dark.any():
         raise MeshFileError("a picture with dark pixels for the casting and light ones beside them")

@@ -18,7 +18,6 @@ from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.super_steps import STAGES
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.casting_shapes import Body, Rectangle, solid_of
-from sandmould.scenario.limits import CELLS, RECORDS
 from sandmould.scenario.solidification import Solidification
 
 KERNEL_FORMS = ("printed", "corrected", "symmetric")
@@ -90,11 +89,6 @@ def problems(scenario: Solidification) -> list[Problem]:
 
 
 def _misfits(scenario: Solidification) -> Iterator[Problem]:
-    sides_m = np.subtract(scenario.box.high_m, scenario.box.low_m)
-    cells = math.prod((sides_m / scenario.element_m).tolist())
-    yield from CELLS.problems("element_m", cells, scenario.element_m)
-    records = scenario.until_s / scenario.record_s
-    yield from RECORDS.problems("record_s", records, scenario.record_s)
     pour_k, solidus_k = scenario.initial_k.casting, scenario.casting.solidus_k
     if pour_k < solidus_k:
         valid = f"at least the solidus of {scenario.casting.name}, {solidus_k:g} K"

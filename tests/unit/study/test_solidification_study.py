@@ -190,11 +190,13 @@ def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:
     assert np.isnan(last["solidification_time_s"])
 
 
-def test_sizes_that_break_the_rule_are_an_outcome(tmp_path: Path) -> None:
-    folder = one_run(tmp_path, exchange="corrected", layers=[2, 1], element_m=0.00125)
-    outcome = RunOutcome.read(folder / "outcome.json")
-    assert outcome.outcome is Outcome.BAD_INPUT
-    assert "the smaller must measure at least 1/c_k" in outcome.detail
+def test_sizes_that_break_the_rule_are_told_before_anything_starts(tmp_path: Path) -> None:
+    uneven: dict[str, Any] = {"exchange": "corrected", "layers": [2, 1], "element_m": 0.00125}
+    told = r"layers = \[2, 1\] .* the smaller must measure at least 1/c_k"
+    with pytest.raises(BadInputError, match=told):
+        expand(open_study(opened(tmp_path, **uneven)))
+    for changed in ({"layers": [4]}, {"refuse_ratio": False}, {"exchange": "faces"}):
+        assert expand(open_study(opened(tmp_path, **uneven | changed)))
 
 
 def test_hot_spots_are_the_latest_within_reach() -> None:
