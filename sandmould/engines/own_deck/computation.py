@@ -73,6 +73,8 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     if world is not None:
         known = world.bcast(known)
     if known:
+        if is_root:
+            output.mkdir(parents=True, exist_ok=True)
         return Computed(RunOutcome(Outcome.BAD_INPUT, known, 0.0, 0.0), cost, is_root)
     notes: list[str] = []
     outcome, detail = Outcome.FINISHED, ""

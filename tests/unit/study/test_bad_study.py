@@ -82,6 +82,21 @@ CASES: dict[str, tuple[str | bytes, str]] = {
         "trial.yaml: material = 'silica' cannot be used: valid is the name of a material of "
         "kind sand: rojek_2004.",
     ),
+    "material of another kind": (
+        "based_on: tube\nmaterial: hirata_2019",
+        "trial.yaml: material = 'hirata_2019' cannot be used: valid is the name of a material of "
+        "kind sand: rojek_2004.",
+    ),
+    "material that no kind can use": (
+        "based_on: plates\nmaterial: hirata_2019_aluminium",
+        "trial.yaml: material = 'hirata_2019_aluminium' cannot be used: valid is the name of a "
+        "material of kind solidification: hirata_2019.",
+    ),
+    "swept range with a misspelt bound": (
+        "based_on: tube\nsweep: {keys: {sand.size_scale: {low: 4, high: 5, nummer: 3}}}",
+        "trial.yaml: sweep.keys.sand.size_scale.nummer = 3 cannot be used: valid is one of the "
+        "keys high, low, number, spacing (did you mean number?).",
+    ),
     "measure after the end": (
         "based_on: tube\nobjective: {at_vibration_s: 60}",
         "trial.yaml: objective.at_vibration_s = 60.0 cannot be used: "
@@ -127,6 +142,18 @@ CASES: dict[str, tuple[str | bytes, str]] = {
 def test_sentence(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text, sentence = CASES[case]
     assert refused(tmp_path, text, monkeypatch) == sentence
+
+
+def test_a_base_that_is_missing_is_not_looked_for_among_other_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "notes.yaml").write_text("shopping: [milk]")
+    (tmp_path / "Old Tube.yaml").write_text("based_on: tube")
+    (tmp_path / "mine.yaml").write_text("based_on: tube")
+    told = refused(tmp_path, "based_on: tuba", monkeypatch)
+    assert ", mine, " in told
+    assert "notes" not in told
+    assert "Old" not in told
 
 
 def test_missing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
