@@ -41,6 +41,11 @@ class _Verbs(TyperGroup):
         except BadInputError as error:
             typer.echo(error, err=True)
             raise typer.Exit(1) from None
+        except OSError as error:
+            if error.filename is None:  # no file of the user's: a fault of ours or of the machine
+                raise
+            typer.echo(f"{error.filename}: {error.strerror}", err=True)
+            raise typer.Exit(1) from None
 
 
 app = typer.Typer(

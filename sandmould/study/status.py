@@ -25,6 +25,8 @@ STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
 LISTED_RUNS = 12
 FRESH_S = 60.0
 """A run on another machine, whose lock is not seen here, has written its progress since."""
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
+"""What reading a file may raise that was cut short or overwritten."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ def run_status(folder: Path) -> RunStatus:
         ``results/<study>/runs/<run>``.
     """
     name = folder.name
-    with contextlib.suppress(OSError, ValueError, KeyError):
+    with contextlib.suppress(*_DAMAGED):
         outcome = RunOutcome.read(folder / "outcome.json")
         cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[-1]
         state: State = "done" if outcome.outcome is Outcome.FINISHED else "failed"
@@ -59,16 +61,16 @@ def run_status(folder: Path) -> RunStatus:
         wall_s = float(cost["wall_s"]) if state == "done" else math.nan
         return RunStatus(name, state, said, float(cost["cpu_s"]), 0.0, wall_s)
     path = folder / "work" / "progress.json"
-    progress: dict[str, Any] = {}
-    fresh = False
-    with contextlib.suppress(OSError, ValueError):
-        progress = json.loads(path.read_text(encoding="utf-8"))
+    said, left_s, fresh = "", math.nan, False
+    with contextlib.suppress(*_DAMAGED):
+        now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         fresh = time.time() - path.stat().st_mtime < FRESH_S
-    if not progress:
+        left_s = float(now["left_s"])
+        said = f"{now['percent']:.0f} %, {now['stage']}, {now['time_s']:.3g} s simulated"
+    if not said:
         return RunStatus(name, "running" if _locked(folder) else "waiting")
-    said = f"{progress['percent']:.0f} %, {progress['stage']}, {progress['time_s']:.3g} s simulated"
     if _locked(folder) or fresh:
-        return RunStatus(name, "running", said, left_s=float(progress["left_s"]))
+        return RunStatus(name, "running", said, left_s=left_s)
     return RunStatus(name, "stopped", said)
 
 
