@@ -37,7 +37,7 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
     nothing_asked = not has and study.objective == Objective()
     for key, name in _asked(study):
         if name not in has and not nothing_asked:
-            yield Problem(key, name, _valid(name, has, kind))
+            yield Problem(key, name, _valid(name, has, _about(key, name, study, kind)))
     at, vibration_s = study.objective.at_vibration_s, kind.planning.vibration_s(scenario)
     if at is not None and vibration_s == 0.0:
         yield Problem("objective.at_vibration_s", at, "absent: nothing vibrates in this scene")
@@ -86,14 +86,20 @@ def _asked(study: Study) -> Iterator[tuple[str, str]]:
                 yield f"calibration.sands.{i}.targets", name
 
 
-def _valid(name: str, has: list[str], kind: Kind[Any]) -> str:
+def _about(key: str, name: str, study: Study, kind: Kind[Any]) -> str:
+    """Why a name is asked for, or why it is not there, in brackets; nothing where none tells."""
+    if key == "objective.measure" and "measure" not in study.objective.model_fields_set:
+        return f" (none is stated: {name} is the default)"
     comes = _comes_with(name, kind)
-    why = f" ({name}: {comes})" if comes else ""
+    return f" ({name}: {comes})" if comes else ""
+
+
+def _valid(name: str, has: list[str], about: str) -> str:
     near = difflib.get_close_matches(name, has, n=NEAREST, cutoff=0.5)
     names = f"nearest are {', '.join(near)}" if len(near) > 1 else f"nearest is {''.join(near)}"
     if not near:
         names = f"such as {', '.join(has[:NEAREST])}" if has else "it has none"
-    return f"a measure that this scene will have{why}: {names}; sandmould measures lists all"
+    return f"a measure that this scene will have{about}: {names}; sandmould measures lists all"
 
 
 def _comes_with(name: str, kind: Kind[Any]) -> str:

@@ -36,8 +36,16 @@ CASES: dict[str, tuple[str, str]] = {
     "of a tube that was replaced, by default": (
         f"based_on: tube\nscenario: {{obstacles: [{POLYGON}]}}",
         "trial.yaml: objective.measure = 'tube_fill_fraction' cannot be used: valid is a measure "
-        "that this scene will have (tube_fill_fraction: with a tube, by its name): nearest are "
-        "bearing_fraction, solid_fraction, largest_overlap_fraction; sandmould measures lists all.",
+        "that this scene will have (none is stated: tube_fill_fraction is the default): "
+        "nearest are bearing_fraction, solid_fraction, largest_overlap_fraction; sandmould "
+        "measures lists all.",
+    ),
+    "of a tube that was replaced": (
+        f"based_on: tube\nscenario: {{obstacles: [{POLYGON}]}}\n"
+        "objective: {measure: tube_front_depth_m}",
+        "trial.yaml: objective.measure = 'tube_front_depth_m' cannot be used: valid is a measure "
+        "that this scene will have (tube_front_depth_m: with a tube, by its name): such as "
+        "grains, bed_height_m, solid_fraction; sandmould measures lists all.",
     ),
     "words": (
         "based_on: l_pattern\nobjective: {measure: pattern_loop}",
