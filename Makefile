@@ -128,9 +128,10 @@ architecture: $(INSTALLED)
 decks: $(INSTALLED)
 	$(BIN)/pytest tests/decks --refresh-golden
 
-## config/schema.json and config/default.yaml from the types
+## config/schema.json, config/default.yaml, docs/measures.md and docs/limits.md from the types
 schema: $(INSTALLED)
 	$(BIN)/python -m sandmould.study.schema
+	$(BIN)/python -m sandmould.study.reference
 
 ## pin all dependencies in requirements.lock
 lock:

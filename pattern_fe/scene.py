@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -18,6 +19,7 @@ from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
 from pattern_fe.supports import Supports
 from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.limits import PATTERN_ELEMENTS
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig
 from sandmould.scenario.scenario import Scenario
 
@@ -41,11 +43,25 @@ def pattern_of(scenario: Scenario) -> Pattern:
     if config.depth_m is not None and (d == 2 or isinstance(config.shape, MeshFile)):
         valid = "null in 2D and for a mesh file, which has its own"
         raise BadInputError([Problem("pattern.depth_m", config.depth_m, valid)])
+    _check_elements(config, box.depth_m if d == 3 else None)
     # what is shared by all runs of a study that differ in their sand or their loop
     body = config.model_copy(update={"loop": Loop()})
     size_m = (box.width_m, box.height_m) if d == 2 else (box.width_m, box.depth_m, box.height_m)
     thickness_m = scenario.sand.disc_thickness_m if d == 2 else None
     return _computed(body, size_m, thickness_m, _changed_ns(config))
+
+
+def _check_elements(config: PatternConfig, box_depth_m: float | None) -> None:
+    """Refuse more elements than can be solved; a mesh file has its own."""
+    shape = config.shape
+    if isinstance(shape, MeshFile):
+        return
+    across_m = shape.reach_m if isinstance(shape, LShape) else shape.width_m
+    sides_m = [across_m, shape.height_m]
+    if box_depth_m is not None:
+        sides_m.append(config.depth_m or box_depth_m)
+    elements = math.prod(side_m / config.element_m for side_m in sides_m)
+    PATTERN_ELEMENTS.check("pattern.element_m", elements, config.element_m)
 
 
 def _changed_ns(config: PatternConfig) -> int:

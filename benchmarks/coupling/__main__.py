@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ctypes
 import json
-import sys
 import time
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import pandas as pd
 from pattern_fe.coupling.schemes import in_step_foam
 from pattern_fe.scene import pattern_of
 from sandmould import ROOT
+from sandmould.scenario.module_main import run_main
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.records import runs_in
@@ -38,8 +38,9 @@ def step_s(scenario: Scenario) -> float:
     return (time.perf_counter() - begun) / STEPS
 
 
-def main(folder: Path) -> None:
+def main(record_folder: str) -> None:
     """Print the shares of each run and of all together."""
+    folder = Path(record_folder)
     record = json.loads((folder / "record.json").read_text())
     study = open_study(ROOT / record["study"])
     scenarios = {run.run: run.scenario for run in runs_in(study, folder)}
@@ -57,4 +58,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    run_main(main, "python -m benchmarks.coupling FOLDER-OF-A-RECORD", (1,))

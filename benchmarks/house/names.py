@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ast
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from sandmould import ROOT
+from sandmould.scenario.module_main import run_main
 
 FOLDERS = ("sandmould", "analysis", "pattern_fe", "benchmarks")
 OTHERS_IDIOMS = ("benchmarks/peers/sweep",)
@@ -59,4 +59,4 @@ def main(root: Path = ROOT) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_main(main, "python -m benchmarks.house.names")

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from sandmould.scenario.module_main import run_main
 from tests.verification.cases import closed_forms
 from tests.verification.cases.bench import (
     LARGE_M,
@@ -70,4 +71,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main, "python -m benchmarks.rebound")

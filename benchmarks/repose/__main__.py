@@ -5,7 +5,6 @@ FOLDER is that of a finished study, such as results/repose_paper; its last snaps
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from analysis import repose
 from benchmarks.frame import table
 from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.module_main import run_main
 from sandmould.study.kinds.sand.moments import list_moments
 from sandmould.study.kinds.sand.outflow import slopes
 from sandmould.study.plan.plan_files import read_run
@@ -20,8 +20,9 @@ from sandmould.study.plan.plan_files import read_run
 FEET = (0.2, 0.3, repose.HEAP_FOOT, 0.4, 0.5)
 
 
-def main(study: Path) -> None:
+def main(study_folder: str) -> None:
     """Measure, print."""
+    study = Path(study_folder)
     heaps = [
         (read_run(folder / "scenario.yaml").scenario, Snapshot.load(list_moments(folder)[-1].path))
         for folder in sorted((study / "runs").iterdir())
@@ -39,4 +40,4 @@ def main(study: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    run_main(main, "python -m benchmarks.repose FOLDER-OF-A-STUDY", (1,))

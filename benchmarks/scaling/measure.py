@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.scaling.study import REPLICATES, SHARED, Place, ProcessCost, graft
-from sandmould.study.definition.sweep import MOST_RUNS
+from sandmould.scenario.limits import RUNS
 from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
 
 _COLLECT = "from pathlib import Path; from sandmould.study.collect import collect; collect({0})"
@@ -84,7 +84,7 @@ def appended(place: Place, runs: int) -> Row:
 
     Empty where a study may have no more runs.
     """
-    if runs + REPLICATES > MOST_RUNS:
+    if runs + REPLICATES > RUNS.most:
         return {}
     cost: ProcessCost = place.snakemake(
         place.study(runs, more_points=1), "--cores", "2", shared=True

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from pattern_fe.coupling.exchange import LOADS, SOLUTION, read_loads, read_pattern, write_solution
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.large_displacement import LoadNotReachedError
+from sandmould.scenario.module_main import run_main
 
 
 def solve_all(folder: Path) -> list[Path]:
@@ -42,14 +42,14 @@ def solve_all(folder: Path) -> list[Path]:
     return written
 
 
-def main(folder: Path) -> None:
+def main(folder: str) -> None:
     """StaticSolution, and say which files are new."""
     try:
-        written = solve_all(folder)
+        written = solve_all(Path(folder))
     except (ValueError, LoadNotReachedError) as fault:
         raise SystemExit(str(fault)) from fault
     print(f"{folder}: {len(written)} answers written")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    run_main(main, "python -m pattern_fe.coupling.from_files FOLDER-OF-AN-EXCHANGE", (1,))

@@ -47,6 +47,11 @@ class _Verbs(TyperGroup):
         except BadInputError as error:
             typer.echo(error, err=True)
             raise typer.Exit(1) from None
+        except OSError as error:
+            if error.filename is None:  # no file of the user's: a fault of ours or of the machine
+                raise
+            typer.echo(f"{error.filename}: {error.strerror}", err=True)
+            raise typer.Exit(1) from None
 
 
 app = typer.Typer(
@@ -78,7 +83,7 @@ def sandmould(
 
 @app.command()
 def plan(study: StudyFile, cores: Cores = None, adopt: Adopt = False) -> None:
-    """Check a study and print its runs and their price; nothing starts."""
+    """Check a study, print its runs and their price; nothing starts."""
     from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
     from sandmould.study.plan.trust import reading_help
 
@@ -164,6 +169,15 @@ def tidy(
     if yes or typer.confirm(f"Remove {number} run folders and free {size}?"):
         remove(opened, RESULTS, found.removable)
         typer.echo(f"{number} run folders removed, {size} freed")
+
+
+@app.command()
+def measures(study: StudyFile) -> None:
+    """List what runs of a study can be measured by, with units."""
+    from sandmould.study.plan.load_study import open_study
+    from sandmould.study.reference import measures_text
+
+    typer.echo(measures_text(open_study(study)))
 
 
 @app.command()

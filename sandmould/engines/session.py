@@ -33,11 +33,22 @@ _LOST = re.compile(r"Lost atoms|Did not assign all atoms|out of range atoms")
 _LACKS = re.compile(r"(Unrecognized|Invalid|Unknown) (\w+ ){0,2}style|not enabled in this LAMMPS")
 
 
-def engine_stop(engine: str, message: str) -> EngineStop:
-    """Outcome that fits an error message of LAMMPS or LIGGGHTS, which is quoted."""
+def engine_stop(engine: str, message: str, of_user: bool = False) -> EngineStop:
+    """Outcome that fits an error message of LAMMPS or LIGGGHTS, which is quoted.
+
+    Parameters
+    ----------
+    engine, message : str
+    of_user : bool
+        Whether the deck is the user's own, in which a style can be misspelt.
+    """
     text = " ".join(message.split())
     if _LOST.search(text):
         return EngineStop(Outcome.LOST_GRAINS, f"{engine} says: {text}")
+    if of_user and _LACKS.search(text) and "not enabled" not in text:
+        unknown = "its name is misspelt, or this build lacks it"
+        said = f"{engine} does not know a style of the deck: {unknown}; it says: {text}"
+        return EngineStop(Outcome.BAD_INPUT, said)
     if _LACKS.search(text):
         lacks = f"this build of {engine} lacks a style that the deck needs; it says: {text}"
         return EngineStop(Outcome.ENGINE_MISSING, lacks)

@@ -16,6 +16,7 @@ from pydantic_core import PydanticCustomError
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.geometry import Block
+from sandmould.scenario.limits import PIXELS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.mesh_file import MeshFileError, file_hash
 from sandmould.scenario.outline import Outline, outline_fault
@@ -237,12 +238,22 @@ def _read_picture(path: Path, sha256: str) -> Array:
     from PIL import Image, UnidentifiedImageError
     from scipy.ndimage import distance_transform_edt
 
+    of_library, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # ours is told below
     try:
-        with Image.open(path) as picture:
-            white = Image.new("RGBA", picture.size, "white")  # shows where it is transparent
-            rows = np.asarray(Image.alpha_composite(white, picture.convert("RGBA")).convert("L"))
-    except (UnidentifiedImageError, OSError) as error:
+        picture = Image.open(path)
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
         raise MeshFileError("a picture, such as a PNG file") from error
+    finally:
+        Image.MAX_IMAGE_PIXELS = of_library
+    with picture:
+        pixels = picture.width * picture.height
+        if pixels > PIXELS.most:
+            raise MeshFileError(f"a picture {PIXELS.sentence(pixels)}")
+        white = Image.new("RGBA", picture.size, "white")  # shows where it is transparent
+        try:
+            rows = np.asarray(Image.alpha_composite(white, picture.convert("RGBA")).convert("L"))
+        except (OSError, SyntaxError, ValueError) as error:
+            raise MeshFileError("a picture, such as a PNG file") from error
     dark = (rows <= GREY)[::-1].T
     if dark.all() or not dark.any():
         raise MeshFileError("a picture with dark pixels for the casting and light ones beside them")

@@ -8,6 +8,7 @@ import numpy as np
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_blocks, tube_wall
+from sandmould.scenario.limits import GRAINS
 from sandmould.scenario.mesh_file import MeshFileError, check_surface
 from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
@@ -240,8 +241,8 @@ def _fill(s: Scenario) -> Iterator[Problem]:
         if count < 1:
             yield Problem("fill.layers", f"layer {i + 1}", "a layer of at least one grain")
             return
-    if sum(counts) > 20_000_000:
-        yield Problem("fill.layers", f"{sum(counts)} grains", "at most 20 million grains")
+    if too_many := [*GRAINS.problems("fill.layers", sum(counts))]:
+        yield from too_many
         return
     height = predicted_bed_height_m(s, counts)
     floor = s.box.width_m * (s.box.depth_m if s.dimension == 3 else 1.0)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import json
-import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,63 +14,17 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.quantity import keys_at
+from sandmould.scenario.limits import YAML_BYTES
+from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
+from sandmould.scenario.yaml_text import fault_of, load_planned, load_users
 
 Tree = dict[str, Any]
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
-def _mapping(loader: Any, node: yaml.MappingNode) -> Tree:
-    merge = "tag:yaml.org,2002:merge"
-    keys = [loader.construct_object(k, deep=True) for k, _ in node.value if k.tag != merge]
-    for key in keys:
-        if not isinstance(key, str):
-            fault = f"key {key!r} is no text: put it in quotes"
-        elif keys.count(key) > 1:
-            fault = f"key {key!r} stands twice"
-        else:
-            continue
-        raise yaml.constructor.ConstructorError(None, None, fault, node.start_mark)
-    loader.flatten_mapping(node)
-    return {
-        loader.construct_object(k, deep=True): loader.construct_object(v, deep=True)
-        for k, v in node.value
-    }
-
-
-def _strict(parser: Any) -> Any:
-    """A loader whose 7e4 is a number and whose repeated keys are refused."""
-
-    class Loader(parser):
-        pass
-
-    Loader.add_implicit_resolver(
-        "tag:yaml.org,2002:float",
-        re.compile(r"^[-+]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)([eE][-+]?\d+)?$"),
-        list("-+0123456789."),
-    )
-    Loader.add_implicit_resolver(
-        "tag:yaml.org,2002:int", re.compile(r"^[-+]?\d[\d_]*$"), list("-+0123456789")
-    )
-    # The first match wins in PyYAML: plain integers must be asked before floats.
-    for resolvers in Loader.yaml_implicit_resolvers.values():
-        resolvers.sort(key=lambda item: not item[0].endswith(":int"))
-    Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
-    return Loader
-
-
-_OF_USERS = _strict(yaml.SafeLoader)
-_OF_THE_PLAN = _strict(getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-
-
 def read_planned(path: Path, name: str) -> Tree:
-    """Read a file that the plan of a study wrote, as :func:`read_yaml` does.
-
-    libyaml reads it six times as fast as Python, and a report reads hundreds. It is not trusted
-    with the files of users: what it says of a fault teaches less, and a file nested without end
-    crashes it.
-    """
-    return _read(path, name, _OF_THE_PLAN)
+    """Read a file that the plan of a study wrote, as :func:`read_yaml` does."""
+    return _read(path, name, load_planned)
 
 
 def read_yaml(path: Path, name: str) -> Tree:
@@ -85,32 +39,33 @@ def read_yaml(path: Path, name: str) -> Tree:
     Raises
     ------
     BadInputError
-        When the file is missing, is no YAML or holds no mapping.
+        When the file is missing, is no YAML, holds no mapping or is beyond a limit.
     """
-    return _read(path, name, _OF_USERS)
+    with contextlib.suppress(OSError):  # which reading tells
+        _named(name, YAML_BYTES.problems("file", path.stat().st_size))
+    return _read(path, name, load_users)
 
 
-def _read(path: Path, name: str, loader: Any) -> Tree:
+def _named(name: str, problems: Iterable[Problem]) -> None:
+    """Refuse a file for its problems, if it has any."""
+    if found := [replace(problem, file=name) for problem in problems]:
+        raise BadInputError(found)
+
+
+def _read(path: Path, name: str, load: Callable[[str], Any]) -> Tree:
     try:
-        tree = yaml.load(path.read_text(encoding="utf-8"), Loader=loader)
+        tree = load(path.read_text(encoding="utf-8"))
+    except BadInputError as error:
+        _named(name, error.problems)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8 text"
         raise BadInputError([Problem("file", reason, "a readable YAML file", name)]) from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise BadInputError([Problem("file", _fault(error), "YAML text", name)]) from error
+        raise BadInputError([Problem("file", fault_of(error), "YAML text", name)]) from error
     if not isinstance(tree, dict):
-        raise BadInputError([Problem("file", tree, "a mapping of keys to values", name)])
+        stated = "nothing" if tree is None else tree
+        raise BadInputError([Problem("file", stated, "a mapping of keys to values", name)])
     return tree
-
-
-def _fault(error: Exception) -> str:
-    """What a parser found, with its line, in one line of text."""
-    mark = getattr(error, "problem_mark", None)
-    if isinstance(error, RecursionError):
-        return "nested too deeply"
-    if mark is None:
-        return " ".join(str(error).split())
-    return f"line {mark.line + 1}: {getattr(error, 'problem', None)}"
 
 
 @dataclass
@@ -210,12 +165,15 @@ def validated(model: type[ModelT], tree: Tree, origin: Origin, above: str = "") 
         findings = [(item, _problem(model, tree, item, origin, above)) for item in error.errors()]
         problems: dict[str, Problem] = {}
         for item, problem in findings:
-            if _is_beside_the_point(item, problem.key, findings):
+            if not problem.valid or _is_beside_the_point(item, problem.key, findings):
                 continue
             before = problems.get(problem.key)
             # Each branch of a union that fits nowhere has its own finding.
-            valid = f"{before.valid} or {problem.valid}" if before else problem.valid
-            problems[problem.key] = replace(problem, valid=valid)
+            if before is None or before.valid == problem.valid:
+                problems[problem.key] = problem
+            else:
+                valid = f"{before.valid} or {problem.valid}"
+                problems[problem.key] = replace(problem, valid=valid)
         raise BadInputError(list(problems.values())) from None
 
 
@@ -246,20 +204,27 @@ def _key_parts(tree: Any, location: tuple[int | str, ...], is_missing: bool) -> 
 
 
 def _problem(model: type[BaseModel], tree: Tree, item: Any, origin: Origin, above: str) -> Problem:
-    kind, context = item["type"], item.get("ctx", {})
-    is_missing = kind == "missing"
-    parts = _key_parts(tree, item["loc"], is_missing)
+    context, is_missing = item.get("ctx", {}), item["type"] == "missing"
+    lacks_entry = is_missing and isinstance(item["loc"][-1], int)
+    parts = _key_parts(tree, item["loc"], is_missing and not lacks_entry)
     key = ".".join(([above] if above else []) + parts) or "file"
-    value = None if is_missing else item.get("input")
-    return Problem(key, value, _valid(model, kind, context, item, parts), origin.file_of(key))
+    value = None if is_missing and not lacks_entry else item.get("input")
+    return Problem(key, value, _valid(model, tree, context, item, parts), origin.file_of(key))
 
 
-def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: list[str]) -> str:
+def _valid(model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: list[str]) -> str:
+    kind = item["type"]
+    if kind == "too_long" or (kind == "missing" and isinstance(item["loc"][-1], int)):
+        lengths = standing_lengths(model, tree, parts)
+        if lengths:  # nothing where another branch of a union takes as many
+            several = f"a list of {' or '.join(map(str, lengths))} entries"
+            return "" if len(item["input"]) in lengths else several
     if kind == "extra_forbidden":
-        keys = keys_at(model, parts[:-1])
+        keys = standing_keys(model, tree, parts[:-1])
         near = difflib.get_close_matches(parts[-1], keys, n=1, cutoff=0.5)
         hint = f" (did you mean {near[0]}?)" if near else ""
         return f"one of the keys {', '.join(sorted(keys)) or '(none)'}{hint}"
+    kinds = standing_kinds(model, tree, parts) if kind == "union_tag_not_found" else []
     limit = next((context[k] for k in ("gt", "ge", "lt", "le") if k in context), None)
     limit = f"{limit:g}" if isinstance(limit, float) else limit
     words = {
@@ -286,7 +251,7 @@ def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: li
         "too_long": f"a list of at most {context.get('max_length')} entries",
         "literal_error": f"one of {context.get('expected')}",
         "union_tag_invalid": f"a kind among {context.get('expected_tags')}",
-        "union_tag_not_found": "a mapping with a kind: plate, tube, polygon, cylinder or mesh",
+        "union_tag_not_found": f"a mapping with a kind: {', '.join(kinds)}",
         "string_pattern_mismatch": f"text of the pattern {context.get('pattern')}",
     }
     return words.get(kind, str(item["msg"]))

@@ -235,7 +235,7 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
         if bounds[place] < bounds[place + 1]:
             gaps = measures.rows[TIME_S].iloc[bounds[place] : bounds[place + 1]].isna().sum()
             texts += [f"{gaps} snapshots cannot be read."] if gaps else []
-        details.append(" ".join(text for text in texts if text))
+        details.append(_sentences(texts))
     summary = {
         **{str(c): runs[c] for c in runs.columns},
         OUTCOME_CODE: [int(o.outcome) if o else np.nan for o in outcomes],
@@ -247,6 +247,12 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
     }
     table = pd.DataFrame(summary).infer_objects()
     return Collected(table, _curves(table, swept_keys(runs), measures), swept_keys(runs))
+
+
+def _sentences(texts: Sequence[str]) -> str:
+    """Texts one after the other, a full stop between those that lack one."""
+    said = [text for text in texts if text]
+    return " ".join([*(f"{text.rstrip('.')}." for text in said[:-1]), *said[-1:]])
 
 
 def _read_outcomes(folders: Sequence[Path]) -> tuple[list[RunOutcome | None], dict[int, str]]:

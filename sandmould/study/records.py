@@ -23,6 +23,7 @@ from sandmould.runs.columns import ENGINE, OUTCOME, RUN, VERSION, finished
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.module_main import run_main
 from sandmould.study.collect import CHECKS, read_summary
 from sandmould.study.definition.run import Run
 from sandmould.study.definition.study import Study
@@ -230,4 +231,8 @@ def _standing(why: str) -> str:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+    run_main(
+        lambda *given: main([*given]),
+        "python -m sandmould.study.records check | record STUDY.yaml",
+        (1, 2),
+    )

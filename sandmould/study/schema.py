@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from sandmould import ROOT
+from sandmould.scenario.module_main import run_main
 from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, models_in
 from sandmould.study.definition.study import Study
@@ -142,4 +143,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main, "python -m sandmould.study.schema")

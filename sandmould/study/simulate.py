@@ -15,6 +15,7 @@ from sandmould.runs.manifest import write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Cost, finish
 from sandmould.runs.provenance import provenance_of
+from sandmould.scenario.module_main import run_main
 from sandmould.scenario.quantity import Section
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.registry import kind_of
@@ -93,14 +94,14 @@ def _finish(folder: Path, scenario: Section, outcome: RunOutcome, cost: Cost) ->
     finish(folder, execution.products, outcome, cost, provenance(scenario))
 
 
-def main(folder: Path, crash: str | None = None) -> int:
+def main(folder: str, crash: str | None = None) -> int:
     """Compute a run, or write down how another process of it crashed."""
     if crash is None:
-        return simulate(folder)
-    write_crash(folder, crash)
+        return simulate(Path(folder))
+    write_crash(Path(folder), crash)
     return 0
 
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it as a kill does, silently
-    raise SystemExit(main(Path(sys.argv[1]), *sys.argv[2:]))
+    run_main(main, "python -m sandmould.study.simulate FOLDER-OF-A-RUN [CRASH]", (1, 2))

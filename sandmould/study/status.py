@@ -27,6 +27,8 @@ STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
 LISTED_RUNS = 12
 FRESH_S = 60.0
 """A run of another machine, whose lock may not be seen here, has written its progress since."""
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
+"""What reading a file may raise that was cut short or overwritten."""
 
 
 @dataclass(frozen=True)
@@ -58,17 +60,17 @@ def run_status(folder: Path, lack: Lack) -> RunStatus:
     if lack.need is Need.NOTHING:
         return _ended(folder)
     path = folder / "work" / "progress.json"
-    progress: dict[str, Any] = {}
-    fresh = False
-    with contextlib.suppress(OSError, ValueError):
-        progress = json.loads(path.read_text(encoding="utf-8"))
+    said, left_s, fresh = "", math.nan, False
+    with contextlib.suppress(*_DAMAGED):
+        now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         fresh = time.time() - path.stat().st_mtime < FRESH_S
+        left_s = float(now["left_s"])
+        said = f"{now['percent']:.0f} %, {now['stage']}, {now['time_s']:.3g} s simulated"
     running = is_locked(folder) or (fresh and computed_elsewhere(folder))
-    if not progress:
+    if not said:
         return RunStatus(name, "running" if running else "waiting", "" if running else lack.why)
-    said = f"{progress['percent']:.0f} %, {progress['stage']}, {progress['time_s']:.3g} s simulated"
     if running:
-        return RunStatus(name, "running", said, left_s=float(progress["left_s"]))
+        return RunStatus(name, "running", said, left_s=left_s)
     return RunStatus(name, "stopped", said)
 
 
@@ -76,7 +78,7 @@ def _ended(folder: Path) -> RunStatus:
     """A run with all that it leaves behind."""
     outcome = RunOutcome.read(folder / "outcome.json")
     cpu_s = wall_s = math.nan
-    with contextlib.suppress(OSError, ValueError, KeyError, IndexError):
+    with contextlib.suppress(*_DAMAGED):
         cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[-1]
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0

@@ -17,7 +17,7 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import write_plan
-from sandmould.study.simulate import measure_run, render_run
+from sandmould.study.simulate import measure_run, render_run, simulate
 
 FALLING = """\
 {% if restart %}
@@ -88,7 +88,9 @@ run 500
 def planned(folder: Path, template: str, **scenario: Any) -> Path:
     """Plan and render a study of one run; its folder."""
     (folder / "deck.in.j2").write_text(template)
-    study = {"kind": "deck", "scenario": {"template": "deck.in.j2", **scenario}}
+    study: dict[str, Any] = {"kind": "deck", "scenario": {"template": "deck.in.j2", **scenario}}
+    for measure in scenario.get("measures", ()):
+        study["objective"] = {"measure": measure}
     (folder / "trial.yaml").write_text(yaml.safe_dump(study))
     (run,) = expand(open_study(folder / "trial.yaml"))
     write_plan([run], folder / "results")
@@ -175,9 +177,52 @@ def test_an_error_of_the_engine_is_quoted(tmp_path: Path) -> None:
 
 def test_a_measure_that_the_log_lacks_is_told(tmp_path: Path) -> None:
     few = {**LAMMPS, "values": {"gravity_m_s2": 9.81, "number": 1000}}
-    folder = planned(tmp_path, FALLING, **{**few, "measures": {"speed_m_s": "v_speed"}})
+    # Behind such a command the text of a deck does not show all that it prints.
+    hidden = FALLING.replace("thermo 1000", 'if "1 > 0" then "thermo 1000"')
+    folder = planned(tmp_path, hidden, **{**few, "measures": {"speed_m_s": "v_speed"}})
     assert compute(folder) == 0
     outcome = RunOutcome.read(folder / "outcome.json")
     assert outcome.outcome is Outcome.BAD_INPUT
     assert "lacks the column v_speed (measures.speed_m_s): it has Step, Time, v_h" in outcome.detail
     measure_run(folder)  # what there is
+
+
+def test_a_column_that_one_run_lacks_stops_the_others_before_they_compute(tmp_path: Path) -> None:
+    hidden = FALLING.replace("thermo 1000", 'if "1 > 0" then "thermo 1000"')
+    (tmp_path / "deck.in.j2").write_text(hidden)
+
+    def study(column: str) -> list[Path]:
+        scenario = {"template": "deck.in.j2", "values": {"gravity_m_s2": 9.81, "number": 1000}}
+        told = {
+            "kind": "deck", "scenario": {**scenario, "measures": {"speed_m_s": column}},
+            "replicates": 2, "objective": {"measure": "speed_m_s"},
+        }  # fmt: skip
+        (tmp_path / "trial.yaml").write_text(yaml.safe_dump(told))
+        runs = expand(open_study(tmp_path / "trial.yaml"))
+        write_plan(runs, tmp_path / "results")
+        folders = [tmp_path / "results" / "runs" / run.run for run in runs]
+        for folder in folders:
+            render_run(folder)
+            assert simulate(folder) == 0
+        return folders
+
+    first, other = study("v_speed")
+    lacks = "the deck's log lacks the column v_speed (measures.speed_m_s): it has Step, Time, v_h"
+    assert RunOutcome.read(first / "outcome.json").detail.startswith(lacks)
+    outcome = RunOutcome.read(other / "outcome.json")
+    assert outcome.outcome is Outcome.BAD_INPUT
+    assert outcome.detail.startswith(f"not computed, since {first.name} has shown that {lacks}")
+    assert not list(other.glob("**/engine*.log"))
+    measure_run(other)  # nothing, and no fault
+    # Asked for what the deck prints, all are computed.
+    for folder in study("v_height"):
+        assert RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED
+
+
+def test_a_misspelt_style_is_no_missing_engine(tmp_path: Path) -> None:
+    folder = planned(tmp_path, "units si\npair_style blah\n")
+    assert simulate(folder) == 0
+    outcome = RunOutcome.read(folder / "outcome.json")
+    assert outcome.outcome is Outcome.BAD_INPUT
+    assert "does not know a style of the deck: its name is misspelt, or" in outcome.detail
+    assert "pair_style blah" in outcome.detail

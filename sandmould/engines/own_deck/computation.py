@@ -11,6 +11,12 @@ from pathlib import Path
 
 import pandas as pd
 
+from sandmould.engines.own_deck.columns import (
+    deck_key,
+    found_missing,
+    keep_found,
+    missing_columns,
+)
 from sandmould.engines.own_deck.deck import (
     RESTART_FILES,
     check_unchanged,
@@ -60,6 +66,16 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     if world is not None:
         candidates = world.bcast(candidates)
     begun, cpu_begun = time.monotonic(), cpu_time_s()
+    cost = Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
+    # run folders lie in the folder runs of their study's
+    study_folder, key = folder.parent.parent, deck_key(scenario, render(scenario, run, study))
+    known = found_missing(study_folder, key, run)
+    if world is not None:
+        known = world.bcast(known)
+    if known:
+        if is_root:
+            output.mkdir(parents=True, exist_ok=True)
+        return Computed(RunOutcome(Outcome.BAD_INPUT, known, 0.0, 0.0), cost, is_root)
     notes: list[str] = []
     outcome, detail = Outcome.FINISHED, ""
     for restart in (*candidates, ""):
@@ -81,9 +97,12 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
             outcome, detail = stop.outcome, stop.detail
             break
     thermo = read_thermo(_logs(work))
-    if outcome is Outcome.FINISHED and (missing := _missing(scenario, thermo.table)):
-        outcome, detail = Outcome.BAD_INPUT, missing
-    cost = Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
+    if outcome is Outcome.FINISHED:
+        missing = missing_columns(scenario, [str(column) for column in thermo.table])
+        if is_root:
+            keep_found(study_folder, key, run, missing)
+        if missing:
+            outcome, detail = Outcome.BAD_INPUT, missing
     cost.version = str(engine_module(scenario.engine.name).installed_version())
     cost.grains = thermo.grains
     cost.steps, cost.grain_steps, cost.engine_wall_s = (
@@ -133,16 +152,6 @@ def _lay_out(scenario: OwnDeck, output: Path, deck: str, goes_on: bool) -> None:
 def _logs(work: Path) -> list[Path]:
     """Logs of all attempts in order."""
     return sorted(work.glob("engine_*.log"), key=lambda path: int(path.stem.split("_")[1]))
-
-
-def _missing(scenario: OwnDeck, table: pd.DataFrame) -> str:
-    """Say which column the log lacks, or nothing."""
-    wanted = {"the time": CLOCK, **{f"measures.{n}": c for n, c in scenario.measures.items()}}
-    lacks = [f"{column} ({what})" for what, column in wanted.items() if column not in table]
-    if not lacks:
-        return ""
-    has = ", ".join(map(str, table.columns)) or "no table"
-    return f"the deck's log lacks the column {', '.join(lacks)}: it has {has}"
 
 
 class _Watch:

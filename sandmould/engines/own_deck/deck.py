@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sandmould.digest import file_digest
+from sandmould.engines.own_deck.columns import column_problems
 from sandmould.engines.own_deck.template import MOST_CHARACTERS, names_in, rendered
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.registry import engine_module
@@ -58,6 +59,7 @@ def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
     try:
         used = names_used(scenario)
         render(scenario, "run", "study", "restart")
+        deck = render(scenario, "run", "study")
     except ValueError as error:
         given = ", ".join(sorted({*scenario.values, *RESERVED}))
         yield Problem(
@@ -68,6 +70,7 @@ def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
         if name not in used:
             valid = f"a name that the template uses: {', '.join(sorted(used - set(RESERVED)))}"
             yield Problem(f"values.{name}", scenario.values[name], valid)
+    yield from column_problems(scenario, deck)
 
 
 def names_used(scenario: OwnDeck) -> set[str]:

@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.limits import RUNS
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.config import fewest_points
@@ -70,6 +71,7 @@ def problems(refine: Refinement, sweep: Sweep, scenario: Section, better: str) -
     for key in refine.interval:
         if key not in keys:
             yield Problem("refine.interval", key, f"a swept key, {' or '.join(keys)}")
+    yield from RUNS.problems("refine.rounds", len(swept) + refine.rounds * refine.runs)
     fewest = fewest_points(len(keys))
     if len(swept) < fewest:
         valid = f"at least {fewest} points for rounds to begin with"

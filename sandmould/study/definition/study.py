@@ -9,6 +9,7 @@ from pydantic import Field
 
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.engine import EngineName
+from sandmould.scenario.limits import REPLICATES
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.calibration.config import Calibration
@@ -66,7 +67,7 @@ class Study(Section):
         "Runs of every point, alike but for the grains' starting places.",
         source=ARGUED,
         ge=1,
-        le=1000,
+        le=REPLICATES.most,
     )
     objective: Objective = Field(Objective(), description="What makes a setting the best.")
     equivalence: Equivalence = Field(

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.limits import RUNS
 from sandmould.scenario.quantity import Section, fields_at, quantity
 from sandmould.scenario.reading import Tree
 from sandmould.scenario.sand import ARGUED
@@ -19,8 +20,6 @@ from sandmould.scenario.sand import ARGUED
 Design = Literal["grid", "zipped", "list", "latin_hypercube", "sobol"]
 Point = dict[str, Any]
 """Values of the swept keys of one point, by key path."""
-MOST_RUNS = 10_000
-"""More jobs than one Snakemake graph carries well are more likely a slip than a wish."""
 
 
 class Range(Section):
@@ -31,7 +30,7 @@ class Range(Section):
         ..., "Highest value.", unit="of the key", source="user", ge=-1e15, le=1e15
     )
     number: int | None = quantity(
-        None, "How many values; for grid and zipped designs.", source="user", ge=2, le=MOST_RUNS
+        None, "How many values; for grid and zipped designs.", source="user", ge=2, le=RUNS.most
     )
     spacing: Literal["linear", "log"] = quantity(
         "linear", "Equal steps or equal ratios.", source=ARGUED
@@ -72,7 +71,7 @@ class Sweep(Section):
         (), description="Points of a list design: each a mapping of key paths to values."
     )
     samples: int | None = quantity(
-        None, "Points of a drawn design.", source="user", ge=1, le=MOST_RUNS
+        None, "Points of a drawn design.", source="user", ge=1, le=RUNS.most
     )
 
     @property
@@ -199,9 +198,7 @@ def problems(sweep: Sweep, scenario: Section, replicates: int) -> list[Problem]:
     replicates : int
     """
     misfits = [*_design(sweep), *_paths(sweep, scenario)]
-    if not misfits and (runs := sweep.number_of_points * replicates) > MOST_RUNS:
-        misfits = [Problem("sweep", f"{runs} runs", f"at most {MOST_RUNS} runs")]
-    return misfits
+    return misfits or [*RUNS.problems("sweep", sweep.number_of_points * replicates)]
 
 
 def _design(sweep: Sweep) -> Iterator[Problem]:

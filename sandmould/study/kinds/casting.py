@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from sandmould.runs.files import replaced, write_text
+from sandmould.runs.measures import MeasureGroup
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.study.definition.run import LAST_MEASURED, Run
@@ -50,6 +51,7 @@ def casting_planning(
     work_unit: str,
     resolved: Callable[[ScenarioT], ScenarioT],
     problems: Callable[[ScenarioT], list[Problem]],
+    measures: tuple[MeasureGroup[ScenarioT], ...],
     threads: Callable[[ScenarioT], int],
     memory_mb: Callable[[ScenarioT], int],
     planned_work: Callable[[ScenarioT], float],
@@ -69,6 +71,7 @@ def casting_planning(
         resolved=resolved,
         problems=problems,
         engine_problem=lambda scenario: None,
+        measures=measures,
         vibration_s=lambda scenario: 0.0,
         sources=lambda scenario: solver.source_files(),
         template_hash=lambda scenario: solver.source_hash(),

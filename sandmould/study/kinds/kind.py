@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from sandmould.runs.measures import MeasureGroup
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.quantity import Section
@@ -76,6 +77,8 @@ class Planning(Generic[ScenarioT]):
     """What keeps a well-typed scenario from being run."""
     engine_problem: Callable[[ScenarioT], Problem | None]
     """Why this machine cannot compute it."""
+    measures: tuple[MeasureGroup[ScenarioT], ...]
+    """All that its runs can be measured by: the one list of names, units and meanings."""
     vibration_s: Callable[[ScenarioT], float]
     """Time of vibration, over which measures are taken."""
     sources: Callable[[ScenarioT], list[Path]]

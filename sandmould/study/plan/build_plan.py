@@ -6,7 +6,7 @@ import contextlib
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from sandmould.study.plan.batches import Batch, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.lacking import Lack, lacks, note_lacks
 from sandmould.study.plan.load_study import OpenStudy, open_study
+from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import plan_table, write_plan, write_study
 from sandmould.study.rounds.round_log import read_rounds
@@ -157,20 +158,12 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         if problem is not None:
             problem = _at_stated_key(study, run, problem)
             problems[str(problem)] = problem
-    for problem in _unfinished(study, results):
-        problems[str(problem)] = problem
+    for problem in problems_elsewhere(study.study, results):
+        found = replace(problem, file=study.origin.file_of(problem.key))
+        problems[str(found)] = found
     if problems:
         raise BadInputError(list(problems.values()))
     return Plan(study, tuple(runs))
-
-
-def _unfinished(study: OpenStudy, results: Path) -> Iterator[Problem]:
-    """Studies that help to calibrate and have not been run."""
-    for i, name in enumerate(study.study.calibration.also):
-        if not (results / name / "summary.tsv").is_file():
-            key = f"calibration.also.{i}"
-            valid = f"a study with results: sandmould run {name} comes first"
-            yield Problem(key, name, valid, study.origin.file_of(key))
 
 
 def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:

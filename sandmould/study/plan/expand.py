@@ -19,6 +19,7 @@ from sandmould.study.definition.run import Part, Run
 from sandmould.study.definition.sweep import Point, points, value_at
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.kinds.registry import kind_named
+from sandmould.study.plan import measured
 from sandmould.study.plan.labels import Labels, letters
 from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.plan.trust import outside
@@ -108,6 +109,24 @@ def expand(
     return list(runs.values())
 
 
+def scenes(study: OpenStudy) -> Iterator[AnyScenario]:
+    """The scenario of each point of a sweep, whether or not it can be computed.
+
+    Raises
+    ------
+    BadInputError
+        At a point whose values have a wrong type.
+    """
+    base = study.study.scenario.model_dump(mode="json")
+    kind = kind_named(study.study.kind)
+    labels = Labels(kind.scenario, kind.labels_have_units)
+    for point in points(study.study.sweep, study.study.scenario):
+        at_point = _AtPoint(study, base, point, labels)
+        if at_point.scenario is None:
+            raise BadInputError(at_point.problems)
+        yield at_point.scenario
+
+
 class _AtPoint:
     """The scenario of one point of a sweep."""
 
@@ -115,6 +134,7 @@ class _AtPoint:
         self.study, self.base, self.point, self.labels = study, base, point, labels
         self.kind = kind_named(study.study.kind)
         self.origin = Origin(dict(study.origin.file), dict(study.origin.source))
+        self.scenario: Any = None
         try:
             self.scenario = self._scenario(point, self.origin)
         except BadInputError as error:
@@ -142,11 +162,8 @@ class _AtPoint:
         """What is wrong with a well-typed scenario of this study, keys from the study's root."""
         planning = self.kind.planning
         misfits = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in planning.problems(scenario)]
-        at, vibration_s = self.study.study.objective.at_vibration_s, planning.vibration_s(scenario)
-        if at is not None and at > vibration_s:
-            valid = f"at most {vibration_s:g} s, the end of the vibration"
-            misfits.append(Problem("objective.at_vibration_s", at, valid))
-        return misfits
+        # What a scene can be measured by is told of one that can be computed.
+        return misfits or [*measured.problems(self.study.study, self.kind, scenario)]
 
     def _at_changed_key(self, problem: Problem) -> Problem:
         """A misfit told at the key that the user has to change."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 from collections.abc import Iterator
@@ -18,7 +19,7 @@ from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
 from sandmould.study.definition import calibration, certificate, comparing, refinement, sweep
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import Kind
-from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
+from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named
 
 STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
@@ -84,12 +85,10 @@ def open_study(path: Path) -> OpenStudy:
     problems = [p for f in files for p in _wrong_units(kind.study, f)]
     origin = Origin(file={"": file_name})
     tree: Tree = {"scenario": kind.defaults()}
-    material = _material(files)
+    material = _material(files, kind)
     if material is not None and kind.material is not None:
         problems += _wrong_units(kind.material, material)
-        # By itself first, so that a message has the key as the material's file has it.
-        alone = Origin(file={"": material.name})
-        validated(kind.material, merge({}, material.tree, alone, material.name), alone)
+        _check_material(material, kind.material)
         tree = merge(tree, {"scenario": material.tree}, origin, material.name)
     for file in files:
         if "sweep" in file.tree:
@@ -157,17 +156,33 @@ def _files(path: Path) -> list[_File]:
     return files
 
 
-def _material(files: list[_File]) -> _File | None:
-    """The material that the last file to name one names."""
+def _material(files: list[_File], kind: Kind[Any]) -> _File | None:
+    """The material that the last file to name one names, of a kind that has materials."""
     stated = [f for f in files if "material" in f.tree]
-    if not stated or (name := stated[-1].tree["material"]) is None:
+    if kind.material is None or not stated or (name := stated[-1].tree["material"]) is None:
         return None
     folders = (stated[-1].path.parent, *MATERIALS)
     places = _places(name, folders)
-    if not places:
-        valid = f"the name of a material: {_candidates(MATERIALS)}"
-        raise BadInputError([Problem("material", name, valid, stated[-1].name)])
-    return _read(places[0])
+    if places and set((found := _read(places[0])).tree) & set(kind.material.model_fields):
+        return found
+    valid = f"the name of a material of kind {kind.name}: {_materials(kind.material)}"
+    raise BadInputError([Problem("material", name, valid, stated[-1].name)])
+
+
+def _check_material(material: _File, model: type[BaseModel]) -> None:
+    """Check a material by itself, so that a message has the key as its own file has it."""
+    alone = Origin(file={"": material.name})
+    validated(model, merge({}, material.tree, alone, material.name), alone)
+
+
+def _materials(model: type[BaseModel]) -> str:
+    """Materials that a kind of study can use, by name."""
+    names = set()
+    for path in _yaml_files(MATERIALS):
+        with contextlib.suppress(BadInputError):
+            _check_material(_read(path), model)
+            names.add(path.stem)
+    return ", ".join(sorted(names)) or "there is none yet"
 
 
 def _read(path: Path) -> _File:
@@ -200,7 +215,22 @@ def _places(name: Any, folders: tuple[Path, ...]) -> list[Path]:
 
 
 def _candidates(folders: tuple[Path, ...]) -> str:
-    return ", ".join(sorted({p.stem for folder in folders for p in folder.glob("*.yaml")}))
+    """Studies and scenarios of some folders; files of another make are passed over."""
+    of_study = {key for kind in KINDS.values() for key in kind.study.model_fields}
+    names = set()
+    for path in _yaml_files(folders):
+        with contextlib.suppress(OSError):
+            # Enough to tell a study by, and much faster than to read all of them.
+            keys = re.findall(rb"^(\w+):", path.read_bytes(), re.MULTILINE)
+            if keys and {key.decode() for key in keys} <= of_study:
+                names.add(path.stem)
+    return ", ".join(sorted(names))
+
+
+def _yaml_files(folders: tuple[Path, ...]) -> Iterator[Path]:
+    """Files of some folders whose stem is a name."""
+    found = (path for folder in folders for path in sorted(folder.glob("*.yaml")))
+    return (path for path in found if re.fullmatch(NAME, path.stem))
 
 
 def _wrong_units(model: type[BaseModel], file: _File) -> list[Problem]:

@@ -72,7 +72,8 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
         text, without_kind = _scenario_texts(run)
         _write(folder / "runs" / run.run / "scenario.yaml", text, without_kind)
     table = folder / "runs.tsv"
-    earlier = table.read_text(encoding="utf-8").splitlines()[1:] if table.is_file() else []
+    text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
+    earlier = text.splitlines()[1:]
     place = {line.split("\t", 1)[0]: n for n, line in enumerate(earlier)}
     ordered = sorted(runs, key=lambda run: place.get(run.run, len(place)))
     _write(table, _table_text(ordered))
@@ -92,7 +93,7 @@ def _write(path: Path, text: str, older: str = "") -> None:
 
     A file that says the same in the form of an older plan is left, too.
     """
-    if path.is_file() and path.read_text(encoding="utf-8") in (text, older or text):
+    if path.is_file() and path.read_bytes() in (text.encode(), older.encode() or text.encode()):
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, text)

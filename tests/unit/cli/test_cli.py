@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -142,3 +143,18 @@ def test_names_of_studies_are_completed() -> None:
     }
     said = CliRunner().invoke(app, [], prog_name="sandmould", env=words)
     assert said.stdout.split() == ["plates_small"]
+
+
+def test_measures_of_a_study_are_printed() -> None:
+    said = sandmould("measures", "tank_small")
+    assert said.exit_code == 0, said.output
+    assert re.search(r"^h70_sd_pa +Pa +Standard deviation in time", said.stdout, re.MULTILINE)
+
+
+def test_a_measure_that_no_run_will_have_starts_nothing(elsewhere: Path) -> None:
+    (elsewhere / "typo.yaml").write_text("based_on: tube_demo\nobjective: {measure: tube_fil}\n")
+    for verb in ("plan", "run", "status"):
+        said = sandmould(verb, "typo.yaml")
+        assert said.exit_code == 1
+        assert "objective.measure = 'tube_fil' cannot be used: valid is a measure" in said.stderr
+    assert not (elsewhere / "results").exists()

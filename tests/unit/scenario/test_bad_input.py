@@ -140,8 +140,9 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "layer of a count that no memory holds": (
         "based_on: tube\nscenario: {fill: {layers: [{count: 10000000, repeat: 100}]}}",
-        "trial.yaml: scenario.fill.layers = '1000000000 grains' cannot be used: "
-        "valid is at most 20 million grains.",
+        "trial.yaml: scenario.fill.layers = '1,000,000,000 grains' cannot be used: "
+        "valid is at most 20,000,000 grains: fewer or thinner layers, or a larger "
+        "sand.size_scale.",
     ),
     "gate that is not there": (
         "based_on: hopper\nscenario: {discharge: {gate: sluice}}",
@@ -186,6 +187,42 @@ CASES: dict[str, tuple[str, str]] = {
         "based_on: hopper\nscenario: {fill: {layers: [{count: 8000, repeat: 3}]}}",
         "trial.yaml: scenario.fill.layers = 'a bed about 0.555 m high' cannot be used: "
         "valid is layers that stay below 0.55 m, the top of what holds the sand.",
+    ),
+    "key of another kind": (
+        "based_on: tube\nscenario: {obstacles: [{kind: tube, diameter_m: 0.02, length_m: 0.05, "
+        "left_end_x_m: 0.07, axis_height_m: 0.02, angle_deg: 90}]}",
+        "trial.yaml: scenario.obstacles.0.angle_deg = 90 cannot be used: valid is one of the keys "
+        "axis_height_m, axis_y_m, closed_end, diameter_m, facets, kind, left_end_x_m, length_m, "
+        "name, section, wall_thickness_m.",
+    ),
+    "misspelt key of a kind": (
+        "based_on: l_pattern\nscenario: {pattern: {shape: {kind: l_shape, reach: 0.1}}}",
+        "trial.yaml: scenario.pattern.shape.reach = 0.1 cannot be used: valid is one of the keys "
+        "height_m, kind, reach_m, thickness_m (did you mean reach_m?).",
+    ),
+    "shape without a kind": (
+        "based_on: plates\nscenario: {shapes: [{low_m: [0, 0], high_m: [0.02, 0.02]}]}",
+        "trial.yaml: scenario.shapes.0 = {'low_m': [0, 0], 'high_m': [0.02, 0.02]} cannot be used: "
+        "valid is a mapping with a kind: rectangle, polygon, plates, mesh, image.",
+    ),
+    "obstacle without a kind": (
+        "based_on: tube\nscenario: {obstacles: [{diameter_m: 0.02}]}",
+        "trial.yaml: scenario.obstacles.0 = {'diameter_m': 0.02} cannot be used: valid is a "
+        "mapping with a kind: plate, tube, polygon, cylinder, mesh, triangles.",
+    ),
+    "place of one number": (
+        "based_on: plates\nscenario: {box: {low_m: [0], high_m: [0.02, 0.02]}}",
+        "trial.yaml: scenario.box.low_m = [0] cannot be used: valid is a list of 2 or 3 entries.",
+    ),
+    "place with a word": (
+        "based_on: plates\nscenario: {box: {low_m: [0, left], high_m: [0.02, 0.02]}}",
+        "trial.yaml: scenario.box.low_m.1 = 'left' cannot be used: valid is a number.",
+    ),
+    "place of four numbers": (
+        "based_on: plates\nscenario: {box: {low_m: [0, 0, 0, 0], high_m: 3}}",
+        "trial.yaml: scenario.box.low_m = [0, 0, 0, 0] cannot be used: valid is a list of 2 or 3 "
+        "entries.\n"
+        "trial.yaml: scenario.box.high_m = 3 cannot be used: valid is a list.",
     ),
     "unit of another key": (
         "based_on: tube\nscenario: {sand: {density_kg_m3: {value: 2.4, unit: g/cm3, source: x}}}",

@@ -79,8 +79,23 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "missing material": (
         "based_on: tube\nmaterial: silica",
-        "trial.yaml: material = 'silica' cannot be used: valid is the name of a material: "
-        "hirata_2019, hirata_2019_aluminium, rojek_2004.",
+        "trial.yaml: material = 'silica' cannot be used: valid is the name of a material of "
+        "kind sand: rojek_2004.",
+    ),
+    "material of another kind": (
+        "based_on: tube\nmaterial: hirata_2019",
+        "trial.yaml: material = 'hirata_2019' cannot be used: valid is the name of a material of "
+        "kind sand: rojek_2004.",
+    ),
+    "material that no kind can use": (
+        "based_on: plates\nmaterial: hirata_2019_aluminium",
+        "trial.yaml: material = 'hirata_2019_aluminium' cannot be used: valid is the name of a "
+        "material of kind solidification: hirata_2019.",
+    ),
+    "swept range with a misspelt bound": (
+        "based_on: tube\nsweep: {keys: {sand.size_scale: {low: 4, high: 5, nummer: 3}}}",
+        "trial.yaml: sweep.keys.sand.size_scale.nummer = 3 cannot be used: valid is one of the "
+        "keys high, low, number, spacing (did you mean number?).",
     ),
     "measure after the end": (
         "based_on: tube\nobjective: {at_vibration_s: 60}",
@@ -89,12 +104,12 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "key twice": (
         "based_on: tube\nreplicates: 2\nreplicates: 3",
-        "trial.yaml: file = \"line 1: key 'replicates' stands twice\" cannot be used: "
-        "valid is YAML text.",
+        "trial.yaml: file = \"line 3: key 'replicates' stands twice, first in line 2\" "
+        "cannot be used: valid is YAML text.",
     ),
     "key that is no text": (
         "based_on: tube\n5: 2",
-        "trial.yaml: file = 'line 1: key 5 is no text: put it in quotes' cannot be used: "
+        "trial.yaml: file = 'line 2: key 5 is no text: put it in quotes' cannot be used: "
         "valid is YAML text.",
     ),
     "broken YAML": (
@@ -104,7 +119,8 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "nested without end": (
         "[" * 1500,
-        "trial.yaml: file = 'nested too deeply' cannot be used: valid is YAML text.",
+        "trial.yaml: file = '51 levels of YAML' cannot be used: valid is at most 50 levels of "
+        "YAML: fewer levels.",
     ),
     "not UTF-8": (
         b"title: Gr\xf6\xdfe",
@@ -117,7 +133,7 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "empty file": (
         "",
-        "trial.yaml: file = None cannot be used: valid is a mapping of keys to values.",
+        "trial.yaml: file = 'nothing' cannot be used: valid is a mapping of keys to values.",
     ),
 }
 
@@ -126,6 +142,18 @@ CASES: dict[str, tuple[str | bytes, str]] = {
 def test_sentence(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text, sentence = CASES[case]
     assert refused(tmp_path, text, monkeypatch) == sentence
+
+
+def test_a_base_that_is_missing_is_not_looked_for_among_other_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "notes.yaml").write_text("shopping: [milk]")
+    (tmp_path / "Old Tube.yaml").write_text("based_on: tube")
+    (tmp_path / "mine.yaml").write_text("based_on: tube")
+    told = refused(tmp_path, "based_on: tuba", monkeypatch)
+    assert ", mine, " in told
+    assert "notes" not in told
+    assert "Old" not in told
 
 
 def test_missing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

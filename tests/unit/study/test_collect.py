@@ -117,6 +117,17 @@ def test_unreadable_snapshot_is_counted_and_passed_over(study: Path) -> None:
     assert len(found.curves) == 8 * 12 + 5
 
 
+def test_sentences_of_a_detail_are_apart(study: Path) -> None:
+    run = study / "runs" / "f25_r1"
+    # As an engine says it, without a full stop.
+    RunOutcome(Outcome.BAD_INPUT, "it has Step, v_a", 1.0, 1.0).write(run / "outcome.json")
+    table = pd.read_csv(run / "measures.tsv", sep="\t")
+    table.loc[len(table)] = {"stage": "unreadable: snapshots/000009.npz"}
+    table.to_csv(run / "measures.tsv", sep="\t", index=False)
+    detail = gather(study).summary.set_index("run").loc["f25_r1", "detail"]
+    assert detail == "it has Step, v_a. 1 snapshots cannot be read."
+
+
 def test_collect_writes_what_reads_back(study: Path) -> None:
     collect(study)
     summary = pd.read_csv(study / "summary.tsv", sep="\t")

@@ -36,8 +36,10 @@ SMALL: dict[str, Any] = {"case": TANK, "duration_s": 0.02, "record_s": 0.005, "d
 
 def opened(folder: Path, top: dict[str, Any] | None = None, /, **scenario: Any) -> Path:
     """Write a study of a small tank."""
-    study = {"kind": "flow", "scenario": SMALL | scenario,
-             "objective": {"measure": "h28_sd_pa", "better": "neither"}}  # fmt: skip
+    whole = SMALL | scenario
+    probe = "h28" if whole["case"]["kind"] == "tank" else "bottom"
+    objective = {"measure": f"{probe}_sd_pa", "better": "neither"}
+    study = {"kind": "flow", "scenario": whole, "objective": objective}
     path = folder / "trial.yaml"
     path.write_text(yaml.safe_dump(study | (top or {})))
     return path

@@ -111,6 +111,42 @@ def test_what_cannot_run_is_told_in_one_sentence(
         expand(open_study(opened(tmp_path, template, **scenario)))
 
 
+PRINTS = TEMPLATE + "thermo_style custom step time v_speed &\n  v_height # v_width\n"
+
+
+@pytest.mark.parametrize(
+    ("template", "measure", "told"),
+    [
+        (PRINTS, "v_height", ""),
+        (
+            PRINTS,
+            "v_width",
+            "scenario.measures.speed_m_s = 'v_width' cannot be used: valid is a column that the "
+            "deck prints: step, time, v_speed, v_height.",
+        ),
+        (
+            PRINTS.replace(" time", ""),
+            "v_speed",
+            "a deck that prints the time: thermo_style custom step time",
+        ),
+        # What an engine names itself, and what the text of a deck does not show, a run tells.
+        (PRINTS, "KinEng", ""),
+        (PRINTS.replace("v_speed", "${what}"), "v_speed", ""),
+        (PRINTS + "include more.in\n", "v_width", ""),
+        (PRINTS + "thermo_modify colname v_height v_width\n", "v_width", ""),
+    ],
+)
+def test_a_column_that_a_deck_does_not_print_is_told_before_any_run(
+    tmp_path: Path, template: str, measure: str, told: str
+) -> None:
+    path = opened(tmp_path, template, measures={"speed_m_s": measure})
+    if not told:
+        assert len(expand(open_study(path))) == 4
+        return
+    with pytest.raises(BadInputError, match=told.replace("(", r"\(")):
+        expand(open_study(path))
+
+
 @pytest.mark.parametrize(
     "section",
     [

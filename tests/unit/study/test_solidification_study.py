@@ -94,7 +94,7 @@ def test_what_cannot_solidify_is_told_in_one_sentence(
     [
         ({"replicates": 2}, "replicates = 2 .* nothing in a run is drawn by lot"),
         ({"certificate": {"controls": ["hold"]}}, "absent in a study of kind solidification"),
-        ({"material": "rojek_2004"}, "sand = "),
+        ({"material": "rojek_2004"}, "a material of kind solidification: hirata_2019"),
         (
             {"sweep": {"keys": {"element_m": [0.01, 0.005]}}, "reference": {"element_m": 0.002}},
             "reference = .* a point of the sweep, such as {'element_m': 0.01}",
@@ -190,12 +190,13 @@ def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:
     assert np.isnan(last["solidification_time_s"])
 
 
-def test_sizes_that_break_the_rule_are_refused(tmp_path: Path) -> None:
-    path = opened(
-        tmp_path, exchange="corrected", layers=[2, 1], element_m=0.00125, heat_transfer_w_m2_k=None
-    )
-    with pytest.raises(BadInputError, match="the smaller must measure at least 1/c_k"):
-        expand(open_study(path))
+def test_sizes_that_break_the_rule_are_told_before_anything_starts(tmp_path: Path) -> None:
+    uneven: dict[str, Any] = {"exchange": "corrected", "layers": [2, 1], "element_m": 0.00125}
+    told = r"layers = \[2, 1\] .* the smaller must measure at least 1/c_k"
+    with pytest.raises(BadInputError, match=told):
+        expand(open_study(opened(tmp_path, **uneven)))
+    for changed in ({"layers": [4]}, {"refuse_ratio": False}, {"exchange": "faces"}):
+        assert expand(open_study(opened(tmp_path, **uneven | changed)))
 
 
 def test_hot_spots_are_the_latest_within_reach() -> None:

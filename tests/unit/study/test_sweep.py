@@ -8,11 +8,11 @@ import pytest
 
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.limits import RUNS
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.definition.sweep import (
-    MOST_RUNS,
     Range,
     Sweep,
     is_whole,
@@ -147,8 +147,12 @@ def test_design_that_does_not_fit_its_parts_is_refused(tree: dict[str, Any], key
 def test_too_many_runs_are_refused_before_they_are_made() -> None:
     many = {"low": 0.1, "high": 9, "number": 10_000}
     sweep = sweep_of(keys={SCALE: many, FRICTION: many})
-    assert told(sweep) == [Problem("sweep", "100000000 runs", f"at most {MOST_RUNS} runs")]
-    assert told(sweep_of(keys={SCALE: [4, 6]}), replicates=MOST_RUNS)[0].key == "sweep"
+    assert told(sweep) == [
+        Problem(
+            "sweep", "100,000,000 runs", "at most 10,000 runs: fewer points, replicates or rounds"
+        )
+    ]
+    assert told(sweep_of(keys={SCALE: [4, 6]}), replicates=RUNS.most)[0].key == "sweep"
 
 
 def test_whole_numbers_are_known_by_their_type() -> None:

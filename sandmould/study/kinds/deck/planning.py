@@ -12,6 +12,7 @@ from sandmould.engines.own_deck import deck as own_deck
 from sandmould.engines.registry import engine_module
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
+from sandmould.study.kinds.deck.measures import MEASURES
 from sandmould.study.kinds.kind import Planning, SpeedClass, UserProgram
 
 SHIPPED = ROOT / "config" / "decks"
@@ -129,6 +130,7 @@ PLANNING = Planning[OwnDeck](
     resolved=own_deck.with_hashes,
     problems=own_deck.problems,
     engine_problem=engine_problem,
+    measures=MEASURES,
     vibration_s=vibration_s,
     sources=sources,
     template_hash=template_hash,

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from sandmould.casting.mps import computation, scene
+from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.flow import MetalFlow, ShoulderedCylinder, StillTank
 from sandmould.study.kinds.casting import casting_planning
+from sandmould.study.kinds.flow.limits import limit_problems
+from sandmould.study.kinds.flow.measures import MEASURES
 from sandmould.study.kinds.kind import Note, SpeedClass
 
 BASE_MEMORY_MB = 600
@@ -16,6 +19,11 @@ RECORD_BYTES = 28
 RATES = {2: 1e6, 3: 4e5}
 """Particle-solves a second of one core by dimension: 0.9e6 to 1.4e6 and 4.0e5 on the machine where
 tank_small was first run; fixed, so that a study has the same batches everywhere."""
+
+
+def problems(scenario: MetalFlow) -> list[Problem]:
+    """What keeps it from being computed, too much of it first: that cannot be laid out."""
+    return [*limit_problems(scenario)] or scene.problems(scenario)
 
 
 def threads(scenario: MetalFlow) -> int:
@@ -77,7 +85,8 @@ PLANNING = casting_planning(
     computation,
     work_unit=computation.WORK,
     resolved=lambda scenario: scenario,  # it names no files
-    problems=scene.problems,
+    problems=problems,
+    measures=MEASURES,
     threads=threads,
     memory_mb=memory_mb,
     planned_work=planned_work,

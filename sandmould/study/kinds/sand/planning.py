@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pattern_fe
@@ -12,6 +12,8 @@ from sandmould.engines import registry
 from sandmould.engines.program import build_program
 from sandmould.runs.formatting import number
 from sandmould.scenario import checks
+from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.limits import FRAMES, RECORDS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.outline import Outline
 from sandmould.scenario.placement import plan_counts
@@ -20,6 +22,7 @@ from sandmould.scenario.solids import SolidMesh, filled_note, with_hash
 from sandmould.scenario.wall_thickness import thinnest_wall
 from sandmould.study.kinds.kind import MachineSpeed, Note, Planning, SpeedClass
 from sandmould.study.kinds.sand import speed
+from sandmould.study.kinds.sand.measures import MEASURES
 
 BASE_MEMORY_MB = 600
 GRAINS_PER_MB = 50
@@ -43,6 +46,20 @@ def resolved(scenario: Scenario) -> Scenario:
         scenario = with_surface(scenario)
     obstacles = tuple(with_hash(o) if isinstance(o, SolidMesh) else o for o in scenario.obstacles)
     return scenario.model_copy(update={"obstacles": obstacles})
+
+
+def problems(scenario: Scenario) -> list[Problem]:
+    """What keeps a scene from being computed, and more records of it than anyone can use."""
+    return checks.problems(scenario) or [*_records(scenario)]
+
+
+def _records(scenario: Scenario) -> Iterator[Problem]:
+    lasts_s, record = planned_s(scenario), scenario.record
+    for key, limit in (
+        ("series_every_s", RECORDS), ("checkpoint_every_s", RECORDS), ("snapshot_every_s", FRAMES),
+    ):  # fmt: skip
+        every_s = getattr(record, key)
+        yield from limit.problems(f"record.{key}", lasts_s / every_s, every_s)
 
 
 def sources(scenario: Scenario) -> list[Path]:
@@ -152,8 +169,9 @@ def notes(scenario: Scenario) -> list[Note]:
 PLANNING = Planning[Scenario](
     work_unit="grain-steps",
     resolved=resolved,
-    problems=checks.problems,
+    problems=problems,
     engine_problem=registry.engine_problem,
+    measures=MEASURES,
     vibration_s=vibration_s,
     sources=sources,
     template_hash=template_hash,

@@ -6,10 +6,13 @@ from collections.abc import Mapping
 
 from sandmould.casting.arpm import computation, scene
 from sandmould.casting.arpm.estimates import least_sand_share
+from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.kinds.casting import casting_planning
 from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.solidification.limits import exchange_problems, limit_problems
+from sandmould.study.kinds.solidification.measures import MEASURES
 from sandmould.study.kinds.solidification.notes import notes
 
 BASE_MEMORY_MB = 600
@@ -24,6 +27,11 @@ def resolved(scenario: Solidification) -> Solidification:
     """The scenario with the hashes of its files, so that a changed mesh makes another run."""
     shapes = tuple(with_file_hash(shape) for shape in scenario.shapes)
     return scenario.model_copy(update={"shapes": shapes})
+
+
+def problems(scenario: Solidification) -> list[Problem]:
+    """What keeps it from being computed, too much of it first: that cannot be laid out."""
+    return [*limit_problems(scenario)] or scene.problems(scenario) or [*exchange_problems(scenario)]
 
 
 def threads(scenario: Solidification) -> int:
@@ -73,7 +81,8 @@ PLANNING = casting_planning(
     computation,
     work_unit="element-steps",
     resolved=resolved,
-    problems=scene.problems,
+    problems=problems,
+    measures=MEASURES,
     threads=threads,
     memory_mb=memory_mb,
     planned_work=planned_work,

@@ -1,0 +1,66 @@
+"""What is known of a measure before any run: its name, unit and meaning, and which scenes have it.
+
+Each kind of study lists its measures once; the plan checks names against that list, the command
+``sandmould measures`` and a page of the documentation print it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from sandmould.runs.formatting import unit_of
+
+SceneT = TypeVar("SceneT")
+_OF_WHAT = re.compile(r"<\w+>")
+"""Stands in a name for that of what is measured, such as ``<tube>``."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A column of ``measures.tsv``."""
+
+    name: str
+    meaning: str
+    """One sentence."""
+    is_number: bool = True
+    """Words cannot be compared."""
+
+    @property
+    def unit(self) -> str:
+        """As its name's ending states it; 1 for a pure number, nothing for words."""
+        return (unit_of(self.name) or "1") if self.is_number else ""
+
+    def of(self, what: str) -> Measure:
+        """The measure of one thing, its name laid in."""
+        return replace(
+            self, name=_OF_WHAT.sub(what, self.name), meaning=_OF_WHAT.sub(what, self.meaning)
+        )
+
+
+@dataclass(frozen=True)
+class MeasureGroup(Generic[SceneT]):
+    """Measures that the same scenes have."""
+
+    when: str
+    """Which scenes, in words."""
+    things: Callable[[SceneT], Iterable[str]]
+    """Names of what is measured in a scene; none where the scene lacks it."""
+    measures: tuple[Measure, ...]
+
+
+def once(is_there: bool = True) -> tuple[str, ...]:
+    """What a group of measures without names of its own gives: one thing, or none."""
+    return ("",) if is_there else ()
+
+
+def measures_of(groups: Sequence[MeasureGroup[SceneT]], scene: SceneT) -> list[Measure]:
+    """Measures that a scene will have, in the order of its list."""
+    return [
+        measure.of(thing)
+        for group in groups
+        for thing in group.things(scene)
+        for measure in group.measures
+    ]

@@ -1,0 +1,88 @@
+"""Keys that can stand at a place of a tree, by what the tree says there.
+
+A union of kinds has the keys of the kind that is stated, not those of all its kinds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+
+
+def standing_keys(model: type[BaseModel], tree: Any, parts: list[str]) -> list[str]:
+    """Keys of the section at a path, that of its kind where a union has several.
+
+    Parameters
+    ----------
+    model : type of BaseModel
+    tree : any
+        What was read for the model.
+    parts : list of str
+        Path of the section; positions in lists included.
+    """
+    return sorted({name for m in _standing(model, tree, parts) for name in m.model_fields})
+
+
+def standing_kinds(model: type[BaseModel], tree: Any, parts: list[str]) -> list[str]:
+    """Kinds among which the section at a path has to state one."""
+    fields = [
+        m.model_fields["kind"] for m in _standing(model, tree, parts) if "kind" in m.model_fields
+    ]
+    return [str(kind) for field in fields for kind in get_args(field.annotation)]
+
+
+def standing_lengths(model: type[BaseModel], tree: Any, parts: list[str]) -> list[int]:
+    """Lengths that the list at a path can have; none where any length will do."""
+    here: list[Any] = [model]
+    for part in parts:
+        here = [inner for outer in here for inner in _below(outer, part)]
+    lists = [get_args(a) for a in here if get_origin(a) is tuple]
+    return sorted({len(entries) for entries in lists if Ellipsis not in entries})
+
+
+def _standing(model: type[BaseModel], tree: Any, parts: list[str]) -> list[type[BaseModel]]:
+    """Models that can stand at a path of a tree."""
+    here: list[Any] = [model]
+    for part in parts:
+        here = [inner for outer in here for inner in _below(outer, part)]
+        tree = _value(tree, part)
+        if isinstance(tree, dict) and "kind" in tree:
+            here = [m for m in here if _takes(m, tree["kind"])] or here
+    return [m for m in here if isinstance(m, type) and issubclass(m, BaseModel)]
+
+
+def _below(outer: Any, part: str) -> Iterator[Any]:
+    """What an annotation has at a key or position, unions taken apart."""
+    if isinstance(outer, type) and issubclass(outer, BaseModel):
+        if part in outer.model_fields:
+            yield from _apart(outer.model_fields[part].annotation)
+    elif get_origin(outer) is dict:
+        yield from _apart(get_args(outer)[1])
+    elif get_origin(outer) in (tuple, list) and part.isdecimal():
+        yield from (inner for each in get_args(outer) for inner in _apart(each))
+
+
+def _apart(annotation: Any) -> Iterator[Any]:
+    """Branches of a union; what is annotated without its notes."""
+    if get_origin(annotation) in (tuple, list, dict, Literal) or not get_args(annotation):
+        yield annotation
+        return
+    for part in get_args(annotation):
+        if isinstance(part, type) or get_args(part):
+            yield from _apart(part)
+
+
+def _value(tree: Any, part: str) -> Any:
+    if isinstance(tree, dict):
+        return tree.get(part)
+    if isinstance(tree, list | tuple) and part.isdecimal() and int(part) < len(tree):
+        return tree[int(part)]
+    return None
+
+
+def _takes(model: Any, kind: Any) -> bool:
+    """Whether a model is the one of a kind."""
+    field = getattr(model, "model_fields", {}).get("kind")
+    return field is not None and kind in get_args(field.annotation)

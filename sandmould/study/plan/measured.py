@@ -1,0 +1,114 @@
+"""Names of measures that a study asks for, against those that its scenes will have."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from sandmould.runs.measures import Measure, measures_of
+from sandmould.scenario.bad_input import Problem
+from sandmould.statistics.config import Objective
+from sandmould.study.definition.study import Study
+from sandmould.study.kinds.kind import AnyScenario, Kind
+
+NEAREST = 3
+
+
+def measured_in(kind: Kind[Any], scenario: AnyScenario) -> list[Measure]:
+    """Measures that the runs of a scenario will have."""
+    return measures_of(kind.planning.measures, scenario)
+
+
+def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[Problem]:
+    """List the measures and times asked for that a scene of a study will not have.
+
+    Parameters
+    ----------
+    study : Study
+    kind : Kind
+    scenario : scenario of any kind
+        At one point of the sweep.
+    """
+    has = [measure.name for measure in measured_in(kind, scenario) if measure.is_number]
+    # A deck that nothing is read from is run for the files that it writes.
+    nothing_asked = not has and study.objective == Objective()
+    for key, name in _asked(study):
+        if name not in has and not nothing_asked:
+            yield Problem(key, name, _valid(name, has, _about(key, name, study, kind)))
+    at, vibration_s = study.objective.at_vibration_s, kind.planning.vibration_s(scenario)
+    if at is not None and vibration_s == 0.0:
+        yield Problem("objective.at_vibration_s", at, "absent: nothing vibrates in this scene")
+    elif at is not None and at > vibration_s:
+        valid = f"at most {vibration_s:g} s, the end of the vibration"
+        yield Problem("objective.at_vibration_s", at, valid)
+
+
+def problems_elsewhere(study: Study, results: Path) -> Iterator[Problem]:
+    """List what keeps a study from calibrating with the results of others.
+
+    Parameters
+    ----------
+    study : Study
+    results : Path
+        Folder of all results.
+    """
+    for i, name in enumerate(study.calibration.also):
+        summary = results / name / "summary.tsv"
+        if not summary.is_file():
+            valid = f"a study with results: sandmould run {name} comes first"
+            yield Problem(f"calibration.also.{i}", name, valid)
+            continue
+        with summary.open(encoding="utf-8", errors="replace") as file:
+            has = file.readline().rstrip("\n").split("\t")
+        for j, sand in enumerate(study.calibration.sands):
+            for target in sand.targets:
+                column = target.removeprefix(f"{name}__")
+                if column != target and column not in has:
+                    near = difflib.get_close_matches(column, has, n=NEAREST, cutoff=0.5)
+                    names = ", ".join(f"{name}__{n}" for n in near)
+                    hint = f": nearest are {names}" if near else ""
+                    valid = f"a column of the results of {name}{hint}"
+                    yield Problem(f"calibration.sands.{j}.targets", target, valid)
+
+
+def _asked(study: Study) -> Iterator[tuple[str, str]]:
+    """Key and name of every measure that a study names of its own runs."""
+    yield "objective.measure", study.objective.measure
+    for name in study.equivalence.margins:
+        yield "equivalence.margins", name
+    others = tuple(f"{name}__" for name in study.calibration.also)
+    for i, sand in enumerate(study.calibration.sands):
+        for name in sand.targets:
+            if not name.startswith(others):
+                yield f"calibration.sands.{i}.targets", name
+
+
+def _about(key: str, name: str, study: Study, kind: Kind[Any]) -> str:
+    """Why a name is asked for, or why it is not there, in brackets; nothing where none tells."""
+    if key == "objective.measure" and "measure" not in study.objective.model_fields_set:
+        return f" (none is stated: {name} is the default)"
+    comes = _comes_with(name, kind)
+    return f" ({name}: {comes})" if comes else ""
+
+
+def _valid(name: str, has: list[str], about: str) -> str:
+    near = difflib.get_close_matches(name, has, n=NEAREST, cutoff=0.5)
+    names = f"nearest are {', '.join(near)}" if len(near) > 1 else f"nearest is {''.join(near)}"
+    if not near:
+        names = f"such as {', '.join(has[:NEAREST])}" if has else "it has none"
+    return f"a measure that this scene will have{about}: {names}; sandmould measures lists all"
+
+
+def _comes_with(name: str, kind: Kind[Any]) -> str:
+    """Scenes that have a measure of this name, in words; nothing where no scene has."""
+    for group in kind.planning.measures:
+        for measure in group.measures:
+            if not measure.is_number and measure.name == name:
+                return "words cannot be compared"
+            pattern = re.sub(r"<\w+>", "[a-z][a-z0-9_]*", measure.name)
+            if pattern != "[a-z][a-z0-9_]*" and re.fullmatch(pattern, name):
+                return group.when
+    return ""

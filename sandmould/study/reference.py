@@ -1,0 +1,97 @@
+"""Pages of the documentation that are written from the code: measures and limits.
+
+``python -m sandmould.study.reference`` writes both again.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from sandmould import ROOT
+from sandmould.runs.measures import Measure
+from sandmould.scenario.limits import LIMITS
+from sandmould.scenario.module_main import run_main
+from sandmould.study.kinds.registry import KINDS, kind_named
+from sandmould.study.plan.expand import scenes
+from sandmould.study.plan.load_study import OpenStudy
+from sandmould.study.plan.measured import measured_in
+
+MEASURES = ROOT / "docs" / "measures.md"
+LIMITS_PAGE = ROOT / "docs" / "limits.md"
+_WRITTEN = "Written by `make schema` from the code; nothing here is edited by hand."
+
+
+def measures_text(study: OpenStudy) -> str:
+    """What the runs of a study can be measured by, a line a measure.
+
+    Parameters
+    ----------
+    study : OpenStudy
+
+    Raises
+    ------
+    BadInputError
+        When a point of its sweep has a value of a wrong type.
+    """
+    kind = kind_named(study.study.kind)
+    every = [measured_in(kind, scene) for scene in scenes(study)]
+    count = Counter(measure for measures in every for measure in measures)
+    rows = [("measure", "unit", "meaning")]
+    for measure, points in count.items():
+        some = "" if points == len(every) else f" At {points} of {len(every)} points."
+        rows.append((measure.name, measure.unit, measure.meaning + some))
+    name_width, unit_width = (max(len(row[i]) for row in rows) for i in (0, 1))
+    lines = [f"{n.ljust(name_width)}  {u.ljust(unit_width)}  {m}" for n, u, m in rows]
+    return "\n".join([*lines, "", "Those without a unit are words and cannot be compared."])
+
+
+def measures_page() -> str:
+    """The page of all measures of all kinds of study."""
+    lines = [
+        "# Measures", "", _WRITTEN, "",
+        "A measure is a column of `measures.tsv` (a row a record) and `summary.tsv` (a row a run). "
+        "`objective.measure`, `equivalence.margins` and the targets of a calibration name "
+        "measures; a name that the scene will not have is refused before anything starts. "
+        "`sandmould measures STUDY` lists those of a study. A unit of 1 is a pure number; those "
+        "without a unit are words and cannot be compared.",
+    ]  # fmt: skip
+    for kind in KINDS.values():
+        lines += ["", f"## Studies of kind {kind.name}"]
+        for group in kind.planning.measures:
+            lines += ["", f"{group.when[0].upper()}{group.when[1:]}:", ""]
+            lines += _table(("measure", "unit", "meaning"), map(_cells, group.measures))
+    return "\n".join(lines) + "\n"
+
+
+def limits_page() -> str:
+    """The page of all limits."""
+    rows = [(limit.what, f"{limit.most:,}", limit.why, limit.change) for limit in LIMITS]
+    lines = [
+        "# Limits", "", _WRITTEN, "",
+        "More than this is refused before anything starts, in a sentence with the count, the limit "
+        "and what to change. The limits are a guard against a slip of the pen, not a promise that "
+        "so much is fast: the plan tells the price.", "",
+        *_table(("of what", "at most", "because", "what to change"), rows), "",
+        "All stand in `sandmould/scenario/limits.py`.",
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _cells(measure: Measure) -> Sequence[str]:
+    meaning = measure.meaning.replace("<", "\\<")
+    return f"`{measure.name}`", measure.unit, meaning
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    return ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)]
+
+
+def main() -> None:
+    """Write both pages."""
+    MEASURES.write_text(measures_page(), encoding="utf-8")
+    LIMITS_PAGE.write_text(limits_page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    run_main(main, "python -m sandmould.study.reference")
