@@ -153,7 +153,7 @@ def _loop_of_small_displacements(scenario: Scenario) -> Loop:
 def _shaken_hz(scenario: Scenario) -> float:
     """Highest frequency of the box, 0 where it stands still."""
     between = scenario.fill.vibration_between_layers
-    stages = (*scenario.vibration, *((between,) if between else ()))
+    stages = (*scenario.vibrations, *((between,) if between else ()))
     return max((stage.frequency_hz for stage in stages), default=0.0)
 
 

@@ -156,12 +156,11 @@ class Driver:
         """Stop where the sand did not come to rest, or came to rest before it had flowed out."""
         settling = stage.settling
         if settling is not None and not session.at_rest:
-            what, key = (
-                (f"layer {stage.layer}", "fill") if stage.layer else ("the sand", stage.name)
-            )
+            what = f"layer {stage.layer}" if stage.layer else "the sand"
+            longest_s = settling.longest_s - stage.stop_s
             raise EngineStop(
                 Outcome.NOT_SETTLED,
-                f"{what} still moved after {key}.settling.longest_s = {settling.longest_s:g}",
+                f"{what} still moved after {stage.longest_key} = {longest_s:g}",
             )
         if stage.opens:
             why = what_blocks(self._scenario, session.snapshot())

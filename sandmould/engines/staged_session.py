@@ -17,6 +17,7 @@ from sandmould.engines.session import Array, RefusedError, Shared
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.step_mover import StepMover
+from sandmould.scenario.stages import StageKind
 
 
 class StageState(NamedTuple):
@@ -55,6 +56,7 @@ class StagedSession(ABC):
         self.stage_over = self.at_rest = False
         self._stage_start = self._stage_end = 0
         self._vibration_start: int | None = None
+        """Step at which vibration began, moved on by stages of rest: they are no time of vibration."""
         self._ended_window = False
         self._opened: set[str] = set()
         self._last_sums: dict[str, tuple[int, int, Array]] = {}
@@ -121,13 +123,13 @@ class StagedSession(ABC):
 
     def _stage_steps(self) -> int:
         """Steps of the stage, at most."""
-        if self.stage.vibration is not None:
-            return self._counts.vibration(self.stage.vibration)
-        assert self.stage.settling is not None
-        return self._counts.steps(self.stage.settling.longest_s)
+        if self.stage.settling is not None:
+            return self._counts.steps(self.stage.settling.longest_s)
+        assert self.stage.vibration is not None
+        return self._counts.vibration(self.stage.vibration)
 
     def start_stage(self, stage: Stage) -> None:
-        """Begin to settle, to flow out or to vibrate."""
+        """Begin to settle, to flow out, to vibrate or to rest."""
         if stage.opens:
             self._take_away(stage.opens)
         self._start(stage)
@@ -137,6 +139,8 @@ class StagedSession(ABC):
         self._opened.add(gate)
 
     def _start(self, stage: Stage) -> None:
+        if self.stage.kind is StageKind.REST and self._vibration_start is not None:
+            self._vibration_start += self.steps - self._stage_start
         self.stage, self.stage_over, self.at_rest = stage, False, False
         self._stage_start = self.steps
         self._stage_end = self._stage_start + self._stage_steps()
@@ -178,9 +182,10 @@ class StagedSession(ABC):
             self._scenario, self.stage, self.steps - self._stage_start, self.step_s
         )
         start = self._vibration_start
+        shaken = self._stage_start if self.stage.kind is StageKind.REST else self.steps
         return Snapshot(
             time_s=self.time_s,
-            vibration_time_s=-1.0 if start is None else (self.steps - start) * self.step_s,
+            vibration_time_s=-1.0 if start is None else (shaken - start) * self.step_s,
             stage=self.stage.name,
             id=ids,
             layer=self._layer_of_id[: self.grains],

@@ -13,6 +13,7 @@ from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
+from sandmould.scenario.vibration import VibrationStage
 
 KINDS = {2: ("plate", "tube", "polygon"), 3: ("plate", "tube", "cylinder", "mesh", "triangles")}
 """Kinds of obstacles that a dimension has."""
@@ -215,7 +216,14 @@ def _time(s: Scenario) -> Iterator[Problem]:
 
 
 def _vibration(s: Scenario) -> Iterator[Problem]:
-    stages = [(f"vibration.{i}", v) for i, v in enumerate(s.vibration)]
+    stages = []
+    for i, stage in enumerate(s.vibration):
+        shortest_s = s.fill.settling.shortest_s
+        if isinstance(stage, VibrationStage):
+            stages.append((f"vibration.{i}", stage))
+        elif stage.longest_s <= shortest_s:
+            valid = f"more than fill.settling.shortest_s, {shortest_s:g} s"
+            yield Problem(f"vibration.{i}.longest_s", stage.longest_s, valid)
     if s.fill.vibration_between_layers is not None:
         stages.append(("fill.vibration_between_layers", s.fill.vibration_between_layers))
     for key, stage in stages:

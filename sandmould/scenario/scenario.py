@@ -21,7 +21,7 @@ from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.stages import is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
-from sandmould.scenario.vibration import VibrationStage
+from sandmould.scenario.vibration import BoxStage, VibrationStage
 
 
 class Recording(Section):
@@ -108,8 +108,15 @@ class Scenario(Section):
     discharge: Discharge | None = Field(
         None, description="Flow of the filled sand through an opened gate, before any vibration."
     )
-    vibration: tuple[VibrationStage, ...] = Field(
-        (), description="Stages of vibration after fill and discharge, in order."
+    vibration: tuple[BoxStage, ...] = Field(
+        (), description="Stages of vibration and of rest after fill and discharge, in order."
+    )
+    measure_at_rest: bool = quantity(
+        True,
+        "Whether the box stops and the sand comes to rest after the last stage of vibration, where "
+        "packing and fill are then measured. Otherwise the run ends, and is measured, at full "
+        "speed.",
+        source=ARGUED,
     )
     frame: Literal["box", "laboratory"] = quantity(
         "box",
@@ -132,6 +139,11 @@ class Scenario(Section):
         if self.discharge is None or (stage and is_filling(stage)):
             return self.scene
         return self.scene.without(self.discharge.gate)
+
+    @property
+    def vibrations(self) -> tuple[VibrationStage, ...]:
+        """The stages in which the box vibrates after fill and discharge."""
+        return tuple(stage for stage in self.vibration if isinstance(stage, VibrationStage))
 
     @property
     def largest_diameter_m(self) -> float:

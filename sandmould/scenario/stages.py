@@ -16,6 +16,8 @@ class StageKind(Enum):
     """Sand flows out through the gate until it rests."""
     VIBRATE = "vibrate"
     """The box vibrates after the fill."""
+    REST = "rest"
+    """The box stands after vibration, and the sand comes to rest."""
 
     @property
     def fills(self) -> bool:

@@ -47,9 +47,10 @@ def _windows(program: Program) -> dict[str, tuple[int, int]]:
     counts = StepCounts.of(program.scenario)
     into_window, windows = 0, {}
     for stage in program.stages:
-        if stage.vibration is not None:
+        if stage.settling is None:
+            assert stage.vibration is not None
             into_window = (into_window + counts.vibration(stage.vibration)) % counts.window
-        elif stage.settling is not None:
+        else:
             # A bed comes to rest at a record.
             longest = counts.steps(stage.settling.longest_s)
             first = counts.window - into_window

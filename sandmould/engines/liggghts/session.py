@@ -28,7 +28,7 @@ from sandmould.engines.session import Array, EngineStop, RefusedError, engine_st
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome
 
-_LOOP = re.compile(r"^label settling_\d+$.*^label settled_\d+$\n", re.M | re.S)
+_LOOP = re.compile(r"^label settling_\w+$.*^label settled_\w+$\n", re.M | re.S)
 _VALUE = re.compile(r"^value (\S+)$", re.M)
 
 
