@@ -1,4 +1,4 @@
-"""The order of things in a run: layers, each at rest before the next, discharge, vibration, rest."""
+"""The order of things in a run: layers, each at rest before the next, discharge, vibration."""
 
 from __future__ import annotations
 

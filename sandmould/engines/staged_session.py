@@ -56,7 +56,7 @@ class StagedSession(ABC):
         self.stage_over = self.at_rest = False
         self._stage_start = self._stage_end = 0
         self._vibration_start: int | None = None
-        """Step at which vibration began, moved on by stages of rest: they are no time of vibration."""
+        """Step at which vibration began, moved on by every rest: it is no time of vibration."""
         self._ended_window = False
         self._opened: set[str] = set()
         self._last_sums: dict[str, tuple[int, int, Array]] = {}

@@ -146,6 +146,12 @@ class Scenario(Section):
         return tuple(stage for stage in self.vibration if isinstance(stage, VibrationStage))
 
     @property
+    def ends_at_rest(self) -> bool:
+        """Whether the last that happens is that the sand comes to rest after vibration."""
+        rests = self.measure_at_rest or self.vibration[-1:] != self.vibrations[-1:]
+        return bool(self.vibrations) and rests
+
+    @property
     def largest_diameter_m(self) -> float:
         """Diameter of the grains of the largest class."""
         return self.sand.classes(self.dimension)[-1].diameter_m

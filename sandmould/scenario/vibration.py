@@ -26,8 +26,8 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 """The 'g' of an acceleration_g (CGPM 1901), whatever gravity the scene has."""
 TUBE_PAPER = "Rojek 2004, section 4.2"
 STOP_PERIODS = 2.0
-"""Periods in which the box stops. Within one the sand would feel the phase at which the stop begins,
-and the more there are, the more the fading vibration packs the bed (docs/measured_at_rest.md)."""
+"""Periods in which the box stops: within one the sand would feel at which phase the stop begins, and
+the more there are, the more the fading vibration packs the bed (docs/measured_at_rest.md)."""
 
 
 class VibrationStage(Section):
