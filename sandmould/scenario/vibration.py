@@ -26,7 +26,7 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 """The 'g' of an acceleration_g (CGPM 1901), whatever gravity the scene has."""
 TUBE_PAPER = "Rojek 2004, section 4.2"
 STOP_PERIODS = 2.0
-"""Periods in which the box stops: within one the sand would feel at which phase the stop begins, and
+"""Periods in which the box stops: within one the sand would feel where in a period that begins, and
 the more there are, the more the fading vibration packs the bed (docs/measured_at_rest.md)."""
 
 
