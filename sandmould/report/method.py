@@ -21,7 +21,7 @@ from sandmould.runs.formatting import listed, name_of, number, seconds, value_te
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.vibration import STOP_PERIODS, VibrationStage
+from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.definition.study import Objective
 
 _NO_TENSION = {
@@ -193,7 +193,7 @@ def measured_when(scenario: Scenario) -> str:
 def _measured(scenario: Scenario) -> str:
     if not scenario.ends_at_rest:
         return "at the end of vibration, at full speed: measure_at_rest is false"
-    stop = f"the box stops within {STOP_PERIODS:g} periods"
+    stop = "the box stops smoothly"
     if scenario.vibrations[-1].ramp_s:
         stop = "the box stands"
     return f"at rest after vibration: {stop} and the sand comes to rest as after a layer"
