@@ -82,7 +82,12 @@ def stops(run: BenchmarkRun) -> list[dict[str, Any]]:
 
 def page(results: dict[str, Any]) -> str:
     """The page of the results."""
-    values = {**results, "stop_periods": STOP_PERIODS}
+    values = {
+        **results,
+        "fillings": WHOLE.fillings,
+        "per_drive": len({row["periods"] for row in results["stops"]}),
+        "stop_periods": STOP_PERIODS,
+    }
     return render(Path(__file__).with_name("page.md.j2"), values)
 
 
