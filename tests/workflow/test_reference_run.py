@@ -128,10 +128,13 @@ def test_weight_of_a_bed_at_rest_is_the_load_on_floor_walls_and_tube(tmp_path: P
     [{}, {"frame": "laboratory"}, SPHERES],
     ids=["box", "laboratory", "3D with turned facets"],
 )
-def test_restored_session_goes_on_bit_for_bit(changes: dict[str, Any], tmp_path: Path) -> None:
+@pytest.mark.parametrize("place", [-2, -1], ids=["vibrating", "stopping"])
+def test_restored_session_goes_on_bit_for_bit(
+    place: int, changes: dict[str, Any], tmp_path: Path
+) -> None:
     program = build_program(scene(**changes))
     session = ReferenceSession(program)
-    for stage in (program.stages[0], program.stages[-1]):
+    for stage in (program.stages[0], program.stages[place]):
         if stage.layer:
             session.insert_layer(1)
         session.start_stage(stage)

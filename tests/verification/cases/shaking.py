@@ -31,6 +31,7 @@ def _shaken(
         step_s=2e-5,
         frame=frame,
         vibration=[stage],
+        measure_at_rest=False,
         record={"load_every_steps": 50, "series_every_s": 1e-3},
         **changes,
     )
