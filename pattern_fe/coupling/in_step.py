@@ -31,9 +31,9 @@ CHECKPOINT = "pattern.npz"
 
 @dataclass(frozen=True)
 class InStepEntry(WindowEntry):
-    """One record of the in-step scheme; the columns of all schemes and its own balance of energy.
+    """One check of the in-step scheme; the columns of all schemes and its own balance of energy.
 
-    Load and residual are those of the mean load over the record, work and energies those of all
+    Load and residual are those of the mean load over the check, work and energies those of all
     steps.
     """
 
@@ -92,7 +92,7 @@ class InStepSession(DelegatingSession):
         return self._foam.displacement_m
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record; see ``Session``.
+        """Compute for a duration, or up to the next check; see ``Session``.
 
         Raises
         ------

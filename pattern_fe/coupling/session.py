@@ -118,15 +118,15 @@ class CoupledSession(DelegatingSession):
         return self._solved if self._loop.scheme == "one_way" else self._interface
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record, in windows of the loop."""
+        """Compute for a duration, or up to the next check, in windows of the loop."""
         sand = self.sand
-        now, record = sand.steps, self._counts.window
-        ahead = record - now % record
+        now, check = sand.steps, self._counts.check
+        ahead = check - now % check
         if duration_s is not None:
             ahead = self._counts.steps(duration_s)
         end = now + ahead
         while sand.steps < end and not sand.stage_over:
-            within = sand.steps % record
+            within = sand.steps % check
             window = int(self._ends[np.searchsorted(self._ends, within, side="right")]) - within
             if within == 0:
                 self._load_sum, self._load_steps = np.zeros_like(self._load), 0
@@ -290,7 +290,7 @@ class CoupledSession(DelegatingSession):
 
 
 def window_ends(window_s: float, counts: StepCounts) -> NDArray[np.int64]:
-    """Steps of a record at which windows end: about as long as asked, of whole load samples."""
-    samples = counts.window // counts.load
-    windows = min(samples, max(1, round(counts.window * counts.step_s / window_s)))
+    """Steps of a check at which windows end: about as long as asked, of whole load samples."""
+    samples = counts.check // counts.load
+    windows = min(samples, max(1, round(counts.check * counts.step_s / window_s)))
     return counts.load * np.rint(np.arange(1, windows + 1) * samples / windows).astype(np.int64)

@@ -15,7 +15,7 @@ _SETUP = ("header", "box", "create", "contacts", "motion", "walls", "background"
 
 
 class DeckSession(StagedSession):
-    """A deck executed block by block, its long runs cut into windows."""
+    """A deck executed block by block, its long runs cut at checks."""
 
     grains = 0
     _restart: ClassVar[str]
@@ -57,7 +57,7 @@ class DeckSession(StagedSession):
         self._setup_due = True
 
     def _compute_to(self, target: int) -> None:
-        # Setup computes forces with whole-step velocities; only without it do windows add up to
+        # Setup computes forces with whole-step velocities; only without it do parts add up to
         # the deck's own uncut run, bit for bit.
         self.send(f"run {target - self.steps} pre {'yes' if self._setup_due else 'no'} post no")
         self._setup_due = False

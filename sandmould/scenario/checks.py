@@ -200,11 +200,15 @@ def _time(s: Scenario) -> Iterator[Problem]:
             own,
             f"at most the critical step {critical.step_s:.4g} s, set by {critical.cause}",
         )
-    elif s.record.series_every_s < s.step_s:
+    elif s.rest.check_every_s < s.step_s:
+        yield Problem(
+            "rest.check_every_s", s.rest.check_every_s, f"at least the time step {s.step_s:.4g} s"
+        )
+    if s.record.series_every_s < s.rest.check_every_s:
         yield Problem(
             "record.series_every_s",
             s.record.series_every_s,
-            f"at least the time step {s.step_s:.4g} s",
+            f"at least rest.check_every_s, {s.rest.check_every_s:g} s",
         )
     if s.record.snapshot_every_s < s.record.series_every_s:
         yield Problem(
