@@ -55,6 +55,15 @@ class DelegatingSession:
         return self.sand.at_rest
 
     @property
+    def sand_rests(self) -> bool:
+        """Whether the checks of this stage find the sand at rest, held or not."""
+        return self.sand.sand_rests
+
+    def hold_rest(self, why: str) -> None:
+        """Let the stage go on while something else than the sand still moves."""
+        self.sand.hold_rest(why)
+
+    @property
     def rest_sentence(self) -> str:
         """What the last check for rest found."""
         return self.sand.rest_sentence

@@ -21,8 +21,14 @@ class RestWatch:
     speed_limit_m_s: float
     in_row: int = 0
     """Checks at rest up to now, without one in between that was not."""
+    all_in_row: int = 0
+    """Those of them in which nobody held the stage."""
+    held: str = ""
+    """Why the stage was held last since the check before."""
     speed_m_s: float = math.nan
     """Of the last check."""
+    last_held: str = ""
+    """Why it was held before the last check."""
     load_error: float = math.nan
     """Loads less weight over the weight, of the last check; NaN where loads are not asked."""
 
@@ -45,11 +51,22 @@ class RestWatch:
             self.load_error = support_n / weight_n - 1.0
             at_rest = at_rest and abs(self.load_error) <= tolerance
         self.in_row = self.in_row + 1 if at_rest else 0
+        self.all_in_row = self.all_in_row + 1 if at_rest and not self.held else 0
+        self.last_held, self.held = self.held, ""
+
+    def hold(self, why: str) -> None:
+        """Let the stage go on: something else than the sand has moved since the last check."""
+        self.held = why
+
+    @property
+    def sand_rests(self) -> bool:
+        """Whether enough checks in a row found the sand at rest."""
+        return self.in_row >= self.rest.checks
 
     @property
     def at_rest(self) -> bool:
-        """Whether enough checks in a row found the sand at rest."""
-        return self.in_row >= self.rest.checks
+        """Whether the sand was at rest in so many checks, and nobody held the stage."""
+        return self.all_in_row >= self.rest.checks
 
     @property
     def sentence(self) -> str:
@@ -60,4 +77,4 @@ class RestWatch:
                 f", vertical loads {100 * self.load_error:+.2g} % off the sand's weight "
                 f"(rest.load_tolerance {100 * (self.rest.load_tolerance or 0.0):g} %)"
             )
-        return f"at the last check: {found}"
+        return f"at the last check: {found}{'; ' if self.last_held else ''}{self.last_held}"

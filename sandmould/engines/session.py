@@ -80,6 +80,19 @@ class Session(Protocol):
         """Whether the sand has come to rest in a stage of settling."""
 
     @property
+    def sand_rests(self) -> bool:
+        """Whether the checks of this stage find the sand at rest, held or not."""
+
+    def hold_rest(self, why: str) -> None:
+        """Let the stage go on while something else than the sand still moves.
+
+        Parameters
+        ----------
+        why : str
+            What has moved since the last check.
+        """
+
+    @property
     def rest_sentence(self) -> str:
         """What the last check for rest found."""
 

@@ -21,12 +21,14 @@ from sandmould.engines.session import Array, RefusedError, Shared
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.step_mover import StepMover
+from sandmould.scenario.fill import Settling
 
 
 class StageState(NamedTuple):
     """How far a session is in its stage, beside the engine's own state."""
 
     stage_over: bool
+    at_rest: bool
     ended_check: bool
     watch: RestWatch
     last_sums: dict[str, tuple[int, int, Array]]
@@ -56,7 +58,7 @@ class StagedSession(ABC):
         self._layer_of_id = np.repeat(np.arange(1, len(program.counts) + 1), program.counts)
         self.step_s = self._counts.step_s
         self.stage = program.stages[0]
-        self.stage_over = False
+        self.stage_over = self.at_rest = False
         self._watch = self._new_watch()
         self._stage_start = self._stage_end = 0
         self._vibration_start: int | None = None
@@ -142,7 +144,7 @@ class StagedSession(ABC):
         self._opened.add(gate)
 
     def _start(self, stage: Stage) -> None:
-        self.stage, self.stage_over = stage, False
+        self.stage, self.stage_over, self.at_rest = stage, False, False
         self._watch = self._new_watch()
         self._stage_start = self.steps
         self._stage_end = self._stage_start + self._stage_steps()
@@ -155,13 +157,13 @@ class StagedSession(ABC):
         return RestWatch(rest, rest.speed_limit_m_s(flows=bool(self.stage.opens)))
 
     @property
-    def at_rest(self) -> bool:
-        """Whether the sand has come to rest in a stage of settling."""
-        settling = self.stage.settling
-        if settling is None:
-            return False
-        long_enough = self.steps - self._stage_start >= self._counts.steps(settling.shortest_s)
-        return long_enough and self._watch.at_rest
+    def sand_rests(self) -> bool:
+        """Whether the checks of this stage find the sand at rest, held or not."""
+        return self.stage.settling is not None and self._watch.sand_rests
+
+    def hold_rest(self, why: str) -> None:
+        """Let the stage go on while something else than the sand still moves; see ``Session``."""
+        self._watch.hold(why)
 
     @property
     def rest_sentence(self) -> str:
@@ -177,16 +179,18 @@ class StagedSession(ABC):
             self._compute_to(min(target, (self.steps // check + 1) * check))
             self._ended_check = self.steps % check == 0
             if self._ended_check and self.stage.settling is not None:
-                self._check_rest()
+                self._check_rest(self.stage.settling)
             self.stage_over = self.at_rest or self.steps >= self._stage_end
 
-    def _check_rest(self) -> None:
+    def _check_rest(self, settling: Settling) -> None:
         """Let the watch see a check that lies in the stage as a whole."""
         if self.steps - self._counts.check < self._stage_start:
             return
         loads = self.surface_loads() or {}
         support_n = -sum(float(force[-1]) for force in loads.values())
         self._watch.check(self._rms_speed_m_s(), support_n, self._weight_n())
+        long_enough = self.steps - self._stage_start >= self._counts.steps(settling.shortest_s)
+        self.at_rest = long_enough and self._watch.at_rest
 
     def _weight_n(self) -> float:
         """Weight of all grains now in the box."""
@@ -256,12 +260,17 @@ class StagedSession(ABC):
 
     def _stage_state(self) -> StageState:
         """How far the session is in its stage, for a checkpoint in memory."""
-        watch = replace(self._watch)
-        return StageState(self.stage_over, self._ended_check, watch, dict(self._last_sums))
+        return StageState(
+            self.stage_over,
+            self.at_rest,
+            self._ended_check,
+            replace(self._watch),
+            dict(self._last_sums),
+        )
 
     def _restore_stage(self, state: StageState) -> None:
         """Stand in the stage as ``_stage_state`` found it."""
-        self.stage_over, self._ended_check = state.stage_over, state.ended_check
+        self.stage_over, self.at_rest, self._ended_check = state[:3]
         self._watch = replace(state.watch)
         self._last_sums = dict(state.last_sums)
 
@@ -282,7 +291,7 @@ class StagedSession(ABC):
                 "stage": self.stage.name,
                 "stage_start": self._stage_start,
                 "vibration_start": self._vibration_start,
-                "checks_at_rest": self._watch.in_row,
+                "checks_at_rest": [self._watch.in_row, self._watch.all_in_row],
             }
             (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
 
@@ -301,5 +310,5 @@ class StagedSession(ABC):
         self._stage_start = state["stage_start"]
         self._stage_end = self._stage_start + self._stage_steps()
         self._vibration_start = state["vibration_start"]
-        self._watch.in_row = state["checks_at_rest"]
+        self._watch.in_row, self._watch.all_in_row = state["checks_at_rest"]
         self._ended_check = True

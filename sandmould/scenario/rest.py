@@ -19,7 +19,7 @@ class Rest(Section):
         le=100,
     )
     checks: int = quantity(
-        4, "Checks in a row that must find the sand at rest.", source=ARGUED, ge=1, le=1000
+        10, "Checks in a row that must find the sand at rest.", source=ARGUED, ge=1, le=1000
     )
     rms_speed_m_s: float = quantity(
         0.01,

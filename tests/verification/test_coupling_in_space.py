@@ -152,7 +152,12 @@ def plank_scene(**changes: Any) -> Scenario:
             "loop": {"scheme": "measured", "window_s": 0.004},
         },
         "fill": {"layers": [{"count": 60}], "settling": {"shortest_s": 0.3}},
-        "rest": {"rms_speed_m_s": 9, "load_tolerance": None, "checks": 1},
+        "rest": {
+            "check_every_s": 0.02,
+            "rms_speed_m_s": 9,
+            "load_tolerance": None,
+            "checks": 1,
+        },
         "time_step": {"fraction": 0.5},
         "vibration": [],
         "engine": {"name": "reference"},
