@@ -94,6 +94,18 @@ class Program:
         """Where the grains of each layer start; drawn when first asked for."""
         return tuple(plan_layer(self.scenario, i + 1, count) for i, count in enumerate(self.counts))
 
+    @cached_property
+    def _masses_kg(self) -> tuple[float, ...]:
+        s = self.scenario
+        return tuple(
+            float(s.sand.grain_mass_kg(1.0, s.dimension) * ((2 * x.radius_m) ** s.dimension).sum())
+            for x in self.layers
+        )
+
+    def mass_kg(self, layers: int) -> float:
+        """Mass of the grains of the first layers."""
+        return sum(self._masses_kg[:layers])
+
     @property
     def expected_s(self) -> float:
         """Expected simulated time of the whole run."""

@@ -20,6 +20,7 @@ from sandmould.runs.columns import (
 from sandmould.runs.formatting import listed, name_of, number, seconds, value_text
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.definition.study import Objective
@@ -162,7 +163,16 @@ def _filling(scenario: Scenario) -> str:
     plural = "s" if layers > 1 else ""
     return (
         f"{layers} layer{plural} dropped {1e3 * fill.drop_height_m:g} mm{between}; the next "
-        f"comes when the grains' rms speed is below {fill.settling.rms_speed_m_s:g} m/s"
+        f"comes when {_rest(scenario.rest)}"
+    )
+
+
+def _rest(rest: Rest) -> str:
+    share = rest.load_tolerance
+    loads = "" if share is None else f" and surfaces bear its weight within {100 * share:g} %"
+    return (
+        f"the grains' rms speed is below {rest.rms_speed_m_s:g} m/s{loads}, "
+        f"in {rest.checks} checks of {1e3 * rest.check_every_s:g} ms in a row"
     )
 
 

@@ -201,11 +201,22 @@ def _time(s: Scenario) -> Iterator[Problem]:
             own,
             f"at most the critical step {critical.step_s:.4g} s, set by {critical.cause}",
         )
-    elif s.record.series_every_s < s.step_s:
+    elif s.rest.check_every_s < s.step_s:
+        yield Problem(
+            "rest.check_every_s", s.rest.check_every_s, f"at least the time step {s.step_s:.4g} s"
+        )
+    loop = None if s.pattern is None else s.pattern.loop
+    if loop is not None and loop.has_windows and loop.window_s > s.rest.check_every_s:
+        yield Problem(
+            "pattern.loop.window_s",
+            loop.window_s,
+            f"at most rest.check_every_s, {s.rest.check_every_s:g} s",
+        )
+    if s.record.series_every_s < s.rest.check_every_s:
         yield Problem(
             "record.series_every_s",
             s.record.series_every_s,
-            f"at least the time step {s.step_s:.4g} s",
+            f"at least rest.check_every_s, {s.rest.check_every_s:g} s",
         )
     if s.record.snapshot_every_s < s.record.series_every_s:
         yield Problem(

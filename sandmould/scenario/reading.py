@@ -14,6 +14,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.moved_keys import moved_to
 from sandmould.scenario.quantity import keys_at
 
 Tree = dict[str, Any]
@@ -254,6 +255,8 @@ def _problem(model: type[BaseModel], tree: Tree, item: Any, origin: Origin, abov
 
 
 def _valid(model: type[BaseModel], kind: str, context: Any, item: Any, parts: list[str]) -> str:
+    if kind == "extra_forbidden" and (new := moved_to(parts)):
+        return f"the key {new}, where this one has moved"
     if kind == "extra_forbidden":
         keys = keys_at(model, parts[:-1])
         near = difflib.get_close_matches(parts[-1], keys, n=1, cutoff=0.5)

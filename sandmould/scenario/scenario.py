@@ -18,6 +18,7 @@ from sandmould.scenario.fill import Fill
 from sandmould.scenario.geometry import Scene
 from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.rest import Rest
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.stages import is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
@@ -25,11 +26,11 @@ from sandmould.scenario.vibration import BoxStage, VibrationStage
 
 
 class Recording(Section):
-    """What a run writes down, and how often."""
+    """What a run writes down, and how often; nothing of it changes what is computed."""
 
     series_every_s: float = quantity(
         0.02,
-        "Interval of the time series, the guards and the rest rule; loads are means over it.",
+        "Interval of the time series, rounded to whole checks; loads are means over it.",
         unit="s",
         source=ARGUED,
         gt=0,
@@ -48,9 +49,6 @@ class Recording(Section):
         False,
         "Whether snapshots hold the orientation of every grain, eqs. (8)-(13).",
         source=ARGUED,
-    )
-    load_every_steps: int = quantity(
-        20, "Steps between samples of the wall loads.", source=ARGUED, ge=1, le=100000
     )
     checkpoint_every_s: float = quantity(
         0.1,
@@ -125,6 +123,7 @@ class Scenario(Section):
     )
     engine: Engine = Field(Engine(), description="The engine.")
     time_step: TimeStep = Field(TimeStep(), description="The time step.")
+    rest: Rest = Field(Rest(), description="When sand is at rest.")
     record: Recording = Field(Recording(), description="What is recorded.")
     guard: GuardLimits = Field(GuardLimits(), description="When a run is stopped.")
     seed: int = quantity(1, "Seed of all that is drawn.", source="user", ge=0, le=2**31 - 1)

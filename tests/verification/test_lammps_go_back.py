@@ -43,7 +43,7 @@ def test_what_follows_follows_again(frame: str, tmp_path: Path) -> None:
     session.save_checkpoint()
     # kept where a record is half over and the hill on its way
     drawn_m = scenario.scene.outlines[0].vertices_m
-    record = session._counts.window
+    record = session._counts.check
     session.move_surface("hill", drawn_m - [0.0, 1e-4], record * session.step_s)
     session.advance(record // 2 * session.step_s)
     session.vertex_loads("hill")

@@ -34,7 +34,7 @@ SCENE: dict[str, Any] = {
     "fill": {"layers": [{"count": 40, "repeat": 2}], "settling": {"shortest_s": 0.8}},
     "background_damping": {"form": "none"},
     "vibration": [],
-    "record": {"load_every_steps": 5},
+    "rest": {"load_every_steps": 5},
 }
 
 
@@ -152,7 +152,7 @@ def test_vertex_loads_of_all_windows_make_up_the_record(tmp_path: Path) -> None:
         session.insert_layer(1)
         session.start_stage(build_program(scenario).stages[0])
         counts = StepCounts.of(scenario)
-        samples = counts.window // counts.load
+        samples = counts.check // counts.load
         parts = [samples // 3, samples // 4, samples - samples // 3 - samples // 4]
         for _ in range(5):
             session.advance()

@@ -32,7 +32,8 @@ SPHERES = {
     "dimension": 3,
     "box": {"depth_m": 0.03},
     "time_step": {"fraction": 0.5},
-    "fill": {"layers": [{"count": 120}], "settling": {"rms_speed_m_s": 0.3}},
+    "fill": {"layers": [{"count": 120}]},
+    "rest": {"rms_speed_m_s": 0.3},
 }
 
 
@@ -110,8 +111,8 @@ def test_killed_run_resumes_and_ends_as_if_never_stopped(tmp_path: Path) -> None
 
 
 def test_weight_of_a_bed_at_rest_is_the_load_on_floor_walls_and_tube(tmp_path: Path) -> None:
-    quiet = {"rms_speed_m_s": 1e-5, "longest_s": 9.0}
-    still = scene(fill={"layers": [{"count": 120}], "settling": quiet}, vibration=[])
+    fill = {"layers": [{"count": 120}], "settling": {"longest_s": 9.0}}
+    still = scene(fill=fill, rest={"rms_speed_m_s": 1e-5}, vibration=[])
     assert drive(still, tmp_path).outcome is Outcome.FINISHED
     loads = pd.read_csv(tmp_path / "loads.tsv", sep="\t")
     last = loads[loads.time_s == loads.time_s.max()]

@@ -195,6 +195,10 @@ def _shaken(scenario: Scenario) -> Scenario:
     )
     window_s = float(f"{1.0 / (WINDOWS_A_PERIOD * SHAKEN_HZ[-1]):.2g}")
     record = scenario.record.model_copy(update={"series_every_s": window_s})
+    # Loads are means over checks; as many of the shorter ones as make up the same time.
+    rest = scenario.rest
+    checks = max(rest.checks, round(rest.checks * rest.check_every_s / window_s))
+    rest = rest.model_copy(update={"check_every_s": window_s, "checks": checks})
     # what is read of it is the load on the floor while it is shaken
-    changed = {"vibration": stages, "record": record, "measure_at_rest": False}
+    changed = {"vibration": stages, "record": record, "rest": rest, "measure_at_rest": False}
     return scenario.model_copy(update=changed)

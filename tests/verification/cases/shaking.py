@@ -32,7 +32,7 @@ def _shaken(
         frame=frame,
         vibration=[stage],
         measure_at_rest=False,
-        record={"load_every_steps": 50, "series_every_s": 1e-3},
+        rest={"load_every_steps": 50, "check_every_s": 1e-3},
         **changes,
     )
     return Bench(given), given.vibration[0]
