@@ -69,7 +69,7 @@ def during_vibration(curves: pd.DataFrame) -> pd.DataFrame:
     The clock of vibration stands while the sand comes to rest, so those rows belong to no curve
     over it.
     """
-    rests = curves[STAGE].astype(str).map(is_rest).astype(bool)
+    rests = curves[STAGE].map(lambda name: is_rest(str(name))).astype(bool)
     return curves[(curves[VIBRATION_TIME_S] >= 0) & ~rests]
 
 

@@ -10,10 +10,11 @@ import pytest
 
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.curves import best_passage, time_chart
-from sandmould.report.sand import sand_pages
+from sandmould.report.method import measured_when
+from sandmould.report.sand import _chosen
 from sandmould.runs.columns import during_vibration
 from sandmould.statistics.verdict import compare_settings
-from sandmould.study.collect import Collected, gather
+from sandmould.study.collect import gather
 from sandmould.study.kinds.sand.measure import write_measures
 from sandmould.study.kinds.sand.moments import list_moments, nearest
 from tests.unit.report_study import DURATION_S, FILLING_S, KEY, PLANTED, scenario, write_study
@@ -89,9 +90,11 @@ def test_other_tables_have_no_rest() -> None:
 
 
 def test_the_report_says_where_it_measures(study: Path) -> None:
-    found = gather(study)
-    summary = found.summary.assign(**{FILL: found.summary["replicate"] + found.summary[KEY]})
-    changed = Collected(summary, found.curves, found.keys)
-    verdict = compare_settings(summary, (KEY,), FILL)
-    pages = sand_pages(study, scenario(100.0), changed, verdict, 100_000)
-    assert pages.panels[-1].heading == "at rest after its end, 2.00 s"
+    moments = list_moments(study / "runs" / RUN)
+    assert [heading for heading, _ in _chosen(moments, scenario(50.0))] == [
+        "at its start", "after 1/8", "after 1/2", "at rest after its end"
+    ]  # fmt: skip
+    at_speed = scenario(50.0).model_copy(update={"measure_at_rest": False})
+    assert _chosen(moments[:-2], at_speed)[-1][0] == "at its end"
+    assert measured_when(scenario(50.0)) == "rest after vibration"
+    assert measured_when(at_speed) == "the end of vibration"
