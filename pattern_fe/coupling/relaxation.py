@@ -87,9 +87,12 @@ class AitkenRelaxation:
     """
 
     def __init__(self, first: float, least: float, most: float) -> None:
-        self.factor = first
+        self.factor = self._first = first
         self._least, self._most = least, most
         self._last: Array | None = None
+        self.is_calm = False
+        """Whether the factor stays below the first one: where sand rests, and no window is computed
+        again, residuals differ by noise alone, which would throw it."""
 
     def next(self, displacement: Array, solution: Array) -> Array:
         """Go with the factor that would have made the last residual vanish."""
@@ -99,7 +102,8 @@ class AitkenRelaxation:
             square = float(change @ change)
             if square > 0.0:
                 factor = -self.factor * float(self._last @ change) / square
-                self.factor = float(np.clip(factor, self._least, self._most))
+                most = self._first if self.is_calm else self._most
+                self.factor = float(np.clip(factor, self._least, most))
         self._last = residual
         return np.asarray(displacement + self.factor * residual)
 
