@@ -91,19 +91,20 @@ class AitkenRelaxation:
         self._least, self._most = least, most
         self._last: Array | None = None
         self.is_calm = False
-        """Whether the factor stays below the first one: where sand rests, and no window is computed
-        again, residuals differ by noise alone, which would throw it."""
+        """Whether the factor is the first one: where sand rests, and no window is computed again,
+        residuals differ by noise alone, which tells no factor."""
 
     def next(self, displacement: Array, solution: Array) -> Array:
         """Go with the factor that would have made the last residual vanish."""
         residual = solution - displacement
-        if self._last is not None:
+        if self.is_calm:
+            self.factor = self._first
+        elif self._last is not None:
             change = residual - self._last
             square = float(change @ change)
             if square > 0.0:
                 factor = -self.factor * float(self._last @ change) / square
-                most = self._first if self.is_calm else self._most
-                self.factor = float(np.clip(factor, self._least, most))
+                self.factor = float(np.clip(factor, self._least, self._most))
         self._last = residual
         return np.asarray(displacement + self.factor * residual)
 

@@ -18,6 +18,7 @@ from sandmould.runs.outcome import Outcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand import planning
+from tests.patterns import _one_thread  # noqa: F401
 
 WIDTH_M = HEIGHT_M = 0.06
 YOUNG_PA, POISSON = 1e5, 0.35

@@ -18,6 +18,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import liggghts_scene
+from tests.patterns import _one_thread  # noqa: F401
 from tests.scenes import tube_scene
 
 RECORDS: tuple[dict[str, Any], ...] = (
