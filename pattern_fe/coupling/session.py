@@ -22,7 +22,11 @@ from pattern_fe.coupling.convergence_log import (
 from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.gain import measure_gain
 from pattern_fe.coupling.pattern_rest import PatternRest
-from pattern_fe.coupling.relaxation import MeasuredRelaxation, relaxation_of
+from pattern_fe.coupling.relaxation import (
+    AitkenRelaxation,
+    MeasuredRelaxation,
+    relaxation_of,
+)
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.session import EngineStop, RefusedError, Session
 from sandmould.engines.snapshot import Snapshot
@@ -199,6 +203,8 @@ class CoupledSession(DelegatingSession):
         solution = self._body.solve(load)
         if self._loop.scheme != "per_layer" or sand.sand_rests or sand.stage_over:
             self._solved = solution.displacement_m
+        if isinstance(self._relaxation, AitkenRelaxation):
+            self._relaxation.is_calm = sand.sand_rests and self._loop.most_passes == 1
         relaxed = self._relaxation.next(displacement.ravel(), self._solved.ravel())
         self._solve_s += time.perf_counter() - begun
         return _Iteration(load, solution, relaxed.reshape(displacement.shape))

@@ -179,12 +179,14 @@ class StagedSession(ABC):
         now, check = self.steps, self._counts.check
         ahead = check - now % check if duration_s is None else self._counts.steps(duration_s)
         target = min(now + ahead, self._stage_end)
-        while self.steps < target and not self.stage_over:
+        while self.steps < target:
             self._compute_to(min(target, (self.steps // check + 1) * check))
             self._ended_check = self.steps % check == 0
             if self._ended_check and self.stage.settling is not None:
                 self._check_rest(self.stage.settling)
             self.stage_over = self.at_rest or self.steps >= self._stage_end
+            if self.stage_over:
+                return
 
     def _check_rest(self, settling: Settling) -> None:
         """Let the watch see a check that lies in the stage as a whole."""
