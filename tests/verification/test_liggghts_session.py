@@ -109,6 +109,7 @@ def test_one_grain_moves_alike_in_both_frames(
             dimension=dimension,
             frame=frame,
             vibration=[stage],
+            measure_at_rest=False,
             contact=SOFT if dimension == 3 else {},
             time_step={"fraction": 0.4},
             rest={"check_every_s": 1e-3, "load_every_steps": 1},
