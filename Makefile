@@ -12,7 +12,7 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
 .PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
-.PHONY: twins verification stability benchmarks peers scaling solidification flow
+.PHONY: twins verification stability at-rest benchmarks peers scaling solidification flow
 
 help:
 	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
@@ -87,6 +87,10 @@ verification: $(INSTALLED)
 ## where each engine becomes unstable: docs/stability.md
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
+
+## packing measured at speed and at rest: docs/measured_at_rest.md
+at-rest: $(INSTALLED)
+	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.at_rest $(QUICK)
 
 ## how fast the engines are: docs/speed.md
 benchmarks: $(INSTALLED)

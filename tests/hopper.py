@@ -60,9 +60,9 @@ HOPPER: dict[str, Any] = {
     "fill": {
         "over_x_m": [round(MIDDLE_M - HALF_INSIDE_M, 9), round(MIDDLE_M + HALF_INSIDE_M, 9)],
         "layers": [{"count": 15}, {"count": 205}],
-        "settling": {"rms_speed_m_s": 0.05},
     },
-    "discharge": {"gate": "gate", "settling": {"rms_speed_m_s": 0.02}},
+    "rest": {"rms_speed_m_s": 0.05, "discharge_rms_speed_m_s": 0.02},
+    "discharge": {"gate": "gate"},
     # Strokes of 2 mm: sand flows through the open gate again.
     "vibration": [
         {"acceleration_g": 3.0, "frequency_hz": 20.0, "duration_s": 0.15, "direction": "horizontal"}

@@ -47,7 +47,8 @@ ONE_GRAIN: dict[str, Any] = {
     },
     "fill": {"layers": [{"count": 1}]},
     "time_step": {"fraction": 0.01},
-    "record": {"load_every_steps": 1, "series_every_s": 1e-4, "snapshot_every_s": 1e-4},
+    "rest": {"load_every_steps": 1, "check_every_s": 1e-4},
+    "record": {"series_every_s": 1e-4, "snapshot_every_s": 1e-4},
 }
 """An empty box of which only the floor matters."""
 

@@ -65,7 +65,7 @@ def wedge_scene(pattern: Pattern, damping_ratio: float = 0.95, **changes: Any) -
         "time_step": {"step_s": 1e-5},
         "engine": {"name": "reference"},
         "fill": FILL,
-        "record": {"load_every_steps": 1, "series_every_s": 2e-3},
+        "rest": {"load_every_steps": 1, "check_every_s": 2e-3},
     }
     return one_grain_scene(**(scene | changes))
 

@@ -126,7 +126,7 @@ def _falling(dimension: int) -> dict[str, Any]:
     return {
         "contact": {"grain_grain": law, "grain_wall": law},
         "time_step": {"fraction": 0.8},
-        "fill": {"settling": {"rms_speed_m_s": 1e-3}},
+        "rest": {"rms_speed_m_s": 1e-3},
     }
 
 
@@ -139,8 +139,8 @@ def _resting() -> dict[str, Any]:
             "viscous_translation_per_s": 1000.0,
             "viscous_rotation_per_s": 1000.0,
         },
-        "fill": {"settling": {"rms_speed_m_s": 1e-3, "shortest_s": 0.005}},
-        "record": {"series_every_s": 0.001},
+        "fill": {"settling": {"shortest_s": 0.005}},
+        "rest": {"rms_speed_m_s": 1e-3, "check_every_s": 0.001},
     }
 
 

@@ -45,7 +45,7 @@ _BASE: dict[str, Any] = {
     "background_damping": {"form": "none"},
     # Never at rest before the end; LAMMPS keeps grains up to where a layer would be dropped from.
     "fill": {"drop_height_m": 0.1, "settling": {"shortest_s": 99.0, "longest_s": 100.0}},
-    "record": {"load_every_steps": 100000},
+    "rest": {"load_every_steps": 100000},
 }
 SCENES: dict[str, dict[str, Any]] = {
     "contact": {

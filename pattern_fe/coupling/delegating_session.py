@@ -46,13 +46,27 @@ class DelegatingSession:
 
     @property
     def stage_over(self) -> bool:
-        """Whether the stage's time is up or its rest rule met."""
+        """Whether the stage's time is up or the sand at rest."""
         return self.sand.stage_over
 
     @property
     def at_rest(self) -> bool:
-        """Whether the settling rule of the stage was met."""
+        """Whether the sand has come to rest in a stage of settling."""
         return self.sand.at_rest
+
+    @property
+    def sand_rests(self) -> bool:
+        """Whether the checks of this stage find the sand at rest, held or not."""
+        return self.sand.sand_rests
+
+    def hold_rest(self, why: str) -> None:
+        """Let the stage go on while something else than the sand still moves."""
+        self.sand.hold_rest(why)
+
+    @property
+    def rest_sentence(self) -> str:
+        """What the last check for rest found."""
+        return self.sand.rest_sentence
 
     @property
     def steps(self) -> int:
@@ -66,7 +80,7 @@ class DelegatingSession:
 
     @property
     def can_checkpoint(self) -> bool:
-        """Whether the last advance ended a record."""
+        """Whether the last advance ended a check."""
         return self.sand.can_checkpoint
 
     @property
@@ -87,7 +101,7 @@ class DelegatingSession:
         self.sand.start_stage(stage)
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record."""
+        """Compute for a duration, or up to the next check."""
         self.sand.advance(duration_s)
 
     def end_stage(self) -> None:
@@ -99,7 +113,7 @@ class DelegatingSession:
         return self.sand.snapshot()
 
     def surface_loads(self) -> Mapping[str, Array] | None:
-        """Mean force of the sand on each surface over the last record, N."""
+        """Mean force of the sand on each surface over the last check, N."""
         return self.sand.surface_loads()
 
     def vertex_loads(self, name: str) -> Array | None:

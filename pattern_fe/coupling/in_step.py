@@ -20,6 +20,7 @@ from pattern_fe.coupling.convergence_log import (
 )
 from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.in_step_foam import InStepFoam
+from pattern_fe.coupling.pattern_rest import PatternRest
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
@@ -31,9 +32,9 @@ CHECKPOINT = "pattern.npz"
 
 @dataclass(frozen=True)
 class InStepEntry(WindowEntry):
-    """One record of the in-step scheme; the columns of all schemes and its own balance of energy.
+    """One check of the in-step scheme; the columns of all schemes and its own balance of energy.
 
-    Load and residual are those of the mean load over the record, work and energies those of all
+    Load and residual are those of the mean load over the check, work and energies those of all
     steps.
     """
 
@@ -56,6 +57,7 @@ class InStepSession(DelegatingSession):
         surface: str,
         work: Path,
         checkpoint: Path | None = None,
+        load_tolerance: float | None = None,
     ) -> None:
         """Start with the pattern at rest, or where a checkpoint left it.
 
@@ -72,8 +74,11 @@ class InStepSession(DelegatingSession):
             Folder of the tables.
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
+        load_tolerance : float, optional
+            See ``PatternRest``.
         """
         super().__init__(sand)
+        self._rest = PatternRest(sand, load_tolerance)
         self._foam, self._body = foam, body
         self._load = np.zeros_like(foam.vertices_m)
         log_bytes, rows = None, 0
@@ -92,7 +97,7 @@ class InStepSession(DelegatingSession):
         return self._foam.displacement_m
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record; see ``Session``.
+        """Compute for a duration, or up to the next check; see ``Session``.
 
         Raises
         ------
@@ -115,6 +120,7 @@ class InStepSession(DelegatingSession):
         load = self._load = foam.take_mean_load_n()
         begun = time.perf_counter()
         solution = self._body.solve(load)
+        self._rest.see(moved_m, solution.displacement_m)
         elastic_j, kinetic_j = foam.elastic_j, foam.kinetic_j
         self._log.write(
             InStepEntry(

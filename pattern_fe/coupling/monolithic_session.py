@@ -28,7 +28,7 @@ CHECKPOINT = "pattern.npz"
 
 @dataclass(frozen=True)
 class MonolithicEntry:
-    """The pattern at a record, and what became of the work of the sand since the run began."""
+    """The pattern at a check, and what became of the work of the sand since the run began."""
 
     time_s: float
     displacement_m: float
@@ -102,15 +102,15 @@ class MonolithicSession(DelegatingSession):
         return self._foam.displacement_m
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record; see ``Session``.
+        """Compute for a duration, or up to the next check; see ``Session``.
 
         Raises
         ------
         EngineStop
             Also where the pattern runs away.
         """
-        record, now = self._counts.window, self.sand.steps
-        ahead = record - now % record if duration_s is None else self._counts.steps(duration_s)
+        check, now = self._counts.check, self.sand.steps
+        ahead = check - now % check if duration_s is None else self._counts.steps(duration_s)
         while self.sand.steps < now + ahead and not self.sand.stage_over:
             self._step()
         self._write()

@@ -42,7 +42,7 @@ def open_coupled(
     config = scenario.pattern
     assert config is not None
     name, loop, counts = config.name, config.loop, StepCounts.of(scenario)
-    pattern, work = pattern_of(scenario), log.parent
+    pattern, work, tolerance = pattern_of(scenario), log.parent, scenario.rest.load_tolerance
     open_session = engine_of(scenario).open_session
     if loop.scheme == "monolithic":
         explicit = explicit_foam(scenario, pattern)
@@ -59,8 +59,8 @@ def open_coupled(
     if loop.scheme == "in_step":
         foam = in_step_foam(scenario, pattern)
         (work / MASSES_LOG).write_text(_selective_masses(foam.mass), encoding="utf-8")
-        return InStepSession(sand, foam, body, name, work, checkpoint)
-    return CoupledSession(sand, body, name, loop, counts, work, checkpoint)
+        return InStepSession(sand, foam, body, name, work, checkpoint, tolerance)
+    return CoupledSession(sand, body, name, loop, counts, work, checkpoint, tolerance)
 
 
 def _explicit_masses(foam: ExplicitFoam) -> str:

@@ -87,14 +87,19 @@ class AitkenRelaxation:
     """
 
     def __init__(self, first: float, least: float, most: float) -> None:
-        self.factor = first
+        self.factor = self._first = first
         self._least, self._most = least, most
         self._last: Array | None = None
+        self.is_calm = False
+        """Whether the factor is the first one: where sand rests, and no window is computed again,
+        residuals differ by noise alone, which tells no factor."""
 
     def next(self, displacement: Array, solution: Array) -> Array:
         """Go with the factor that would have made the last residual vanish."""
         residual = solution - displacement
-        if self._last is not None:
+        if self.is_calm:
+            self.factor = self._first
+        elif self._last is not None:
             change = residual - self._last
             square = float(change @ change)
             if square > 0.0:

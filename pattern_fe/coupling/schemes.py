@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
+from pattern_fe.coupling.gain_prediction import predicted_gain
 from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.pattern import Pattern
 from sandmould.engines.capabilities import Capabilities
@@ -64,6 +65,8 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         raise _bad(
             "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"
         )
+    if scheme == "per_layer" and scenario.dimension == 2:
+        _refuse_foam_by_layers(scenario, pattern, loop)
     if scheme == "monolithic":
         explicit_foam(scenario, pattern)
     if scheme == "in_step":
@@ -91,6 +94,17 @@ def _refuse_in_space(loop: Loop) -> None:
         raise _bad("scheme", loop.scheme, "a scheme with windows in 3D")
     if loop.exchange == "files":
         raise _bad("exchange", loop.exchange, "memory in 3D")
+
+
+def _refuse_foam_by_layers(scenario: Scenario, pattern: Pattern, loop: Loop) -> None:
+    """Refuse layers on a pattern so soft that the fixed share would swing beside resting sand."""
+    limit = predicted_gain(scenario, pattern, loop.window_s).limit
+    if loop.factor > limit:
+        valid = (
+            f"another scheme for so soft a foam: under sand at rest its surface would swing, for a "
+            f"share of pattern.loop.factor = {loop.factor:g} holds below {limit:.2g} only"
+        )
+        raise _bad("scheme", loop.scheme, valid)
 
 
 def explicit_foam(scenario: Scenario, pattern: Pattern) -> ExplicitFoam:
@@ -153,7 +167,7 @@ def _loop_of_small_displacements(scenario: Scenario) -> Loop:
 def _shaken_hz(scenario: Scenario) -> float:
     """Highest frequency of the box, 0 where it stands still."""
     between = scenario.fill.vibration_between_layers
-    stages = (*scenario.vibration, *((between,) if between else ()))
+    stages = (*scenario.vibrations, *((between,) if between else ()))
     return max((stage.frequency_hz for stage in stages), default=0.0)
 
 

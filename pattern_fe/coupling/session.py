@@ -21,7 +21,12 @@ from pattern_fe.coupling.convergence_log import (
 )
 from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.gain import measure_gain
-from pattern_fe.coupling.relaxation import MeasuredRelaxation, relaxation_of
+from pattern_fe.coupling.pattern_rest import PatternRest
+from pattern_fe.coupling.relaxation import (
+    AitkenRelaxation,
+    MeasuredRelaxation,
+    relaxation_of,
+)
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.session import EngineStop, RefusedError, Session
 from sandmould.engines.snapshot import Snapshot
@@ -31,6 +36,8 @@ from sandmould.scenario.pattern import Loop
 
 Array = NDArray[np.float64]
 CHECKPOINT = "pattern.npz"
+GAIN_EVERY_S = 0.02
+"""About how often the gain is measured, at checks: it costs two windows."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +59,8 @@ class CoupledSession(DelegatingSession):
     taken (conservative: force and moment are kept), the pattern is solved at rest under it, and the
     next window moves part of the way to that displacement (consistent: vertex for vertex). A window
     may be iterated, computed again from its checkpoint, until the solution is the displacement at
-    the interface. Loads of one way move no surface; with one solve a layer it goes to where the
-    loads at the end of the last stage bent the pattern.
+    the interface. Loads of one way move no surface; by layers it stands still until the sand rests,
+    and then goes to where the loads bend the pattern.
     """
 
     def __init__(
@@ -65,6 +72,7 @@ class CoupledSession(DelegatingSession):
         counts: StepCounts,
         work: Path,
         checkpoint: Path | None = None,
+        load_tolerance: float | None = None,
     ) -> None:
         """Start with the pattern at rest, or where a checkpoint left it.
 
@@ -84,13 +92,18 @@ class CoupledSession(DelegatingSession):
             Folder of the tables.
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
+        load_tolerance : float, optional
+            See ``PatternRest``.
         """
         super().__init__(sand)
         self._body = body
+        self._rest = PatternRest(sand, load_tolerance if loop.scheme != "one_way" else None)
         self._surface = surface
         self._loop = loop
         self._counts = counts
         self._ends = window_ends(loop.window_s, counts)
+        checks = round(GAIN_EVERY_S / (counts.check * counts.step_s))
+        self._gain_steps = counts.check * max(1, checks)
         self._relaxation = relaxation_of(loop)
         rest = body.vertices_m
         self._interface = np.zeros_like(rest)
@@ -118,25 +131,26 @@ class CoupledSession(DelegatingSession):
         return self._solved if self._loop.scheme == "one_way" else self._interface
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record, in windows of the loop."""
+        """Compute for a duration, or up to the next check, in windows of the loop."""
         sand = self.sand
-        now, record = sand.steps, self._counts.window
-        ahead = record - now % record
+        now, check = sand.steps, self._counts.check
+        ahead = check - now % check
         if duration_s is not None:
             ahead = self._counts.steps(duration_s)
         end = now + ahead
         while sand.steps < end and not sand.stage_over:
-            within = sand.steps % record
+            within = sand.steps % check
             window = int(self._ends[np.searchsorted(self._ends, within, side="right")]) - within
             if within == 0:
                 self._load_sum, self._load_steps = np.zeros_like(self._load), 0
+            if sand.steps % self._gain_steps == 0:
                 self._measure(window * sand.step_s)
             self._window(min(window, end - sand.steps))
         if sand.is_root:
             self._shapes.write(sand.time_s, self.displacement_m)
 
     def _measure(self, window_s: float) -> None:
-        """Measure the gain anew, at every record: sand that falls, settles or is shaken changes it.
+        """Measure the gain anew: sand that falls, settles or is shaken changes it.
 
         Without a load the factor stays.
         """
@@ -151,6 +165,8 @@ class CoupledSession(DelegatingSession):
         """Compute one window, in as many iterations as its residual needs."""
         loop = self._loop
         checkpoint = self.sand.save_checkpoint() if loop.most_passes > 1 else None
+        # Where sand rests the noise is the loop's own: it is computed to the share asked of rest.
+        tolerance = min(loop.tolerance, self._rest.share if self.sand.sand_rests else np.inf)
         start, displacement, iterations = self._interface, self._next, 0
         self._solve_s = 0.0
         while True:
@@ -160,7 +176,7 @@ class CoupledSession(DelegatingSession):
                 self._interface = displacement
                 return
             residual_m = rms_m(iteration.solution.displacement_m - displacement)
-            converged = residual_m <= loop.tolerance * rms_m(displacement)
+            converged = residual_m <= tolerance * rms_m(displacement)
             if iterations == loop.most_passes or converged:
                 break
             self.sand.restore_checkpoint(checkpoint)
@@ -170,6 +186,7 @@ class CoupledSession(DelegatingSession):
         self._load = self._load_sum / self._load_steps
         self._work_j += work_of(load, displacement - start)
         self._interface = displacement
+        self._rest.see(displacement, iteration.solution.displacement_m)
         self._next = self._predicted(start, displacement, iteration.next_m)
         self._write(steps, iterations, iteration)
         self._check()
@@ -184,8 +201,10 @@ class CoupledSession(DelegatingSession):
             return None
         begun = time.perf_counter()
         solution = self._body.solve(load)
-        if self._loop.scheme != "per_layer" or sand.stage_over:
+        if self._loop.scheme != "per_layer" or sand.sand_rests or sand.stage_over:
             self._solved = solution.displacement_m
+        if isinstance(self._relaxation, AitkenRelaxation):
+            self._relaxation.is_calm = sand.sand_rests and self._loop.most_passes == 1
         relaxed = self._relaxation.next(displacement.ravel(), self._solved.ravel())
         self._solve_s += time.perf_counter() - begun
         return _Iteration(load, solution, relaxed.reshape(displacement.shape))
@@ -290,7 +309,7 @@ class CoupledSession(DelegatingSession):
 
 
 def window_ends(window_s: float, counts: StepCounts) -> NDArray[np.int64]:
-    """Steps of a record at which windows end: about as long as asked, of whole load samples."""
-    samples = counts.window // counts.load
-    windows = min(samples, max(1, round(counts.window * counts.step_s / window_s)))
+    """Steps of a check at which windows end: about as long as asked, of whole load samples."""
+    samples = counts.check // counts.load
+    windows = min(samples, max(1, round(counts.check * counts.step_s / window_s)))
     return counts.load * np.rint(np.arange(1, windows + 1) * samples / windows).astype(np.int64)

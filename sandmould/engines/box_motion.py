@@ -27,8 +27,9 @@ def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
     """
     if stage.vibration is None:
         return np.zeros(count)
-    times: Array = (np.arange(first, first + count) - 1) * np.float64(step_s)
-    return stage.vibration.displacements_at(times)
+    steps = np.arange(first, first + count) + stage.vibration_steps
+    times: Array = (steps - 1) * np.float64(step_s)
+    return stage.vibration.displacements_at(times, stage.stops_smoothly)
 
 
 def box_motion(scenario: Scenario, stage: Stage, steps: int, step_s: float) -> tuple[Array, Array]:
@@ -51,7 +52,6 @@ def box_motion(scenario: Scenario, stage: Stage, steps: int, step_s: float) -> t
     vibration = stage.vibration
     if scenario.frame == "box" or vibration is None:
         return np.zeros(d), np.zeros(d)
-    t = (steps - 1) * step_s
     direction = np.array(vibration.unit_direction(d))
-    after, before = vibration.displacement_at(t + step_s), vibration.displacement_at(t - step_s)
-    return vibration.displacement_at(t) * direction, (after - before) / (2 * step_s) * direction
+    before, now, after = displacements(stage, steps - 1, 3, step_s)
+    return now * direction, (after - before) / (2 * step_s) * direction

@@ -12,6 +12,7 @@ from sandmould.engines.deck import exact, remark
 from sandmould.engines.program import Program, Stage
 from sandmould.scenario.placement import predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind
 
 SKIN = 0.15
 """Neighbour skin of LAMMPS and LIGGGHTS over the mean diameter."""
@@ -69,10 +70,12 @@ def skin_m(scenario: Scenario) -> float:
 
 
 def vibration_key(program: Program, stage: Stage) -> str:
-    """Where in the scenario a stage of vibration stands."""
-    if not stage.counts_as_vibration:
+    """Where in the scenario the vibration of a stage stands, or the one that a rest comes from."""
+    if stage.kind is StageKind.BETWEEN:
         return "fill.vibration_between_layers"
-    return f"vibration.{[s for s in program.stages if s.counts_as_vibration].index(stage)}"
+    if stage.kind is StageKind.REST:
+        stage = program.stages[program.stages.index(stage) - 1]
+    return f"vibration.{stage.number - 1}"
 
 
 def size_classes(scenario: Scenario) -> list[dict[str, Any]]:

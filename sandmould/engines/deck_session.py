@@ -15,7 +15,7 @@ _SETUP = ("header", "box", "create", "contacts", "motion", "walls", "background"
 
 
 class DeckSession(StagedSession):
-    """A deck executed block by block, its long runs cut into windows."""
+    """A deck executed block by block, its long runs cut at checks."""
 
     grains = 0
     _restart: ClassVar[str]
@@ -57,7 +57,7 @@ class DeckSession(StagedSession):
         self._setup_due = True
 
     def _compute_to(self, target: int) -> None:
-        # Setup computes forces with whole-step velocities; only without it do windows add up to
+        # Setup computes forces with whole-step velocities; only without it do parts add up to
         # the deck's own uncut run, bit for bit.
         self.send(f"run {target - self.steps} pre {'yes' if self._setup_due else 'no'} post no")
         self._setup_due = False
@@ -65,6 +65,9 @@ class DeckSession(StagedSession):
     def end_stage(self) -> None:
         """Close the stage that is over."""
         self.send(self._around_run()[1])
+        after = self._blocks.get(f"after_{self.stage.name}")
+        if after is not None:
+            self.send(after.text)
 
     def _save(self, folder: Path) -> None:
         self.send(f'write_restart "{folder.absolute()}/{self._restart}"')

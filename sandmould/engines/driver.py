@@ -66,8 +66,9 @@ class Driver:
         self._guard = Guard(program.scenario)
         self._progress = Progress(name, self._work, program.expected_grain_steps)
         counts, record = StepCounts.of(program.scenario), program.scenario.record
-        self._snapshot_steps = counts.windows(record.snapshot_every_s)
-        self._checkpoint_steps = counts.windows(record.checkpoint_every_s)
+        self._record_steps = counts.record
+        self._snapshot_steps = counts.records(record.snapshot_every_s)
+        self._checkpoint_steps = counts.records(record.checkpoint_every_s)
         self._stop_requested = False
         self._recorder: Recorder | None = None
         self.is_root = True
@@ -146,7 +147,7 @@ class Driver:
                 self._begin_stage(session, stage)
             self._guard.start_stage(stage, session.snapshot())
             while not session.stage_over:
-                self._window(session)
+                self._advance(session)
             self._check_rest(session, stage)
             session.end_stage()
         if session.is_root:
@@ -156,12 +157,12 @@ class Driver:
         """Stop where the sand did not come to rest, or came to rest before it had flowed out."""
         settling = stage.settling
         if settling is not None and not session.at_rest:
-            what, key = (
-                (f"layer {stage.layer}", "fill") if stage.layer else ("the sand", stage.name)
-            )
+            what = f"layer {stage.layer}" if stage.layer else "the sand"
+            longest_s = settling.longest_s - stage.stop_s
             raise EngineStop(
                 Outcome.NOT_SETTLED,
-                f"{what} still moved after {key}.settling.longest_s = {settling.longest_s:g}",
+                f"{what} was not at rest after {stage.longest_key} = {longest_s:g}; "
+                f"{session.rest_sentence}",
             )
         if stage.opens:
             why = what_blocks(self._scenario, session.snapshot())
@@ -176,7 +177,8 @@ class Driver:
         if (stage.counts_as_vibration or stage.opens) and self._recorder is not None:
             self._recorder.save(snapshot)
 
-    def _window(self, session: Session) -> None:
+    def _advance(self, session: Session) -> None:
+        """Compute up to the next check, look at it, and record it where a record is due."""
         before, began = session.steps, time.monotonic()
         session.advance()
         cost = self.cost
@@ -189,12 +191,16 @@ class Driver:
             cost.largest_overlap_fraction, health.largest_overlap_fraction
         )
         loads = session.surface_loads()
+        ended_record = session.steps % self._record_steps == 0
         if self._recorder is not None:
-            self._recorder.record(snapshot, health, loads)
+            self._recorder.add_loads(loads)
+            if ended_record or session.stage_over:
+                self._recorder.record(snapshot, health)
             if session.steps % self._snapshot_steps == 0 or session.stage_over:
                 self._recorder.save(snapshot)
             self._show(session)
-        self._checkpoint_if_due(session)
+        if ended_record:
+            self._checkpoint_if_due(session)
 
     def _show(self, session: Session, last: bool = False) -> None:
         rate = self.cost.grain_steps / max(self.cost.engine_wall_s, 1e-9)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
+from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.fill import Settling
 from sandmould.scenario.placement import (
@@ -17,7 +19,7 @@ from sandmould.scenario.placement import (
 )
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
-from sandmould.scenario.vibration import VibrationStage
+from sandmould.scenario.vibration import RestStage, VibrationStage
 
 OUTFLOW = 0.6
 """Solid measure that flows through an outlet of width w in the time w^(1/2 - d) / sqrt(g): about
@@ -38,8 +40,13 @@ class Stage:
     settling: Settling | None = None
     """When the sand is at rest, which ends the stage; none in a vibration stage."""
     vibration: VibrationStage | None = None
+    """How the box moves; in a stage of rest, the vibration that it comes from."""
     expected_s: float = 0.0
     """Duration: exact for vibration, a guess for settling."""
+    stops_smoothly: bool = False
+    """Whether the box stops smoothly once the vibration is over, since a rest follows."""
+    vibration_steps: int = 0
+    """Steps that the box has vibrated when the stage begins: it stops in the stage of rest."""
 
     @property
     def name(self) -> str:
@@ -50,6 +57,22 @@ class Stage:
     def layer(self) -> int:
         """Layer that falls at the start, from 1; 0 in any other stage."""
         return self.number if self.kind is StageKind.SETTLE else 0
+
+    @property
+    def stop_s(self) -> float:
+        """Time in which the box stops at the beginning of a stage of rest."""
+        if self.kind is not StageKind.REST or self.vibration is None:
+            return 0.0
+        return self.vibration.stop_s
+
+    @property
+    def longest_key(self) -> str:
+        """Key of the scenario that limits the time in which the sand must come to rest."""
+        if self.kind is StageKind.DISCHARGE:
+            return "discharge.settling.longest_s"
+        if self.kind is StageKind.REST and self.number:
+            return f"vibration.{self.number - 1}.longest_s"
+        return "fill.settling.longest_s"
 
     @property
     def counts_as_vibration(self) -> bool:
@@ -70,6 +93,18 @@ class Program:
     def layers(self) -> tuple[PlannedLayer, ...]:
         """Where the grains of each layer start; drawn when first asked for."""
         return tuple(plan_layer(self.scenario, i + 1, count) for i, count in enumerate(self.counts))
+
+    @cached_property
+    def _masses_kg(self) -> tuple[float, ...]:
+        s = self.scenario
+        return tuple(
+            float(s.sand.grain_mass_kg(1.0, s.dimension) * ((2 * x.radius_m) ** s.dimension).sum())
+            for x in self.layers
+        )
+
+    def mass_kg(self, layers: int) -> float:
+        """Mass of the grains of the first layers."""
+        return sum(self._masses_kg[:layers])
 
     @property
     def expected_s(self) -> float:
@@ -137,13 +172,50 @@ def build_program(scenario: Scenario) -> Program:
                 expected_s=_outflow_s(scenario, scenario.discharge),
             )
         )
-    stages += [
-        Stage(
-            StageKind.VIBRATE,
-            number,
-            vibration=stage,
-            expected_s=stage.whole_duration_s,
-        )
-        for number, stage in enumerate(scenario.vibration, start=1)
-    ]
-    return Program(scenario, tuple(stages), tuple(counts))
+    return Program(scenario, (*stages, *_box_stages(scenario)), tuple(counts))
+
+
+def _box_stages(scenario: Scenario) -> Iterator[Stage]:
+    """Stages of vibration and rest after the fill, numbered by their place in the scenario.
+
+    The rest that follows the last vibration by default has no number.
+    """
+    planned: list[tuple[int, VibrationStage | RestStage]] = [*enumerate(scenario.vibration, 1)]
+    if scenario.measure_at_rest and planned and isinstance(planned[-1][1], VibrationStage):
+        longest_s = scenario.fill.settling.longest_s
+        planned.append((0, RestStage(kind="rest", longest_s=longest_s)))
+    moved: VibrationStage | None = None
+    for place, (number, stage) in enumerate(planned):
+        if isinstance(stage, VibrationStage):
+            following = planned[place + 1 : place + 2]
+            stops = bool(following) and isinstance(following[0][1], RestStage)
+            yield Stage(
+                StageKind.VIBRATE,
+                number,
+                vibration=stage,
+                expected_s=stage.whole_duration_s,
+                stops_smoothly=stops and stage.stop_s > 0,
+            )
+            moved = stage
+        else:
+            yield _rest_stage(scenario, number, stage, moved)
+            moved = None
+
+
+def _rest_stage(
+    scenario: Scenario, number: int, rest: RestStage, moved: VibrationStage | None
+) -> Stage:
+    """A stage of rest: the rule of the fill is applied once the box stands."""
+    stop_s = 0.0 if moved is None else moved.stop_s
+    rule = scenario.fill.settling
+    times = {"shortest_s": rule.shortest_s, "longest_s": rest.longest_s}
+    settling = rule.model_copy(update={k: round(stop_s + t, 9) for k, t in times.items()})
+    return Stage(
+        StageKind.REST,
+        number,
+        settling=settling,
+        vibration=moved,
+        expected_s=min(max(stop_s + REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s),
+        stops_smoothly=stop_s > 0,
+        vibration_steps=0 if moved is None else StepCounts.of(scenario).vibration(moved),
+    )

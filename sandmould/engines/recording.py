@@ -34,6 +34,8 @@ class Recorder:
         for path in self._folder.iterdir():
             if not path.stem.isdigit() or int(path.stem) >= self.snapshots:
                 path.unlink()
+        self._load_sums: dict[str, Array] = {}
+        self._checks = 0
         headers = _headers(dimension)
         sizes = {"series.tsv": mark.series_bytes, "loads.tsv": mark.loads_bytes} if mark else {}
         self._series, self._loads = (
@@ -41,14 +43,25 @@ class Recorder:
             for name, columns in headers.items()
         )
 
-    def record(self, snapshot: Snapshot, health: Health, loads: Mapping[str, Array] | None) -> None:
-        """Write one row of the series and one row a surface of the loads."""
+    def add_loads(self, loads: Mapping[str, Array] | None) -> None:
+        """Take in the mean loads of a check that has ended; None where none has."""
+        if loads is not None:
+            self._load_sums = {k: self._load_sums.get(k, 0.0) + f for k, f in loads.items()}
+            self._checks += 1
+
+    def record(self, snapshot: Snapshot, health: Health) -> None:
+        """Write one row of the series and one row a surface of the loads.
+
+        Loads are means over the checks since the last row.
+        """
         when = (f"{snapshot.time_s:.9g}", f"{snapshot.vibration_time_s:.9g}", snapshot.stage)
         measured = (health.kinetic_energy_j, health.rms_speed_m_s, health.largest_overlap_fraction)
         row = (*when, str(len(snapshot.id)), *(f"{x:.6g}" for x in measured))
         self._series.write("\t".join(row) + "\n")
-        for surface, force in (loads or {}).items():
-            self._loads.write("\t".join((*when, surface, *(f"{x:.9g}" for x in force))) + "\n")
+        for surface, force_n in self._load_sums.items():
+            mean = (f"{x / self._checks:.9g}" for x in force_n)
+            self._loads.write("\t".join((*when, surface, *mean)) + "\n")
+        self._load_sums, self._checks = {}, 0
 
     def save(self, snapshot: Snapshot) -> None:
         """Write the next snapshot."""

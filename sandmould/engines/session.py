@@ -84,11 +84,28 @@ class Session(Protocol):
 
     @property
     def stage_over(self) -> bool:
-        """Whether the stage's time is up or its rest rule met."""
+        """Whether the stage's time is up or the sand at rest."""
 
     @property
     def at_rest(self) -> bool:
-        """Whether the settling rule of the stage was met."""
+        """Whether the sand has come to rest in a stage of settling."""
+
+    @property
+    def sand_rests(self) -> bool:
+        """Whether the checks of this stage find the sand at rest, held or not."""
+
+    def hold_rest(self, why: str) -> None:
+        """Let the stage go on while something else than the sand still moves.
+
+        Parameters
+        ----------
+        why : str
+            What has moved since the last check.
+        """
+
+    @property
+    def rest_sentence(self) -> str:
+        """What the last check for rest found."""
 
     @property
     def steps(self) -> int:
@@ -117,7 +134,7 @@ class Session(Protocol):
         """Begin to settle or to vibrate."""
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record, not past the end of the stage.
+        """Compute for a duration, or up to the next check, not past the end of the stage.
 
         Parameters
         ----------
@@ -137,18 +154,18 @@ class Session(Protocol):
         """State of all grains, relative to the box."""
 
     def surface_loads(self) -> Mapping[str, Array] | None:
-        """Give the mean force of the sand on each wall and block over the last window.
+        """Give the mean force of the sand on each wall and block over the last check.
 
         Returns
         -------
         mapping of surface to (d,) float64, N, or None
-            None when the last advance did not end a window.
+            None when the last advance did not end a check.
         """
 
     def vertex_loads(self, name: str) -> Array | None:
         """Give the mean force of the sand on each vertex of a surface since the last asking.
 
-        Of a record that ended without asking nothing is kept. Forces between vertices are shared
+        Of a check that ended without asking nothing is kept. Forces between vertices are shared
         out by shape functions, eq. (56), so that force and moment are those of the contacts.
 
         Parameters
@@ -198,11 +215,11 @@ class Session(Protocol):
         """
 
     def write_checkpoint(self, folder: Path) -> None:
-        """Write all that a continued run needs; only after a full window."""
+        """Write all that a continued run needs; only after a full check."""
 
     @property
     def can_checkpoint(self) -> bool:
-        """Whether the last advance ended a window, so that no mean is cut."""
+        """Whether the last advance ended a check, so that no mean is cut."""
 
     def share(self, value: Shared) -> Shared:
         """Give the first rank's value to all ranks."""

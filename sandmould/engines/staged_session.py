@@ -1,10 +1,13 @@
-"""What sessions of all engines do alike: stages cut into windows, snapshots, checkpoints."""
+"""What sessions of all engines do alike: stages cut at checks, rest, snapshots, checkpoints."""
 
 from __future__ import annotations
 
+import bisect
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -13,10 +16,13 @@ from numpy.typing import NDArray
 
 from sandmould.engines.box_motion import box_motion
 from sandmould.engines.program import Program, Stage
+from sandmould.engines.rest import RestWatch
 from sandmould.engines.session import Array, RefusedError, Shared
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.step_mover import StepMover
+from sandmould.scenario.fill import Settling
+from sandmould.scenario.stages import StageKind
 
 
 class StageState(NamedTuple):
@@ -24,7 +30,8 @@ class StageState(NamedTuple):
 
     stage_over: bool
     at_rest: bool
-    ended_window: bool
+    ended_check: bool
+    watch: RestWatch
     last_sums: dict[str, tuple[int, int, Array]]
     """See ``StagedSession``."""
 
@@ -53,12 +60,14 @@ class StagedSession(ABC):
         self.step_s = self._counts.step_s
         self.stage = program.stages[0]
         self.stage_over = self.at_rest = False
+        self._watch = self._new_watch()
         self._stage_start = self._stage_end = 0
         self._vibration_start: int | None = None
-        self._ended_window = False
+        """Step at which vibration began, moved on by every rest: it is no time of vibration."""
+        self._ended_check = False
         self._opened: set[str] = set()
         self._last_sums: dict[str, tuple[int, int, Array]] = {}
-        """Record, samples and sums of the loads on a surface's vertices when last asked for."""
+        """Check, samples and sums of the loads on a surface's vertices when last asked for."""
 
     @property
     @abstractmethod
@@ -83,18 +92,18 @@ class StagedSession(ABC):
         """Compute up to a step of the stage."""
 
     @abstractmethod
-    def _rests(self) -> bool:
-        """Whether the rest rule of the settling stage is met."""
+    def _rms_speed_m_s(self) -> float:
+        """Root mean square speed of all grains, weighted by mass."""
 
     @abstractmethod
     def _mean_loads(self) -> Mapping[str, Array]:
-        """Mean force of the sand on each surface over the window that has just ended, N."""
+        """Mean force of the sand on each surface over the check that has just ended, N."""
 
     @abstractmethod
     def _vertex_sums(self, name: str) -> tuple[Array, int]:
-        """Sum of the loads on a surface's vertices over this record, and its number of samples.
+        """Sum of the loads on a surface's vertices over this check, and its number of samples.
 
-        Right after a record has ended: of the whole of that record.
+        Right after a check has ended: of the whole of that check.
         """
 
     @abstractmethod
@@ -121,13 +130,13 @@ class StagedSession(ABC):
 
     def _stage_steps(self) -> int:
         """Steps of the stage, at most."""
-        if self.stage.vibration is not None:
-            return self._counts.vibration(self.stage.vibration)
-        assert self.stage.settling is not None
-        return self._counts.steps(self.stage.settling.longest_s)
+        if self.stage.settling is not None:
+            return self._counts.steps(self.stage.settling.longest_s)
+        assert self.stage.vibration is not None
+        return self._counts.vibration(self.stage.vibration)
 
     def start_stage(self, stage: Stage) -> None:
-        """Begin to settle, to flow out or to vibrate."""
+        """Begin to settle, to flow out, to vibrate or to rest."""
         if stage.opens:
             self._take_away(stage.opens)
         self._start(stage)
@@ -137,22 +146,62 @@ class StagedSession(ABC):
         self._opened.add(gate)
 
     def _start(self, stage: Stage) -> None:
+        if self.stage.kind is StageKind.REST and self._vibration_start is not None:
+            self._vibration_start += self.steps - self._stage_start
         self.stage, self.stage_over, self.at_rest = stage, False, False
+        self._watch = self._new_watch()
         self._stage_start = self.steps
         self._stage_end = self._stage_start + self._stage_steps()
         if stage.counts_as_vibration and self._vibration_start is None:
             self._vibration_start = self._stage_start
         self._begin_stage()
 
+    def _new_watch(self) -> RestWatch:
+        rest = self._scenario.rest
+        return RestWatch(rest, rest.speed_limit_m_s(flows=bool(self.stage.opens)))
+
+    @property
+    def sand_rests(self) -> bool:
+        """Whether the checks of this stage find the sand at rest, held or not."""
+        return self.stage.settling is not None and self._watch.sand_rests
+
+    def hold_rest(self, why: str) -> None:
+        """Let the stage go on while something else than the sand still moves; see ``Session``."""
+        self._watch.hold(why)
+
+    @property
+    def rest_sentence(self) -> str:
+        """What the last check for rest found."""
+        return self._watch.sentence
+
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration or up to the next record, not past the end of the stage."""
-        now, window = self.steps, self._counts.window
-        ahead = window - now % window if duration_s is None else self._counts.steps(duration_s)
-        self._compute_to(min(now + ahead, self._stage_end))
-        self._ended_window = self.steps % window == 0
-        if self._ended_window and self.stage.settling is not None:
-            self.at_rest = self._rests()
-        self.stage_over = self.at_rest or self.steps >= self._stage_end
+        """Compute for a duration or up to the next check, not past the end of the stage."""
+        now, check = self.steps, self._counts.check
+        ahead = check - now % check if duration_s is None else self._counts.steps(duration_s)
+        target = min(now + ahead, self._stage_end)
+        while self.steps < target:
+            self._compute_to(min(target, (self.steps // check + 1) * check))
+            self._ended_check = self.steps % check == 0
+            if self._ended_check and self.stage.settling is not None:
+                self._check_rest(self.stage.settling)
+            self.stage_over = self.at_rest or self.steps >= self._stage_end
+            if self.stage_over:
+                return
+
+    def _check_rest(self, settling: Settling) -> None:
+        """Let the watch see a check that lies in the stage as a whole."""
+        if self.steps - self._counts.check < self._stage_start:
+            return
+        loads = self.surface_loads() or {}
+        support_n = -sum(float(force[-1]) for force in loads.values())
+        self._watch.check(self._rms_speed_m_s(), support_n, self._weight_n())
+        long_enough = self.steps - self._stage_start >= self._counts.steps(settling.shortest_s)
+        self.at_rest = long_enough and self._watch.at_rest
+
+    def _weight_n(self) -> float:
+        """Weight of all grains now in the box."""
+        layers = bisect.bisect_right(list(accumulate(self._program.counts)), self.grains)
+        return self._program.mass_kg(layers) * self._scenario.gravity_m_s2
 
     def _snapshot(
         self,
@@ -178,9 +227,10 @@ class StagedSession(ABC):
             self._scenario, self.stage, self.steps - self._stage_start, self.step_s
         )
         start = self._vibration_start
+        shaken = self._stage_start if self.stage.kind is StageKind.REST else self.steps
         return Snapshot(
             time_s=self.time_s,
-            vibration_time_s=-1.0 if start is None else (self.steps - start) * self.step_s,
+            vibration_time_s=-1.0 if start is None else (shaken - start) * self.step_s,
             stage=self.stage.name,
             id=ids,
             layer=self._layer_of_id[: self.grains],
@@ -192,18 +242,18 @@ class StagedSession(ABC):
         )
 
     def surface_loads(self) -> Mapping[str, Array] | None:
-        """Mean force of the sand on each surface over the last window, N."""
-        if not self._ended_window:
+        """Mean force of the sand on each surface over the last check, N."""
+        if not self._ended_check:
             return None
         return {name: f for name, f in self._mean_loads().items() if name not in self._opened}
 
     def vertex_loads(self, name: str) -> Array | None:
         """Mean force of the sand on each vertex of a surface since the last asking, N."""
-        record = (self.steps - 1) // self._counts.window
+        check = (self.steps - 1) // self._counts.check
         sums, samples = self._vertex_sums(name)
         earlier = self._last_sums.get(name)
-        self._last_sums[name] = (record, samples, sums)
-        if earlier is not None and earlier[0] == record:
+        self._last_sums[name] = (check, samples, sums)
+        if earlier is not None and earlier[0] == check:
             sums, samples = sums - earlier[2], samples - earlier[1]
         return sums / samples if samples else None
 
@@ -217,11 +267,18 @@ class StagedSession(ABC):
 
     def _stage_state(self) -> StageState:
         """How far the session is in its stage, for a checkpoint in memory."""
-        return StageState(self.stage_over, self.at_rest, self._ended_window, dict(self._last_sums))
+        return StageState(
+            self.stage_over,
+            self.at_rest,
+            self._ended_check,
+            replace(self._watch),
+            dict(self._last_sums),
+        )
 
     def _restore_stage(self, state: StageState) -> None:
         """Stand in the stage as ``_stage_state`` found it."""
-        self.stage_over, self.at_rest, self._ended_window = state[:3]
+        self.stage_over, self.at_rest, self._ended_check = state[:3]
+        self._watch = replace(state.watch)
         self._last_sums = dict(state.last_sums)
 
     def attach_mover(self, name: str, mover: StepMover) -> None:
@@ -230,8 +287,8 @@ class StagedSession(ABC):
 
     @property
     def can_checkpoint(self) -> bool:
-        """Whether the last advance ended a window and the stage goes on."""
-        return self._ended_window and not self.stage_over
+        """Whether the last advance ended a check and the stage goes on."""
+        return self._ended_check and not self.stage_over
 
     def write_checkpoint(self, folder: Path) -> None:
         """Write the engine's state and where the stage stands."""
@@ -241,6 +298,7 @@ class StagedSession(ABC):
                 "stage": self.stage.name,
                 "stage_start": self._stage_start,
                 "vibration_start": self._vibration_start,
+                "checks_at_rest": [self._watch.in_row, self._watch.all_in_row],
             }
             (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
 
@@ -259,4 +317,5 @@ class StagedSession(ABC):
         self._stage_start = state["stage_start"]
         self._stage_end = self._stage_start + self._stage_steps()
         self._vibration_start = state["vibration_start"]
-        self._ended_window = True
+        self._watch.in_row, self._watch.all_in_row = state["checks_at_rest"]
+        self._ended_check = True

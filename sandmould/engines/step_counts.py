@@ -11,27 +11,32 @@ from sandmould.scenario.vibration import VibrationStage
 
 @dataclass(frozen=True)
 class StepCounts:
-    """Steps between load samples and between records; the second a multiple of the first."""
+    """Steps between load samples, checks and records; each a multiple of the one before.
+
+    What is computed hangs on the first two alone.
+    """
 
     step_s: float
     load: int
-    window: int
+    check: int
+    record: int
 
     @classmethod
     def of(cls, scenario: Scenario) -> StepCounts:
         """Round the intervals of a scenario."""
         step = scenario.step_s
-        load = scenario.record.load_every_steps
-        window = load * max(1, round(scenario.record.series_every_s / step / load))
-        return cls(step, load, window)
+        load = scenario.rest.load_every_steps
+        check = load * max(1, round(scenario.rest.check_every_s / step / load))
+        record = check * max(1, round(scenario.record.series_every_s / step / check))
+        return cls(step, load, check, record)
 
     def steps(self, time_s: float) -> int:
         """Whole steps that cover a time."""
         return math.ceil(time_s / self.step_s * (1 - 1e-12))
 
-    def windows(self, interval_s: float) -> int:
-        """Steps of an interval, rounded to whole windows, at least one."""
-        return self.window * max(1, round(interval_s / self.step_s / self.window))
+    def records(self, interval_s: float) -> int:
+        """Steps of an interval, rounded to whole records, at least one."""
+        return self.record * max(1, round(interval_s / self.step_s / self.record))
 
     def vibration(self, stage: VibrationStage) -> int:
         """Steps of a vibration stage, with one at rest at either end."""

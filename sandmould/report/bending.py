@@ -129,7 +129,7 @@ def _tip_sentences(
     first = shaken.iloc[0] if len(shaken) else rows.iloc[-1]
     last = rows.iloc[-1]
     said.append(f"Its tip had sunk by {_mm(first[TIP])} mm when the box was filled{_under(first)}.")
-    if scenario.vibration and len(shaken) > 1:
+    if scenario.vibrations and len(shaken) > 1:
         back = 1.0 - last[TIP] / first[TIP] if first[TIP] else 0.0
         way = "hardly moved it"
         if abs(back) > _RECOVERS:

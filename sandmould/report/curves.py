@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from sandmould.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
-from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S
+from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import (
     display_scale,
     name_of,
@@ -103,7 +103,7 @@ def time_chart(
     """
     if measure not in curves or not curves[measure].notna().any():
         return None
-    shaken = curves[curves[VIBRATION_TIME_S] >= 0]
+    shaken = during_vibration(curves)
     clock = VIBRATION_TIME_S if len(shaken) else TIME_S
     charted = shaken if len(shaken) else curves
     factor, what = display_scale(measure)
@@ -319,7 +319,7 @@ def best_passage(
     rows = runs_of(collected.summary, verdict.best)
     used = rows.loc[barred(rows, measure) == "", RUN]
     curves = collected.curves
-    shaken = curves[curves[RUN].isin(used) & (curves[VIBRATION_TIME_S] >= 0)]
+    shaken = during_vibration(curves[curves[RUN].isin(used)])
     passages = []
     for _, run in shaken.groupby(RUN):
         time_s = run[VIBRATION_TIME_S].to_numpy(dtype=np.float64)

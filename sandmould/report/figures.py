@@ -93,7 +93,7 @@ def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
     for tube in scenario.obstacles:
         if isinstance(tube, Tube):
             _tube_dimensions(tube, ax, width, far)
-    if scenario.vibration:
+    if scenario.vibrations:
         _draw_vibration(scenario, ax, (width + 1.5 * far, 0.5 * height), 1.6 * far)
     ax.set_xlim(left, right)
     ax.set_ylim(foot, height + 0.4 * far)
@@ -120,7 +120,7 @@ def _draw_vibration(
     scenario: Scenario, ax: Axes, centre: tuple[float, float], reach: float
 ) -> None:
     """An arrow both ways along the direction of the first stage, not to scale."""
-    direction = scenario.vibration[0].unit_direction(scenario.dimension)
+    direction = scenario.vibrations[0].unit_direction(scenario.dimension)
     along = np.array([direction[0], direction[-1]]) * reach
     style = {"arrowstyle": "<|-|>", "color": "#0b5cad", "lw": 2.0, "mutation_scale": 16}
     middle = np.array(centre)

@@ -13,7 +13,7 @@ from scipy.stats import t as student
 from analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.report.chart import Chart, Line, tints
 from sandmould.report.curves import reported_lines, runs_by_setting, runs_of
-from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S
+from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred
@@ -56,7 +56,7 @@ def filling_pages(
         At the best setting.
     """
     best, measure = verdict.best, verdict.measure
-    if best is None or not scenario.vibration or not measure.endswith("_fill_fraction"):
+    if best is None or not scenario.vibrations or not measure.endswith("_fill_fraction"):
         return None
     shaken = _shaken(collected, measure)
     if measure not in shaken or shaken.empty:
@@ -79,11 +79,11 @@ def _shaken(collected: Collected, measure: str) -> pd.DataFrame:
     """Curves of usable runs during vibration."""
     summary, curves = collected.summary, collected.curves
     used = summary.loc[barred(summary, measure) == "", RUN]
-    return curves[curves[RUN].isin(used) & (curves[VIBRATION_TIME_S] >= 0)]
+    return during_vibration(curves[curves[RUN].isin(used)])
 
 
 def _drive(scenario: Scenario, best: Setting) -> str:
-    stage = scenario.vibration[0]
+    stage = scenario.vibrations[0]
     velocity_m_s = stage.amplitude_m * stage.angular_frequency_rad_s
     return (
         f"At {best.label} the box moves {number(1e3 * stage.amplitude_m)} mm to either side at "

@@ -20,6 +20,7 @@ from sandmould.runs.columns import (
 from sandmould.runs.formatting import listed, name_of, number, seconds, value_text
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.definition.study import Objective
@@ -75,7 +76,8 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
         Row("No tension, eq. (18)", _NO_TENSION[contact.no_tension]),
         Row("Background damping", _damping(scenario)),
         Row("Filling", _filling(scenario)),
-        *(Row("Vibration", _vibration(s, scenario, keys)) for s in scenario.vibration),
+        *(Row("Vibration", _vibration(s, scenario, keys)) for s in scenario.vibrations),
+        *([Row("Measured", _measured(scenario))] if scenario.vibrations else []),
         Row("Time step", _time_step(scenario, summary)),
         Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
         Row("Seeds", _seeds(summary)),
@@ -161,7 +163,16 @@ def _filling(scenario: Scenario) -> str:
     plural = "s" if layers > 1 else ""
     return (
         f"{layers} layer{plural} dropped {1e3 * fill.drop_height_m:g} mm{between}; the next "
-        f"comes when the grains' rms speed is below {fill.settling.rms_speed_m_s:g} m/s"
+        f"comes when {_rest(scenario.rest)}"
+    )
+
+
+def _rest(rest: Rest) -> str:
+    share = rest.load_tolerance
+    loads = "" if share is None else f" and surfaces bear its weight within {100 * share:g} %"
+    return (
+        f"the grains' rms speed is below {rest.rms_speed_m_s:g} m/s{loads}, "
+        f"in {rest.checks} checks of {1e3 * rest.check_every_s:g} ms in a row"
     )
 
 
@@ -180,6 +191,22 @@ def _vibration(stage: VibrationStage, scenario: Scenario, keys: Sequence[str]) -
     )
     ramp = f", ramp {seconds(stage.ramp_s)}" if stage.ramp_s else ""
     return f"{where}, sinusoidal, {what}; {seconds(stage.whole_duration_s)}{ramp}; in {frame}"
+
+
+def measured_when(scenario: Scenario) -> str:
+    """When measures are taken without a time: at the end of a run."""
+    if not scenario.vibrations:
+        return "the end"
+    return "rest after vibration" if scenario.ends_at_rest else "the end of vibration"
+
+
+def _measured(scenario: Scenario) -> str:
+    if not scenario.ends_at_rest:
+        return "at the end of vibration, at full speed: measure_at_rest is false"
+    stop = "the box stops smoothly"
+    if scenario.vibrations[-1].ramp_s:
+        stop = "the box stands"
+    return f"at rest after vibration: {stop} and the sand comes to rest as after a layer"
 
 
 def _time_step(scenario: Scenario, summary: pd.DataFrame) -> str:

@@ -123,7 +123,7 @@ def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
         rigid_n = weight_n / scenario.gravity_m_s2 * SHAKE_G * STANDARD_GRAVITY_M_S2
         window_s = scenario.record.series_every_s
         shaken, response = [], []
-        for place, stage in enumerate(scenario.vibration, start=1):
+        for place, stage in enumerate(scenario.vibrations, start=1):
             rows = total[total[STAGE] == StageKind.VIBRATE.numbered(place)]
             if len(rows) < 4:
                 continue

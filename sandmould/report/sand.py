@@ -175,7 +175,7 @@ def _role_text(role: str, verdict: Verdict, summary: pd.DataFrame) -> str:
 
 def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Moment]]:
     """Snapshots at 0, 1/8, 1/2 and 1 of the vibration, as far as the run has them."""
-    duration_s = sum(stage.whole_duration_s for stage in scenario.vibration)
+    duration_s = sum(stage.whole_duration_s for stage in scenario.vibrations)
     if not moments:
         return []
     if not duration_s:
@@ -184,7 +184,9 @@ def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Mo
     for heading, share in MOMENTS.items():
         moment = nearest(moments, share * duration_s)
         if abs(moment.vibration_time_s - share * duration_s) <= 0.1 * duration_s:
-            chosen.setdefault(moment.path, (heading, moment))
+            rests = share == 1.0 and scenario.ends_at_rest
+            shown = "at rest after its end" if rests else heading
+            chosen.setdefault(moment.path, (shown, moment))
     return list(chosen.values()) or [("at its last snapshot", moments[-1])]
 
 

@@ -137,7 +137,7 @@ def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table
     scenarios : mapping of str to Scenario
         One scenario a setting, by label, for the drive of the vibrating table.
     """
-    shaken = any(s.vibration for s in scenarios.values())
+    shaken = any(s.vibrations for s in scenarios.values())
     drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if shaken else ()
     columns = (
         Column("setting", False),
@@ -186,9 +186,9 @@ def _drive_cells(scenario: Scenario | None, shaken: bool) -> tuple[Cell, ...]:
     """Peak displacement, velocity and acceleration of the first stage of vibration."""
     if not shaken:
         return ()
-    if scenario is None or not scenario.vibration:
+    if scenario is None or not scenario.vibrations:
         return _number_cells(*[(math.nan, 3)] * 3)
-    stage = scenario.vibration[0]
+    stage = scenario.vibrations[0]
     velocity = stage.amplitude_m * stage.angular_frequency_rad_s
     return _number_cells(
         (1e3 * stage.amplitude_m, 3), (1e3 * velocity, 3), (stage.peak_acceleration_g, 3)

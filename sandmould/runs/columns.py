@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.stages import is_rest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,6 +63,16 @@ SOLIDIFICATION_TIME_S: Final = "solidification_time_s"
 
 OF_OUTCOME: Final = (OUTCOME_CODE, OUTCOME, DETAIL, SIMULATED_S, PLANNED_S)
 CLOCK: Final = (TIME_S, VIBRATION_TIME_S, STAGE)
+
+
+def during_vibration(curves: pd.DataFrame) -> pd.DataFrame:
+    """Rows of curves from the start of vibration to its end.
+
+    The clock of vibration stands while the sand comes to rest, so those rows belong to no curve
+    over it.
+    """
+    rests = curves[STAGE].map(lambda name: is_rest(str(name))).astype(bool)
+    return curves[(curves[VIBRATION_TIME_S] >= 0) & ~rests]
 
 
 def finished(summary: pd.DataFrame) -> pd.Series[bool]:

@@ -14,6 +14,7 @@ from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
+from sandmould.scenario.vibration import VibrationStage
 
 KINDS = {2: ("plate", "tube", "polygon"), 3: ("plate", "tube", "cylinder", "mesh", "triangles")}
 """Kinds of obstacles that a dimension has."""
@@ -201,11 +202,22 @@ def _time(s: Scenario) -> Iterator[Problem]:
             own,
             f"at most the critical step {critical.step_s:.4g} s, set by {critical.cause}",
         )
-    elif s.record.series_every_s < s.step_s:
+    elif s.rest.check_every_s < s.step_s:
+        yield Problem(
+            "rest.check_every_s", s.rest.check_every_s, f"at least the time step {s.step_s:.4g} s"
+        )
+    loop = None if s.pattern is None else s.pattern.loop
+    if loop is not None and loop.has_windows and loop.window_s > s.rest.check_every_s:
+        yield Problem(
+            "pattern.loop.window_s",
+            loop.window_s,
+            f"at most rest.check_every_s, {s.rest.check_every_s:g} s",
+        )
+    if s.record.series_every_s < s.rest.check_every_s:
         yield Problem(
             "record.series_every_s",
             s.record.series_every_s,
-            f"at least the time step {s.step_s:.4g} s",
+            f"at least rest.check_every_s, {s.rest.check_every_s:g} s",
         )
     if s.record.snapshot_every_s < s.record.series_every_s:
         yield Problem(
@@ -216,7 +228,14 @@ def _time(s: Scenario) -> Iterator[Problem]:
 
 
 def _vibration(s: Scenario) -> Iterator[Problem]:
-    stages = [(f"vibration.{i}", v) for i, v in enumerate(s.vibration)]
+    stages = []
+    for i, stage in enumerate(s.vibration):
+        shortest_s = s.fill.settling.shortest_s
+        if isinstance(stage, VibrationStage):
+            stages.append((f"vibration.{i}", stage))
+        elif stage.longest_s <= shortest_s:
+            valid = f"more than fill.settling.shortest_s, {shortest_s:g} s"
+            yield Problem(f"vibration.{i}.longest_s", stage.longest_s, valid)
     if s.fill.vibration_between_layers is not None:
         stages.append(("fill.vibration_between_layers", s.fill.vibration_between_layers))
     for key, stage in stages:

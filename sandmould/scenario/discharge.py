@@ -9,15 +9,11 @@ from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 
 
-class Rest(Settling):
-    """When a flow counts as over: stricter than for a layer, for few of many still roll."""
+class FlowSettling(Settling):
+    """How long a flow may take to be over."""
 
-    rms_speed_m_s: float = quantity(
-        0.002, "Root mean square speed of all grains, weighted by mass, below which it is over.",
-        unit="m/s", source=ARGUED, gt=0, le=10,
-    )  # fmt: skip
     shortest_s: float = quantity(
-        0.2, "The rule is asked no sooner than this.", unit="s", source=ARGUED, ge=0, le=100
+        0.2, "A flow counts as over no sooner than this.", unit="s", source=ARGUED, ge=0, le=100
     )
     longest_s: float = quantity(
         20.0, "A flow not over by then ends the run.", unit="s", source=ARGUED, gt=0, le=1000
@@ -31,4 +27,6 @@ class Discharge(Section):
     """
 
     gate: str = quantity(..., "Name of the plate that is taken away.", source="user")
-    settling: Rest = Field(Rest(), description="When the flow counts as over.")
+    settling: FlowSettling = Field(
+        FlowSettling(), description="How long the flow may take to be over."
+    )

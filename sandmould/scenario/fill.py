@@ -34,18 +34,10 @@ class Layer(Section):
 
 
 class Settling(Section):
-    """When a layer is at rest, so that the next may come."""
+    """How long a layer may take to come to rest, by the checks of ``rest``."""
 
-    rms_speed_m_s: float = quantity(
-        0.01,
-        "Root mean square speed of all grains, weighted by mass, below which the bed is at rest.",
-        unit="m/s",
-        source=ARGUED,
-        gt=0,
-        le=10,
-    )
     shortest_s: float = quantity(
-        0.05, "The rule is asked no sooner than this.", unit="s", source=ARGUED, ge=0, le=100
+        0.05, "A bed counts as at rest no sooner than this.", unit="s", source=ARGUED, ge=0, le=100
     )
     longest_s: float = quantity(
         2.0, "A bed not at rest by then ends the run.", unit="s", source=ARGUED, gt=0, le=1000
@@ -91,7 +83,7 @@ class Fill(Section):
         gt=0,
         lt=1,
     )
-    settling: Settling = Field(Settling(), description="When a layer counts as settled.")
+    settling: Settling = Field(Settling(), description="How long a layer may take to settle.")
     vibration_between_layers: VibrationStage | None = Field(
         None, description="Vibration after each layer but the last."
     )

@@ -95,7 +95,7 @@ class Loop(Section):
     """The staggered loop: in each window sand moves under a moving surface, then the pattern."""
 
     window_s: float = quantity(
-        0.002, "Length of a window; rounded so that a record holds whole ones.", unit="s",
+        0.0025, "Length of a window; rounded so that a check holds whole ones.", unit="s",
         source=ARGUED, gt=0, le=1,
     )  # fmt: skip
     scheme: Scheme = quantity(

@@ -18,18 +18,19 @@ from sandmould.scenario.fill import Fill
 from sandmould.scenario.geometry import Scene
 from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.rest import Rest
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.stages import is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
-from sandmould.scenario.vibration import VibrationStage
+from sandmould.scenario.vibration import BoxStage, VibrationStage
 
 
 class Recording(Section):
-    """What a run writes down, and how often."""
+    """What a run writes down, and how often; nothing of it changes what is computed."""
 
     series_every_s: float = quantity(
         0.02,
-        "Interval of the time series, the guards and the rest rule; loads are means over it.",
+        "Interval of the time series, rounded to whole checks; loads are means over it.",
         unit="s",
         source=ARGUED,
         gt=0,
@@ -48,9 +49,6 @@ class Recording(Section):
         False,
         "Whether snapshots hold the orientation of every grain, eqs. (8)-(13).",
         source=ARGUED,
-    )
-    load_every_steps: int = quantity(
-        20, "Steps between samples of the wall loads.", source=ARGUED, ge=1, le=100000
     )
     checkpoint_every_s: float = quantity(
         0.1,
@@ -108,8 +106,15 @@ class Scenario(Section):
     discharge: Discharge | None = Field(
         None, description="Flow of the filled sand through an opened gate, before any vibration."
     )
-    vibration: tuple[VibrationStage, ...] = Field(
-        (), description="Stages of vibration after fill and discharge, in order."
+    vibration: tuple[BoxStage, ...] = Field(
+        (), description="Stages of vibration and of rest after fill and discharge, in order."
+    )
+    measure_at_rest: bool = quantity(
+        True,
+        "Whether the box stops and the sand comes to rest after the last stage of vibration, where "
+        "packing and fill are then measured. Otherwise the run ends, and is measured, at full "
+        "speed.",
+        source=ARGUED,
     )
     frame: Literal["box", "laboratory"] = quantity(
         "box",
@@ -118,6 +123,7 @@ class Scenario(Section):
     )
     engine: Engine = Field(Engine(), description="The engine.")
     time_step: TimeStep = Field(TimeStep(), description="The time step.")
+    rest: Rest = Field(Rest(), description="When sand is at rest.")
     record: Recording = Field(Recording(), description="What is recorded.")
     guard: GuardLimits = Field(GuardLimits(), description="When a run is stopped.")
     seed: int = quantity(1, "Seed of all that is drawn.", source="user", ge=0, le=2**31 - 1)
@@ -132,6 +138,17 @@ class Scenario(Section):
         if self.discharge is None or (stage and is_filling(stage)):
             return self.scene
         return self.scene.without(self.discharge.gate)
+
+    @property
+    def vibrations(self) -> tuple[VibrationStage, ...]:
+        """The stages in which the box vibrates after fill and discharge."""
+        return tuple(stage for stage in self.vibration if isinstance(stage, VibrationStage))
+
+    @property
+    def ends_at_rest(self) -> bool:
+        """Whether the last that happens is that the sand comes to rest after vibration."""
+        rests = self.measure_at_rest or self.vibration[-1:] != self.vibrations[-1:]
+        return bool(self.vibrations) and rests
 
     @property
     def largest_diameter_m(self) -> float:

@@ -16,6 +16,8 @@ class StageKind(Enum):
     """Sand flows out through the gate until it rests."""
     VIBRATE = "vibrate"
     """The box vibrates after the fill."""
+    REST = "rest"
+    """The box stands after vibration, and the sand comes to rest."""
 
     @property
     def fills(self) -> bool:
@@ -41,3 +43,8 @@ def stage_kind(name: str) -> StageKind:
 def is_filling(name: str) -> bool:
     """Whether the stage of a name belongs to the fill."""
     return stage_kind(name).fills
+
+
+def is_rest(name: str) -> bool:
+    """Whether a stage of this name is a rest after vibration; any text will do."""
+    return name.partition("_")[0] == StageKind.REST.value

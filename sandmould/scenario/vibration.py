@@ -1,18 +1,22 @@
-"""Vibration of the moulding box: one sinusoid a stage, what is held constant, and its start.
+"""Vibration of the moulding box: one sinusoid a stage, what is held constant, its start and stop.
 
 The box moves as s(t) = A R(t) sin(2 pi f t) from the start of the stage, with R rising to 1 and
 falling to 0 over the ramp at either end. A stage lasts a whole number of periods, so the box
 ends where it began and the next stage needs no jump.
+
+Where the sand comes to rest after a stage without a ramp, the box stops smoothly: once the stage
+is over the sinusoid goes on, and its amplitude falls as (1 + cos(pi t / t_stop)) / 2. Neither the
+place nor the velocity of the box jumps at either end of the stop, at whatever phase it begins.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Discriminator, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from sandmould.scenario.quantity import Section, quantity
@@ -21,11 +25,16 @@ from sandmould.scenario.sand import ARGUED
 STANDARD_GRAVITY_M_S2 = 9.80665
 """The 'g' of an acceleration_g (CGPM 1901), whatever gravity the scene has."""
 TUBE_PAPER = "Rojek 2004, section 4.2"
+STOP_PERIODS = 1.0
+"""Periods in which the box stops: in a half one it would be accelerated 1.4 times as hard as by the
+vibration, in one 1.05 times, and the longer it takes the more the fading vibration packs the bed
+(docs/measured_at_rest.md)."""
 
 
 class VibrationStage(Section):
     """One stage of vibration at one frequency."""
 
+    kind: Literal["vibrate"] = "vibrate"
     direction: Literal["vertical", "horizontal"] | tuple[float, ...] = quantity(
         "vertical", "Direction of the box motion: a word or a vector.", source=TUBE_PAPER
     )
@@ -117,6 +126,11 @@ class VibrationStage(Section):
         """Duration rounded to a whole number of periods, at least one."""
         return max(1, round(self.duration_s * self.frequency_hz)) / self.frequency_hz
 
+    @property
+    def stop_s(self) -> float:
+        """Time in which the box stops once the stage is over; 0 of a stage that has a ramp."""
+        return 0.0 if self.ramp_s > 0 else STOP_PERIODS / self.frequency_hz
+
     def unit_direction(self, dimension: int) -> tuple[float, ...]:
         """Direction as a unit vector of the scene's dimension."""
         if self.direction == "vertical":
@@ -128,16 +142,61 @@ class VibrationStage(Section):
         length = math.hypot(*vector)
         return tuple(x / length for x in vector)
 
-    def displacements_at(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """s(t) along the direction, m; zero before and after the stage."""
-        end = self.whole_duration_s
-        ramp = np.ones_like(time_s)
+    def displacements_at(
+        self, time_s: NDArray[np.float64], stops_smoothly: bool = False
+    ) -> NDArray[np.float64]:
+        """Displacement s(t) along the direction.
+
+        Parameters
+        ----------
+        time_s : float64, s
+            Since the stage began.
+        stops_smoothly : bool
+            Whether the box stops smoothly after the stage, or dead at its end.
+
+        Returns
+        -------
+        float64, m
+            Zero before the stage, and once the box has stopped.
+        """
+        end, stop_s = self.whole_duration_s, self.stop_s if stops_smoothly else 0.0
+        amplitude = np.full_like(time_s, self.amplitude_m)
         if self.ramp_s > 0:
-            ramp = np.minimum(1.0, np.minimum(time_s, end - time_s) / self.ramp_s)
-        moving = (time_s > 0) & (time_s < end)
-        wave = self.amplitude_m * ramp * np.sin(self.angular_frequency_rad_s * time_s)
+            amplitude *= np.minimum(1.0, np.minimum(time_s, end - time_s) / self.ramp_s)
+        elif stop_s > 0:
+            amplitude *= 0.5 + 0.5 * np.cos(np.pi * np.maximum(0.0, time_s - end) / stop_s)
+        moving = (time_s > 0) & (time_s < end + stop_s)
+        wave = amplitude * np.sin(self.angular_frequency_rad_s * time_s)
         return np.where(moving, wave, 0.0)
 
-    def displacement_at(self, time_s: float) -> float:
-        """s(t) along the direction, m; zero before and after the stage."""
-        return float(self.displacements_at(np.array(time_s)))
+    def displacement_at(self, time_s: float, stops_smoothly: bool = False) -> float:
+        """See ``displacements_at``, at one time."""
+        return float(self.displacements_at(np.array(time_s), stops_smoothly))
+
+
+class RestStage(Section):
+    """A stage in which the box stands and the sand comes to rest, as after a layer of the fill."""
+
+    kind: Literal["rest"]
+    longest_s: float = quantity(
+        2.0,
+        "Sand that is not at rest so long after the box has stopped ends the run.",
+        unit="s",
+        source=ARGUED,
+        gt=0,
+        le=1000,
+    )
+
+
+def _kind_of(entry: Any) -> Any:
+    """Kind of an entry of the list: one that names none vibrates."""
+    if isinstance(entry, dict):
+        return entry.get("kind", "vibrate")
+    return getattr(entry, "kind", "vibrate")
+
+
+BoxStage = Annotated[
+    Annotated[VibrationStage, Tag("vibrate")] | Annotated[RestStage, Tag("rest")],
+    Discriminator(_kind_of),
+]
+"""What the box does in a stage after the fill."""

@@ -37,7 +37,8 @@ class Objective(Section):
     )
     at_vibration_s: float | None = quantity(
         None,
-        "Time of vibration at which the measure is taken; its end unless given.",
+        "Time of vibration at which the measure is taken, at full speed; unless given at the end "
+        "of the run, where the sand is at rest again.",
         unit="s",
         source=ARGUED,
         ge=0,

@@ -131,15 +131,21 @@
     const shaken = film.vibration_time_s[frame], value = film.reading[frame];
     const total = film.vibration_time_s[film.frames - 1];
     const clock = shaken < 0 ? `filling, ${film.time_s[frame].toFixed(2)} s`
+      : atRest(film.stage[frame]) ? `rest, ${film.time_s[frame].toFixed(2)} s`
       : `vibration, ${shaken.toFixed(2)} of ${total.toFixed(2)} s`;
     time.textContent = value === null ? clock : `${clock} · ${measure} ${value.toFixed(3)}`;
     slider.setAttribute("aria-valuetext", clock);
   }
 
+  const atRest = (stage) => stage.split("_")[0] === "rest";
+
   function phases(film) {
     const filling = film.vibration_time_s.filter((t) => t < 0).length;
+    // rests between two vibrations are short and belong to them
+    const rest = [...film.stage].reverse().findIndex((stage) => !atRest(stage));
+    const vibration = film.frames - filling - rest;
     byId("film-phases").innerHTML = "";
-    for (const [name, frames] of [["filling", filling], ["vibration", film.frames - filling]]) {
+    for (const [name, frames] of [["filling", filling], ["vibration", vibration], ["rest", rest]]) {
       if (!frames) continue;
       const part = document.createElement("span");
       part.textContent = name;

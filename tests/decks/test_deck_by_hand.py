@@ -24,7 +24,8 @@ GRAINS = 80
 FILL = {"layers": [{"count": 40, "repeat": 2}]}
 SHORT = {
     "fill": {"layers": [{"count": 15}, {"count": 65}]},
-    "discharge": {"settling": {"rms_speed_m_s": 0.3, "shortest_s": 0.1}},
+    "discharge": {"settling": {"shortest_s": 0.1}},
+    "rest": {"rms_speed_m_s": 0.05, "discharge_rms_speed_m_s": 0.3, "load_tolerance": 0.1},
     "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.02}],
 }
 """Grains still roll where the flow counts as over: their places depend on every step before."""

@@ -97,8 +97,8 @@ def test_deck_by_hand_equals_the_session_to_the_last_digit(frame: str, tmp_path:
         fill={
             "layers": [{"count": 30, "repeat": 2}],
             "vibration_between_layers": stage,
-            "settling": {"rms_speed_m_s": 0.05},
         },
+        rest={"rms_speed_m_s": 0.05},
         vibration=[stage],
     )
     program = build_program(scene)

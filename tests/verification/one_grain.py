@@ -39,7 +39,8 @@ def one_grain_scene(**changes: object) -> Scenario:
         "fill": {"layers": [{"count": 1}]},
         "background_damping": {"form": "none"},
         "time_step": {"fraction": 0.01},
-        "record": {"load_every_steps": 1, "series_every_s": 1e-4, "snapshot_every_s": 1e-4},
+        "rest": {"load_every_steps": 1, "check_every_s": 1e-4},
+        "record": {"series_every_s": 1e-4, "snapshot_every_s": 1e-4},
     }
     return Scenario.model_validate(base | changes)
 

@@ -29,14 +29,15 @@ from tests.workflow.runs import drive
 SCENE: dict[str, Any] = {
     "box": {"width_m": 0.06, "height_m": 0.06},
     "sand": {"size_scale": 8.0, "size_classes": 2},
-    # Sand falls for 10 ms, and rests by the rule at the first record after it: eight windows.
+    # Sand falls for 10 ms, and rests by the rule at the first check after it: eight windows.
     "fill": {
         "layers": [{"count": 30, "repeat": 2}],
         "drop_height_m": 0.0005,
-        "settling": {"shortest_s": 0.012, "rms_speed_m_s": 10.0},
+        "settling": {"shortest_s": 0.012},
     },
     "time_step": {"fraction": 0.4},
     "vibration": [],
+    "rest": {"check_every_s": 0.008, "rms_speed_m_s": 10.0, "load_tolerance": None, "checks": 1},
     "record": {"series_every_s": 0.008, "checkpoint_every_s": 0.008},
     "engine": {"name": "reference"},
 }

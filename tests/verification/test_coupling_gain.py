@@ -49,8 +49,8 @@ def squeezed(
 ) -> tuple[Any, float]:
     """The loop after some records, and how far the bar is from its exact rest, as a share."""
     pattern = wedge_pattern(young_pa)
-    record = {"load_every_steps": every, "series_every_s": WINDOW_S}
-    scenario = wedge_scene(pattern, damping_ratio, engine={"name": engine}, record=record)
+    rest = {"load_every_steps": every, "check_every_s": WINDOW_S}
+    scenario = wedge_scene(pattern, damping_ratio, engine={"name": engine}, rest=rest)
     session = staggered(pattern, scenario, folder, window_s=WINDOW_S, **changes)
     put_disc(session)
     for _ in range(records):

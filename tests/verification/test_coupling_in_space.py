@@ -45,7 +45,7 @@ def cantilever_scene(**changes: Any) -> Scenario:
         },
         "time_step": {"fraction": 0.2},
         "fill": {"layers": [{"count": 1}], "settling": {"shortest_s": 1.9}},
-        "record": {"load_every_steps": 1, "series_every_s": 2e-3},
+        "rest": {"load_every_steps": 1, "check_every_s": 2e-3},
         "engine": {"name": "reference"},
     }
     told = one_grain_scene().model_dump(mode="json", exclude_unset=True)
@@ -151,7 +151,13 @@ def plank_scene(**changes: Any) -> Scenario:
             "supports": {"clamped": ["left", "right"]},
             "loop": {"scheme": "measured", "window_s": 0.004},
         },
-        "fill": {"layers": [{"count": 60}], "settling": {"shortest_s": 0.3, "rms_speed_m_s": 9}},
+        "fill": {"layers": [{"count": 60}], "settling": {"shortest_s": 0.3}},
+        "rest": {
+            "check_every_s": 0.02,
+            "rms_speed_m_s": 9,
+            "load_tolerance": None,
+            "checks": 1,
+        },
         "time_step": {"fraction": 0.5},
         "vibration": [],
         "engine": {"name": "reference"},

@@ -38,10 +38,10 @@ def plank_scene(engine: str) -> Scenario:
         "fill": {
             "layers": [{"count": 40}],
             "drop_height_m": 0.001,
-            "settling": {"shortest_s": 0.1, "rms_speed_m_s": 9},
+            "settling": {"shortest_s": 0.1},
         },
         "vibration": [],
-        "record": {"load_every_steps": 40},
+        "rest": {"rms_speed_m_s": 9, "load_tolerance": None, "checks": 1, "load_every_steps": 40},
         "engine": {"name": engine},
     }
     return with_surface(Scenario.model_validate(scene))

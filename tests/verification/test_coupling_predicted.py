@@ -38,7 +38,8 @@ def plank_scene(window_s: float, factor: float, **changes: Any) -> Scenario:
             "supports": {"clamped": ["left", "right"]},
             "loop": {"scheme": "fixed", "factor": factor, "window_s": window_s},
         },
-        "fill": {"layers": [{"count": 160}], "settling": {"shortest_s": 0.24, "rms_speed_m_s": 9}},
+        "fill": {"layers": [{"count": 160}], "settling": {"shortest_s": 0.24}},
+        "rest": {"rms_speed_m_s": 9, "load_tolerance": None, "checks": 1},
         "vibration": [],
         "engine": {"name": "reference"},
     }

@@ -105,7 +105,8 @@ def hill(**changes: Any) -> Scenario:
             }
         ],
         "sand": {"size_scale": 8.0, "size_classes": 3},
-        "fill": {"layers": [{"count": 40, "repeat": 2}], "settling": {"rms_speed_m_s": 1e-3}},
+        "fill": {"layers": [{"count": 40, "repeat": 2}]},
+        "rest": {"rms_speed_m_s": 1e-3},
         "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.06}],
         "record": {"snapshot_every_s": 0.02},
     }  # fmt: skip
@@ -147,7 +148,7 @@ def test_checkpoint_with_a_polygon_goes_on_bit_for_bit(frame: str, tmp_path: Pat
     shaken = slab_scene(SLAB, frame=frame, vibration=[gentle], background_damping=DAMPED)
     straight = open_lammps(shaken, tmp_path)
     put_grain(straight, [0.0195, TOP_M + RADIUS_M * 0.999], [0.05, 0.0])
-    straight.start_stage(straight._program.stages[-1])
+    straight.start_stage(straight._program.stages[1])
     for _ in range(60):
         straight.advance()
     mark = tmp_path / "mark"
@@ -196,7 +197,7 @@ def test_polygon_moves_with_its_sand_and_drags_it(tmp_path: Path) -> None:
         "shortest_s": 0.1}}), tmp_path)  # fmt: skip
     put_grain(session, [0.0195, TOP_M + RADIUS_M], [0.0, 0.0])
     session.start_stage(session._program.stages[0])
-    window_s = session._counts.window * session.step_s
+    window_s = session._counts.check * session.step_s
     for _ in range(20):
         session.advance()
     before = session.snapshot()

@@ -98,7 +98,7 @@ def test_shaken_polygon_equals_a_shaken_plate(frame: str, tmp_path: Path) -> Non
         for obstacle in (PLATE, SLAB)
     ]
     over = [0.023, TOP_M + RADIUS_M]
-    plate, polygon = tracks(tmp_path, scenes, over, [0.0, 0.0], 10_000, stage=-1)
+    plate, polygon = tracks(tmp_path, scenes, over, [0.0, 0.0], 10_000, stage=1)
     assert np.ptp(plate[:, 1]) > 4e-4  # the grain was thrown
     np.testing.assert_allclose(polygon, plate, rtol=1e-9, atol=1e-9)
 
@@ -134,9 +134,9 @@ def test_a_grain_rests_in_a_notch_on_both_its_sides(tmp_path: Path) -> None:
         "name": "slab",
         "vertices_m": [[0.0, 0.005], [0.05, 0.005], [0.05, 0.02], [0.025, 0.01], [0.0, 0.02]],
     }
-    quiet = {"shortest_s": 0.1, "rms_speed_m_s": 1e-5}
-    fill = {"layers": [{"count": 1}], "settling": quiet}
-    session = open_lammps(slab_scene(notch, contact=SMOOTH, fill=fill), tmp_path)
+    quiet = {"rest": {"rms_speed_m_s": 1e-5, "check_every_s": 1e-4, "load_every_steps": 1}}
+    quiet["fill"] = {"layers": [{"count": 1}], "settling": {"shortest_s": 0.1}}
+    session = open_lammps(slab_scene(notch, contact=SMOOTH, **quiet), tmp_path)
     slope = math.atan2(0.01, 0.025)
     put_grain(session, [0.025, 0.01 + RADIUS_M / math.cos(slope)], [0.0, 0.0])
     session.start_stage(session._program.stages[0])

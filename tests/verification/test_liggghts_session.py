@@ -51,7 +51,8 @@ def test_weight_of_a_bed_at_rest_is_the_load_on_floor_walls_and_obstacles(
         box={"width_m": 0.04, "depth_m": 0.04, "height_m": 0.08},
         obstacles=[{**plate, "angle_deg": 20}] if dimension == 3 else [wedge],
         contact=SOFT if dimension == 3 else {},
-        fill={"layers": [{"count": 80}], "settling": {"rms_speed_m_s": 1e-4, "longest_s": 4.0}},
+        fill={"layers": [{"count": 80}], "settling": {"longest_s": 4.0}},
+        rest={"rms_speed_m_s": 1e-4},
         vibration=[],
     )
     session = settled(scene, tmp_path)
@@ -108,15 +109,17 @@ def test_one_grain_moves_alike_in_both_frames(
             dimension=dimension,
             frame=frame,
             vibration=[stage],
+            measure_at_rest=False,
             contact=SOFT if dimension == 3 else {},
             time_step={"fraction": 0.4},
+            rest={"check_every_s": 1e-3, "load_every_steps": 1},
             record={"series_every_s": 1e-3, "snapshot_every_s": 1e-3},
         )
         folder = tmp_path / frame
         folder.mkdir()
         session = open_liggghts(scene, folder)
         put_grain(session, RADIUS_M, [0.0] * dimension)
-        session.start_stage(session._program.stages[-1])
+        session.start_stage(session._program.stages[1])
         vibration = scene.vibration[0]
         track = []
         while not session.stage_over:
@@ -158,7 +161,8 @@ def run_to(session: LiggghtsSession, stage_name: str) -> None:
 def test_restored_equals_straight(frame: str, stage: str, tmp_path: Path) -> None:
     scene = liggghts_scene(
         frame=frame,
-        fill={"layers": [{"count": 40, "repeat": 2}], "settling": {"rms_speed_m_s": 0.05}},
+        fill={"layers": [{"count": 40, "repeat": 2}]},
+        rest={"rms_speed_m_s": 0.05},
     )
     session = open_liggghts(scene, tmp_path)
     run_to(session, stage)
@@ -185,7 +189,8 @@ def test_restored_equals_straight(frame: str, stage: str, tmp_path: Path) -> Non
 def test_restored_in_moving_walls_loses_one_force(tmp_path: Path) -> None:
     scene = liggghts_scene(
         frame="laboratory",
-        fill={"layers": [{"count": 40}], "settling": {"rms_speed_m_s": 0.05}},
+        fill={"layers": [{"count": 40}]},
+        rest={"rms_speed_m_s": 0.05},
     )
     session = open_liggghts(scene, tmp_path)
     run_to(session, "vibrate_1")

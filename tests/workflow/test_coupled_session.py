@@ -34,7 +34,7 @@ SCENE: dict[str, Any] = {
     "fill": {"layers": [{"count": 40, "repeat": 2}], "settling": {"shortest_s": 0.8}},
     "background_damping": {"form": "none"},
     "vibration": [],
-    "record": {"load_every_steps": 5},
+    "rest": {"load_every_steps": 5},
 }
 
 
@@ -152,9 +152,9 @@ def test_vertex_loads_of_all_windows_make_up_the_record(tmp_path: Path) -> None:
         session.insert_layer(1)
         session.start_stage(build_program(scenario).stages[0])
         counts = StepCounts.of(scenario)
-        samples = counts.window // counts.load
+        samples = counts.check // counts.load
         parts = [samples // 3, samples // 4, samples - samples // 3 - samples // 4]
-        for _ in range(5):
+        while session.time_s < 0.1:  # sand has come down
             session.advance()
         mean = np.zeros_like(SLAB_M)
         for part in parts:
@@ -233,28 +233,24 @@ def test_loads_of_one_way_bend_a_pattern_that_the_sand_never_sees_move(tmp_path:
     assert sunk_m[0] > 0.0
 
 
-def test_one_solve_a_layer_bends_the_pattern_after_it_and_moves_it_under_the_next(
-    tmp_path: Path,
-) -> None:
+def test_by_layers_the_plate_stands_still_until_the_sand_rests(tmp_path: Path) -> None:
     session = coupled(tmp_path, scheme="per_layer", factor=0.1)
-    answers = []
+    ended = []
     for stage in build_program(tube_scene(**SCENE)).stages:
         session.insert_layer(stage.layer)
         session.start_stage(stage)
+        before, rested = session.displacement_m.copy(), False
         while not session.stage_over:
-            assert answers or not session.displacement_m.any()
             session.advance()
-        answers.append(session._solved.copy())
-    log, last = after(session, tmp_path)
+            rested = rested or session.sand_rests
+            if not ended and not rested:
+                np.testing.assert_array_equal(session.displacement_m, before)
+        ended.append(session.displacement_m[0, 1])
+        assert rested
     session.close()
-    first = log[log.displacement_m == 0.0]
-    second = log.drop(first.index)
-    assert len(first) > 100
-    assert len(second) > 100
-    assert (second.displacement_m.diff().dropna() >= 0.0).all()
-    # A tenth of the way in each of hundreds of windows; its last load is answered after it.
-    assert last.displacement_m == pytest.approx(-answers[0][0, 1], rel=1e-3)
-    assert answers[1][0, 1] < 1.5 * answers[0][0, 1] < 0.0
+    # It has come to where its springs carry the sand, though nobody holds the stage in this test.
+    assert ended[1] == pytest.approx(session._load.sum(axis=0)[1] / STIFFNESS_N_M, rel=0.02)
+    assert ended[1] < 1.5 * ended[0] < 0.0
 
 
 def test_a_soft_plate_runs_away_in_the_plain_loop_and_holds_by_aitken(tmp_path: Path) -> None:

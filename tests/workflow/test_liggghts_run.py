@@ -24,7 +24,8 @@ from tests.workflow.runs import (
 
 pytestmark = needs_liggghts
 SHORT = {
-    "fill": {"layers": [{"count": 40, "repeat": 2}], "settling": {"rms_speed_m_s": 0.03}},
+    "fill": {"layers": [{"count": 40, "repeat": 2}]},
+    "rest": {"rms_speed_m_s": 0.03},
     "record": {"snapshot_every_s": 0.02, "checkpoint_every_s": 0.02},
 }
 

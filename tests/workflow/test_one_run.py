@@ -62,7 +62,8 @@ def test_vibration_has_snapshots_at_both_its_ends(straight: Path) -> None:
 
 def test_weight_of_a_bed_at_rest_is_the_load_on_floor_walls_and_tube(tmp_path: Path) -> None:
     scene = tube_scene(
-        fill={"layers": [{"count": 100}], "settling": {"rms_speed_m_s": 1e-5, "longest_s": 4.0}},
+        fill={"layers": [{"count": 100}], "settling": {"longest_s": 4.0}},
+        rest={"rms_speed_m_s": 1e-5},
         vibration=[],
     )
     session = open_lammps(scene, tmp_path)

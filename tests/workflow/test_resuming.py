@@ -108,13 +108,15 @@ def test_paper_size_tube_starts_stops_and_resumes(tmp_path: Path) -> None:
             "dimension": 3,
             "box": {"depth_m": 0.06},
             "time_step": {"fraction": 0.9},
-            "fill": {"layers": [{"count": 60}], "settling": {"rms_speed_m_s": 0.3}},
+            "fill": {"layers": [{"count": 60}]},
+            "rest": {"rms_speed_m_s": 0.3},
         },
     ],
     ids=["box", "laboratory", "3D with turned facets"],
 )
+@pytest.mark.parametrize("place", [-2, -1], ids=["vibrating", "stopping"])
 def test_restored_session_equals_the_one_that_wrote_the_checkpoint(
-    changes: dict[str, Any], tmp_path: Path
+    place: int, changes: dict[str, Any], tmp_path: Path
 ) -> None:
     scene = tube_scene(**changes)
     session = open_lammps(scene, tmp_path)
@@ -123,7 +125,7 @@ def test_restored_session_equals_the_one_that_wrote_the_checkpoint(
     while not session.stage_over:
         session.advance()
     session.end_stage()
-    session.start_stage(session._program.stages[-1])
+    session.start_stage(session._program.stages[place])
     while not session.can_checkpoint:
         session.advance()
     session.write_checkpoint(tmp_path)

@@ -1,4 +1,4 @@
-"""A scenario computed by LAMMPS in process: the deck's own blocks, runs cut into windows."""
+"""A scenario computed by LAMMPS in process: the deck's own blocks, runs cut at checks."""
 
 from __future__ import annotations
 
@@ -160,19 +160,16 @@ class LammpsSession(DeckSession):
 
     def _compute_sampling(self, loads: WallLoads, target: int) -> None:
         """Compute up to a step, runs cut where the loads on the walls are sampled."""
-        every, record = self._counts.load, self._counts.window
+        every = self._counts.load
         while self.steps < target:
-            if self.steps % record == 0:
+            if self.steps % self._counts.check == 0:
                 loads.clear()
             super()._compute_to(min(target, (self.steps // every + 1) * every))
             if self.steps % every == 0:
                 loads.sample()
-            ended = self.steps % record == 0
-            if ended and self.stage.settling is not None and self._rests():
-                return
 
-    def _rests(self) -> bool:
-        return bool(self._lmp.extract_variable("at_rest") == 1.0)
+    def _rms_speed_m_s(self) -> float:
+        return float(self._lmp.extract_variable("rms_speed"))
 
     def _gather(self, name: str, count: int) -> Any:
         """Per-grain numbers of all ranks in the order of ids."""
@@ -194,7 +191,7 @@ class LammpsSession(DeckSession):
     def _mean_loads(self) -> Mapping[str, Array]:
         means = self._recorded_loads()
         if self._wall_loads is not None:
-            means = self._wall_loads.sums / (self._counts.window // self._counts.load)
+            means = self._wall_loads.sums / (self._counts.check // self._counts.load)
         loads = dict(zip(self._surfaces, means, strict=True))
         return loads | self._kernel.mean_loads() if self._kernel is not None else loads
 
@@ -217,7 +214,7 @@ class LammpsSession(DeckSession):
         return self._kernel
 
     def _vertex_sums(self, name: str) -> tuple[Array, int]:
-        samples = ((self.steps - 1) % self._counts.window + 1) // self._counts.load
+        samples = ((self.steps - 1) % self._counts.check + 1) // self._counts.load
         return self._kernel_of(name).load_sums(name), samples
 
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
@@ -246,14 +243,14 @@ class LammpsSession(DeckSession):
         Raises
         ------
         RefusedError
-            In a scene that LAMMPS computes alone; or first inside a record, for the samples of
+            In a scene that LAMMPS computes alone; or first inside a check, for the samples of
             loads that LAMMPS has begun to add up would be lost.
         """
         if self._kernel is None:
             raise RefusedError("pattern", None, "a pattern, to go back on engine lammps")
         if self._wall_loads is None:
-            if self.steps % self._counts.window:
-                raise RefusedError("first kept step", self.steps, "the start of a record")
+            if self.steps % self._counts.check:
+                raise RefusedError("first kept step", self.steps, "the start of a check")
             self._wall_loads = WallLoads(self._lmp, self._surfaces, self._scenario.dimension)
             # set up over and over it would write hundreds of MB
             self.send('print "States are kept and gone back to: nothing more is logged"\nlog none')

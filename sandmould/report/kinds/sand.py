@@ -11,7 +11,7 @@ from sandmould.report.figure_files import pictures, strip
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.heaps import steepest_heaps
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
-from sandmould.report.method import sand_method
+from sandmould.report.method import measured_when, sand_method
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import SandPages, sand_pages
 from sandmould.report.time_series import curve_figures
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def _sand_notes(
     scenario: Scenario, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
-    stage = scenario.vibration[0] if scenario.vibration else None
+    stage = scenario.vibrations[0] if scenario.vibrations else None
     deepest = _deepest_overlap_fraction(collected.summary)
     return sand_notes(collected.keys, stage, deepest, seeks_best, is_controlled)
 
@@ -54,13 +54,14 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),
-        "the end of vibration" if scenario.vibration else "the end",
+        measured_when(scenario),
         filling.advice if filling else (),
         {
             "pages": pages,
             "bending": bending,
             "dimension": scenario.dimension,
-            "vibrates": bool(scenario.vibration),
+            "vibrates": bool(scenario.vibrations),
+            "ends_at_rest": scenario.ends_at_rest,
             "filling": filling,
         },
         _sand_figures(pages, filling, bending),

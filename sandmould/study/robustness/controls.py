@@ -47,7 +47,7 @@ def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Itera
     for control in checks.controls:
         if control == "hold":
             # At the middle frequency nothing differs from the sweep.
-            others = {"acceleration", "velocity", "displacement"} - {scenario.vibration[0].hold}
+            others = {"acceleration", "velocity", "displacement"} - {scenario.vibrations[0].hold}
             for hold in sorted(others):
                 yield Case(control, hold, None, _holding(hold, best_hz), (0, 2))
         elif control in BY_FACTOR:
@@ -62,7 +62,7 @@ def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Itera
 
 def _holding(hold: str, best_hz: float) -> Change:
     def change(scenario: Scenario) -> Scenario:
-        stage = scenario.vibration[0]
+        stage = scenario.vibrations[0]
         at_best = stage.model_copy(update={"frequency_hz": best_hz})
         # The same motion at the best frequency, whatever is held from there.
         new = VibrationStage(
@@ -74,7 +74,9 @@ def _holding(hold: str, best_hz: float) -> Change:
             displacement_m=at_best.amplitude_m,
             reference_frequency_hz=best_hz,
         )  # fmt: skip
-        return scenario.model_copy(update={"vibration": (new, *scenario.vibration[1:])})
+        place = scenario.vibration.index(stage)
+        stages = (*scenario.vibration[:place], new, *scenario.vibration[place + 1 :])
+        return scenario.model_copy(update={"vibration": stages})
 
     return change
 
@@ -181,7 +183,7 @@ def _on(engine: str) -> Change:
 
 def _shaken(scenario: Scenario) -> Scenario:
     """A shake too weak to move grains, one frequency after the other."""
-    direction = scenario.vibration[0].direction
+    direction = scenario.vibrations[0].direction
     stages = tuple(
         VibrationStage(
             direction=direction,
@@ -193,4 +195,10 @@ def _shaken(scenario: Scenario) -> Scenario:
     )
     window_s = float(f"{1.0 / (WINDOWS_A_PERIOD * SHAKEN_HZ[-1]):.2g}")
     record = scenario.record.model_copy(update={"series_every_s": window_s})
-    return scenario.model_copy(update={"vibration": stages, "record": record})
+    # Loads are means over checks; as many of the shorter ones as make up the same time.
+    rest = scenario.rest
+    checks = max(rest.checks, round(rest.checks * rest.check_every_s / window_s))
+    rest = rest.model_copy(update={"check_every_s": window_s, "checks": checks})
+    # what is read of it is the load on the floor while it is shaken
+    changed = {"vibration": stages, "record": record, "rest": rest, "measure_at_rest": False}
+    return scenario.model_copy(update=changed)

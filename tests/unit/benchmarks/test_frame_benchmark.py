@@ -12,7 +12,7 @@ import pytest
 from benchmarks.frame import Benchmark, BenchmarkRun, Parts, benchmark, table
 from sandmould import ROOT
 
-PAGED = ("agreement", "arpm", "calibration", "engines", "mps", "scaling", "stability")
+PAGED = ("agreement", "arpm", "at_rest", "calibration", "engines", "mps", "scaling", "stability")
 ORIGIN = {"commit": "abc", "machine": {"processor": "a core"}, "versions": {}}
 
 

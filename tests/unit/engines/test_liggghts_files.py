@@ -20,7 +20,6 @@ from sandmould.engines.liggghts.render import (
     surface_meshes,
     write_deck,
 )
-from sandmould.engines.liggghts.session import around_run
 from sandmould.engines.liggghts.vtk_stress import read_triangle_loads
 from sandmould.engines.program import Program, build_program
 from sandmould.scenario.geometry import Array
@@ -238,17 +237,16 @@ def test_tables_are_exact_for_each_pair_of_classes() -> None:
         np.testing.assert_array_equal(table(name), table(name).T)
 
 
-def test_loop_of_windows_is_left_to_the_session() -> None:
+def test_loop_of_checks_is_left_to_the_session() -> None:
     deck = Deck(render_deck(build_program(liggghts_scene()), {}).text)
-    before, after = around_run(deck.blocks["settle_2"])
-    assert before.splitlines()[-1].startswith("variable window_number loop")
-    assert after.startswith("variable window_number delete")
-    before, after = around_run(deck.blocks["vibrate_1"])
+    assert deck.blocks["settle_2"].around_run() == ("variable stage_start equal $(step)\n", "")
+    assert "label settling_settle_2" in deck.blocks["rest_of_settle_2"].text
+    before, after = deck.blocks["vibrate_1"].around_run()
     assert "run" not in after
     assert before.splitlines()[-1].startswith("variable shake_next")
 
 
-def test_first_window_after_a_vibration_ends_at_a_record() -> None:
+def test_first_run_after_a_vibration_ends_at_a_check() -> None:
     between = {"displacement_m": 1e-4, "hold": "displacement", "duration_s": 0.04}
     scene = liggghts_scene(fill={"vibration_between_layers": between})
     program = build_program(scene)

@@ -24,6 +24,7 @@ GIVEN: dict[str, tuple[Any, ...]] = {
     "attach_mover": ("pattern", Mock()),
     "write_checkpoint": (Path("folder"),),
     "share": ("value",),
+    "hold_rest": ("why",),
 }
 
 

@@ -232,13 +232,13 @@ def test_another_foam_is_another_result() -> None:
 
 
 def test_windows_fill_a_record_with_whole_samples() -> None:
-    ends = window_ends(0.002, StepCounts(1e-5, 20, 20 * 47))
+    ends = window_ends(0.002, StepCounts(1e-5, 20, 20 * 47, 20 * 47))
     assert ends[-1] == 20 * 47
     assert set(ends % 20) == {0}
     assert len(ends) == round(47 * 20e-5 / 0.002)
     assert np.ptp(np.diff(ends, prepend=0)) <= 20
-    assert window_ends(1.0, StepCounts(1e-5, 20, 940)).tolist() == [940]
-    assert len(window_ends(1e-9, StepCounts(1e-5, 20, 940))) == 47
+    assert window_ends(1.0, StepCounts(1e-5, 20, 940, 940)).tolist() == [940]
+    assert len(window_ends(1e-9, StepCounts(1e-5, 20, 940, 940))) == 47
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ CASES: dict[str, tuple[str, str]] = {
         "valid is a plate among the obstacles: there is none.",
     ),
     "discharge without a gate": (
-        "based_on: tube\nscenario: {discharge: {settling: {rms_speed_m_s: 0.01}}}",
+        "based_on: tube\nscenario: {discharge: {settling: {longest_s: 9}}}",
         "trial.yaml: scenario.discharge.gate = None cannot be used: "
         "valid is a value: this key must be given.",
     ),

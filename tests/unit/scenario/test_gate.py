@@ -87,11 +87,11 @@ def test_discharge_and_its_rest_come_between_fill_and_vibration() -> None:
     scene = hopper_scene(fill={"vibration_between_layers": between})
     stages = build_program(scene).stages
     assert [s.name for s in stages] == [
-        "settle_1", "between_1", "settle_2", "discharge", "vibrate_1"
+        "settle_1", "between_1", "settle_2", "discharge", "vibrate_1", "rest"
     ]  # fmt: skip
     discharge = stages[3]
     assert scene.discharge is not None
-    assert [s.opens for s in stages] == ["", "", "", "gate", ""]
+    assert [s.opens for s in stages] == ["", "", "", "gate", "", ""]
     assert discharge.settling == scene.discharge.settling != scene.fill.settling
     assert stages[2].settling == scene.fill.settling
     assert stages[1].settling is stages[4].settling is None

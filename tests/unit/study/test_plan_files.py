@@ -19,6 +19,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import stage_kind
+from sandmould.scenario.vibration import STOP_PERIODS
 from sandmould.study.definition.run import RUN_NAME, Run
 from sandmould.study.kinds.sand import speed
 from sandmould.study.kinds.sand.planning import planned_steps, planned_work, predicted_s
@@ -154,13 +155,15 @@ def test_stages_are_falls_and_vibrations() -> None:
         math.sqrt(2 * (0.005 + loose_height_m(scene, count)) / scene.gravity_m_s2)
         for count in (300, 200)
     ]
-    expected = [falls[0] + REST_AFTER_FALL_S, 0.1, falls[1] + REST_AFTER_FALL_S, 9 / 30]
+    expected = [falls[0] + REST_AFTER_FALL_S, 0.1, falls[1] + REST_AFTER_FALL_S, 9 / 30,
+                STOP_PERIODS / 30 + REST_AFTER_FALL_S]  # fmt: skip
     stages = build_program(scene).stages
-    assert [stage.name for stage in stages] == ["settle_1", "between_1", "settle_2", "vibrate_1"]
+    names = ["settle_1", "between_1", "settle_2", "vibrate_1", "rest"]
+    assert [stage.name for stage in stages] == names
     assert [stage_kind(stage.name) for stage in stages] == [stage.kind for stage in stages]
     assert [stage.expected_s for stage in stages] == pytest.approx(expected)
     steps = [time / scene.step_s for time in expected]
-    assert planned_steps(scene) == pytest.approx(sum(steps), abs=4)
+    assert planned_steps(scene) == pytest.approx(sum(steps), abs=5)
     assert planned_work(scene) == pytest.approx(300 * sum(steps[:2]) + 500 * sum(steps[2:]))
 
 

@@ -114,7 +114,7 @@ def scene(
             "settling": {"shortest_s": 99.0, "longest_s": 100.0},
         },
         "time_step": {"step_s": step_s},
-        "record": {"load_every_steps": 1000, "series_every_s": 1000 * step_s},
+        "rest": {"load_every_steps": 1000, "check_every_s": 1000 * step_s},
     }
     if engine == "liggghts" and dimension == 2:
         base["sand"]["disc_inertia"] = "sphere"

@@ -37,7 +37,7 @@ def clamped(engine: str, dimension: int, wall_stiffness: float) -> tuple[Bench, 
         wall=law(dimension, normal=wall_stiffness),
         step_s=5e-6,
         box={"width_m": width},
-        record={"load_every_steps": 1, "series_every_s": 5e-5},
+        rest={"load_every_steps": 1, "check_every_s": 5e-5},
     )
     place = np.tile(vector(dimension, 0.0, 0.05), (GRAINS, 1))
     place[:, 0] = RADIUS_M - at_wall + np.arange(GRAINS) * (2 * RADIUS_M - overlap)
@@ -111,7 +111,7 @@ def load_of_a_grain_at_rest(engine: str, dimension: int) -> Iterator[Measured]:
         dimension,
         gravity_m_s2=LIGHT_M_S2,
         step_s=1e-5,
-        record={"load_every_steps": 1, "series_every_s": 1e-4},
+        rest={"load_every_steps": 1, "check_every_s": 1e-4},
     )
     weight = mass_kg(dimension) * LIGHT_M_S2
     with Bench(given) as bench:

@@ -38,7 +38,7 @@ def _crowd(engine: str, dimension: int, /, **changes: Any) -> tuple[Scenario, Ar
         step_s=2e-5,
         gravity_m_s2=9.80665,
         box={"width_m": 0.026, "depth_m": 0.014},
-        record={"load_every_steps": 50, "series_every_s": WINDOW_S},
+        rest={"load_every_steps": 50, "check_every_s": WINDOW_S},
         **changes,
     )
     rng = np.random.default_rng(3)

@@ -31,7 +31,8 @@ def _shaken(
         step_s=2e-5,
         frame=frame,
         vibration=[stage],
-        record={"load_every_steps": 50, "series_every_s": 1e-3},
+        measure_at_rest=False,
+        rest={"load_every_steps": 50, "check_every_s": 1e-3},
         **changes,
     )
     return Bench(given), given.vibration[0]

@@ -38,5 +38,5 @@ def list_moments(run_folder: Path) -> tuple[Moment, ...]:
 
 
 def nearest(moments: Sequence[Moment], vibration_time_s: float) -> Moment:
-    """The snapshot nearest a time of vibration."""
-    return min(moments, key=lambda m: abs(m.vibration_time_s - vibration_time_s))
+    """The snapshot nearest a time of vibration; the last of several, where the sand has rested."""
+    return min(moments, key=lambda m: (abs(m.vibration_time_s - vibration_time_s), -m.time_s))

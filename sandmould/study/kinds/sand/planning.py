@@ -83,7 +83,7 @@ def computed_hash(scenario: Scenario) -> str:
 
 def vibration_s(scenario: Scenario) -> float:
     """The whole vibration."""
-    return sum(stage.whole_duration_s for stage in scenario.vibration)
+    return sum(stage.whole_duration_s for stage in scenario.vibrations)
 
 
 def threads(scenario: Scenario) -> int:
@@ -120,12 +120,12 @@ def predicted_s(scenario: Scenario) -> float:
 
 
 def planned_s(scenario: Scenario) -> float:
-    """Fill, estimated, discharge and vibration."""
+    """Fill, estimated, discharge, vibration and rest."""
     return build_program(scenario).expected_s
 
 
 def planned_steps(scenario: Scenario) -> int:
-    """Time steps of a run: its fill, estimated, and its vibration."""
+    """Time steps of a run: its fill and its rests, estimated, and its vibration."""
     stages = build_program(scenario).stages
     return sum(math.ceil(stage.expected_s / scenario.step_s) for stage in stages)
 

@@ -1,0 +1,1 @@
+"""What a packing measured at rest differs from one measured at full speed."""

@@ -1,0 +1,59 @@
+"""When sand is at rest: checks of its own, which no record changes."""
+
+from __future__ import annotations
+
+from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.sand import ARGUED
+
+
+class Rest(Section):
+    """Checks that end a stage in which sand comes to rest."""
+
+    check_every_s: float = quantity(
+        0.005,
+        "Interval of the checks, and of the guards; loads are means over it, and no engine is cut "
+        "at other steps. Series and snapshots are written at whole checks.",
+        unit="s",
+        source=ARGUED,
+        gt=0,
+        le=100,
+    )
+    checks: int = quantity(
+        10, "Checks in a row that must find the sand at rest.", source=ARGUED, ge=1, le=1000
+    )
+    rms_speed_m_s: float = quantity(
+        0.01,
+        "Root mean square speed of all grains, weighted by mass, below which the bed is at rest.",
+        unit="m/s",
+        source=ARGUED,
+        gt=0,
+        le=10,
+    )
+    discharge_rms_speed_m_s: float = quantity(
+        0.002,
+        "The same after a discharge, where few of many grains still roll.",
+        unit="m/s",
+        source=ARGUED,
+        gt=0,
+        le=10,
+    )
+    load_tolerance: float | None = quantity(
+        0.01,
+        "Share of the sand's weight by which the vertical loads on all surfaces together may "
+        "differ from it; null asks the speed alone.",
+        source=ARGUED,
+        gt=0,
+        le=10,
+    )
+    load_every_steps: int = quantity(
+        20,
+        "Steps between the samples of loads that checks and the coupling take means of, on LAMMPS "
+        "and LIGGGHTS; a check holds whole samples.",
+        source=ARGUED,
+        ge=1,
+        le=100000,
+    )
+
+    def speed_limit_m_s(self, *, flows: bool) -> float:
+        """The limit of a bed, or of sand that has flowed out."""
+        return self.discharge_rms_speed_m_s if flows else self.rms_speed_m_s

@@ -1,0 +1,88 @@
+"""Sand on a block of foam that floor and walls hold: its sag is exact, in every scheme."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import simpson
+
+from pattern_fe.coupling.interface import with_surface
+from pattern_fe.coupling.opening import open_coupled
+from sandmould.engines.driver import Driver
+from sandmould.engines.program import build_program
+from sandmould.engines.registry import engine_of
+from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.outcome import Outcome
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.kinds.sand import planning
+from tests.patterns import _one_thread  # noqa: F401
+
+WIDTH_M = HEIGHT_M = 0.06
+YOUNG_PA, POISSON = 1e5, 0.35
+SCHEMES = (
+    "one_way", "per_layer", "fixed", "measured", "aitken", "quasi_newton", "in_step", "monolithic",
+)  # fmt: skip
+
+
+def column(scheme: str, engine: str = "reference") -> Scenario:
+    """All by default but the scene."""
+    loop = {"scheme": scheme} | ({"repeats": 0} if engine == "liggghts" else {})
+    scene = Scenario.model_validate(
+        {
+            "box": {"width_m": WIDTH_M, "height_m": 0.25},
+            "pattern": {
+                "shape": {"kind": "bar", "width_m": WIDTH_M, "height_m": HEIGHT_M},
+                "position_m": [0.0, 0.0],
+                "element_m": 0.015,
+                "young_modulus_pa": YOUNG_PA,
+                "poisson_ratio": POISSON,
+                "supports": {"clamped": [], "resting": ["bottom", "left", "right"]},
+                "loop": loop,
+            },
+            # walls that carry nothing
+            "contact": {"grain_wall": {"friction": 0.0}},
+            "sand": {"size_scale": 8.0, "size_classes": 3},
+            "fill": {"layers": [{"count": 60}]},
+            "engine": {"name": engine},
+        }
+    )
+    return with_surface(scene)
+
+
+def sag_m(scene: Scenario, pattern_m: np.ndarray) -> float:
+    """Mean sag of the top: Simpson's rule over its corners and the nodes between them."""
+    drawn_m = scene.scene.outlines[0].vertices_m
+    top = np.flatnonzero(drawn_m[:, 1] > HEIGHT_M - 1e-9)
+    top = top[np.argsort(drawn_m[top, 0])]
+    sunk_m = drawn_m[top, 1] - pattern_m[top, 1]
+    return float(simpson(sunk_m, x=drawn_m[top, 0])) / WIDTH_M
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_foam_sags_as_the_closed_form_says(scheme: str, tmp_path: Path) -> None:
+    """Weight over the confined block: W H/(M A), with M the constrained modulus."""
+    scene = column(scheme)
+    program = build_program(scene)
+    engine_of(scene).write_deck(program, {}, tmp_path, "test", "test")
+    outcome = Driver(program, tmp_path, "test", "hash", open_coupled).run()
+    assert outcome.outcome is Outcome.FINISHED, outcome.detail
+    last = Snapshot.load(max((tmp_path / "work" / "snapshots").iterdir()))
+    weight_n = program.mass_kg(1) * scene.gravity_m_s2
+    constrained_pa = YOUNG_PA * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
+    area_m2 = WIDTH_M * scene.sand.disc_thickness_m
+    assert last.pattern_m is not None
+    # The tolerance of rest, 1 % of the weight.
+    assert sag_m(scene, last.pattern_m) == pytest.approx(
+        weight_n * HEIGHT_M / (constrained_pa * area_m2), rel=0.01
+    )
+
+
+def test_layers_are_refused_on_a_foam_too_soft_for_their_share() -> None:
+    scene = column("per_layer")
+    assert scene.pattern is not None
+    pattern = scene.pattern.model_copy(update={"young_modulus_pa": 1e3})
+    with pytest.raises(BadInputError, match=r"scheme = 'per_layer' .* for so soft a foam"):
+        planning.resolved(scene.model_copy(update={"pattern": pattern, "obstacles": ()}))
