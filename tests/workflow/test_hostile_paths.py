@@ -123,3 +123,16 @@ def test_engines_take_what_is_left(tmp_path: Path) -> None:
     again = open_lammps(scenario, folder, folder / "checkpoint")
     assert again.steps == steps > 0
     again.close()
+
+
+def test_a_foreign_deck_is_refused_without_the_command_too(tmp_path: Path) -> None:
+    (tmp_path / "probe.in.j2").write_text("shell touch HIT\n")
+    (tmp_path / "probe.yaml").write_text("kind: deck\nscenario: {template: probe.in.j2}\n")
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile")]
+    said = subprocess.run(
+        [*command, "--configfile", "probe.yaml", "--cores", "1"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert said.returncode == 1
+    assert "write trust_deck: true in probe.yaml" in said.stderr
+    assert not list(tmp_path.rglob("HIT"))

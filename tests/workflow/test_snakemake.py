@@ -261,12 +261,3 @@ def test_bad_input_is_one_sentence_and_starts_nothing(
     assert len(said) == 1, ran.stderr
     assert said[0].startswith(f"bad.yaml: {sentence} cannot be used: valid is ")
     assert not (checkout / "results" / "bad").exists()
-
-
-def test_a_foreign_deck_is_refused_without_the_command_too(checkout: Path) -> None:
-    (checkout / "probe.in.j2").write_text("shell touch hit\n")
-    (checkout / "probe.yaml").write_text("kind: deck\nscenario: {template: probe.in.j2}\n")
-    said = snakemake("--configfile", "probe.yaml", folder=checkout)
-    assert said.returncode == 1
-    assert "write trust_deck: true in probe.yaml" in said.stderr
-    assert not list(checkout.rglob("hit"))
