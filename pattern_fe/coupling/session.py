@@ -23,6 +23,7 @@ from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.gain import measure_gain
 from pattern_fe.coupling.relaxation import MeasuredRelaxation, relaxation_of
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
+from pattern_fe.large_displacement import LoadNotReachedError
 from sandmould.engines.session import EngineStop, RefusedError, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
@@ -118,7 +119,20 @@ class CoupledSession(DelegatingSession):
         return self._solved if self._loop.scheme == "one_way" else self._interface
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next record, in windows of the loop."""
+        """Compute for a duration, or up to the next record, in windows of the loop.
+
+        Raises
+        ------
+        EngineStop
+            Also where the pattern finds no equilibrium, or is to move too far.
+        """
+        try:
+            self._advance(duration_s)
+        except LoadNotReachedError as fault:
+            detail = f"after {self.sand.time_s:.4g} s {fault}"
+            raise EngineStop(Outcome.NO_EQUILIBRIUM, detail) from fault
+
+    def _advance(self, duration_s: float | None) -> None:
         sand = self.sand
         now, record = sand.steps, self._counts.window
         ahead = record - now % record

@@ -23,6 +23,7 @@ from pattern_fe.scene import pattern_of
 from sandmould.engines.driver import Driver
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.kinds.sand.bending import verdict_of
 from tests.patterns import _one_thread  # noqa: F401
 from tests.workflow.runs import drive
 
@@ -174,3 +175,13 @@ def test_loads_of_another_run_are_asked_anew(asked: Path) -> None:
     drive(plank_scene("files"), asked.parent, driver)
     assert not answer.exists()
     assert loads.read_text() == fresh
+
+
+def test_foam_too_soft_for_its_load_ends_the_run_in_a_sentence(tmp_path: Path) -> None:
+    tree = plank_scene("memory", "large").model_dump(mode="json")
+    tree["pattern"] |= {"young_modulus_pa": 30.0}
+    outcome = drive(with_surface(Scenario.model_validate(tree)), tmp_path, driver)
+    assert outcome.outcome is Outcome.NO_EQUILIBRIUM
+    assert re.match(r"after .* s the pattern finds no equilibrium beyond", outcome.detail)
+    found = verdict_of(tmp_path)
+    assert found is None or found.state == "diverged"

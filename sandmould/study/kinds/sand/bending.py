@@ -126,7 +126,7 @@ def verdict_of(folder: Path, until_s: float = np.inf) -> LoopVerdict | None:
     if log is None:
         return None
     stopped = np.isinf(until_s) and outcome.is_file() and (
-        RunOutcome.read(outcome).outcome is Outcome.COUPLING_DIVERGED
+        RunOutcome.read(outcome).outcome in (Outcome.COUPLING_DIVERGED, Outcome.NO_EQUILIBRIUM)
     )  # fmt: skip
     return classify_loop(log[log["time_s"] <= until_s], stopped)
 
