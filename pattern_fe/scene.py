@@ -17,6 +17,7 @@ from pattern_fe.mesh_file import read_mesh
 from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
 from pattern_fe.supports import Supports
+from pattern_fe.surroundings import Surroundings
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig
 from sandmould.scenario.scenario import Scenario
@@ -46,6 +47,16 @@ def pattern_of(scenario: Scenario) -> Pattern:
     size_m = (box.width_m, box.height_m) if d == 2 else (box.width_m, box.depth_m, box.height_m)
     thickness_m = scenario.sand.disc_thickness_m if d == 2 else None
     return _computed(body, size_m, thickness_m, _changed_ns(config))
+
+
+def surroundings_of(scenario: Scenario, pattern: Pattern) -> Surroundings:
+    """What the pattern of a scenario can touch beside the sand."""
+    config = scenario.pattern
+    assert config is not None
+    surface = pattern.surface
+    held = pattern.fixed[surface.nodes[surface.outer_line]]
+    reach_m = config.loop.largest_displacement_m
+    return Surroundings(scenario.scene, surface.outer, held, config.name, reach_m)
 
 
 def _changed_ns(config: PatternConfig) -> int:

@@ -48,8 +48,8 @@ class LoopVerdict:
     spikes: int
     """Windows whose residual is larger than the displacement."""
     made_j: float
-    """Energy of the shape at the interface in the end less the work of the sand; above 0 the loop
-    itself gave it."""
+    """Energy of the shape at the interface in the end less the work of the sand that contact with
+    floor, walls and obstacles left it; above 0 the loop itself gave it."""
     stored_j: float
     """Median of the elastic energy."""
     last_s: float
@@ -126,7 +126,8 @@ def classify_loop(log: pd.DataFrame, stopped: bool = False) -> LoopVerdict | Non
     elif "kinetic_j" in log and stored.any():
         residual = float(np.sqrt(2.0 * last["kinetic_j"].mean() / stored.mean()))
     stored_j = float(stored.median())
-    made_j = float(at_interface.median()) - float(last["work_j"].median())
+    given = last["work_j"] - last["contact_j"] if "contact_j" in last else last["work_j"]
+    made_j = float(at_interface.median()) - float(given.median())
     state: State = "holds"
     is_fed = made_j > MADE_SHARE * stored_j
     if stopped or not np.isfinite(last[["displacement_m", "work_j"]]).to_numpy().all():
