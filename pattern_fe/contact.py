@@ -17,13 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pattern_fe.surroundings import Surroundings
+from pattern_fe.surroundings import Gaps, Surroundings
 
 Array = NDArray[np.float64]
 Response = Callable[[Array], Array]
 """Displacements of the surface under loads on it, both (nv d, m) float64, m and N."""
 _ROUNDS = 40
 """Of the active set, which takes some five; then least squares, slower but sure to end."""
+_SHARES = 1e-11
+"""Of its compliance, added to that of each place alone: those that coincide share a reaction."""
+_NO_STIFFNESS = "the pattern has no stiffness against reactions of contact"
 _OPEN = 1e-10
 """Share of the pattern's extent that counts as no overlap."""
 
@@ -39,7 +42,11 @@ class Touch:
 
 
 def touch(
-    surroundings: Surroundings, at_m: Array, free_m: Array, response: Response
+    surroundings: Surroundings,
+    at_m: Array,
+    free_m: Array,
+    response: Response,
+    pressed: NDArray[np.bool_] | None = None,
 ) -> Touch | None:
     """Find the reactions that keep a motion out of what surrounds a pattern.
 
@@ -51,6 +58,9 @@ def touch(
     free_m : (nv, d) float64, m
         Displacement that it leads to without reactions.
     response : Response
+    pressed : (nv,) bool, optional
+        Vertices with reactions before, whose closed gaps are taken to stay closed unless they are
+        found to pull: a pattern that only its contacts keep from buckling has no stiffness without.
 
     Returns
     -------
@@ -60,13 +70,63 @@ def touch(
     Raises
     ------
     RuntimeError
-        When the pattern has no stiffness against the reactions.
+        When no reactions are found: the pattern has no stiffness against them.
     """
     way_m = 1.5 * float(np.linalg.norm(free_m - at_m, axis=1).max())
-    gaps = surroundings.gaps(at_m, way_m)
-    open_m = gaps.gap_m + gaps.opening_m(free_m - at_m)
+    around = surroundings.gaps(at_m, way_m)
     least_m = -_OPEN * surroundings.extent_m
-    touched: Touch | None = None
+    held = np.zeros(0, dtype=np.int64)
+    if pressed is not None:
+        closed = (np.abs(around.gap_m) <= -least_m) & pressed[around.vertices[:, 0]]
+        held = np.flatnonzero(closed)
+    while True:
+        bound = _Bound(around.only(held), at_m, free_m, response)
+        load_n, moved_m = _pushed(around, at_m, bound.moved_m, bound.response, least_m)
+        pulls = bound.reactions_n(load_n) < 0.0
+        if not pulls.any():
+            break
+        held = held[~pulls]
+    load_n = load_n + bound.loads_n(load_n)
+    return Touch(load_n, moved_m) if load_n.any() else None
+
+
+class _Bound:
+    """A pattern some of whose closed gaps are kept closed, as by supports."""
+
+    def __init__(self, gaps: Gaps, at_m: Array, free_m: Array, response: Response) -> None:
+        self._rows = gaps.rows(len(free_m))
+        self._free_response = response
+        self._open_m = gaps.gap_m + gaps.opening_m(free_m - at_m)
+        self._answers = response(self._rows.T) if len(self._rows) else self._rows.T
+        compliance = self._rows @ self._answers
+        self._compliance = compliance + _SHARES * np.diag(np.abs(compliance.diagonal()))
+        away_m = self._answers @ np.linalg.solve(self._compliance, self._open_m)
+        self.moved_m = free_m - away_m.reshape(free_m.shape)
+        """(nv, d) float64, m: where the free motion leads with these gaps closed."""
+
+    def response(self, load_n: Array) -> Array:
+        """Displacements under loads, as those of the free pattern."""
+        answer = self._free_response(load_n)
+        return answer - self._answers @ np.linalg.solve(self._compliance, self._rows @ answer)
+
+    def reactions_n(self, load_n: Array) -> Array:
+        """What keeps the gaps closed under loads (nv, d) beside the free motion, N."""
+        if not len(self._rows):
+            return np.zeros(0)
+        moved = self._rows @ self._free_response(load_n.reshape(-1, 1))[:, 0]
+        return -np.linalg.solve(self._compliance, self._open_m + moved)
+
+    def loads_n(self, load_n: Array) -> Array:
+        """The same as loads on the vertices, (nv, d) float64, N."""
+        return np.asarray((self._rows.T @ self.reactions_n(load_n)).reshape(load_n.shape))
+
+
+def _pushed(
+    gaps: Gaps, at_m: Array, free_m: Array, response: Response, least_m: float
+) -> tuple[Array, Array]:
+    """Loads that open all gaps of a motion, and where it then leads, (nv, d) float64, N and m."""
+    load_n, moved_m = np.zeros_like(free_m), free_m
+    open_m = gaps.gap_m + gaps.opening_m(free_m - at_m)
     use = np.zeros(0, dtype=np.int64)
     rows, answers = np.zeros((0, free_m.size)), np.zeros((free_m.size, 0))
     fresh = np.flatnonzero(open_m < least_m)
@@ -76,10 +136,10 @@ def touch(
         answers = np.concatenate([answers, response(new.T)], axis=1)
         reaction = reactions_n(rows @ answers, open_m[use])
         moved_m = free_m + (answers @ reaction).reshape(free_m.shape)
-        touched = Touch((rows.T @ reaction).reshape(free_m.shape), moved_m)
+        load_n = (rows.T @ reaction).reshape(free_m.shape)
         left_m = gaps.gap_m + gaps.opening_m(moved_m - at_m)
         fresh = np.setdiff1d(np.flatnonzero(left_m < least_m), use)
-    return touched
+    return load_n, moved_m
 
 
 def reactions_n(compliance_m_n: Array, open_m: Array) -> Array:
@@ -102,11 +162,10 @@ def reactions_n(compliance_m_n: Array, open_m: Array) -> Array:
         When C is not positive.
     """
     diagonal = compliance_m_n.diagonal()
-    if not (diagonal >= -1e-12 * np.abs(diagonal).max(initial=0.0)).all():
-        raise RuntimeError("the pattern has no stiffness against reactions of contact")
+    if (diagonal < -1e-12 * np.abs(diagonal).max(initial=0.0)).any():
+        raise RuntimeError(_NO_STIFFNESS)
     free = np.flatnonzero(diagonal > 1e-9 * diagonal.max(initial=0.0))
-    # Places that coincide have equal rows: a trace of compliance of their own shares the reaction.
-    matrix = compliance_m_n[np.ix_(free, free)] + 1e-11 * np.diag(diagonal[free])
+    matrix = compliance_m_n[np.ix_(free, free)] + _SHARES * np.diag(diagonal[free])
     reaction = np.zeros(len(open_m))
     reaction[free] = _complementary(matrix, open_m[free])
     return reaction
@@ -117,7 +176,8 @@ def _complementary(matrix: Array, gap: Array) -> Array:
     for _ in range(_ROUNDS):
         reaction = np.zeros(len(gap))
         if active.any():
-            reaction[active] = np.linalg.solve(matrix[np.ix_(active, active)], -gap[active])
+            among = matrix[np.ix_(active, active)]
+            reaction[active] = np.linalg.solve(among, -gap[active])
         left = matrix @ reaction + gap
         new = np.where(active, reaction > 0.0, left < 0.0)
         if (new == active).all():
@@ -126,5 +186,5 @@ def _complementary(matrix: Array, gap: Array) -> Array:
     try:
         root = np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError as fault:
-        raise RuntimeError("the pattern has no stiffness against reactions of contact") from fault
+        raise RuntimeError(_NO_STIFFNESS) from fault
     return np.asarray(nnls(root.T, -np.linalg.solve(root, gap))[0])

@@ -92,7 +92,6 @@ class _Equilibrium:
             return step
 
         step = answer(residual_n.ravel())
-        self.contact_n = np.zeros_like(displacement_m)
         if self.obstructed is not None:
             nodes, shape = self.obstructed.nodes, displacement_m.shape
             entries = (nodes[:, None] * shape[1] + np.arange(shape[1])).ravel()
@@ -104,7 +103,9 @@ class _Equilibrium:
 
             at = displacement_m[nodes]
             led = at + step.reshape(shape)[nodes]
-            touched = touch(self.obstructed.surroundings, at, led, response)
+            pressed = self.contact_n[nodes].any(axis=1)
+            touched = touch(self.obstructed.surroundings, at, led, response, pressed)
+            self.contact_n = np.zeros_like(displacement_m)
             if touched is not None:
                 self.contact_n[nodes] = touched.load_n
                 step = answer((residual_n + self.contact_n).ravel())

@@ -45,7 +45,7 @@ class Gaps:
         rows = np.zeros((m, vertices, d))
         for corner, share in zip(self.vertices.T, self.shares.T, strict=True):
             np.add.at(rows, (np.arange(m), corner), share[:, None] * self.normal)
-        return rows.reshape(m, -1)
+        return rows.reshape(m, vertices * d)
 
     def only(self, chosen: Indices) -> Gaps:
         """Some of the rows."""
