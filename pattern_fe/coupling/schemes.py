@@ -10,6 +10,7 @@ from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.pattern import Pattern
+from pattern_fe.scene import surroundings_of
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_of, engines_that
 from sandmould.scenario.bad_input import BadInputError, Problem
@@ -105,7 +106,14 @@ def explicit_foam(scenario: Scenario, pattern: Pattern) -> ExplicitFoam:
     loop = _loop_of_small_displacements(scenario)
     bound = ContactBound.of(scenario, pattern)
     try:
-        foam = ExplicitFoam(pattern, scenario.step_s, bound, loop.mass_scale, loop.damping_ratio)
+        foam = ExplicitFoam(
+            pattern,
+            scenario.step_s,
+            bound,
+            loop.mass_scale,
+            loop.damping_ratio,
+            surroundings_of(scenario, pattern),
+        )
     except ValueError as fault:
         raise _bad("mass_scale", loop.mass_scale, f"one that can be computed: {fault}") from fault
     shaken_hz = _shaken_hz(scenario)
