@@ -127,6 +127,25 @@ class Surroundings:
         gap_m = (self.drawn_m + moved_m) @ self._wall_normal.T - self._wall_at_m
         return np.asarray(gap_m + self._never_m)
 
+    def bounds_m(self) -> tuple[Array, Array]:
+        """Least and greatest displacements between floor and walls, both (nv, d) float64, m."""
+        low, high = np.full_like(self.drawn_m, -np.inf), np.full_like(self.drawn_m, np.inf)
+        gap_m = self.wall_gaps_m(np.zeros_like(self.drawn_m))
+        for normal, away_m in zip(self._wall_normal, gap_m.T, strict=True):
+            axis = int(np.abs(normal).argmax())
+            if normal[axis] > 0.0:
+                low[:, axis] = -away_m
+            else:
+                high[:, axis] = away_m
+        return low, high
+
+    def outlines_m(self) -> list[Array]:
+        """Corners of each obstacle in turn, counter-clockwise, (k, 2) float64, m; in 2D."""
+        return [
+            solid.vertices_m if isinstance(solid, Outline) else solid.corners()[[0, 2, 3, 1]]
+            for solid in self.solids
+        ]
+
     @cached_property
     def as_drawn(self) -> Clearance:
         """Distances from obstacles as drawn."""

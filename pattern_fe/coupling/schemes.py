@@ -141,6 +141,7 @@ def in_step_foam(scenario: Scenario, pattern: Pattern) -> InStepFoam:
             loop.largest_displacement_m,
             loop.mass_scale,
             loop.damping_ratio,
+            surroundings_of(scenario, pattern),
         )
     mass, shaken_hz = foam.mass, _shaken_hz(scenario)
     if mass.first_hz < min(ABOVE_VIBRATION * shaken_hz, LIKE_FOAM * mass.own_first_hz):
