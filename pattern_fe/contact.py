@@ -107,7 +107,8 @@ class _Bound:
     def response(self, load_n: Array) -> Array:
         """Displacements under loads, as those of the free pattern."""
         answer = self._free_response(load_n)
-        return answer - self._answers @ np.linalg.solve(self._compliance, self._rows @ answer)
+        kept = np.linalg.solve(self._compliance, self._rows @ answer)
+        return np.asarray(answer - self._answers @ kept)
 
     def reactions_n(self, load_n: Array) -> Array:
         """What keeps the gaps closed under loads (nv, d) beside the free motion, N."""

@@ -103,7 +103,7 @@ class _Equilibrium:
 
             at = displacement_m[nodes]
             led = at + step.reshape(shape)[nodes]
-            pressed = self.contact_n[nodes].any(axis=1)
+            pressed = np.asarray(self.contact_n[nodes].any(axis=1))
             touched = touch(self.obstructed.surroundings, at, led, response, pressed)
             self.contact_n = np.zeros_like(displacement_m)
             if touched is not None:

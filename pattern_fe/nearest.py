@@ -10,9 +10,7 @@ _PAIRS = 200_000
 """Of points and facets held in memory together."""
 
 
-def nearest_on_facets(
-    points_m: Array, corners_m: Array
-) -> tuple[NDArray[np.int64], Array, Array]:
+def nearest_on_facets(points_m: Array, corners_m: Array) -> tuple[NDArray[np.int64], Array, Array]:
     """Find the facet nearest each point, and the place on it.
 
     Parameters

@@ -109,10 +109,18 @@ class Surroundings:
         )  # fmt: skip
         corners = outer.vertices_m[outer.facets]
         sides_m = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        apart_m = 0.5 * float(sides_m.min())
-        points = [self.drawn_m[:0], *(points_on(solid, apart_m, low_m, high_m)
-                                      for solid in self.solids)]  # fmt: skip
+        self._apart_m = 0.5 * float(sides_m.min())
+        points = [self.drawn_m[:0]]
+        for solid in self.solids:
+            # In 2D one of two outlines that overlap has a corner in the other.
+            of_solid = _corners if self.dimension == 2 else points_on
+            points.append(of_solid(solid, self._apart_m, low_m, high_m))
         self._points_m = np.concatenate(points)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.drawn_m.shape[1]
 
     @property
     def extent_m(self) -> float:
@@ -126,6 +134,20 @@ class Surroundings:
         """
         gap_m = (self.drawn_m + moved_m) @ self._wall_normal.T - self._wall_at_m
         return np.asarray(gap_m + self._never_m)
+
+    def overlapped_by(self) -> str | None:
+        """Name of an obstacle that reaches into the pattern as drawn; None where none does."""
+        least_m = -1e-6 * self.extent_m
+        low_m, high_m = self.drawn_m.min(axis=0), self.drawn_m.max(axis=0)
+        for solid in self.solids:
+            points_m = points_on(solid, self._apart_m, low_m, high_m)
+            gap_m = float(solid.distance_m(self.drawn_m).min())
+            if len(points_m):
+                inner_m = self._from_pattern_m(points_m, self.drawn_m, np.inf)
+                gap_m = min(gap_m, float(inner_m.min()))
+            if gap_m < least_m:
+                return solid.name
+        return None
 
     def bounds_m(self) -> tuple[Array, Array]:
         """Least and greatest displacements between floor and walls, both (nv, d) float64, m."""
@@ -265,32 +287,38 @@ def _of_vertices(gap_m: Array, normal: Array, vertex: Indices) -> Gaps:
 
 
 def points_on(solid: Solid, apart_m: float, low_m: Array, high_m: Array) -> Array:
-    """Points on a solid that may get inside a pattern between its vertices, (k, d) float64, m.
-
-    Corners in 2D, where two outlines that overlap have a vertex in one another; in 3D points along
-    all edges of its triangles, as far apart as asked.
+    """Points along all edges of a solid that may lie inside a pattern, (k, d) float64, m.
 
     Parameters
     ----------
     solid : Solid
     apart_m : float
+        Distance of the points: vertices of the pattern are farther apart.
     low_m, high_m : (d,) float64, m
         Box that the pattern may reach; points outside it are left out.
     """
     if isinstance(solid, Revolved):
         solid = solid.mesh(_ROUND_SIDES)
-    points = solid.corners()
-    if points.shape[1] == 3:
-        facets = solid.triangles if isinstance(solid, TriangleMesh) else solid.facets()  # type: ignore[union-attr]
-        ends = np.concatenate([facets[:, [i, (i + 1) % 3]] for i in range(3)])
-        ends = np.unique(np.sort(ends, axis=1), axis=0)
-        low, high = np.sort(points[ends], axis=1).transpose(1, 0, 2)
-        ends = ends[((low <= high_m) & (high >= low_m)).all(axis=1)]
-        edges = [
-            start + np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(end - start) / apart_m))[:, None]
-            * (end - start)
-            for start, end in points[ends]
-        ]  # fmt: skip
-        points = np.concatenate([points[:0], *edges])
-    inside = ((points >= low_m) & (points <= high_m)).all(axis=1)
-    return np.unique(points[inside], axis=0)
+    corners = solid.corners()
+    if isinstance(solid, Outline):
+        number = np.arange(len(corners))
+        facets = np.stack([number, np.roll(number, -1)], axis=1)
+    else:
+        facets = solid.triangles if isinstance(solid, TriangleMesh) else solid.facets()
+    ends = np.concatenate([np.roll(facets, -i, axis=1)[:, :2] for i in range(facets.shape[1])])
+    ends = np.unique(np.sort(ends, axis=1), axis=0)
+    low, high = np.sort(corners[ends], axis=1).transpose(1, 0, 2)
+    ends = ends[((low <= high_m) & (high >= low_m)).all(axis=1)]
+    parts = [corners[:0]]
+    for start, end in corners[ends]:
+        count = 2 + int(np.linalg.norm(end - start) / apart_m)
+        parts.append(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start))
+    return _within(np.concatenate(parts), low_m, high_m)
+
+
+def _corners(solid: Solid, apart_m: float, low_m: Array, high_m: Array) -> Array:
+    return _within(solid.corners(), low_m, high_m)
+
+
+def _within(points: Array, low_m: Array, high_m: Array) -> Array:
+    return np.unique(points[((points >= low_m) & (points <= high_m)).all(axis=1)], axis=0)

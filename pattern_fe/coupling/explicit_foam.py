@@ -121,7 +121,7 @@ class ExplicitFoam:
         self.contact_n = np.zeros_like(self.vertices_m)
         """(nv, d) float64, N: of what it touches, in the last step."""
         self._surroundings = surroundings
-        self._clearance = surroundings and surroundings.as_drawn
+        self._clearance = None if surroundings is None else surroundings.as_drawn
         self._mobility_m_n = self._motion.mobility_m_n[self._nodes]
 
     @property

@@ -47,7 +47,7 @@ class FoamBody:
         self._line = pattern.surface.outer_line
         self._nodes = pattern.surface.nodes[self._line]
         self._surroundings = surroundings
-        self._obstructed = surroundings and Obstructed(surroundings, self._nodes)
+        self._obstructed = None if surroundings is None else Obstructed(surroundings, self._nodes)
         self._answers: dict[int, Array] = {}
 
     @property
