@@ -115,7 +115,7 @@ class _Bound:
         if not len(self._rows):
             return np.zeros(0)
         moved = self._rows @ self._free_response(load_n.reshape(-1, 1))[:, 0]
-        return -np.linalg.solve(self._compliance, self._open_m + moved)
+        return np.asarray(-np.linalg.solve(self._compliance, self._open_m + moved))
 
     def loads_n(self, load_n: Array) -> Array:
         """The same as loads on the vertices, (nv, d) float64, N."""

@@ -24,7 +24,7 @@ class StaticSolution:
     moment_left_n_m: float = np.nan
     """Size of the moment about the origin that loads and reactions leave; NaN where unknown."""
     contact_n: Array | None = None
-    """(nv, d) float64, N: of floor, walls and obstacles on the vertices; None where none touches."""
+    """(nv, d) float64, N: of floor, walls and obstacles on the vertices; None where none do."""
 
 
 class ElasticBody(Protocol):

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.condensation import CondensedSurface
+from pattern_fe.coupling.contact_arrays import contact_arrays
 from pattern_fe.coupling.contact_rows import ContactRows
-from pattern_fe.coupling.contact_step import contact_arrays
 from pattern_fe.coupling.foam_step import (
     CONTACT,
     DAMPED,
