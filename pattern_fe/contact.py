@@ -20,6 +20,7 @@ from scipy.optimize import nnls
 from pattern_fe.surroundings import Gaps, Surroundings
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Response = Callable[[Array], Array]
 """Displacements of the surface under loads on it, both (nv d, m) float64, m and N."""
 _ROUNDS = 40
@@ -27,6 +28,8 @@ _ROUNDS = 40
 _SHARES = 1e-11
 """Of its compliance, added to that of each place alone: those that coincide share a reaction."""
 _NO_STIFFNESS = "the pattern has no stiffness against reactions of contact"
+_AT_ONCE = 100
+"""Places that are taken to press in a round, before all gaps are looked at again."""
 _OPEN = 1e-10
 """Share of the pattern's extent that counts as no overlap."""
 
@@ -130,7 +133,7 @@ def _pushed(
     open_m = gaps.gap_m + gaps.opening_m(free_m - at_m)
     use = np.zeros(0, dtype=np.int64)
     rows, answers = np.zeros((0, free_m.size)), np.zeros((free_m.size, 0))
-    fresh = np.flatnonzero(open_m < least_m)
+    fresh = _deepest(gaps, open_m, least_m)
     while len(fresh):
         new = gaps.only(fresh).rows(len(free_m))
         use, rows = np.concatenate([use, fresh]), np.concatenate([rows, new])
@@ -139,8 +142,17 @@ def _pushed(
         moved_m = free_m + (answers @ reaction).reshape(free_m.shape)
         load_n = (rows.T @ reaction).reshape(free_m.shape)
         left_m = gaps.gap_m + gaps.opening_m(moved_m - at_m)
-        fresh = np.setdiff1d(np.flatnonzero(left_m < least_m), use)
+        left_m[use] = 0.0
+        fresh = _deepest(gaps, left_m, least_m)
     return load_n, moved_m
+
+
+def _deepest(gaps: Gaps, open_m: Array, least_m: float) -> Indices:
+    """Places that are most inside, one a facet: hardly any more is open when these are."""
+    inside = np.flatnonzero(open_m < least_m)
+    inside = inside[open_m[inside].argsort(kind="stable")]
+    _, first = np.unique(gaps.vertices[inside, 0], return_index=True)
+    return inside[np.sort(first)[:_AT_ONCE]]
 
 
 def reactions_n(compliance_m_n: Array, open_m: Array) -> Array:

@@ -109,7 +109,7 @@ class Surroundings:
         )  # fmt: skip
         corners = outer.vertices_m[outer.facets]
         sides_m = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        self._apart_m = 0.5 * float(sides_m.min())
+        self._apart_m = float(sides_m.min())
         points = [self.drawn_m[:0]]
         for solid in self.solids:
             # In 2D one of two outlines that overlap has a corner in the other.

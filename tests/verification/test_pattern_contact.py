@@ -38,19 +38,19 @@ def surroundings(pattern: Pattern, box: Box, *obstacles: AnyObstacle) -> Surroun
 
 
 def square(*clamped: str, gap_m: float, poisson: float = 0.0, **supports: Any) -> Pattern:
-    """A square or cube of foam, its foot a gap over the floor, its left side at the wall."""
+    """A square or cube of foam over the floor; elements of first order take even loads evenly."""
     depth_m = supports.pop("depth_m", None)
     up = np.eye(2 if depth_m is None else 3)[-1]
     mesh = mesh_of(bar(SIDE_M, SIDE_M), SIDE_M / 4, depth_m).translated(gap_m * up)
     foam = Foam(YOUNG_PA, poisson)
     thickness_m = THICKNESS_M if depth_m is None else None
-    return Pattern(mesh, Supports(clamped=clamped, **supports), foam, 2, thickness_m)
+    return Pattern(mesh, Supports(clamped=clamped, **supports), foam, 1, thickness_m)
 
 
-def cantilever(along: int = 40) -> Pattern:
+def cantilever(along: int = 40, through: int = 2) -> Pattern:
     """A slender plank clamped at its left end, a gap over the floor; without Poisson's effect."""
     mesh = MeshQuad.init_tensor(
-        np.linspace(0.0, LENGTH_M, along + 1), GAP_M + np.linspace(0.0, HEIGHT_M, 3)
+        np.linspace(0.0, LENGTH_M, along + 1), GAP_M + np.linspace(0.0, HEIGHT_M, through + 1)
     )
     foam = Foam(YOUNG_PA, 0.0)
     return Pattern(with_sides(mesh), Supports(("left",)), foam, 2, THICKNESS_M)
@@ -123,10 +123,11 @@ def test_the_floor_bears_a_pressed_block(large: bool, dimension: int) -> None:
     constrained_pa = YOUNG_PA * (1 - 0.35) / (1 + 0.35) / (1 - 2 * 0.35)
     width_m = THICKNESS_M if dimension == 2 else SIDE_M
     shorter_m = force_n * SIDE_M / (constrained_pa * SIDE_M * width_m)
-    top_m = -found.displacement_m[:, -1].min()
-    # Large displacements differ by about 3/2 of the strain; local shares of the load (1:2:1 for
-    # quadratic elements) by less than 1 % of the mean.
-    assert top_m == pytest.approx(shorter_m, rel=0.02)
+    # Twice the energy over the load is the way of its mean. Halves of the faces of cubes share the
+    # load unevenly among vertices: 1 %. Large displacements differ by 3/2 of the strain, 1e-4.
+    assert 2.0 * found.energy_j / force_n == pytest.approx(
+        shorter_m, rel=0.02 if depth_m else 1e-3
+    )
 
 
 @pytest.mark.parametrize("large", [False, True])
@@ -146,19 +147,17 @@ def test_a_cantilever_that_lands_is_a_propped_one(large: bool) -> None:
 
 
 def test_an_evenly_loaded_cantilever_lies_down_as_far_as_its_theory_says() -> None:
-    # Under a line load q the free part a of a beam that lies on the floor is clamped at both ends,
-    # one sunk by g, without moment where it lifts off: q a^4 = 72 E I g, and the moment's balance
-    # gives the clamp 5/8 ... of a propped beam; the floor bears the rest.
+    # Where a beam under a line load q lifts off the floor it has neither slope nor moment: with
+    # w = g there q a^4 = 72 E I g for the length a that hangs, and the clamp bears 2/3 q a of it.
     pattern = cantilever(along=80)
     body = FoamBody(pattern, surroundings=surroundings(pattern, Box(width_m=0.2)))
     line_n_m = 72.0 * STIFFNESS_N_M2 * GAP_M / (0.6 * LENGTH_M) ** 4
     found = body.solve(even_load(pattern, line_n_m * LENGTH_M))
     touching = np.flatnonzero(found.contact_n.any(axis=1))  # type: ignore[union-attr]
     lands_m = body.vertices_m[touching, 0].min()
-    assert lands_m == pytest.approx(0.6 * LENGTH_M, rel=0.03)
-    # Clamped with a sunk end without moment or slope there: V0 = q a / 2 + 12 E I g / a^3.
-    a_m = 0.6 * LENGTH_M
-    clamp_n = line_n_m * a_m / 2.0 + 12.0 * STIFFNESS_N_M2 * GAP_M / a_m**3
+    # Shear lets it land earlier, by some sqrt(E I / (k G A)) = 2.2 mm; vertices are 0.6 mm apart.
+    assert lands_m == pytest.approx(0.6 * LENGTH_M - 0.0022, abs=0.0012)
+    clamp_n = 2.0 / 3.0 * line_n_m * 0.6 * LENGTH_M
     assert pressed_n(found) == pytest.approx(line_n_m * LENGTH_M - clamp_n, rel=0.02)
 
 
@@ -180,7 +179,7 @@ def test_a_post_narrower_than_an_element_holds_a_plank() -> None:
 
 def test_a_wedge_is_met_at_right_angles_to_its_side() -> None:
     pattern = cantilever(along=20)
-    wedge = Polygon(kind="polygon", vertices_m=((0.1005, 0.0), (0.14, 0.0), (0.14, 0.0395)))
+    wedge = Polygon(kind="polygon", vertices_m=((0.099, 0.0), (0.14, 0.0), (0.14, 0.041)))
     body = FoamBody(pattern, surroundings=surroundings(pattern, Box(width_m=0.2), wedge))
     found = body.solve(end_force(body, 2.0))
     force = found.contact_n.sum(axis=0)  # type: ignore[union-attr]
@@ -228,18 +227,19 @@ def test_places_that_coincide_share_one_reaction() -> None:
 
 
 def test_a_dropped_end_stops_without_rebound_and_its_energy_is_counted() -> None:
-    pattern = cantilever(along=20)
+    pattern = cantilever(along=8, through=1)
     around = surroundings(pattern, Box(width_m=0.2))
-    foam = ExplicitFoam(pattern, 1e-5, ContactBound(1e3, 0.0), damping_ratio=0.2,
+    foam = ExplicitFoam(pattern, 1e-5, ContactBound(1.0, 0.0), damping_ratio=1.0,
                         surroundings=around)  # fmt: skip
     closing_n = 3.0 * STIFFNESS_N_M2 * GAP_M / LENGTH_M**3
     load = end_force(FoamBody(pattern), 1.4 * closing_n)
-    lowest = 0.0
-    for _ in range(20000):
+    lowest, pressed = 0.0, []
+    for _ in range(12000):
         foam.advance(load)
         lowest = min(lowest, (foam.vertices_m + foam.displacement_m)[:, 1].min())
+        pressed.append(foam.contact_n[:, 1].sum())
     assert lowest > -1e-9
-    assert foam.contact_n[:, 1].sum() == pytest.approx(0.4 * closing_n, rel=0.02)
+    assert np.mean(pressed[-2000:]) == pytest.approx(0.4 * closing_n, rel=0.03)
     left_j = foam.work_j - foam.elastic_j - foam.kinetic_j - foam.damped_j - foam.contact_j
     assert left_j == pytest.approx(0.0, abs=1e-9 * foam.work_j)
     assert 0.0 < foam.contact_j < foam.work_j
