@@ -30,6 +30,8 @@ from pattern_fe.motion import CentralDifferences
 from pattern_fe.perimeter import perimeter_of
 from pattern_fe.space import space_of
 from pattern_fe.supports import Supports, check_held, fixed_components
+from pattern_fe.surroundings import Surroundings
+from sandmould.scenario.geometry import Scene
 
 Array = NDArray[np.float64]
 _NEWTON = NewtonSettings()
@@ -172,6 +174,11 @@ class Pattern:
             pull_n = -(self.stiffness @ whole.ravel())[inner]
             whole.ravel()[inner] = factorised(self.stiffness[inner][:, inner]).solve(pull_n)
         return whole
+
+    def surrounded(self, scene: Scene, own_name: str = "", reach_m: float = np.inf) -> Surroundings:
+        """What the pattern can touch of a scene; see ``Surroundings``."""
+        held = self.fixed[self.surface.nodes[self.surface.outer_line]]
+        return Surroundings(scene, self.surface.outer, held, own_name, reach_m)
 
     def _check_load(self, load_n: Array) -> None:
         valid = self.space.node_m.shape

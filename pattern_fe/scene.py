@@ -53,10 +53,7 @@ def surroundings_of(scenario: Scenario, pattern: Pattern) -> Surroundings:
     """What the pattern of a scenario can touch beside the sand."""
     config = scenario.pattern
     assert config is not None
-    surface = pattern.surface
-    held = pattern.fixed[surface.nodes[surface.outer_line]]
-    reach_m = config.loop.largest_displacement_m
-    return Surroundings(scenario.scene, surface.outer, held, config.name, reach_m)
+    return pattern.surrounded(scenario.scene, config.name, config.loop.largest_displacement_m)
 
 
 def _changed_ns(config: PatternConfig) -> int:

@@ -96,7 +96,9 @@ class Surroundings:
         """Vertices as drawn, (nv, d) float64, m."""
         self._facets = outer.facets
         self._held = held.all(axis=1)
-        self._wall_normal = np.array([wall.normal for wall in scene.walls])
+        self.walls = scene.walls
+        none = np.zeros((0, self.dimension))
+        self._wall_normal = np.vstack([none, *(wall.normal for wall in scene.walls)])
         self._wall_at_m = np.array([wall.normal @ wall.point_m for wall in scene.walls])
         along_wall = held @ np.abs(self._wall_normal.T) > 0.0
         self._never_m = np.where(along_wall, np.inf, 0.0)
@@ -197,7 +199,7 @@ class Surroundings:
         since : Clearance, optional
             That it has moved from; the drawing unless given.
         """
-        if self.wall_gaps_m(moved_m).min() < 0.0:
+        if self.wall_gaps_m(moved_m).min(initial=0.0) < 0.0:
             return False
         if not self.solids:
             return True

@@ -56,7 +56,7 @@ def open_coupled(
     body: ElasticBody = FoamBody(pattern, large, around)
     sand = open_session(program, folder, log, checkpoint)
     if loop.exchange == "files":
-        body = FilesBody(pattern, large, folder / EXCHANGE, sand)
+        body = FilesBody(pattern, large, folder / EXCHANGE, sand, around)
     if loop.scheme == "in_step":
         foam = in_step_foam(scenario, pattern)
         (work / MASSES_LOG).write_text(_selective_masses(foam.mass), encoding="utf-8")

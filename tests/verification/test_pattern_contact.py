@@ -32,9 +32,7 @@ GAP_M = 0.002
 
 
 def surroundings(pattern: Pattern, box: Box, *obstacles: AnyObstacle) -> Surroundings:
-    surface, dimension = pattern.surface, pattern.space.dimension
-    held = pattern.fixed[surface.nodes[surface.outer_line]]
-    return Surroundings(build_scene(box, obstacles, dimension), surface.outer, held)
+    return pattern.surrounded(build_scene(box, obstacles, pattern.space.dimension))
 
 
 def square(*clamped: str, gap_m: float, poisson: float = 0.0, **supports: Any) -> Pattern:
@@ -125,9 +123,7 @@ def test_the_floor_bears_a_pressed_block(large: bool, dimension: int) -> None:
     shorter_m = force_n * SIDE_M / (constrained_pa * SIDE_M * width_m)
     # Twice the energy over the load is the way of its mean. Halves of the faces of cubes share the
     # load unevenly among vertices: 1 %. Large displacements differ by 3/2 of the strain, 1e-4.
-    assert 2.0 * found.energy_j / force_n == pytest.approx(
-        shorter_m, rel=0.02 if depth_m else 1e-3
-    )
+    assert 2.0 * found.energy_j / force_n == pytest.approx(shorter_m, rel=0.02 if depth_m else 1e-3)
 
 
 @pytest.mark.parametrize("large", [False, True])
