@@ -20,6 +20,9 @@ Indices = NDArray[np.int64]
 _ROUND_SIDES = 32
 """Of a round obstacle, where points on it are looked for: vertices of the pattern meet it round."""
 
+_PUSHES = 20
+"""Of a surface out of what it has entered: corners of obstacles may need some."""
+
 
 @dataclass(frozen=True)
 class Gaps:
@@ -223,13 +226,19 @@ class Surroundings:
                       for name in ("gap_m", "normal", "vertices", "shares")))  # fmt: skip
 
     def pushed_out(self, moved_m: Array) -> Array:
-        """A displacement whose vertices lie outside walls and obstacles: those inside are moved."""
+        """A displacement that enters nothing: what is inside is moved out, the shortest way."""
         if self.is_clear(moved_m):
-            return np.asarray(moved_m)
-        moved_m = moved_m + np.maximum(0.0, -self.wall_gaps_m(moved_m)) @ self._wall_normal
-        for solid in self.solids:
-            inside = self._solid(solid, self.drawn_m + moved_m, 0.0)
-            moved_m[inside.vertices[:, 0]] -= inside.gap_m[:, None] * inside.normal
+            return moved_m
+        moved_m = moved_m.copy()
+        for _ in range(_PUSHES):
+            inside = self.gaps(moved_m, -1e-9 * self.extent_m)
+            if not len(inside.gap_m):
+                break
+            # Several corners in one facet each push it by a part.
+            together = np.bincount(inside.vertices[:, 0])[inside.vertices[:, 0]]
+            size_m = -inside.gap_m / (np.sum(inside.shares**2, axis=1) * together)
+            pushes_m = inside.shares[..., None] * (size_m[:, None] * inside.normal)[:, None]
+            np.add.at(moved_m, inside.vertices, pushes_m)
         return moved_m
 
     def _walls(self, moved_m: Array, within_m: float) -> Gaps:

@@ -11,8 +11,11 @@ from skfem import MeshQuad
 
 from pattern_fe.contact import reactions_n
 from pattern_fe.coupling.body import StaticSolution
+from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.foam_step import step_foam
+from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.material import Foam
 from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, mesh_of, with_sides
@@ -240,3 +243,26 @@ def test_a_dropped_end_stops_without_rebound_and_its_energy_is_counted() -> None
     assert left_j == pytest.approx(0.0, abs=1e-9 * foam.work_j)
     assert 0.0 < foam.contact_j < foam.work_j
     assert foam.kinetic_j < 1e-6 * foam.work_j
+
+
+def test_steps_come_to_the_rest_of_the_static_solution_on_a_post() -> None:
+    pattern = cantilever(along=8, through=1)
+    post = Plate(kind="plate", centre_m=(0.072, GAP_M / 4), size_m=(0.002, GAP_M / 2))
+    around = surroundings(pattern, Box(width_m=0.2), post)
+    body = FoamBody(pattern, surroundings=around)
+    load = end_force(body, 0.25)
+    exact = body.solve(load)
+    row = ContactRows((np.zeros((pattern.condensed.mass_kg.size,) * 2),), 0.0)
+    in_step = InStepFoam(pattern, 1e-5, row, 0.1, damping_ratio=1.0, surroundings=around)
+    for _ in range(16000):
+        in_step._arrays.load[:] = load
+        step_foam(in_step._arrays)
+    np.testing.assert_allclose(in_step.displacement_m, exact.displacement_m, atol=1e-6)
+    left_j = in_step.work_j - in_step.elastic_j - in_step.kinetic_j - in_step.damped_j
+    assert left_j == pytest.approx(in_step.contact_j, abs=1e-9 * in_step.work_j)
+    assert in_step.contact_j > 0.0
+    explicit = ExplicitFoam(pattern, 1e-5, ContactBound(1.0, 0.0), damping_ratio=1.0,
+                            surroundings=around)  # fmt: skip
+    for _ in range(10000):
+        explicit.advance(load)
+    np.testing.assert_allclose(explicit.displacement_m, exact.displacement_m, atol=1e-6)

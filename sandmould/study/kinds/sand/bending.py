@@ -18,7 +18,7 @@ from pattern_fe.distance import distance_from_drawing
 from pattern_fe.large_displacement import LoadNotReachedError
 from pattern_fe.pattern import Pattern
 from pattern_fe.perimeter import Perimeter
-from pattern_fe.scene import pattern_of
+from pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
@@ -40,7 +40,8 @@ class BentPattern:
         held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
         self.tip = farthest_corner(self.drawn.vertices_m, held)
         """Its vertex farthest from the supports."""
-        self._body = FoamBody(self.pattern, config.statics == "large")
+        around = surroundings_of(scenario, self.pattern)
+        self._body = FoamBody(self.pattern, config.statics == "large", around)
 
     @property
     def reach_m(self) -> float:
