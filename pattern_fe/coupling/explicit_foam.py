@@ -163,18 +163,20 @@ class ExplicitFoam:
         if around is None:
             return self.contact_n
         free_m = motion.displacement_m[nodes]
-        if around.is_clear(free_m, self._clearance):
-            return self.contact_n
-        if around.solids:
+        if around.is_clear_of_solids(free_m, self._clearance):
+            # Lumped masses: floor and walls stop each vertex by itself.
+            back_m = around.way_to_walls_m(free_m)
+            beyond = back_m != 0.0
+            self.contact_n[beyond] = back_m[beyond] / self._mobility_m_n[beyond]
+        else:
             self._clearance = around.clearance(self._before[nodes])
-            if around.is_clear(free_m, self._clearance):
-                return self.contact_n
-        mobility = self._mobility_m_n.reshape(-1, 1)
-        found = touch(around, self._before[nodes], free_m, lambda load_n: mobility * load_n)
-        if found is not None:
-            self.contact_n = found.load_n
+            mobility = self._mobility_m_n.reshape(-1, 1)
+            found = touch(around, self._before[nodes], free_m, lambda load_n: mobility * load_n)
+            if found is not None:
+                self.contact_n = found.load_n
+        if self.contact_n.any():
             whole = np.zeros_like(motion.displacement_m)
-            whole[nodes] = found.load_n
+            whole[nodes] = self.contact_n
             motion.push(whole)
         return self.contact_n
 
