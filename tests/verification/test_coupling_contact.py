@@ -139,3 +139,11 @@ def test_files_carry_what_the_pattern_must_not_enter(tmp_path: Path) -> None:
     assert outcome.outcome is Outcome.FINISHED
     assert (log["contact_n"] > 0.0).any()
     assert deepest_m(told, moved_m) < 1e-9
+
+
+def test_in_space_a_soft_plank_lies_on_the_floor(tmp_path: Path) -> None:
+    plank = {"position_m": [0.0, 0.0, 0.003], "depth_m": 0.02, "element_m": 0.01}
+    told = scene(dimension=3, box={"depth_m": 0.02}, pattern=plank)
+    moved_m, log = driven(told, tmp_path)
+    assert (log["contact_n"] > 0.0).any()
+    assert deepest_m(told, moved_m) < 1e-9
