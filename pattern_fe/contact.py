@@ -196,8 +196,15 @@ def _complementary(matrix: Array, gap: Array) -> Array:
         if (new == active).all():
             return reaction
         active = new
-    try:
-        root = np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError as fault:
-        raise RuntimeError(_NO_STIFFNESS) from fault
-    return np.asarray(nnls(root.T, -np.linalg.solve(root, gap))[0])
+    return _least_squares(matrix, gap)
+
+
+def _least_squares(matrix: Array, gap: Array) -> Array:
+    """The same as non-negative least squares, for a matrix that may have lost its last digits."""
+    for share in (0.0, 1e-9, 1e-7):
+        try:
+            root = np.linalg.cholesky(matrix + share * np.diag(matrix.diagonal()))
+        except np.linalg.LinAlgError:
+            continue
+        return np.asarray(nnls(root.T, -np.linalg.solve(root, gap), maxiter=30 * len(gap))[0])
+    raise RuntimeError(_NO_STIFFNESS)

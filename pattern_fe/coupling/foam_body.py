@@ -14,7 +14,9 @@ from pattern_fe.surroundings import Surroundings
 
 Array = NDArray[np.float64]
 _LINEARISATIONS = 40
-"""Of gaps round obstacles; some five are enough."""
+"""Of gaps round obstacles; some ten are enough."""
+_WHOLE_WAYS = 12
+"""The first of them."""
 _STAYS = 1e-7
 """Share of the extent by which a surface may still move when it has come to rest."""
 
@@ -89,12 +91,13 @@ class FoamBody:
         if around is None or around.is_clear(moved[self._nodes]):
             return moved, touched
         free_m, at_m = moved[self._nodes], np.zeros_like(self.vertices_m)
-        for _ in range(_LINEARISATIONS):
+        for number in range(_LINEARISATIONS):
             contact = touch(around, at_m, free_m, self._response)
             led_m = free_m if contact is None else contact.moved_m
             near_m = _STAYS * around.extent_m
             stays = bool(np.abs(led_m - at_m).max() <= near_m)
-            at_m = led_m
+            # At a corner two linearisations may lead to one another: half of the way is between.
+            at_m = led_m if number < _WHOLE_WAYS else 0.5 * (at_m + led_m)
             if stays or (not around.solids and around.deepest_m(at_m) <= near_m):
                 break
         if contact is not None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from skfem import MeshQuad
 
-from pattern_fe.contact import reactions_n
+from pattern_fe.contact import _least_squares, reactions_n
 from pattern_fe.coupling.body import StaticSolution
 from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
@@ -217,6 +217,13 @@ def test_reactions_press_only_where_gaps_close() -> None:
     assert (found >= 0.0).all()
     assert left.min() > -1e-8
     assert found @ left == pytest.approx(0.0, abs=1e-8)
+    # The way that is sure to end, for where the active set does not, finds the same.
+    np.testing.assert_allclose(_least_squares(matrix, gap), found, atol=1e-6 * found.max())
+
+
+def test_a_pattern_without_stiffness_against_its_contacts_is_told() -> None:
+    with pytest.raises(RuntimeError, match="no stiffness against reactions"):
+        reactions_n(np.array([[-1.0]]), np.array([-1.0]))
 
 
 def test_places_that_coincide_share_one_reaction() -> None:
