@@ -7,13 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pattern_fe.contact import touch
 from pattern_fe.elasticity import displacement_gradient, element_stiffness_n_m, internal_force_n
 from pattern_fe.factor import factorised
 from pattern_fe.material import Foam
 from pattern_fe.space import Space
 from pattern_fe.supports import Mask
+from pattern_fe.surroundings import Surroundings
 
 Array = NDArray[np.float64]
+_OVERLAP = 1e-6
+"""Share of the pattern's extent by which it may reach into what surrounds it."""
 _HALVINGS = 8
 """Of a step of Newton's method, before the load is halved instead."""
 
@@ -48,26 +52,63 @@ class NewtonSettings:
             raise ValueError(f"number of load steps is {self.load_steps}, valid is 1 or more")
 
 
+@dataclass(frozen=True)
+class Obstructed:
+    """What stands in a pattern's way."""
+
+    surroundings: Surroundings
+    nodes: NDArray[np.int64]
+    """(nv,) int64: node at each vertex of the surface that they surround."""
+
+
 class _Equilibrium:
     """One pattern under growing dead loads."""
 
-    def __init__(self, space: Space, foam: Foam, bedding: Array, fixed: Mask) -> None:
+    def __init__(
+        self, space: Space, foam: Foam, bedding: Array, fixed: Mask, obstructed: Obstructed | None
+    ) -> None:
         self.space = space
         self.foam = foam
         self.bedding = bedding
         self.free = np.flatnonzero(~fixed.ravel())
+        self.obstructed = obstructed
+        self.contact_n = np.zeros_like(space.node_m)
+        """(n, d) float64, N: loads of what stands in the way, in the last iteration."""
 
     def force_n(self, displacement_m: Array) -> Array:
         spring = self.bedding[:, None] * displacement_m
         return internal_force_n(self.space, self.foam, displacement_m) + spring
 
     def newton_step_m(self, displacement_m: Array, residual_n: Array) -> Array:
+        """Step under a residual without reactions of contact, which it finds too."""
         matrices = element_stiffness_n_m(self.space, self.foam, displacement_m)
         tangent = self.space.assembled(matrices)
         tangent.setdiag(tangent.diagonal() + np.repeat(self.bedding, self.space.dimension))
-        step = np.zeros(displacement_m.size)
-        part = tangent[self.free][:, self.free]
-        step[self.free] = factorised(part).solve(residual_n.ravel()[self.free])
+        factor = factorised(tangent[self.free][:, self.free])
+
+        def answer(load_n: Array) -> Array:
+            step = np.zeros_like(load_n)
+            step[self.free] = factor.solve(load_n[self.free])
+            return step
+
+        step = answer(residual_n.ravel())
+        if self.obstructed is not None:
+            nodes, shape = self.obstructed.nodes, displacement_m.shape
+            entries = (nodes[:, None] * shape[1] + np.arange(shape[1])).ravel()
+
+            def response(load_n: Array) -> Array:
+                whole = np.zeros((displacement_m.size, load_n.shape[1]))
+                whole[entries] = load_n
+                return answer(whole)[entries]
+
+            at = displacement_m[nodes]
+            led = at + step.reshape(shape)[nodes]
+            pressed = np.asarray(self.contact_n[nodes].any(axis=1))
+            touched = touch(self.obstructed.surroundings, at, led, response, pressed)
+            self.contact_n = np.zeros_like(displacement_m)
+            if touched is not None:
+                self.contact_n[nodes] = touched.load_n
+                step = answer((residual_n + self.contact_n).ravel())
         return step.reshape(displacement_m.shape)
 
     def residual_n(self, displacement_m: Array, load_n: Array) -> tuple[Array, float]:
@@ -78,11 +119,21 @@ class _Equilibrium:
         largest = max(float(np.abs(force).max()), float(np.abs(load_n).max()))
         return residual.reshape(force.shape), largest
 
+    def is_open(self, displacement_m: Array) -> bool:
+        """Whether the surface is outside what surrounds it, to a millionth of its extent."""
+        if self.obstructed is None:
+            return True
+        around, moved_m = self.obstructed.surroundings, displacement_m[self.obstructed.nodes]
+        if around.is_clear(moved_m):
+            return True
+        return around.deepest_m(moved_m) <= _OVERLAP * around.extent_m
+
     def solve(self, displacement_m: Array, load_n: Array, settings: NewtonSettings) -> Array | None:
         """State under a load, found from one nearby, or None."""
-        residual, largest = self.residual_n(displacement_m, load_n)
         for _ in range(settings.iterations):
-            if np.abs(residual).max() <= settings.tolerance * largest:
+            residual, largest = self.residual_n(displacement_m, load_n)
+            left = np.abs(residual + self._pressed(residual)).max()
+            if left <= settings.tolerance * largest and self.is_open(displacement_m):
                 return displacement_m
             try:
                 step = self.newton_step_m(displacement_m, residual)
@@ -93,8 +144,13 @@ class _Equilibrium:
             if searched is None:
                 return None
             displacement_m = searched
-            residual, largest = self.residual_n(displacement_m, load_n)
         return None
+
+    def _pressed(self, residual_n: Array) -> Array:
+        """Reactions of contact at free components."""
+        pressed = np.zeros(residual_n.size)
+        pressed[self.free] = self.contact_n.ravel()[self.free]
+        return pressed.reshape(residual_n.shape)
 
     def _searched(self, displacement_m: Array, step_m: Array) -> Array | None:
         """Halve a step until it turns no element inside out, where the law has false equilibria.
@@ -119,8 +175,9 @@ def solve_large(
     fixed: Mask,
     load_n: Array,
     settings: NewtonSettings,
-) -> Array:
-    """Displacements under dead loads in the total Lagrangian form.
+    obstructed: Obstructed | None = None,
+) -> tuple[Array, Array]:
+    """Displacements under dead loads in the total Lagrangian form, and reactions of contact.
 
     Parameters
     ----------
@@ -131,17 +188,19 @@ def solve_large(
     fixed : (n, d) bool
     load_n : (n, d) float64, N
     settings : NewtonSettings
+    obstructed : Obstructed, optional
+        What stands in the way; its gaps are linearised anew in every iteration.
 
     Returns
     -------
-    (n, d) float64, m
+    displacement_m, contact_n : (n, d) float64, m and N
 
     Raises
     ------
     LoadNotReachedError
         When the iteration fails in the smallest load step.
     """
-    equilibrium = _Equilibrium(space, foam, bedding, fixed)
+    equilibrium = _Equilibrium(space, foam, bedding, fixed, obstructed)
     displacement, reached, step = np.zeros_like(space.node_m), 0.0, 1.0 / settings.load_steps
     while reached < 1.0:
         target = min(1.0, reached + step)
@@ -155,4 +214,4 @@ def solve_large(
         else:
             displacement, reached = equilibrium_m, target
             step = min(2.0 * step, 1.0 / settings.load_steps)
-    return displacement
+    return displacement, equilibrium.contact_n

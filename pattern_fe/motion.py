@@ -59,3 +59,14 @@ class CentralDifferences:
         self.velocity_m_s = self._keeps * self.velocity_m_s + self._gains * force
         self.displacement_m = self.displacement_m + self.step_s * self.velocity_m_s
         self.time_s += self.step_s
+
+    @property
+    def mobility_m_n(self) -> Array:
+        """Displacement in a step under a force of 1 N at its start, (n, d) float64, m/N."""
+        return np.asarray(self.step_s * self._gains)
+
+    def push(self, force_n: Array) -> None:
+        """Add forces, (n, d) float64, N, to those of the step that was just taken."""
+        pushed = self._gains * force_n
+        self.velocity_m_s = self.velocity_m_s + pushed
+        self.displacement_m = self.displacement_m + self.step_s * pushed

@@ -24,12 +24,14 @@ from pattern_fe.elasticity import (
     von_mises_pa,
 )
 from pattern_fe.factor import factorised
-from pattern_fe.large_displacement import NewtonSettings, solve_large
+from pattern_fe.large_displacement import NewtonSettings, Obstructed, solve_large
 from pattern_fe.material import Foam
 from pattern_fe.motion import CentralDifferences
 from pattern_fe.perimeter import perimeter_of
 from pattern_fe.space import space_of
 from pattern_fe.supports import Supports, check_held, fixed_components
+from pattern_fe.surroundings import Surroundings
+from sandmould.scenario.geometry import Scene
 
 Array = NDArray[np.float64]
 _NEWTON = NewtonSettings()
@@ -139,9 +141,17 @@ class Pattern:
         LoadNotReachedError
             When no equilibrium is found; it knows the share of the load reached.
         """
+        return self.solve_obstructed(load_n, None, settings)[0]
+
+    def solve_obstructed(
+        self, load_n: Array, obstructed: Obstructed | None, settings: NewtonSettings = _NEWTON
+    ) -> tuple[Array, Array]:
+        """Large displacements under dead loads among obstacles; see ``solve_large``."""
         self._check_load(load_n)
         check_held(self.space.node_m, self.fixed, self.supports)
-        return solve_large(self.space, self.foam, self._bedding_n_m, self.fixed, load_n, settings)
+        return solve_large(
+            self.space, self.foam, self._bedding_n_m, self.fixed, load_n, settings, obstructed
+        )
 
     def spread(self, outer_m: Array) -> Array:
         """Displacement of all nodes at rest for a given one of the outer surface; small ones.
@@ -164,6 +174,11 @@ class Pattern:
             pull_n = -(self.stiffness @ whole.ravel())[inner]
             whole.ravel()[inner] = factorised(self.stiffness[inner][:, inner]).solve(pull_n)
         return whole
+
+    def surrounded(self, scene: Scene, own_name: str = "", reach_m: float = np.inf) -> Surroundings:
+        """What the pattern can touch of a scene; see ``Surroundings``."""
+        held = self.fixed[self.surface.nodes[self.surface.outer_line]]
+        return Surroundings(scene, self.surface.outer, held, own_name, reach_m)
 
     def _check_load(self, load_n: Array) -> None:
         valid = self.space.node_m.shape

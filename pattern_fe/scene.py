@@ -18,6 +18,7 @@ from pattern_fe.mesh_file import read_mesh
 from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
 from pattern_fe.supports import Supports
+from pattern_fe.surroundings import Surroundings
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.limits import PATTERN_ELEMENTS
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig
@@ -62,6 +63,13 @@ def _check_elements(config: PatternConfig, box_depth_m: float | None) -> None:
         sides_m.append(config.depth_m or box_depth_m)
     elements = math.prod(side_m / config.element_m for side_m in sides_m)
     PATTERN_ELEMENTS.check("pattern.element_m", elements, config.element_m)
+
+
+def surroundings_of(scenario: Scenario, pattern: Pattern) -> Surroundings:
+    """What the pattern of a scenario can touch beside the sand."""
+    config = scenario.pattern
+    assert config is not None
+    return pattern.surrounded(scenario.scene, config.name, config.loop.largest_displacement_m)
 
 
 def _changed_ns(config: PatternConfig) -> int:

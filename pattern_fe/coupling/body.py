@@ -20,9 +20,11 @@ class StaticSolution:
     energy_j: float
     """Elastic energy stored in it."""
     reaction_n: Array
-    """(d,) float64, N: force of the supports on the pattern."""
+    """(d,) float64, N: force of the supports on the pattern, and of what it touches."""
     moment_left_n_m: float = np.nan
     """Size of the moment about the origin that loads and reactions leave; NaN where unknown."""
+    contact_n: Array | None = None
+    """(nv, d) float64, N: of floor, walls and obstacles on the vertices; None where none do."""
 
 
 class ElasticBody(Protocol):

@@ -47,6 +47,11 @@ class WindowEntry:
     """Elastic energy of the pattern at rest under the loads."""
     solve_s: float
     """Wall time of the pattern's participant."""
+    contact_n: float
+    """Size of the force of floor, walls and obstacles on the pattern."""
+    contact_j: float
+    """Work against these forces on the interface since the run began: none where the pattern
+    rests on them, some where the interface comes after the solution that touches already."""
 
 
 def rms_m(displacement_m: Array) -> float:
@@ -62,6 +67,11 @@ def work_of(load_n: Array, moved_m: Array) -> float:
     load_n, moved_m : (nv, d) float64, N and m
     """
     return float((load_n * moved_m).sum())
+
+
+def force_n(contact_n: Array | None) -> float:
+    """Size of the sum of forces of contact, N."""
+    return 0.0 if contact_n is None else float(np.linalg.norm(contact_n.sum(axis=0)))
 
 
 def imbalance_n(load_n: Array, solution: StaticSolution) -> float:

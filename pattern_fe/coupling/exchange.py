@@ -1,6 +1,7 @@
 """Pattern, loads and displacements in files: what two programs need that couple without meeting.
 
-``pattern.yaml`` names the foam, its supports and its mesh, ``pattern.vtu``. Each ``loads_*.tsv``
+``pattern.yaml`` names the foam, its supports, its mesh ``pattern.vtu``, and the planes (floor and
+walls) and outlines (obstacles, solid inside) that it must not enter. Each ``loads_*.tsv``
 holds the sand's mean forces of a window, ``answer_*.tsv`` of the same name the surface that they
 bend. Columns carry their units; what holds for the whole table stands in lines of ``# key: value``
 above it. Numbers are written so that they read back the same.
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -22,7 +24,10 @@ from pattern_fe.mesh_file import read_mesh, write_mesh
 from pattern_fe.pattern import Pattern
 from pattern_fe.perimeter import Perimeter
 from pattern_fe.supports import Supports
+from pattern_fe.surroundings import Surroundings
 from sandmould.runs.files import write_text
+from sandmould.scenario.geometry import Scene, Wall
+from sandmould.scenario.outline import Outline
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -33,12 +38,16 @@ SOLUTION = "answer_"
 _PLACE = ("x_m", "y_m")
 _FORCE = ("force_x_n", "force_y_n", "pressure_pa")
 _MOVED = ("displacement_x_m", "displacement_y_m")
+_TOUCHED = ("contact_x_n", "contact_y_n")
+"""Forces of what the pattern touches; other programs may leave them out."""
 _WHOLE = ("energy_j", "reaction_x_n", "reaction_y_n", "moment_left_n_m")
 _NEAR = 1e-6
 """Share of the drawing's extent by which a vertex may be off: other programs write fewer digits."""
 
 
-def write_pattern(folder: Path, pattern: Pattern, large: bool) -> None:
+def write_pattern(
+    folder: Path, pattern: Pattern, large: bool, surroundings: Surroundings | None = None
+) -> None:
     """Write what a pattern in 2D is made of and how it is held.
 
     Parameters
@@ -47,11 +56,13 @@ def write_pattern(folder: Path, pattern: Pattern, large: bool) -> None:
     pattern : Pattern
     large : bool
         Whether displacements are large.
+    surroundings : Surroundings, optional
+        What it can touch; nothing unless given.
     """
     folder.mkdir(exist_ok=True)
     write_mesh(folder / MESH, pattern.space.mesh)
     foam, supports = pattern.foam, pattern.supports
-    section = {
+    section: dict[str, Any] = {
         "mesh": MESH,
         "order": pattern.space.order,
         "thickness_m": pattern.space.thickness_m,
@@ -61,12 +72,20 @@ def write_pattern(folder: Path, pattern: Pattern, large: bool) -> None:
         "clamped": list(supports.clamped),
         "resting": list(supports.resting),
         "statics": "large" if large else "linear",
+        "planes": [],
+        "outlines_m": [],
     }
+    if surroundings is not None:
+        section["planes"] = [
+            {"point_m": wall.point_m.tolist(), "normal": wall.normal.tolist()}
+            for wall in surroundings.walls
+        ]
+        section["outlines_m"] = [line.tolist() for line in surroundings.outlines_m()]
     (folder / PATTERN).write_text(yaml.safe_dump(section, sort_keys=False), encoding="utf-8")
 
 
-def read_pattern(folder: Path) -> tuple[Pattern, bool]:
-    """Read what ``write_pattern`` wrote: the pattern, and whether displacements are large.
+def read_pattern(folder: Path) -> tuple[Pattern, bool, Surroundings]:
+    """Read what ``write_pattern`` wrote: pattern, whether displacements are large, surroundings.
 
     Raises
     ------
@@ -84,6 +103,13 @@ def read_pattern(folder: Path) -> tuple[Pattern, bool]:
             section["thickness_m"],
         )
         large = section["statics"] == "large"
+        walls = [
+            Wall(f"plane_{i}", np.array(plane["point_m"]), np.array(plane["normal"]))
+            for i, plane in enumerate(section["planes"])
+        ]
+        outlines = [
+            Outline(f"outline_{i}", np.array(line)) for i, line in enumerate(section["outlines_m"])
+        ]
     except OSError as error:
         raise ValueError(f"{path} cannot be read: {error.strerror}") from error
     except KeyError as error:
@@ -92,7 +118,9 @@ def read_pattern(folder: Path) -> tuple[Pattern, bool]:
         ) from error
     except (TypeError, RecursionError, yaml.YAMLError) as error:
         raise ValueError(f"{path} is not a list of keys and values") from error
-    return Pattern(read_mesh(mesh), supports, foam, order, thickness_m), large
+    pattern = Pattern(read_mesh(mesh), supports, foam, order, thickness_m)
+    scene = Scene(2, tuple(walls), (), (), tuple(outlines))
+    return pattern, large, pattern.surrounded(scene)
 
 
 def write_loads(path: Path, outer: Perimeter, load_n: Array, time_s: float) -> None:
@@ -128,15 +156,20 @@ def write_solution(path: Path, outer: Perimeter, solution: StaticSolution, time_
     """Write where loads bend the line; arguments as ``write_loads``."""
     energetic = (solution.energy_j, *solution.reaction_n, solution.moment_left_n_m)
     whole = {"time_s": time_s} | dict(zip(_WHOLE, energetic, strict=True))
-    rows = np.column_stack([outer.vertices_m, solution.displacement_m])
-    _write(path, whole, (*_PLACE, *_MOVED), rows)
+    contact_n = solution.contact_n
+    touched = np.zeros_like(outer.vertices_m) if contact_n is None else contact_n
+    rows = np.column_stack([outer.vertices_m, solution.displacement_m, touched])
+    _write(path, whole, (*_PLACE, *_MOVED, *_TOUCHED), rows)
 
 
 def read_solution(path: Path, outer: Perimeter) -> StaticSolution:
     """Read what ``write_solution`` or another program wrote; errors as ``read_loads``."""
-    whole, rows = _read(path, _WHOLE, (*_PLACE, *_MOVED), outer)
+    whole, rows = _read(path, _WHOLE, (*_PLACE, *_MOVED, *_TOUCHED), outer, len(_TOUCHED))
     reaction_n = np.array([whole["reaction_x_n"], whole["reaction_y_n"]])
-    return StaticSolution(rows[:, 2:], whole["energy_j"], reaction_n, whole["moment_left_n_m"])
+    contact_n = rows[:, 4:] if rows[:, 4:].any() else None
+    return StaticSolution(
+        rows[:, 2:4], whole["energy_j"], reaction_n, whole["moment_left_n_m"], contact_n
+    )
 
 
 def _write(path: Path, whole: Values, columns: tuple[str, ...], rows: Array) -> None:
@@ -147,9 +180,9 @@ def _write(path: Path, whole: Values, columns: tuple[str, ...], rows: Array) -> 
 
 
 def _read(
-    path: Path, keys: tuple[str, ...], columns: tuple[str, ...], outer: Perimeter
+    path: Path, keys: tuple[str, ...], columns: tuple[str, ...], outer: Perimeter, more: int = 0
 ) -> tuple[dict[str, float], Array]:
-    """Read a table whose first columns are the vertices of a line."""
+    """Read a table whose first columns are the vertices of a line; the last few may be missing."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
         head = [line[1:].split(":", 1) for line in lines if line.startswith("#")]
@@ -163,7 +196,7 @@ def _read(
     missing = [key for key in keys if key not in whole]
     if missing:
         raise ValueError(f"{path} has no line '# {missing[0]}: value' above its table")
-    if tuple(names) != columns:
+    if tuple(names) not in (columns, columns[: len(columns) - more]):
         raise ValueError(f"{path} has columns {', '.join(names)}; valid are {', '.join(columns)}")
     _check_rows(path, rows, outer)
     return whole, rows

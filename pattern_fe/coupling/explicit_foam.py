@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pattern_fe.contact import touch
 from pattern_fe.pattern import Pattern
+from pattern_fe.surroundings import Surroundings
 from sandmould.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -64,6 +66,7 @@ class ExplicitFoam:
         contact: ContactBound,
         mass_scale: float | None = None,
         damping_ratio: float = 0.0,
+        surroundings: Surroundings | None = None,
     ) -> None:
         """Stand at rest as drawn.
 
@@ -78,6 +81,8 @@ class ExplicitFoam:
             below 1, unless given. With a smaller one the pattern goes in shorter steps.
         damping_ratio : float
             Of the slowest mode, by mass damping.
+        surroundings : Surroundings, optional
+            What it can touch; nothing unless given.
 
         Raises
         ------
@@ -111,8 +116,13 @@ class ExplicitFoam:
             step_s / self.sub_steps, self._damping_1_s, mass_scale
         )
         self._before = self._motion.displacement_m
-        self.work_j = self.damped_j = 0.0
-        """Work of the loads, and what damping took of it, since the start."""
+        self.work_j = self.damped_j = self.contact_j = 0.0
+        """Work of the loads, what damping took of it and what contact, since the start."""
+        self.contact_n = np.zeros_like(self.vertices_m)
+        """(nv, d) float64, N: of what it touches, in the last step."""
+        self._surroundings = surroundings
+        self._clearance = None if surroundings is None else surroundings.as_drawn
+        self._mobility_m_n = self._motion.mobility_m_n[self._nodes]
 
     @property
     def displacement_m(self) -> Array:
@@ -133,10 +143,42 @@ class ExplicitFoam:
         for _ in range(self.sub_steps):
             self._before, velocity = motion.displacement_m, motion.velocity_m_s
             motion.advance(load)
+            touched = self._kept_out()
             mean = 0.5 * (velocity + motion.velocity_m_s)
             self.work_j += motion.step_s * float(np.vdot(load, mean))
             lost = self._damping_1_s * float(np.vdot(self._mass_kg * mean, mean))
             self.damped_j += motion.step_s * lost
+            self.contact_j -= motion.step_s * float(np.vdot(touched, mean[self._nodes]))
+
+    def _kept_out(self) -> Array:
+        """Take the step anew with the forces of what the pattern would enter, and give them.
+
+        They act at the start of the step and are just what leaves the gaps closed at its end
+        (forward increment Lagrange multipliers; Carpenter, Taylor and Katona, International Journal
+        for Numerical Methods in Engineering 32, 1991): a vertex stops without rebound, and no
+        stiffness of contact bounds the step.
+        """
+        around, motion, nodes = self._surroundings, self._motion, self._nodes
+        self.contact_n = np.zeros_like(self.vertices_m)
+        if around is None:
+            return self.contact_n
+        free_m = motion.displacement_m[nodes]
+        if around.is_clear_of_solids(free_m, self._clearance):
+            # Lumped masses: floor and walls stop each vertex by itself.
+            back_m = around.way_to_walls_m(free_m)
+            beyond = back_m != 0.0
+            self.contact_n[beyond] = back_m[beyond] / self._mobility_m_n[beyond]
+        else:
+            self._clearance = around.clearance(self._before[nodes])
+            mobility = self._mobility_m_n.reshape(-1, 1)
+            found = touch(around, self._before[nodes], free_m, lambda load_n: mobility * load_n)
+            if found is not None:
+                self.contact_n = found.load_n
+        if self.contact_n.any():
+            whole = np.zeros_like(motion.displacement_m)
+            whole[nodes] = self.contact_n
+            motion.push(whole)
+        return self.contact_n
 
     @property
     def kinetic_j(self) -> float:
@@ -157,7 +199,7 @@ class ExplicitFoam:
             "displacement": motion.displacement_m,
             "velocity": motion.velocity_m_s,
             "before": self._before,
-            "energies": np.array([self.work_j, self.damped_j]),
+            "energies": np.array([self.work_j, self.damped_j, self.contact_j]),
         }
 
     def restore(self, arrays: dict[str, Array]) -> None:
@@ -165,4 +207,4 @@ class ExplicitFoam:
         self._motion.displacement_m = arrays["displacement"]
         self._motion.velocity_m_s = arrays["velocity"]
         self._before = arrays["before"]
-        self.work_j, self.damped_j = (float(x) for x in arrays["energies"])
+        self.work_j, self.damped_j, self.contact_j = (float(x) for x in arrays["energies"])

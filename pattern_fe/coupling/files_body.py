@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pattern_fe.coupling.body import StaticSolution
 from pattern_fe.coupling.exchange import (
     LOADS,
+    PATTERN,
     SOLUTION,
     read_loads,
     read_solution,
@@ -17,6 +18,7 @@ from pattern_fe.coupling.exchange import (
     write_pattern,
 )
 from pattern_fe.pattern import Pattern
+from pattern_fe.surroundings import Surroundings
 from sandmould.engines.session import EngineStop, Session
 from sandmould.runs.outcome import Outcome
 
@@ -27,6 +29,10 @@ _SAME = 1e-6
 from a checkpoint repeats windows, on LAMMPS to some digits."""
 
 
+_INSIDE = 1e-3
+"""Share of the extent by which a solution may be inside: other programs press by penalties."""
+
+
 class FilesBody:
     """An ``ElasticBody`` behind a folder of files; see ``exchange``.
 
@@ -34,7 +40,14 @@ class FilesBody:
     checkpoint, finds their solutions, and comes to the one that it waited for.
     """
 
-    def __init__(self, pattern: Pattern, large: bool, folder: Path, session: Session) -> None:
+    def __init__(
+        self,
+        pattern: Pattern,
+        large: bool,
+        folder: Path,
+        session: Session,
+        surroundings: Surroundings,
+    ) -> None:
         """Write the pattern.
 
         Parameters
@@ -46,11 +59,13 @@ class FilesBody:
             Of the files; made where it is missing.
         session : Session
             Whose step names them.
+        surroundings : Surroundings
+            What it can touch.
         """
-        self._folder, self._session = folder, session
+        self._folder, self._session, self._surroundings = folder, session, surroundings
         self._outer = pattern.surface.outer
         self._last = (-1, 0)
-        write_pattern(folder, pattern, large)
+        write_pattern(folder, pattern, large, surroundings)
 
     @property
     def vertices_m(self) -> Array:
@@ -77,9 +92,17 @@ class FilesBody:
             )
             raise EngineStop(Outcome.AWAITS_PATTERN, detail)
         try:
-            return read_solution(solution, self._outer)
+            found = read_solution(solution, self._outer)
         except ValueError as fault:
             raise EngineStop(Outcome.AWAITS_PATTERN, str(fault)) from fault
+        inside_m = self._surroundings.deepest_m(found.displacement_m)
+        if inside_m > _INSIDE * self._surroundings.extent_m:
+            detail = (
+                f"{solution} leads {inside_m:.3g} m into floor, walls or obstacles; valid is a "
+                f"pattern outside the planes and outlines of {self._folder / PATTERN}"
+            )
+            raise EngineStop(Outcome.AWAITS_PATTERN, detail)
+        return found
 
     def _name(self) -> str:
         """The step, and the number of its iteration: a window may be repeated."""

@@ -5,11 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pattern_fe.contact import touch
 from pattern_fe.coupling.body import StaticSolution
 from pattern_fe.elasticity import internal_force_n
+from pattern_fe.large_displacement import Obstructed
 from pattern_fe.pattern import Pattern
+from pattern_fe.surroundings import Surroundings
 
 Array = NDArray[np.float64]
+_LINEARISATIONS = 40
+"""Of gaps round obstacles; some ten are enough."""
+_WHOLE_WAYS = 12
+"""The first of them."""
+_STAYS = 1e-7
+"""Share of the extent by which a surface may still move when it has come to rest."""
 
 
 def cross(place_m: Array, force_n: Array) -> Array:
@@ -20,9 +29,11 @@ def cross(place_m: Array, force_n: Array) -> Array:
 
 
 class FoamBody:
-    """A pattern at rest under the loads on its outer surface."""
+    """A pattern at rest under the loads on its outer surface, beside floor, walls and obstacles."""
 
-    def __init__(self, pattern: Pattern, large: bool = False) -> None:
+    def __init__(
+        self, pattern: Pattern, large: bool = False, surroundings: Surroundings | None = None
+    ) -> None:
         """Stand as drawn.
 
         Parameters
@@ -30,10 +41,16 @@ class FoamBody:
         pattern : Pattern
         large : bool
             Whether displacements are large.
+        surroundings : Surroundings, optional
+            What it can touch; nothing unless given.
         """
         self._pattern = pattern
         self._large = large
         self._line = pattern.surface.outer_line
+        self._nodes = pattern.surface.nodes[self._line]
+        self._surroundings = surroundings
+        self._obstructed = None if surroundings is None else Obstructed(surroundings, self._nodes)
+        self._answers: dict[int, Array] = {}
 
     @property
     def vertices_m(self) -> Array:
@@ -43,22 +60,68 @@ class FoamBody:
     def solve(self, load_n: Array) -> StaticSolution:
         """Find the pattern at rest under loads on the outer surface, (nv, d) float64, N."""
         pattern = self._pattern
-        on_surface = np.zeros_like(pattern.surface.vertices_m)
-        on_surface[self._line] = load_n
-        load = pattern.on_nodes(on_surface)
-        moved = pattern.solve_nonlinear(load) if self._large else pattern.solve_linear(load)
+        load = self._on_nodes(load_n)
+        if self._large:
+            moved, touched = pattern.solve_obstructed(load, self._obstructed)
+        else:
+            moved, touched = self._linear(load)
         reaction = self._inner_force_n(moved) - load
-        reaction[~pattern.fixed.any(axis=1)] = 0.0
+        reaction[~(pattern.fixed | (touched != 0.0)).any(axis=1)] = 0.0
         # Small displacements balance on the drawing, large ones where the nodes have come to.
         place_m = pattern.space.node_m + (moved if self._large else 0.0)
         outer = load + reaction
         moment = cross(place_m, outer).sum(axis=0)
         return StaticSolution(
-            pattern.on_surface(moved)[self._line],
+            moved[self._nodes],
             pattern.energy_j(moved, self._large),
             np.asarray(reaction.sum(axis=0)),
             float(np.linalg.norm(moment)),
+            touched[self._nodes] if touched.any() else None,
         )
+
+    def _linear(self, load: Array) -> tuple[Array, Array]:
+        """Small displacements of all nodes, and the loads of what they touch.
+
+        Floor and walls are planes: one problem has their reactions. Round obstacles their gaps are
+        linearised where the pattern has come to, from the drawing on, until it stays there.
+        """
+        pattern, around = self._pattern, self._surroundings
+        touched = np.zeros_like(load)
+        moved = pattern.solve_linear(load)
+        if around is None or around.is_clear(moved[self._nodes]):
+            return moved, touched
+        free_m, at_m = moved[self._nodes], np.zeros_like(self.vertices_m)
+        for number in range(_LINEARISATIONS):
+            contact = touch(around, at_m, free_m, self._response)
+            led_m = free_m if contact is None else contact.moved_m
+            near_m = _STAYS * around.extent_m
+            stays = bool(np.abs(led_m - at_m).max() <= near_m)
+            # At a corner two linearisations may lead to one another: half of the way is between.
+            at_m = led_m if number < _WHOLE_WAYS else 0.5 * (at_m + led_m)
+            if stays or (not around.solids and around.deepest_m(at_m) <= near_m):
+                break
+        if contact is not None:
+            touched[self._nodes] = contact.load_n
+            moved = pattern.solve_linear(load + touched)
+        return moved, touched
+
+    def _response(self, load_n: Array) -> Array:
+        """Displacements of the surface under loads on it, (nv d, m); those of one load are kept."""
+        for entry in np.flatnonzero(load_n.any(axis=1)):
+            if entry not in self._answers:
+                unit = np.zeros_like(self.vertices_m)
+                unit.ravel()[entry] = 1.0
+                answer = self._pattern.solve_linear(self._on_nodes(unit))
+                self._answers[int(entry)] = answer[self._nodes].ravel()
+        used = np.flatnonzero(load_n.any(axis=1))
+        if not len(used):
+            return np.zeros_like(load_n)
+        return np.column_stack([self._answers[int(e)] for e in used]) @ load_n[used]
+
+    def _on_nodes(self, load_n: Array) -> Array:
+        on_surface = np.zeros_like(self._pattern.surface.vertices_m)
+        on_surface[self._line] = load_n
+        return self._pattern.on_nodes(on_surface)
 
     def _inner_force_n(self, moved_m: Array) -> Array:
         pattern = self._pattern

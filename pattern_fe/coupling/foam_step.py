@@ -7,13 +7,14 @@ from typing import Any, NamedTuple
 
 from numba import carray
 
+from pattern_fe.coupling.contact_step import hold_out
 from sandmould.compiled import cfunc, njit
 from sandmould.dem.addresses import Floats, Ints, int_line_at, line_at, rows_at, to_ints
 from sandmould.dem.vectors import OPTIONS
 
 STEP, KEEPS, GAINS, OMEGA2, DAMPING, LIMIT = range(6)
 """Places in ``FoamArrays.numbers``."""
-WORK, DAMPED, STOPPED, STEPS = range(4)
+WORK, DAMPED, STOPPED, STEPS, CONTACT = range(5)
 """Places in ``FoamArrays.sums``."""
 
 
@@ -56,8 +57,22 @@ class FoamArrays(NamedTuple):
     mean_momentum: Floats
     """(n,) float64, kg m/s: scratch."""
     sums: Floats
-    """(4,) float64: work of the loads and what damping took of it (J), whether the pattern has
-    stopped because it ran away, steps since the last record."""
+    """(5,) float64: work of the loads and what damping took of it (J), whether the pattern has
+    stopped because it ran away, steps since the last record, what contact took of the work (J)."""
+    impulse: Floats
+    """(n,) float64, kg m: scratch."""
+    low: Floats
+    """From here on as in ``ContactArrays``."""
+    high: Floats
+    segments: Floats
+    starts: Ints
+    corners: Floats
+    drawn: Floats
+    clear: Floats
+    clear_at: Floats
+    wall: Floats
+    push: Floats
+    push_sum: Floats
 
 
 _FIELDS = len(FoamArrays._fields)
@@ -111,6 +126,21 @@ def _push(foam: FoamArrays) -> None:
 
 
 @njit(**OPTIONS)
+def _press(foam: FoamArrays) -> None:
+    """Add what floor, walls and obstacles do in this step."""
+    impulse, push, numbers = foam.impulse, foam.push, foam.numbers
+    momentum, mean_momentum, moved_mass = foam.momentum, foam.mean_momentum, foam.moved_mass
+    dt, gains = numbers[STEP], numbers[GAINS]
+    push[:] = 0.0
+    if hold_out(foam, foam.pressed, foam.inverse, foam.before, foam.displacement, impulse):
+        for i in range(len(impulse)):
+            moved_mass[i] += impulse[i]
+            momentum[i] += impulse[i] / dt
+            mean_momentum[i] += 0.5 * impulse[i] / dt
+            push[i] = impulse[i] / (dt * gains)
+
+
+@njit(**OPTIONS)
 def _move(foam: FoamArrays) -> bool:
     """Find displacements and velocities from the momenta; gives whether all are within bounds."""
     force, mean_momentum, velocity = foam.force, foam.mean_momentum, foam.velocity
@@ -119,7 +149,9 @@ def _move(foam: FoamArrays) -> bool:
     dt, alpha, limit = numbers[STEP], numbers[DAMPING], numbers[LIMIT]
     before[:] = displacement
     _product(foam.inverse, foam.moved_mass, displacement)
-    work = damped = 0.0
+    _press(foam)
+    push, push_sum = foam.push, foam.push_sum
+    work = damped = taken = 0.0
     bounded = True
     for i in range(len(velocity)):
         new = (displacement[i] - before[i]) / dt
@@ -127,9 +159,12 @@ def _move(foam: FoamArrays) -> bool:
         velocity[i] = new
         work += force[i] * mean
         damped += mean_momentum[i] * mean
+        taken -= push[i] * mean
+        push_sum[i] += push[i]
         bounded = bounded and abs(displacement[i]) <= limit
     sums[WORK] += dt * work
     sums[DAMPED] += dt * alpha * damped
+    sums[CONTACT] += dt * taken
     return bounded
 
 
@@ -171,6 +206,18 @@ def _open(address: Any) -> FoamArrays:
         line_at(table, 13),
         line_at(table, 14),
         line_at(table, 15),
+        line_at(table, 16),
+        line_at(table, 17),
+        line_at(table, 18),
+        rows_at(table, 19),
+        int_line_at(table, 20),
+        rows_at(table, 21),
+        rows_at(table, 22),
+        line_at(table, 23),
+        rows_at(table, 24),
+        line_at(table, 25),
+        line_at(table, 26),
+        line_at(table, 27),
     )
 
 

@@ -30,8 +30,8 @@ def solve_all(folder: Path) -> list[Path]:
     LoadNotReachedError
         When large displacements find no rest under the loads.
     """
-    pattern, large = read_pattern(folder)
-    body, outer, written = FoamBody(pattern, large), pattern.surface.outer, []
+    pattern, large, surroundings = read_pattern(folder)
+    body, outer, written = FoamBody(pattern, large, surroundings), pattern.surface.outer, []
     for loads in sorted(folder.glob(f"{LOADS}*.tsv")):
         path = folder / loads.name.replace(LOADS, SOLUTION)
         if path.exists():

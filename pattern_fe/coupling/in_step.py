@@ -15,6 +15,7 @@ from pattern_fe.coupling.convergence_log import (
     CONVERGENCE_LOG,
     ConvergenceLog,
     WindowEntry,
+    force_n,
     imbalance_n,
     rms_m,
 )
@@ -43,7 +44,7 @@ class InStepEntry(WindowEntry):
     damped_j: float
     """Taken by the mass damping."""
     balance_j: float
-    """Work less all three energies: round-off."""
+    """Work less all four energies, that which contact took among them: round-off."""
 
 
 class InStepSession(DelegatingSession):
@@ -138,9 +139,11 @@ class InStepSession(DelegatingSession):
                 work_j=foam.work_j,
                 energy_j=elastic_j,
                 solve_s=time.perf_counter() - begun,
+                contact_n=force_n(foam.mean_contact_n),
+                contact_j=foam.contact_j,
                 kinetic_j=kinetic_j,
                 damped_j=foam.damped_j,
-                balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j,
+                balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j - foam.contact_j,
             )
         )
         self._shapes.write(self.sand.time_s, moved_m)

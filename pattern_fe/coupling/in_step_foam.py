@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.condensation import CondensedSurface
+from pattern_fe.coupling.contact_arrays import contact_arrays
 from pattern_fe.coupling.contact_rows import ContactRows
 from pattern_fe.coupling.foam_step import (
+    CONTACT,
     DAMPED,
     OMEGA2,
     STEPS,
@@ -21,6 +23,7 @@ from pattern_fe.coupling.foam_step import (
 )
 from pattern_fe.coupling.selective_mass import SelectiveMass, selective_mass
 from pattern_fe.pattern import Pattern
+from pattern_fe.surroundings import Surroundings
 from sandmould.dem.addresses import table_of
 from sandmould.engines.step_mover import StepMover
 
@@ -36,7 +39,7 @@ class InStepFoam:
 
     _STATE: ClassVar[tuple[str, ...]] = (
         "load", "speed", "load_sum", "momentum", "moved_mass", "displacement", "before",
-        "velocity", "sums",
+        "velocity", "sums", "clear", "clear_at", "wall", "push", "push_sum",
     )  # fmt: skip
 
     def __init__(
@@ -47,6 +50,7 @@ class InStepFoam:
         largest_m: float,
         mass_scale: float | None = None,
         damping_ratio: float = 0.0,
+        surroundings: Surroundings | None = None,
     ) -> None:
         """Stand at rest as drawn.
 
@@ -62,6 +66,8 @@ class InStepFoam:
             See ``selective_mass``.
         damping_ratio : float
             Of the slowest mode, by mass damping.
+        surroundings : Surroundings, optional
+            What it can touch; nothing unless given.
         """
         surface = pattern.condensed
         line = pattern.surface.outer_line
@@ -69,7 +75,9 @@ class InStepFoam:
         """Of the outer line as drawn, (nv, d) float64, m."""
         self.mass: SelectiveMass = selective_mass(surface, contacts, step_s, mass_scale)
         alpha_1_s = 4.0 * math.pi * self.mass.first_hz * damping_ratio
-        self._arrays = _at_rest(surface, self.mass, self.vertices_m.shape)
+        first = line.start * self.vertices_m.shape[1]
+        pressed = first + np.arange(self.vertices_m.size)
+        self._arrays = _at_rest(surface, self.mass, self.vertices_m, pressed, surroundings)
         half = 0.5 * step_s * alpha_1_s
         self._arrays.numbers[:] = (
             step_s,
@@ -79,9 +87,9 @@ class InStepFoam:
             alpha_1_s,
             largest_m,
         )
-        first = line.start * self.vertices_m.shape[1]
-        self._arrays.pressed[:] = first + np.arange(self.vertices_m.size)
         self._table = table_of(self._arrays)
+        self.mean_contact_n = np.zeros_like(self.vertices_m)
+        """(nv, d) float64, N: of what it touches, in the mean that was asked for last."""
 
     @property
     def mover(self) -> StepMover:
@@ -111,6 +119,11 @@ class InStepFoam:
         return float(self._arrays.sums[DAMPED])
 
     @property
+    def contact_j(self) -> float:
+        """What contact took of it: the kinetic energy of what it stops."""
+        return float(self._arrays.sums[CONTACT])
+
+    @property
     def kinetic_j(self) -> float:
         """Kinetic energy of the scaled masses, half a step ago."""
         return 0.5 * float(self._arrays.velocity @ self._arrays.momentum)
@@ -125,8 +138,11 @@ class InStepFoam:
     def take_mean_load_n(self) -> Array:
         """Mean load on the outer line since the last asking, (nv, d) float64, N; 0 at first."""
         arrays = self._arrays
-        mean = arrays.load_sum / max(1.0, arrays.sums[STEPS])
+        steps = max(1.0, arrays.sums[STEPS])
+        mean = arrays.load_sum / steps
+        self.mean_contact_n = (arrays.push_sum[arrays.pressed] / steps).reshape(mean.shape)
         arrays.load_sum[:] = 0.0
+        arrays.push_sum[:] = 0.0
         arrays.sums[STEPS] = 0.0
         return np.asarray(mean)
 
@@ -140,8 +156,14 @@ class InStepFoam:
             getattr(self._arrays, name)[:] = arrays[name]
 
 
-def _at_rest(surface: CondensedSurface, mass: SelectiveMass, line: tuple[int, ...]) -> FoamArrays:
-    """A surface at rest, its numbers and pressed components not set."""
+def _at_rest(
+    surface: CondensedSurface,
+    mass: SelectiveMass,
+    vertices_m: Array,
+    pressed: NDArray[np.int64],
+    surroundings: Surroundings | None,
+) -> FoamArrays:
+    """A surface at rest, its numbers not set."""
     free = np.isfinite(surface.mass_kg)
     n = len(free)
     more = -n % 4  # components that the compiled product wants, held like those of supports
@@ -154,10 +176,10 @@ def _at_rest(surface: CondensedSurface, mass: SelectiveMass, line: tuple[int, ..
         mass=np.pad(np.where(free, mass.scale * surface.mass_kg, 0.0), (0, more)),
         free=np.pad(free.astype(np.float64), (0, more)),
         numbers=np.zeros(6),
-        pressed=np.zeros(math.prod(line), dtype=np.int64),
-        load=np.zeros(line),
-        speed=np.zeros(line),
-        load_sum=np.zeros(line),
+        pressed=pressed,
+        load=np.zeros_like(vertices_m),
+        speed=np.zeros_like(vertices_m),
+        load_sum=np.zeros_like(vertices_m),
         momentum=none(),
         moved_mass=none(),
         displacement=none(),
@@ -165,5 +187,7 @@ def _at_rest(surface: CondensedSurface, mass: SelectiveMass, line: tuple[int, ..
         velocity=none(),
         force=none(),
         mean_momentum=none(),
-        sums=np.zeros(4),
+        sums=np.zeros(5),
+        impulse=none(),
+        **contact_arrays(surroundings, vertices_m, pressed, n + more)._asdict(),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pattern_fe.coupling.schemes import refuse_scheme
+from pattern_fe.placing import refuse_place
 from pattern_fe.scene import pattern_of
 from sandmould.scenario.box import Polygon
 from sandmould.scenario.scenario import Scenario
@@ -20,6 +21,7 @@ def with_surface(scenario: Scenario) -> Scenario:
     if config is None:
         return scenario
     pattern = pattern_of(scenario)
+    refuse_place(scenario, pattern)
     refuse_scheme(scenario, pattern)
     outer = pattern.surface.outer
     vertices_m = [tuple(v) for v in outer.vertices_m.tolist()]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog, rms_m
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog, force_n, rms_m
 from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.explicit_foam import ExplicitFoam
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
@@ -44,8 +44,12 @@ class MonolithicEntry:
     """Of the scaled masses."""
     damped_j: float
     """Taken by the mass damping."""
+    contact_n: float
+    """Size of the force of floor, walls and obstacles on the pattern in the last step."""
+    contact_j: float
+    """Taken by contact with them: the kinetic energy of vertices that they stop."""
     balance_j: float
-    """Work less all three energies: round-off."""
+    """Work less all four energies: round-off."""
 
 
 class MonolithicSession(DelegatingSession):
@@ -149,7 +153,9 @@ class MonolithicSession(DelegatingSession):
                 elastic_j=elastic_j,
                 kinetic_j=kinetic_j,
                 damped_j=foam.damped_j,
-                balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j,
+                contact_n=force_n(foam.contact_n),
+                contact_j=foam.contact_j,
+                balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j - foam.contact_j,
             )
         )
         self._shapes.write(self.time_s, displacement)

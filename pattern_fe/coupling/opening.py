@@ -14,7 +14,7 @@ from pattern_fe.coupling.monolithic_session import MonolithicSession
 from pattern_fe.coupling.schemes import explicit_foam, in_step_foam
 from pattern_fe.coupling.selective_mass import SelectiveMass
 from pattern_fe.coupling.session import CoupledSession
-from pattern_fe.scene import pattern_of
+from pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.engines.program import Program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
@@ -52,15 +52,16 @@ def open_coupled(
         limit_m = loop.largest_displacement_m
         return MonolithicSession(sand, explicit, name, limit_m, counts, work, checkpoint)
     large = config.statics == "large"
-    body: ElasticBody = FoamBody(pattern, large)
+    around = surroundings_of(scenario, pattern)
+    body: ElasticBody = FoamBody(pattern, large, around)
     sand = open_session(program, folder, log, checkpoint)
     if loop.exchange == "files":
-        body = FilesBody(pattern, large, folder / EXCHANGE, sand)
+        body = FilesBody(pattern, large, folder / EXCHANGE, sand, around)
     if loop.scheme == "in_step":
         foam = in_step_foam(scenario, pattern)
         (work / MASSES_LOG).write_text(_selective_masses(foam.mass), encoding="utf-8")
         return InStepSession(sand, foam, body, name, work, checkpoint, tolerance)
-    return CoupledSession(sand, body, name, loop, counts, work, checkpoint, tolerance)
+    return CoupledSession(sand, body, name, loop, counts, work, checkpoint, tolerance, around)
 
 
 def _explicit_masses(foam: ExplicitFoam) -> str:

@@ -11,6 +11,7 @@ from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from pattern_fe.coupling.gain_prediction import predicted_gain
 from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.pattern import Pattern
+from pattern_fe.scene import surroundings_of
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_of, engines_that
 from sandmould.scenario.bad_input import BadInputError, Problem
@@ -119,7 +120,14 @@ def explicit_foam(scenario: Scenario, pattern: Pattern) -> ExplicitFoam:
     loop = _loop_of_small_displacements(scenario)
     bound = ContactBound.of(scenario, pattern)
     try:
-        foam = ExplicitFoam(pattern, scenario.step_s, bound, loop.mass_scale, loop.damping_ratio)
+        foam = ExplicitFoam(
+            pattern,
+            scenario.step_s,
+            bound,
+            loop.mass_scale,
+            loop.damping_ratio,
+            surroundings_of(scenario, pattern),
+        )
     except ValueError as fault:
         raise _bad("mass_scale", loop.mass_scale, f"one that can be computed: {fault}") from fault
     shaken_hz = _shaken_hz(scenario)
@@ -147,6 +155,7 @@ def in_step_foam(scenario: Scenario, pattern: Pattern) -> InStepFoam:
             loop.largest_displacement_m,
             loop.mass_scale,
             loop.damping_ratio,
+            surroundings_of(scenario, pattern),
         )
     mass, shaken_hz = foam.mass, _shaken_hz(scenario)
     if mass.first_hz < min(ABOVE_VIBRATION * shaken_hz, LIKE_FOAM * mass.own_first_hz):

@@ -15,6 +15,7 @@ from pattern_fe.coupling.convergence_log import (
     CONVERGENCE_LOG,
     ConvergenceLog,
     WindowEntry,
+    force_n,
     imbalance_n,
     rms_m,
     work_of,
@@ -28,6 +29,8 @@ from pattern_fe.coupling.relaxation import (
     relaxation_of,
 )
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
+from pattern_fe.large_displacement import LoadNotReachedError
+from pattern_fe.surroundings import Surroundings
 from sandmould.engines.session import EngineStop, RefusedError, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
@@ -73,6 +76,7 @@ class CoupledSession(DelegatingSession):
         work: Path,
         checkpoint: Path | None = None,
         load_tolerance: float | None = None,
+        surroundings: Surroundings | None = None,
     ) -> None:
         """Start with the pattern at rest, or where a checkpoint left it.
 
@@ -94,8 +98,11 @@ class CoupledSession(DelegatingSession):
             Folder that ``write_checkpoint`` wrote.
         load_tolerance : float, optional
             See ``PatternRest``.
+        surroundings : Surroundings, optional
+            What the surface must not enter, wherever a scheme leads it.
         """
         super().__init__(sand)
+        self._surroundings = surroundings
         self._body = body
         self._rest = PatternRest(sand, load_tolerance if loop.scheme != "one_way" else None)
         self._surface = surface
@@ -114,7 +121,7 @@ class CoupledSession(DelegatingSession):
         """Displacement of the pattern's last solution that counts, m."""
         self._load = np.zeros_like(rest)
         self._load_sum, self._load_steps = np.zeros_like(rest), 0
-        self._work_j = self._solve_s = 0.0
+        self._work_j = self._contact_j = self._solve_s = 0.0
         self._gain = np.nan
         log_bytes, rows = None, 0
         if checkpoint is not None:
@@ -131,7 +138,20 @@ class CoupledSession(DelegatingSession):
         return self._solved if self._loop.scheme == "one_way" else self._interface
 
     def advance(self, duration_s: float | None = None) -> None:
-        """Compute for a duration, or up to the next check, in windows of the loop."""
+        """Compute for a duration, or up to the next check, in windows of the loop.
+
+        Raises
+        ------
+        EngineStop
+            Also where the pattern finds no equilibrium, or is to move too far.
+        """
+        try:
+            self._advance(duration_s)
+        except LoadNotReachedError as fault:
+            detail = f"after {self.sand.time_s:.4g} s {fault}"
+            raise EngineStop(Outcome.NO_EQUILIBRIUM, detail) from fault
+
+    def _advance(self, duration_s: float | None) -> None:
         sand = self.sand
         now, check = sand.steps, self._counts.check
         ahead = check - now % check
@@ -185,6 +205,8 @@ class CoupledSession(DelegatingSession):
         self._load_sum, self._load_steps = self._load_sum + steps * load, self._load_steps + steps
         self._load = self._load_sum / self._load_steps
         self._work_j += work_of(load, displacement - start)
+        if iteration.solution.contact_n is not None:
+            self._contact_j -= work_of(iteration.solution.contact_n, displacement - start)
         self._interface = displacement
         self._rest.see(displacement, iteration.solution.displacement_m)
         self._next = self._predicted(start, displacement, iteration.next_m)
@@ -207,12 +229,17 @@ class CoupledSession(DelegatingSession):
             self._relaxation.is_calm = sand.sand_rests and self._loop.most_passes == 1
         relaxed = self._relaxation.next(displacement.ravel(), self._solved.ravel())
         self._solve_s += time.perf_counter() - begun
-        return _Iteration(load, solution, relaxed.reshape(displacement.shape))
+        return _Iteration(load, solution, self._outside(relaxed.reshape(displacement.shape)))
+
+    def _outside(self, displacement: Array) -> Array:
+        """A displacement that enters nothing: steps beyond the solution may lead into a wall."""
+        around = self._surroundings
+        return displacement if around is None else around.pushed_out(displacement)
 
     def _predicted(self, start: Array, displacement: Array, relaxed: Array) -> Array:
         """Where the next window leads: part of the way to the solution, or on as in this one."""
         if self._loop.predicts:
-            return np.asarray(relaxed + (displacement - start))
+            return self._outside(relaxed + (displacement - start))
         return relaxed
 
     def _write(self, steps: int, iterations: int, iteration: _Iteration) -> None:
@@ -233,6 +260,8 @@ class CoupledSession(DelegatingSession):
                 work_j=self._work_j,
                 energy_j=solution.energy_j,
                 solve_s=self._solve_s,
+                contact_n=force_n(solution.contact_n),
+                contact_j=self._contact_j,
             )
         )
 
@@ -282,6 +311,7 @@ class CoupledSession(DelegatingSession):
             "answered": self._solved,
             "load": self._load,
             "work_j": self._work_j,
+            "contact_j": self._contact_j,
             "gain": self._gain,
             "ledger_bytes": log_bytes,
             "rows": self._shapes.rows,
@@ -294,7 +324,7 @@ class CoupledSession(DelegatingSession):
         with np.load(folder / CHECKPOINT, allow_pickle=False) as saved:
             self._interface, self._next, self._load = saved["shown"], saved["next"], saved["load"]
             self._solved = saved["answered"]
-            self._work_j = float(saved["work_j"])
+            self._work_j, self._contact_j = float(saved["work_j"]), float(saved["contact_j"])
             self._gain = float(saved["gain"])
             start = "relaxation_"
             memory = {k.removeprefix(start): saved[k] for k in saved.files if k.startswith(start)}

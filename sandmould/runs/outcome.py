@@ -24,6 +24,7 @@ class Outcome(IntEnum):
     COUPLING_DIVERGED = 315
     ESCAPED_METAL = 316
     NO_FREE_SURFACE = 317
+    NO_EQUILIBRIUM = 318
     ENGINE_FAILED = 320
     OUT_OF_WALL_TIME = 400
     DISK_REFUSED = 401
@@ -57,6 +58,7 @@ _MEANING = {
     Outcome.COUPLING_DIVERGED: "The coupling of sand and pattern ran away.",
     Outcome.ESCAPED_METAL: "Metal left the mould.",
     Outcome.NO_FREE_SURFACE: "Metal without a free surface did not fit its place in the mould.",
+    Outcome.NO_EQUILIBRIUM: "The pattern found no equilibrium under the load of the sand.",
     Outcome.ENGINE_FAILED: "The engine stopped with an error of its own.",
     Outcome.OUT_OF_WALL_TIME: "The wall-time limit came first; the same command continues.",
     Outcome.DISK_REFUSED: "The disk took no more; with room on it the same command continues.",

@@ -23,6 +23,7 @@ from pattern_fe.scene import pattern_of
 from sandmould.engines.driver import Driver
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.kinds.sand.bending import verdict_of
 from tests.patterns import _one_thread  # noqa: F401
 from tests.workflow.runs import drive
 
@@ -94,7 +95,7 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
         outcome = drive(plank_scene("files"), folder, driver)
         assert outcome.outcome is Outcome.AWAITS_PATTERN
         loads = sorted((folder / EXCHANGE).glob("loads_*.tsv"))[-1]
-        pattern, _ = read_pattern(folder / EXCHANGE)
+        pattern, _, _ = read_pattern(folder / EXCHANGE)
         if read_loads(loads, pattern.surface.outer)[0].any():
             return folder
         solve_all(folder / EXCHANGE)
@@ -113,7 +114,7 @@ def test_command_answers_from_the_folder_alone(asked: Path, tmp_path: Path) -> N
     command = [sys.executable, "-m", "pattern_fe.coupling.from_files", str(alone)]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "1 answers written" in said
-    pattern, _ = read_pattern(alone)
+    pattern, _, _ = read_pattern(alone)
     outer = pattern.surface.outer
     answer = read_solution(sorted(alone.glob("answer_*.tsv"))[-1], outer)
     loads = sorted(alone.glob("loads_*.tsv"))[-1]
@@ -175,3 +176,33 @@ def test_loads_of_another_run_are_asked_anew(asked: Path) -> None:
     drive(plank_scene("files"), asked.parent, driver)
     assert not answer.exists()
     assert loads.read_text() == fresh
+
+
+def test_an_answer_through_the_floor_is_told(asked: Path) -> None:
+    (answer,) = solve_all(asked)
+    head, rows = answer.read_text().rsplit("contact_y_n\n", 1)
+    lower = [line.split("\t") for line in rows.splitlines()]
+    for row in lower:
+        row[3] = "-0.02"
+    answer.write_text(head + "contact_y_n\n" + "\n".join("\t".join(r) for r in lower) + "\n")
+    stopped = drive(plank_scene("files"), asked.parent, driver)
+    assert stopped.outcome is Outcome.AWAITS_PATTERN
+    assert "leads 0.01 m into floor, walls or obstacles" in stopped.detail
+
+
+def test_another_program_may_leave_out_forces_of_contact(asked: Path) -> None:
+    (answer,) = solve_all(asked)
+    outer = read_pattern(asked)[0].surface.outer
+    found = read_solution(answer, outer)
+    answer.write_text(re.sub(r"(\t[^\t\n]+){2}$", "", answer.read_text(), flags=re.MULTILINE))
+    np.testing.assert_array_equal(read_solution(answer, outer).displacement_m, found.displacement_m)
+
+
+def test_foam_too_soft_for_its_load_ends_the_run_in_a_sentence(tmp_path: Path) -> None:
+    tree = plank_scene("memory", "large").model_dump(mode="json")
+    tree["pattern"] |= {"young_modulus_pa": 30.0}
+    outcome = drive(with_surface(Scenario.model_validate(tree)), tmp_path, driver)
+    assert outcome.outcome is Outcome.NO_EQUILIBRIUM
+    assert re.match(r"after .* s the pattern finds no equilibrium beyond", outcome.detail)
+    found = verdict_of(tmp_path)
+    assert found is None or found.state == "diverged"

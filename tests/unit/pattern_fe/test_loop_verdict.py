@@ -56,6 +56,35 @@ def test_a_surface_that_comes_too_late_lags() -> None:
     assert "40 % of the displacement" in found.sentence
 
 
+def test_no_shape_of_a_loop_that_lags_is_called_right() -> None:
+    # By per layer a bed comes to rest on a surface that the last loads never moved.
+    told = judged(residual_m=0.0118, work_j=0.03)
+    assert told.state == "lags"
+    assert told.sentence.startswith(
+        "Lags: the sand saw the pattern elsewhere than its loads bend it, so the shape is no answer"
+    )
+    assert "rest only" not in told.sentence
+
+
+def test_a_surface_that_never_moved_does_not_hold() -> None:
+    told = judged(displacement_m=0.0, residual_m=0.01, work_j=0.0)
+    assert told.state == "lags"
+    assert "loads and no motion of the surface" in told.sentence
+
+
+def test_a_pattern_stepped_with_the_grains_swings_and_is_not_late() -> None:
+    told = judged(residual_m=0.0027, kinetic_j=1e-4, work_j=0.03)
+    assert told.state == "lags"
+    assert "still swings about where its loads bend it" in told.sentence
+    assert "a swing of 27 % of the displacement" in told.sentence
+    # Without residuals kinetic energy tells the swing: T = a^2 U / 2 in the mean, a = 0.2.
+    stepped = convergence_log(kinetic_j=0.5 * 0.2**2 * 0.02).drop(columns=["residual_m", "factor"])
+    found = classify_loop(stepped.rename(columns={"energy_j": "elastic_j"}).assign(work_j=0.03))
+    assert found is not None
+    assert found.residual_fraction == pytest.approx(0.2, rel=0.06)
+    assert found.state == "lags"
+
+
 def test_a_spike_is_told() -> None:
     spike = np.where(np.arange(WINDOWS) == WINDOWS - 5, 0.012, 1e-4)
     found = judged(residual_m=spike)
@@ -89,6 +118,10 @@ def test_a_run_that_was_stopped_diverged() -> None:
     found = classify_loop(broken)
     assert found is not None
     assert found.state == "diverged"
+    # Also where it was stopped before the first window with a load was written.
+    found = classify_loop(convergence_log(load_n=0.0), stopped=True)
+    assert found is not None
+    assert found.sentence == "Diverged: the shape means nothing."
 
 
 def test_one_way_loads_are_no_loop() -> None:

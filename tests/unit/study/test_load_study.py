@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import yaml
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.contact import WALL_LAW
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.expand import expand
-from sandmould.study.plan.load_study import OpenStudy, display_path, open_study
+from sandmould.study.plan.load_study import OpenStudy, _from_root, display_path, open_study
 
 Opened = Callable[..., OpenStudy]
 SHIPPED = sorted((ROOT / "config" / "studies").glob("*.yaml"))
@@ -152,3 +154,17 @@ def test_names_in_messages_hide_the_machine(
     assert display_path(demo) == "config/studies/tube_demo.yaml"
     assert display_path(tmp_path / "a.yaml") == "a.yaml"
     assert display_path(Path("../a.yaml")) == "../a.yaml"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "scenario: {pattern: {shape: {kind: file, file: ../mesh/arch.vtu}}}",
+        "scenario: {pattern: {shape: {kind: file, file: {value: ../mesh/arch.vtu}}}}",
+        "sweep: {keys: {pattern.shape.file: [../mesh/arch.vtu]}}",
+    ],
+)
+def test_a_pattern_s_mesh_is_seen_from_the_file_that_names_it(tmp_path: Path, text: str) -> None:
+    tree = _from_root(yaml.safe_load(text), tmp_path / "config")
+    (file,) = re.findall(r"[^' ]+arch.vtu", str(tree))
+    assert (ROOT / file).resolve() == tmp_path / "mesh" / "arch.vtu"

@@ -18,7 +18,7 @@ from pattern_fe.distance import distance_from_drawing
 from pattern_fe.large_displacement import LoadNotReachedError
 from pattern_fe.pattern import Pattern
 from pattern_fe.perimeter import Perimeter
-from pattern_fe.scene import pattern_of
+from pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
@@ -40,7 +40,8 @@ class BentPattern:
         held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
         self.tip = farthest_corner(self.drawn.vertices_m, held)
         """Its vertex farthest from the supports."""
-        self._body = FoamBody(self.pattern, config.statics == "large")
+        around = surroundings_of(scenario, self.pattern)
+        self._body = FoamBody(self.pattern, config.statics == "large", around)
 
     @property
     def reach_m(self) -> float:
@@ -126,7 +127,7 @@ def verdict_of(folder: Path, until_s: float = np.inf) -> LoopVerdict | None:
     if log is None:
         return None
     stopped = np.isinf(until_s) and outcome.is_file() and (
-        RunOutcome.read(outcome).outcome is Outcome.COUPLING_DIVERGED
+        RunOutcome.read(outcome).outcome in (Outcome.COUPLING_DIVERGED, Outcome.NO_EQUILIBRIUM)
     )  # fmt: skip
     return classify_loop(log[log["time_s"] <= until_s], stopped)
 
