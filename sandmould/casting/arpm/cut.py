@@ -194,7 +194,7 @@ def _nearest(middle_m: Floats, place_m: Floats, axis: int, cell_m: float) -> tup
     off = np.abs(place_m - middle_m[face]) / cell_m
     along = off[:, axis].copy()
     off[:, axis] = 0.0
-    return face, (off.max(axis=1) <= 1.0) & (along <= _FAR)
+    return face, (off.max(axis=1) <= 0.5 + 1e-6) & (along <= _FAR)
 
 
 def _volume(casting: Flags, share: Floats, faces: _Faces, area: Floats) -> Floats:
