@@ -15,7 +15,7 @@ import pandas as pd
 from sandmould import ROOT
 from sandmould.arrays import Flags
 from sandmould.casting.arpm import scene
-from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.solidification import (
     Cooling,
     CoolingProgress,
@@ -95,7 +95,8 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     begun = time.monotonic()
     cost, planned_s = no_cost(scenario), scene.expected_s(scenario)
     progress = Progress(run, work, scene.expected_element_steps(scenario), "element-steps")
-    elements, filling = scene.elements_of(scenario), scene.filling_of(scenario)
+    raster, filling = scene.drawn_raster(scenario), scene.filling_of(scenario)
+    elements = placed(raster, scenario.layers)
     cost.elements = len(elements.size_m)
     cooled = CoolingProgress(0.0, 0.0, 0.0, 0)
     checkpoint = CheckpointFile(work / CHECKPOINT, computed_hash(scenario))
@@ -107,7 +108,7 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
         progress.show("cooling", now.time_s, now.element_steps, now.element_steps_per_s)
 
     try:
-        marching = scene.method_of(scenario).marching(elements, filling, scene.raster_of(scenario))
+        marching = scene.method_of(scenario).marching(elements, filling, raster)
         marching.advance(filling.heat(elements), 1e-9)  # compiled before it is timed
         cost.time_step_s = marching.step_s
         probes_m = {probe.name: np.array(probe.at_m) for probe in scenario.probes}

@@ -33,8 +33,9 @@ class Elements:
     """(d,) float64, m: corners of the box that they fill."""
     high_m: Floats
     cut: Cut | None = None
-    """Of the grid of ``cell_m``, whose cells the elements cover."""
-    cell_m: float = 0.0
+    """Of the grid whose cells the elements cover, where a drawn surface cuts them."""
+    cell_m: float | None = None
+    """Of the cut grid."""
     cut_volume_m3: Floats | None = None
     """(n,) float64: what elements hold that a drawn surface cuts or that stand beside one."""
 
@@ -50,6 +51,11 @@ class Elements:
     def dimensions(self) -> int:
         """2 or 3."""
         return self.position_m.shape[1]
+
+    @property
+    def grid_m(self) -> float:
+        """Side of the cells on which elements lie: of the smallest, or those of the cut grid."""
+        return self.cell_m or float(self.size_m.min())
 
     @property
     def volume_m3(self) -> Floats:
@@ -163,5 +169,5 @@ def _elements(raster: Raster, span: Ints) -> Elements:
     first = at // span[tuple(at)] * span[tuple(at)]
     owner = number[np.ravel_multi_index(tuple(first), span.shape)]
     volume_m3 = elements.volume_m3
-    np.add.at(volume_m3, owner, (cut.volume_share - 1.0) * raster.cell_m ** elements.dimensions)
+    np.add.at(volume_m3, owner, (cut.volume_share - 1.0) * raster.cell_m**elements.dimensions)
     return replace(elements, cut=cut, cell_m=raster.cell_m, cut_volume_m3=volume_m3)

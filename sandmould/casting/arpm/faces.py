@@ -54,7 +54,7 @@ def owners(elements: Elements) -> Ints:
     ValueError
         When elements overlap, leave gaps, or lie on no common grid.
     """
-    cell = elements.cell_m if elements.cut else float(elements.size_m.min())
+    cell = elements.grid_m
     low = (elements.position_m - 0.5 * elements.size_m[:, None] - elements.low_m) / cell
     span = elements.size_m / cell
     corner, side = np.round(low).astype(np.int64), np.round(span).astype(np.int64)
@@ -85,8 +85,7 @@ def faces_of(elements: Elements) -> Faces:
     -------
     Faces
     """
-    owner, n = owners(elements), len(elements.size_m)
-    cell = elements.cell_m if elements.cut else float(elements.size_m.min())
+    owner, n, cell = owners(elements), len(elements.size_m), elements.grid_m
     parts = []
     for axis in range(owner.ndim):
         before = np.take(owner, range(owner.shape[axis] - 1), axis=axis).ravel()
@@ -145,7 +144,7 @@ def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k
     material, half = elements.material, 0.5 * elements.size_m
     differ = material[faces.first] != material[faces.second]
     # what the surface is off the face between the two, from the first's side to the second's
-    off = (faces.first_part - 0.5) * elements.cell_m
+    off = (faces.first_part - 0.5) * elements.grid_m
     path = sum(
         (half[i] + side * off) / conductivity_w_m_k[material[i]]
         for i, side in ((faces.first, 1.0), (faces.second, -1.0))

@@ -72,8 +72,17 @@ BAR = SMALL["shapes"][0]
         ({"casting": {"solidus_k": 1900.0}}, "a solidus_k that is not above its liquidus_k"),
         ({"exchange": "difference", "layers": [2]}, r"layers = \[2\] .* empty with exchange"),
         (
-            {"exchange": "corrected", "layers": [2], "kernel_size": 1.5},
+            {
+                "exchange": "corrected",
+                "heat_transfer_w_m2_k": None,
+                "layers": [2],
+                "kernel_size": 1.5,
+            },
             "kernel_size = 1.5 .* at least 2 where sizes double",
+        ),
+        *(
+            ({"exchange": form}, rf"exchange = '{form}' cannot be used: valid is faces or differ")
+            for form in ("printed", "corrected", "symmetric")
         ),
         (
             {"shapes": [{"kind": "polygon", "vertices_m": [[0, 0], [1, 1], [0, 1], [1, 0]]}]},
@@ -191,7 +200,8 @@ def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:
 
 
 def test_sizes_that_break_the_rule_are_an_outcome(tmp_path: Path) -> None:
-    folder = one_run(tmp_path, exchange="corrected", layers=[2, 1], element_m=0.00125)
+    folder = one_run(tmp_path, exchange="corrected", heat_transfer_w_m2_k=None, layers=[2, 1],
+                     element_m=0.00125)  # fmt: skip
     outcome = RunOutcome.read(folder / "outcome.json")
     assert outcome.outcome is Outcome.BAD_INPUT
     assert "the smaller must measure at least 1/c_k" in outcome.detail
