@@ -13,9 +13,10 @@ import numpy as np
 import pandas as pd
 
 from sandmould import ROOT
-from sandmould.arrays import Flags
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.elements import Elements, placed
+from sandmould.casting.arpm.filling import Filling
+from sandmould.casting.arpm.front import middle_frozen_s
 from sandmould.casting.arpm.solidification import (
     Cooling,
     CoolingProgress,
@@ -122,7 +123,7 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
         outcome = RunOutcome(code, str(stop), cooled.time_s, planned_s)
         cost.wall_s = time.monotonic() - begun
         return Computed(outcome, cost, is_root=True)
-    _write(scenario, elements, filling.melts(elements), result, work)
+    _write(scenario, elements, filling, result, work)
     end_s = float(result.time_s[-1])
     progress.show("cooling", end_s, result.heat.element_steps,
                result.heat.element_steps / max(result.wall_s, 1e-9), last=True)  # fmt: skip
@@ -138,20 +139,22 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
 def _write(
     scenario: Solidification,
     elements: Elements,
-    melts: Flags,
+    filling: Filling,
     result: SolidificationResult,
     work: Path,
 ) -> None:
     """Write the curves and the fields at the end."""
-    frozen_s, volume = result.heat.frozen_s[melts], elements.volume_m3[melts]
-    solid = [float(volume[frozen_s <= t].sum() / volume.sum()) for t in result.time_s]
+    melts, volume = filling.melts(elements), elements.volume_m3
+    frozen_s = middle_frozen_s(elements, filling, result.heat.frozen_s)
+    whole = volume[melts].sum()
+    solid = [float(volume[melts & (frozen_s <= t)].sum() / whole) for t in result.time_s]
     clock, share, heat = scene.series_columns(scenario)
     probes = {f"{name}_k": curve for name, curve in result.probe_k.items()}
     table = pd.DataFrame({clock: result.time_s, **probes, share: solid, heat: result.enthalpy_j})
     table.to_csv(work / "series.tsv", sep="\t", index=False, float_format="%.10g")
     np.savez_compressed(
         work / "fields.npz", position_m=elements.position_m, size_m=elements.size_m,
-        melts=melts, frozen_s=result.heat.frozen_s, temperature_k=result.heat.temperature_k,
+        melts=melts, frozen_s=frozen_s, temperature_k=result.heat.temperature_k,
     )  # fmt: skip
 
 
