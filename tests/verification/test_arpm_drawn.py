@@ -144,7 +144,7 @@ def test_the_radial_solution_of_a_thin_casting_is_the_lumped_one(dimensions: int
     assert found == pytest.approx(lumped_s(filling, R / dimensions), rel=3e-3)
 
 
-@pytest.mark.parametrize(("way", "layers"), [("difference", ()), ("faces", ()), ("faces", (2,))])
+@pytest.mark.parametrize(("way", "layers"), [("difference", ()), ("faces", ()), ("faces", (4,))])
 @pytest.mark.parametrize("case", list(CASES))
 def test_a_disc_freezes_as_the_radial_solution(
     case: str, way: str, layers: tuple[int, ...]

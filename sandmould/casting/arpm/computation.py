@@ -154,7 +154,7 @@ def _write(
     table.to_csv(work / "series.tsv", sep="\t", index=False, float_format="%.10g")
     np.savez_compressed(
         work / "fields.npz", position_m=elements.position_m, size_m=elements.size_m,
-        melts=melts, frozen_s=frozen_s, temperature_k=result.heat.temperature_k,
+        volume_m3=volume, melts=melts, frozen_s=frozen_s, temperature_k=result.heat.temperature_k,
     )  # fmt: skip
 
 
