@@ -25,8 +25,8 @@ from sandmould.casting.arpm.drawn_surface import Pieces, pieces_of
 from sandmould.casting.arpm.raster import MOULD, Cut, Raster, inside_solid
 from sandmould.scenario.casting_shapes import Body
 
-SAMPLES = 256
-"""Points of a cut cell at which it is asked what lies there."""
+SAMPLES = {2: 256, 3: 64}
+"""Points of a cut cell in 2D and 3D at which it is asked what lies there."""
 LEAST_SHARE = 0.125
 """Of its cell every element keeps: what a cube's corner holds that just holds the centre."""
 _OFF = 1e-3
@@ -119,7 +119,7 @@ def _even_points(d: int) -> Floats:
     root = 2.0
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (d + 1))
-    steps = (np.arange(SAMPLES) + 0.5)[:, None] * root ** -np.arange(1.0, d + 1.0)
+    steps = (np.arange(SAMPLES[d]) + 0.5)[:, None] * root ** -np.arange(1.0, d + 1.0)
     return np.asarray((0.5 + steps) % 1.0)
 
 
@@ -184,7 +184,7 @@ def _surface(raster: Raster, faces: _Faces, pieces: Pieces) -> tuple[Floats, Flo
             np.add.at(inner, f, w * np.maximum(np.sum((at - inside_at[f]) * n, axis=1), 0.0))
             np.add.at(outer, f, w * np.maximum(np.sum((outside_at[f] - at) * n, axis=1), 0.0))
             # along this axis no face is near: the area counts at one of another
-            away, other = anywhere.query(some.place_m[~close])
+            away, other = (np.asarray(it) for it in anywhere.query(some.place_m[~close]))
             there = away <= _FAR * cell_m
             np.add.at(area, other[there], weight[~close][there])
     known = inner + outer > 0.0
@@ -199,7 +199,7 @@ def _nearest(middle_m: Floats, place_m: Floats, axis: int, cell_m: float) -> tup
         return np.zeros(len(place_m), dtype=np.int64), np.zeros(len(place_m), dtype=np.bool_)
     scale = np.ones(middle_m.shape[1])
     scale[axis] = _ALONG
-    face = cKDTree(middle_m * scale).query(place_m * scale)[1]
+    face = np.asarray(cKDTree(middle_m * scale).query(place_m * scale)[1], dtype=np.int64)
     off = np.abs(place_m - middle_m[face]) / cell_m
     along = off[:, axis].copy()
     off[:, axis] = 0.0

@@ -120,7 +120,8 @@ def _pixel_pieces(body: Pixels) -> Pieces:
     """
     dark = np.pad(body.distance_in_pixels < 0.0, 1)
     smooth = gaussian_filter(np.pad(dark, 8).astype(np.float64), SMOOTH_PIXELS)
-    slope = np.stack(np.gradient(smooth), axis=-1)[8:-8, 8:-8]
+    across, up = np.gradient(smooth)
+    slope = np.stack([across, up], axis=-1)[8:-8, 8:-8]
     parts = []
     for axis in range(2):
         before, after = (

@@ -48,7 +48,7 @@ def _later_s_m(place_m: Floats, size_m: Floats, frozen_s: Floats) -> Floats:
     """Seconds a metre that the front takes from each element to the next, 0 where it ends."""
     count = min(3 ** place_m.shape[1], len(place_m))
     found = cKDTree(place_m).query(place_m, k=count)
-    away, near = (values.reshape(-1, count) for values in found)
+    away, near = (np.asarray(values).reshape(-1, count) for values in found)
     there = (away > 0.0) & (away <= REACH * 0.5 * (size_m[:, None] + size_m[near]))
     slope = (frozen_s[near] - frozen_s[:, None]) / np.where(there, away, np.inf)
     return np.asarray(np.maximum(slope.max(axis=1), 0.0))
