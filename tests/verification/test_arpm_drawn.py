@@ -225,6 +225,15 @@ def test_a_painted_disc_has_the_slope_that_its_steps_stand_for() -> None:
     assert area_of(raster) == pytest.approx(2 * math.pi * R, rel=0.01)
 
 
+def test_large_pixels_are_taken_as_drawn() -> None:
+    # off the grid by 0.3 of an element, and 1.5 elements wide
+    painting = picture(np.ones((4, 3)) > 0, 1.5 * R / 8)
+    raster = drawn([painting], 8, 0.3)
+    assert area_of(raster) == pytest.approx(2 * (4 + 3) * painting.pixel_m, rel=1e-9)
+    assert volume_of(raster) == pytest.approx(12 * painting.pixel_m**2, rel=5e-3)
+    assert cut_of(raster).area_share.max() < 1.7  # beside a corner that holds no middle
+
+
 @pytest.mark.parametrize("way", ["difference", "faces"])
 def test_drawings_on_the_grid_stay_as_they_were(way: str) -> None:
     half = np.full(2, HALF[2])

@@ -55,7 +55,16 @@ def source_files() -> list[Path]:
     """Files of the solver, and those of the scenario that compute for it."""
     shared = (
         ROOT / "sandmould" / "scenario" / name
-        for name in ("casting_shapes.py", "outline.py", "solidification.py")
+        for name in (
+            "casting_shapes.py",
+            "geometry.py",
+            "mesh.py",
+            "mesh_file.py",
+            "mesh_search.py",
+            "outline.py",
+            "solidification.py",
+            "solids.py",
+        )
     )
     return sorted([*Path(__file__).parent.glob("*.py"), *shared])
 

@@ -23,7 +23,7 @@ from scipy.spatial import cKDTree
 from sandmould.arrays import Flags, Floats, Ints
 from sandmould.casting.arpm.drawn_surface import Pieces, pieces_of
 from sandmould.casting.arpm.raster import MOULD, Cut, Raster, inside_solid
-from sandmould.scenario.casting_shapes import Body
+from sandmould.scenario.casting_shapes import Body, Pixels
 
 SAMPLES = {2: 256, 3: 64}
 """Points of a cut cell in 2D and 3D at which it is asked what lies there."""
@@ -98,29 +98,29 @@ def casting_share(raster: Raster, solids: Sequence[Body]) -> Floats:
     share = casting.astype(np.float64)
     near = maximum_filter(casting, 3, mode="nearest") & ~minimum_filter(casting, 3, mode="nearest")
     cells, d, centre = np.flatnonzero(near), casting.ndim, raster.centre_m
-    if d == 3:
-        # a mesh is asked often: cells that no surface reaches are whole
+    if not any(isinstance(solid, Pixels) for solid in solids):
+        # cells that no surface reaches are whole; a picture tells distances too coarsely
         away_m = [np.abs(solid.distance_m(centre[cells])) for solid in solids]
         cells = cells[np.min(away_m, axis=0) <= 0.5 * math.sqrt(d) * raster.cell_m * (1.0 + 1e-9)]
-    offset = (_even_points(d) - 0.5) * raster.cell_m
     flat = share.reshape(-1)
-    for part in np.array_split(cells, max(1, -(-len(cells) * len(offset) // _CHUNK))):
-        place = (centre[part][:, None] + offset).reshape(-1, d)
-        flat[part] = _inside(solids, place).reshape(len(part), -1).mean(axis=1)
+    for part in np.array_split(cells, max(1, -(-len(cells) * SAMPLES[d] // _CHUNK))):
+        place = centre[part][:, None] + (_even_points(part, d) - 0.5) * raster.cell_m
+        flat[part] = _inside(solids, place.reshape(-1, d)).reshape(len(part), -1).mean(axis=1)
     return share
 
 
-def _even_points(d: int) -> Floats:
-    """Points spread evenly over a unit square or cube, none in line with another.
+def _even_points(cells: Ints, d: int) -> Floats:
+    """Points spread evenly over a unit square or cube for each of some cells, (c, k, d) float64.
 
     Additive recurrence of the root of x^(d+1) = x + 1 (Roberts, "The unreasonable effectiveness of
-    quasirandom sequences", 2018); rows of a grid lie on a slope all at once.
+    quasirandom sequences", 2018): no rows that lie on a slope all at once. It goes on from cell to
+    cell, for a slope may cut all cells alike.
     """
     root = 2.0
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (d + 1))
-    steps = (np.arange(SAMPLES[d]) + 0.5)[:, None] * root ** -np.arange(1.0, d + 1.0)
-    return np.asarray((0.5 + steps) % 1.0)
+    number = cells[:, None] * SAMPLES[d] + np.arange(SAMPLES[d]) + 0.5
+    return np.asarray((number[:, :, None] * root ** -np.arange(1.0, d + 1.0)) % 1.0)
 
 
 def _inside(solids: Sequence[Body], place_m: Floats) -> Flags:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from sandmould.arrays import Flags, Floats
+from sandmould.arrays import Flags, Floats, Ints
 from sandmould.scenario.casting_shapes import Body, Pixels
 from sandmould.scenario.geometry import Block
 from sandmould.scenario.mesh import TriangleMesh
@@ -56,7 +56,9 @@ def pieces_of(body: Body, low_m: Floats, cell_m: float) -> Pieces:
         When the solid is of another kind.
     """
     if isinstance(body, Pixels):
-        return _pixel_pieces(body)
+        if body.pixel_m <= 0.5 * cell_m:
+            return _slopes(body)
+        return _edge_pieces(*_pixel_edges(body), low_m, cell_m)
     if isinstance(body, Outline):
         return _edge_pieces(body.vertices_m, np.roll(body.vertices_m, -1, axis=0), low_m, cell_m)
     if isinstance(body, Block):
@@ -112,7 +114,29 @@ def _triangle_pieces(corners_m: Floats, cell_m: float) -> Pieces:
     return Pieces(place, normals, areas)
 
 
-def _pixel_pieces(body: Pixels) -> Pieces:
+def _steps(dark: Flags) -> list[Ints]:
+    """Pixels on the low side of the edges between dark and light ones, (k, 2) for each axis."""
+    found = []
+    for axis in range(2):
+        before, after = (
+            np.take(dark, range(k, dark.shape[axis] - 1 + k), axis=axis) for k in (0, 1)
+        )
+        found.append(np.argwhere(before != after))
+    return found
+
+
+def _pixel_edges(body: Pixels) -> tuple[Floats, Floats]:
+    """Ends of all edges between dark and light pixels, which are taken as drawn."""
+    dark = np.pad(body.distance_in_pixels < 0.0, 1)
+    unit, corners = np.eye(2, dtype=np.int64), []
+    for axis, step in enumerate(_steps(dark)):
+        first = step + unit[axis] - 1
+        corners.append(np.stack([first, first + unit[1 - axis]]))
+    start, end = np.concatenate(corners, axis=1)
+    return body.low_m + body.pixel_m * start, body.low_m + body.pixel_m * end
+
+
+def _slopes(body: Pixels) -> Pieces:
     """Edges between dark and light pixels, each as long as the slope that it is a step of.
 
     Steps across axis a make |n_a| of the length of a line of normal n. With |n_a| of their own
@@ -123,20 +147,14 @@ def _pixel_pieces(body: Pixels) -> Pieces:
     across, up = np.gradient(smooth)
     slope = np.stack([across, up], axis=-1)[8:-8, 8:-8]
     parts = []
-    for axis in range(2):
-        before, after = (
-            np.take(dark, range(k, dark.shape[axis] - 1 + k), axis=axis) for k in (0, 1)
-        )
-        step = np.argwhere(before != after)
+    for axis, step in enumerate(_steps(dark)):
         beyond = step + np.eye(2, dtype=np.int64)[axis]
         normal = -(slope[tuple(step.T)] + slope[tuple(beyond.T)])
         outward = np.where(dark[tuple(step.T)], 1.0, -1.0)
-        size = np.linalg.norm(normal, axis=1)
-        lost = (size < 1e-12) | (normal[:, axis] * outward <= 0.0)
+        lost = normal[:, axis] * outward <= 1e-12
         normal[lost] = outward[lost, None] * np.eye(2)[axis]
         normal /= np.linalg.norm(normal, axis=1)[:, None]
-        middle = 0.5 * (step + beyond) + 0.5 - 1.0
-        place = body.low_m + body.pixel_m * middle
+        place = body.low_m + body.pixel_m * (0.5 * (step + beyond) - 0.5)
         parts.append((place, normal, body.pixel_m * np.abs(normal[:, axis])))
     places, normals, areas = (np.concatenate(part) for part in zip(*parts, strict=True))
     return Pieces(places, normals, areas)
