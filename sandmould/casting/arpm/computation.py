@@ -13,10 +13,11 @@ import numpy as np
 import pandas as pd
 
 from sandmould import ROOT
-from sandmould.arrays import Flags
 from sandmould.casting.arpm import scene
-from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.estimates import least_sand_share
+from sandmould.casting.arpm.filling import Filling
+from sandmould.casting.arpm.front import middle_frozen_s
 from sandmould.casting.arpm.solidification import (
     Cooling,
     CoolingProgress,
@@ -57,6 +58,7 @@ def source_files() -> list[Path]:
         ROOT / "sandmould" / "scenario" / name
         for name in (
             "casting_shapes.py",
+            "geometry.py",
             "mesh.py",
             "mesh_cuts.py",
             "mesh_file.py",
@@ -67,6 +69,7 @@ def source_files() -> list[Path]:
             "outline.py",
             "plane_triangulation.py",
             "solidification.py",
+            "solids.py",
         )
     )
     return sorted([*Path(__file__).parent.glob("*.py"), *shared])
@@ -108,7 +111,8 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     begun = time.monotonic()
     cost, planned_s = no_cost(scenario), scene.expected_s(scenario)
     progress = Progress(run, work, scene.expected_element_steps(scenario), "element-steps")
-    elements, filling = scene.elements_of(scenario), scene.filling_of(scenario)
+    raster, filling = scene.drawn_raster(scenario), scene.filling_of(scenario)
+    elements = placed(raster, scenario.layers)
     cost.elements = len(elements.size_m)
     cooled = CoolingProgress(0.0, 0.0, 0.0, 0)
     checkpoint = CheckpointFile(work / CHECKPOINT, computed_hash(scenario))
@@ -120,7 +124,7 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
         progress.show("cooling", now.time_s, now.element_steps, now.element_steps_per_s)
 
     try:
-        marching = scene.method_of(scenario).marching(elements, filling, scene.raster_of(scenario))
+        marching = scene.method_of(scenario).marching(elements, filling, raster)
         marching.advance(filling.heat(elements), 1e-9)  # compiled before it is timed
         cost.time_step_s = marching.step_s
         probes_m = {probe.name: np.array(probe.at_m) for probe in scenario.probes}
@@ -134,7 +138,7 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
         outcome = RunOutcome(code, str(stop), cooled.time_s, planned_s)
         cost.wall_s = time.monotonic() - begun
         return Computed(outcome, cost, is_root=True)
-    _write(scenario, elements, filling.melts(elements), result, work)
+    _write(scenario, elements, filling, result, work)
     end_s = float(result.time_s[-1])
     progress.show("cooling", end_s, result.heat.element_steps,
                result.heat.element_steps / max(result.wall_s, 1e-9), last=True)  # fmt: skip
@@ -153,20 +157,22 @@ def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
 def _write(
     scenario: Solidification,
     elements: Elements,
-    melts: Flags,
+    filling: Filling,
     result: SolidificationResult,
     work: Path,
 ) -> None:
     """Write the curves and the fields at the end."""
-    frozen_s, volume = result.heat.frozen_s[melts], elements.volume_m3[melts]
-    solid = [float(volume[frozen_s <= t].sum() / volume.sum()) for t in result.time_s]
+    melts, volume = filling.melts(elements), elements.volume_m3
+    frozen_s = middle_frozen_s(elements, filling, result.heat.frozen_s)
+    whole = volume[melts].sum()
+    solid = [float(volume[melts & (frozen_s <= t)].sum() / whole) for t in result.time_s]
     clock, share, heat = scene.series_columns(scenario)
     probes = {f"{name}_k": curve for name, curve in result.probe_k.items()}
     table = pd.DataFrame({clock: result.time_s, **probes, share: solid, heat: result.enthalpy_j})
     table.to_csv(work / "series.tsv", sep="\t", index=False, float_format="%.10g")
     np.savez_compressed(
         work / "fields.npz", position_m=elements.position_m, size_m=elements.size_m,
-        melts=melts, frozen_s=result.heat.frozen_s, temperature_k=result.heat.temperature_k,
+        volume_m3=volume, melts=melts, frozen_s=frozen_s, temperature_k=result.heat.temperature_k,
     )  # fmt: skip
 
 

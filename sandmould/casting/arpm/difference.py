@@ -29,6 +29,8 @@ class HeatGrid(NamedTuple):
     """(nx, ny, nz) float64, W/m3/K: between each cell and the next along an axis."""
     material: Any
     """(nx, ny, nz) int64."""
+    thinner: Any
+    """(nx, ny, nz) float64: a cell's volume over what it holds; (0, 0, 0) where all hold it."""
     rows: Floats
     reference: float
     """See ``EnthalpyTable``."""
@@ -62,15 +64,22 @@ class DifferenceSteps:
         shape = (1,) * (3 - raster.material.ndim) + raster.material.shape
         material = raster.material.reshape(shape)
         along_x, along_y, along_z = (
-            _between(material, axis, raster.cell_m, conductivity_w_m_k, resistance_m2k_w)
+            _between(material, axis, raster, conductivity_w_m_k, resistance_m2k_w)
             for axis in range(3)
         )
         rate = np.zeros(shape)
         for axis, along in enumerate((along_x, along_y, along_z)):
             rate += along + np.roll(along, 1, axis=axis)
-        self._grid = HeatGrid(along_x, along_y, along_z, material, table.rows, table.reference_k)
-        self.step_s = share * float((table.rows[material, 0] / rate).min())
         self.volume_m3 = np.full(material.size, raster.cell_m**raster.material.ndim)
+        thinner = np.zeros((0, 0, 0))
+        if raster.cut:
+            self.volume_m3[raster.cut.cell] *= raster.cut.volume_share
+            thinner = np.ones(shape)
+            thinner.reshape(-1)[raster.cut.cell] = 1.0 / raster.cut.volume_share
+            rate *= thinner
+        self._grid = HeatGrid(along_x, along_y, along_z, material, thinner, table.rows,
+                              table.reference_k)  # fmt: skip
+        self.step_s = share * float((table.rows[material, 0] / rate).min())
         self._threads = threads
 
     def advance(self, heat: Heat, duration_s: float) -> None:
@@ -86,17 +95,27 @@ class DifferenceSteps:
         heat.element_steps += steps * self._grid.material.size
 
 
-def _between(material: Any, axis: int, cell_m: float, conductivity: Floats, resistance: float
+def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, resistance: float
              ) -> Floats:  # fmt: skip
-    """Rate (W/m3/K) between each cell and the next along an axis; 0 behind the last."""
-    rate = np.zeros(material.shape)
-    n = material.shape[axis]
+    """Rate (W/K over a whole cell's volume) between each cell and the next; 0 behind the last."""
+    rate, cell_m, n = np.zeros(material.shape), raster.cell_m, material.shape[axis]
     before, after = (np.take(material, range(k, n - 1 + k), axis=axis) for k in (0, 1))
     path = 0.5 * cell_m / conductivity[before] + 0.5 * cell_m / conductivity[after]
     path += np.where(before != after, resistance, 0.0)
     inner = [slice(None)] * 3
     inner[axis] = slice(0, n - 1)
     rate[tuple(inner)] = 1.0 / (path * cell_m)
+    if raster.cut:
+        own = raster.cut.axis == axis - (3 - raster.material.ndim)
+        area, part = raster.cut.area_share[own], raster.cut.low_part[own]
+        low = np.unravel_index(raster.cut.low[own], material.shape)
+        high = tuple(at + (k == axis) for k, at in enumerate(low))
+        path = cell_m * part / conductivity[material[low]]
+        path += cell_m * (1.0 - part) / conductivity[material[high]]
+        if resistance > 0.0:
+            rate[low] = area / ((path * area + resistance) * cell_m)
+        else:
+            rate[low] = 1.0 / (path * cell_m)
     return rate
 
 
@@ -106,7 +125,7 @@ def _difference_steps(
     frozen: Any,
 ) -> Any:  # fmt: skip
     """Take explicit steps; enthalpy and freezing times change in place, temperatures come back."""
-    through_x, through_y, through_z, material, rows, reference = grid
+    through_x, through_y, through_z, material, thinner, rows, reference = grid
     nx, ny, nz = enthalpy.shape
     now, then = temperature.copy(), np.empty_like(temperature)
     for step in range(steps):
@@ -126,6 +145,8 @@ def _difference_steps(
                     taken += through_z[x, y, z - 1] * (now[x, y, z - 1] - own)
                 if z < nz - 1:
                     taken += through_z[x, y, z] * (now[x, y, z + 1] - own)
+                if thinner.size:
+                    taken *= thinner[x, y, z]
                 before, m = enthalpy[x, y, z], material[x, y, z]
                 after = before + dt * taken
                 enthalpy[x, y, z] = after

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from sandmould.arrays import Flags, Floats, Ints
-from sandmould.casting.arpm.raster import Raster
+from sandmould.casting.arpm.raster import Cut, Raster
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,12 @@ class Elements:
     low_m: Floats
     """(d,) float64, m: corners of the box that they fill."""
     high_m: Floats
+    cut: Cut | None = None
+    """Of the grid whose cells the elements cover, where a drawn surface cuts them."""
+    cell_m: float | None = None
+    """Of the cut grid."""
+    cut_volume_m3: Floats | None = None
+    """(n,) float64: what elements hold that a drawn surface cuts or that stand beside one."""
 
     def __post_init__(self) -> None:
         lengths = {len(self.position_m), len(self.size_m), len(self.material)}
@@ -47,8 +53,15 @@ class Elements:
         return self.position_m.shape[1]
 
     @property
+    def grid_m(self) -> float:
+        """Side of the cells on which elements lie: of the smallest, or those of the cut grid."""
+        return self.cell_m or float(self.size_m.min())
+
+    @property
     def volume_m3(self) -> Floats:
         """(n,) float64, m3, or m2 in 2D."""
+        if self.cut_volume_m3 is not None:
+            return self.cut_volume_m3
         return np.asarray(self.size_m**self.dimensions)
 
     def counts(self) -> dict[float, int]:
@@ -141,10 +154,20 @@ def _elements(raster: Raster, span: Ints) -> Elements:
     corner = np.all(place % span == 0, axis=0)
     low = place[:, corner].T
     size_m = (span[corner] * raster.cell_m).astype(np.float64)
-    return Elements(
+    elements = Elements(
         (raster.low_m + low * raster.cell_m + 0.5 * size_m[:, None]).astype(np.float64),
         size_m,
         raster.material[corner],
         raster.low_m,
         (raster.low_m + np.array(span.shape) * raster.cell_m).astype(np.float64),
     )
+    if raster.cut is None:
+        return elements
+    cut = raster.cut
+    number = np.cumsum(corner.reshape(-1)) - 1
+    at = np.stack(np.unravel_index(cut.cell, span.shape))
+    first = at // span[tuple(at)] * span[tuple(at)]
+    owner = number[np.ravel_multi_index(tuple(first), span.shape)]
+    volume_m3 = elements.volume_m3
+    np.add.at(volume_m3, owner, (cut.volume_share - 1.0) * raster.cell_m**elements.dimensions)
+    return replace(elements, cut=cut, cell_m=raster.cell_m, cut_volume_m3=volume_m3)

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sandmould.arrays import Floats, Ints
+from sandmould.arrays import Flags, Floats, Ints
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.exchange import Exchange, check_resistance, from_rows
+from sandmould.casting.arpm.raster import Cut
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,12 @@ class Faces:
     axis: Ints
     """(f,) int64: across which axis the face lies."""
     area_m2: Floats
-    """(f,) float64, m2, or m in 2D."""
+    """(f,) float64, m2, or m in 2D: of the grid."""
+    drawn_share: Floats
+    """(f,) float64: the drawn surface's area over ``area_m2``; 1 within a material."""
+    first_part: Floats
+    """(f,) float64: of the line between the cells' centres on both sides, that in the first's
+    material."""
 
 
 def owners(elements: Elements) -> Ints:
@@ -48,7 +54,7 @@ def owners(elements: Elements) -> Ints:
     ValueError
         When elements overlap, leave gaps, or lie on no common grid.
     """
-    cell = float(elements.size_m.min())
+    cell = elements.grid_m
     low = (elements.position_m - 0.5 * elements.size_m[:, None] - elements.low_m) / cell
     span = elements.size_m / cell
     corner, side = np.round(low).astype(np.int64), np.round(span).astype(np.int64)
@@ -79,18 +85,39 @@ def faces_of(elements: Elements) -> Faces:
     -------
     Faces
     """
-    owner, n = owners(elements), len(elements.size_m)
-    cell = float(elements.size_m.min())
+    owner, n, cell = owners(elements), len(elements.size_m), elements.grid_m
     parts = []
     for axis in range(owner.ndim):
         before = np.take(owner, range(owner.shape[axis] - 1), axis=axis).ravel()
         after = np.take(owner, range(1, owner.shape[axis]), axis=axis).ravel()
         apart = before != after
-        pair, count = np.unique(before[apart] * n + after[apart], return_counts=True)
+        pair, of, count = np.unique(
+            before[apart] * n + after[apart], return_inverse=True, return_counts=True
+        )
         area = count * cell ** (owner.ndim - 1)
-        parts.append((pair // n, pair % n, np.full(len(pair), axis), area))
-    first, second, across, areas = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Faces(first, second, across, areas.astype(np.float64))
+        share, part = np.ones(len(pair)), np.full(len(pair), 0.5)
+        if elements.cut:
+            share, part = _drawn(elements.cut, owner.shape, axis, apart, of, count)
+        parts.append((pair // n, pair % n, np.full(len(pair), axis), area, share, part))
+    first, second, across, areas, shares, first_part = (
+        np.concatenate(part) for part in zip(*parts, strict=True)
+    )
+    return Faces(first, second, across, areas.astype(np.float64), shares, first_part)
+
+
+def _drawn(cut: Cut, shape: tuple[int, ...], axis: int, apart: Flags, of: Ints, count: Ints
+           ) -> tuple[Floats, Floats]:  # fmt: skip
+    """Means of the surface's share and the path's part over the cells' faces of each pair."""
+    own = cut.axis == axis
+    at = np.unravel_index(cut.low[own], shape)
+    inner = tuple(k - (i == axis) for i, k in enumerate(shape))
+    place = np.ravel_multi_index(at, inner)
+    means = []
+    for values, plain in ((cut.area_share[own], 1.0), (cut.low_part[own], 0.5)):
+        all_faces = np.full(len(apart), plain)
+        all_faces[place] = values
+        means.append(np.bincount(of, all_faces[apart], len(count)) / count)
+    return means[0], means[1]
 
 
 def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float,
@@ -115,9 +142,18 @@ def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k
     check_resistance(resistance_m2k_w)
     faces = faces_of(elements)
     material, half = elements.material, 0.5 * elements.size_m
-    path = sum(half[i] / conductivity_w_m_k[material[i]] for i in (faces.first, faces.second))
     differ = material[faces.first] != material[faces.second]
-    conductance = faces.area_m2 / (path + np.where(differ, resistance_m2k_w, 0.0))
+    # what the surface is off the face between the two, from the first's side to the second's
+    off = (faces.first_part - 0.5) * elements.grid_m
+    path = sum(
+        (half[i] + side * off) / conductivity_w_m_k[material[i]]
+        for i, side in ((faces.first, 1.0), (faces.second, -1.0))
+    )
+    conductance = faces.area_m2 / path
+    if resistance_m2k_w > 0.0:
+        share = np.where(differ, faces.drawn_share, 1.0)
+        path = path * share + np.where(differ, resistance_m2k_w, 0.0)
+        conductance = faces.area_m2 * share / path
     first, second = faces.first, faces.second
     if consistent:
         extra = _shared(elements, faces, conductance)

@@ -15,6 +15,24 @@ MOULD = 0
 
 
 @dataclass(frozen=True)
+class Cut:
+    """What a drawn surface that is not on the grid makes of the cells beside it."""
+
+    cell: Ints
+    """(c,) int64: cells in C order that hold more or less than their square or cube."""
+    volume_share: Floats
+    """(c,) float64: what each holds over it."""
+    low: Ints
+    """(f,) int64: cells on the low side of faces between unlike materials."""
+    axis: Ints
+    """(f,) int64: across which axis each of these faces lies."""
+    area_share: Floats
+    """(f,) float64: the drawn surface's area there over a full face's."""
+    low_part: Floats
+    """(f,) float64: of the line between the two centres, what lies in the low cell's material."""
+
+
+@dataclass(frozen=True)
 class Raster:
     """Material of each cell of a regular grid.
 
@@ -29,6 +47,8 @@ class Raster:
     cell_m: float
     low_m: Floats
     """(d,) float64, m: the grid's corner."""
+    cut: Cut | None = None
+    """None where materials meet at faces of the grid."""
 
     def __post_init__(self) -> None:
         if self.material.ndim not in (2, 3) or not self.material.size:
@@ -82,7 +102,7 @@ def painted(low_m: Floats, high_m: Floats, cell_m: float, solids: Mapping[int, B
     for material, solid in solids.items():
         if material == MOULD:
             raise ValueError(f"{solid.name} has material {MOULD}, which is the mould's")
-        inside = _inside(solid, centre)
+        inside = inside_solid(solid, centre)
         if not inside.any():
             raise ValueError(f"{solid.name} holds no cell of {cell_m} m; it must lie in the box")
         if (taken := inside & (flat != MOULD)).any():
@@ -95,7 +115,7 @@ def painted(low_m: Floats, high_m: Floats, cell_m: float, solids: Mapping[int, B
     return raster
 
 
-def _inside(solid: Body, position_m: Floats) -> Flags:
+def inside_solid(solid: Body, position_m: Floats) -> Flags:
     """Which points a solid holds; only those among its corners are measured, which costs."""
     corners = solid.corners()
     low_m, high_m = corners.min(axis=0), corners.max(axis=0)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.estimates import Cooled, cooled, freezes_s
 from sandmould.casting.arpm.filling import Filling, check_casting
@@ -77,6 +78,17 @@ def elements_of(scenario: Solidification) -> Elements:
     return _elements(scenario.box, scenario.shapes, scenario.element_m, scenario.layers)
 
 
+def drawn_raster(scenario: Solidification) -> Raster:
+    """Cells with the volumes and areas of the drawing, for those who exchange over faces.
+
+    Kernels know no faces: theirs are the painted cells.
+    """
+    raster = raster_of(scenario)
+    if scenario.exchange in KERNEL_FORMS:
+        return raster
+    return with_cut(raster, solids_of(scenario))
+
+
 def filling_of(scenario: Solidification) -> Filling:
     """Materials: the mould, then the metal."""
     mould = ThermalMaterial(**scenario.mould.model_dump())
@@ -110,6 +122,12 @@ def _misfits(scenario: Solidification) -> Iterator[Problem]:
     if scenario.exchange == "difference" and scenario.layers:
         valid = "empty with exchange difference: its cells have one size"
         yield Problem("layers", list(scenario.layers), valid)
+    if scenario.exchange in KERNEL_FORMS and scenario.heat_transfer_w_m2_k:
+        valid = (
+            "faces or difference where heat_transfer_w_m2_k resists the heat: kernels do not see "
+            "the surface on which it acts"
+        )
+        yield Problem("exchange", scenario.exchange, valid)
     has_ratio = scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.refuse_ratio
     if has_ratio and scenario.kernel_size < 2.0:
         valid = "at least 2 where sizes double, or any with refuse_ratio: false"

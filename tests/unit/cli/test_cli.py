@@ -14,8 +14,8 @@ from sandmould.scenario.bad_input import BadInputError
 
 COARSE = """\
 based_on: plates
-sweep: {design: list, points: [{exchange: corrected, element_m: 0.01, layers: []}]}
-reference: {exchange: corrected, element_m: 0.01}
+sweep: {design: list, points: [{exchange: faces, element_m: 0.01, layers: []}]}
+reference: {exchange: faces, element_m: 0.01}
 """
 
 
