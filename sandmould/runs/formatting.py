@@ -140,8 +140,8 @@ def mark(value: Any) -> str:
 
 def _text(value: Any) -> str:
     """A value that is no number: short ones in full, so that no two look alike."""
-    text = value if isinstance(value, str) else json.dumps(value)
-    if isinstance(value, list | dict | tuple) or text[:1] in ("[", "{"):
+    text = json.dumps(value) if isinstance(value, list | dict | tuple) else str(value)
+    if text[:1] in ("[", "{"):
         return text if len(text) <= _LONGEST_LIST else f"no. {mark(text)}"
     return text.replace("_", " ")
 

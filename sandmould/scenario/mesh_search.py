@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.compiled import njit
-from sandmould.scenario.mesh_winding import windings
+from sandmould.scenario.mesh_winding import LEAF, windings
 
 Array = NDArray[np.float64]
-_LEAF = 4
-"""Triangles in a leaf of the tree."""
 _DEPTH = 40
 """Boxes that a walk through the tree can have before it: more than the tree has levels."""
 
@@ -100,9 +98,9 @@ def _boxes(corners_m: Array) -> tuple[Array, Array]:
     The last half of the nodes are leaves of four triangles in order; those without any are empty,
     infinitely far away.
     """
-    leaves = 1 << max(0, math.ceil(math.log2(max(1, -(-len(corners_m) // _LEAF)))))
+    leaves = 1 << max(0, math.ceil(math.log2(max(1, -(-len(corners_m) // LEAF)))))
     low_m, high_m = np.full((2 * leaves - 1, 3), np.inf), np.full((2 * leaves - 1, 3), np.inf)
-    starts = np.arange(0, len(corners_m), _LEAF)
+    starts = np.arange(0, len(corners_m), LEAF)
     at = leaves - 1 + np.arange(len(starts))
     low_m[at] = np.minimum.reduceat(corners_m.min(axis=1), starts)
     high_m[at] = np.maximum.reduceat(corners_m.max(axis=1), starts)
@@ -203,8 +201,8 @@ def _distances(points, reach, corners, normals, low, high):  # type: ignore[no-u
             if gaps[waiting] >= best2:
                 continue
             if node >= leaves - 1:
-                start = (node - leaves + 1) * _LEAF
-                for t in range(start, min(start + _LEAF, len(corners))):
+                start = (node - leaves + 1) * LEAF
+                for t in range(start, min(start + LEAF, len(corners))):
                     own = _nearest_on_triangle(p, corners[t], here)
                     away2 = 0.0
                     for i in range(3):
@@ -251,8 +249,8 @@ def _near(points, radii, corners, low, high, sphere, triangle):  # type: ignore[
                 nodes[waiting], nodes[waiting + 1] = 2 * node + 1, 2 * node + 2
                 waiting += 2
                 continue
-            start = (node - leaves + 1) * _LEAF
-            for t in range(start, min(start + _LEAF, len(corners))):
+            start = (node - leaves + 1) * LEAF
+            for t in range(start, min(start + LEAF, len(corners))):
                 _nearest_on_triangle(p, corners[t], here)
                 away2 = 0.0
                 for i in range(3):

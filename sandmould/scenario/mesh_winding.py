@@ -6,6 +6,9 @@ import numpy as np
 
 from sandmould.compiled import njit
 
+LEAF = 4
+"""Triangles in a leaf of the tree."""
+
 
 @njit()
 def windings(points, corners, shell, shells, low, high):  # type: ignore[no-untyped-def]
@@ -31,7 +34,6 @@ def windings(points, corners, shell, shells, low, high):  # type: ignore[no-unty
     (n, shells) int64
     """
     leaves = (len(low) + 1) // 2
-    leaf = 4
     nodes = np.empty(64, np.int64)
     counts = np.zeros((len(points), shells), np.int64)
     for n in range(len(points)):
@@ -49,8 +51,8 @@ def windings(points, corners, shell, shells, low, high):  # type: ignore[no-unty
                 nodes[waiting], nodes[waiting + 1] = 2 * node + 1, 2 * node + 2
                 waiting += 2
                 continue
-            start = (node - leaves + 1) * leaf
-            for t in range(start, min(start + leaf, len(corners))):
+            start = (node - leaves + 1) * LEAF
+            for t in range(start, min(start + LEAF, len(corners))):
                 way = _way_through(corners[t], x, y)
                 if way != 0 and _is_above(corners[t], way, x, y, z):
                     counts[n, shell[t]] += way

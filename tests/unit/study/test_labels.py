@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from sandmould.runs.formatting import setting_text
@@ -54,3 +55,7 @@ def test_a_setting_names_sections_of_keys_that_end_alike() -> None:
     text = setting_text({"casting.density_kg_m3": 7200.0, "mould.density_kg_m3": 1600.0})
     assert text == "casting density 7200 kg/m³, mould density 1600 kg/m³"
     assert setting_text({"time_s": 0.1 + 0.2}) == "0.3 s"
+
+
+def test_values_of_a_table_read_like_those_of_a_study() -> None:
+    assert setting_text({"relaxations": np.int64(5)}) == setting_text({"relaxations": 5})

@@ -16,7 +16,6 @@ from sandmould.casting.arpm.estimates import cooled, freezes_s
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.scenario.casting_shapes import Rectangle
 from sandmould.scenario.wall_thickness import thinnest_wall
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -108,12 +107,10 @@ def test_walls_of_a_picture(tmp_path: Path) -> None:
 def test_elements_that_hold_another_volume_than_drawn_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A square of 38.4 mm in elements that hold 40 mm, as 1600 of 1474.56 mm2."""
     assert notes_of(tmp_path, **around(0.04, 0.04), element_m=0.004) == []
-    drawn = [Rectangle(low_m=(0.0, 0.0), high_m=(0.0384, 0.0384)).solid]
-    monkeypatch.setattr(scene, "solids_of", lambda scenario: drawn)
+    monkeypatch.setattr(scene, "held_volume_m3", lambda scenario: 0.001736)
     assert notes_of(tmp_path, **around(0.04, 0.04), element_m=0.004) == [
-        "The elements hold 8.5% more than the drawn casting: 1\u202f600 instead of 1\u202f475 mm2."
+        "The elements hold 8.5% more than the drawn casting: 1\u202f736 instead of 1\u202f600 mm2."
     ]
 
 
