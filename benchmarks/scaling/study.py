@@ -159,13 +159,13 @@ def graft(place: Place, study: Path, source: Path) -> int:
         for product in products[like]:
             os.link(finished[like] / product, target / product)
             linked += 1
-        # Its origin is its own: a run of another scenario would be computed again.
+        # Its origin is its own, to the byte as long: else it would be computed again.
         origin = target / "provenance.json"
-        text = json.dumps(
-            json.loads(origin.read_text("utf-8")) | {"scenario_sha256": scenario_hash(run.scenario)}
-        )
+        own = json.loads(origin.read_text("utf-8")) | {
+            "scenario_sha256": scenario_hash(run.scenario)
+        }
         origin.unlink()
-        origin.write_text(text, encoding="utf-8")
+        origin.write_text(json.dumps(own, indent=1) + "\n", encoding="utf-8")
     # Products are older than the plan; links share their times, so the plan is dated back.
     oldest = min(p.stat().st_mtime for p in (source / "runs").rglob("*") if p.is_file())
     for path in (*folder.glob("runs/*/scenario.yaml"), folder / "runs.tsv", folder / "study.yaml"):
