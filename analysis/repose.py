@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_closing, label
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -272,3 +273,30 @@ def walls_touched(surface: Surface, low_m: Array, high_m: Array, depth_m: float)
         beside = (along - low < depth_m, high - along < depth_m)
         touched += [name for name, by in zip(names[axis], beside, strict=True) if (by & deep).any()]
     return touched
+
+
+def connected(surface: Surface, depth_m: float, start: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which points of a surface belong to one deep heap with some of them.
+
+    Parameters
+    ----------
+    surface : Surface
+        As ``free_surface`` gives it: its points are a grid.
+    depth_m : float, m
+        Sand deeper than this is a heap.
+    start : (m,) bool
+        Points where the heap begins; only deep ones count.
+
+    Returns
+    -------
+    (m,) bool
+        Deep points that deep neighbours, over gaps of two cells at most, join to a start.
+    """
+    cells = tuple(len(np.unique(along)) for along in surface.point_m.T)
+    deep = (surface.height_m > depth_m).reshape(cells)
+    # a closing at the edge of the grid needs room beyond it
+    closed = binary_closing(np.pad(deep, 1, mode="edge"))[(slice(1, -1),) * len(cells)] | deep
+    part, _ = label(closed)
+    begun = np.unique(part[start.reshape(cells) & deep])
+    joined: NDArray[np.bool_] = (np.isin(part, begun) & deep).ravel()
+    return joined

@@ -12,7 +12,7 @@ import pandas as pd
 
 from sandmould import ROOT
 from sandmould.statistics.agreement import Compared, EngineSpeed, agreement_sentences, speeds
-from sandmould.study.collect import compare_study, swept_keys
+from sandmould.study.collect import compare_study, read_summary, swept_keys
 from sandmould.study.plan.load_study import open_study
 
 
@@ -46,7 +46,7 @@ def read_recorded(folder: Path) -> Recorded:
     """
     record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
     study = open_study(ROOT / record["study"]).study
-    summary = pd.read_csv(folder / "summary.tsv", sep="\t", dtype={"run": str, "version": str})
+    summary = read_summary(folder, words=["version"])
     keys = swept_keys(pd.read_csv(folder / "runs.tsv", sep="\t"))
     return Recorded(
         folder.name,

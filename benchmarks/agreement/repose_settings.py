@@ -12,6 +12,7 @@ from benchmarks.frame import render
 from sandmould.runs.formatting import name_of, number, seconds
 from sandmould.runs.outcome import Outcome
 from sandmould.statistics.agreement import Compared, value_label
+from sandmould.study.collect import read_summary
 from sandmould.study.records import RECORDS
 
 MEASURE = "heap_angle_deg"
@@ -135,7 +136,7 @@ def page(records: Path = RECORDS) -> str:
     factors: list[Factor] = []
     margins, confidences = set(), set()
     for recorded in read_all(records, STUDIES):
-        summary = pd.read_csv(records / recorded.name / "summary.tsv", sep="\t")
+        summary = read_summary(records / recorded.name)
         factors += factors_of(recorded, summary, recorded.keys)
         margins |= {c.agreement.margin for c in recorded.compared if c.measure == MEASURE}
         confidences.add(recorded.confidence)

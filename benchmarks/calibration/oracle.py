@@ -18,7 +18,7 @@ from sandmould import ROOT
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
-from sandmould.statistics.verdict import finished_values
+from sandmould.statistics.evidence import usable_values
 from sandmould.study.collect import gather
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.registry import kind_of
@@ -102,7 +102,7 @@ def read_map(path: Path, measure: str = ANGLE) -> Map:
     lacking = [name for name in (*KEYS, measure, "outcome_code") if name not in table]
     if lacking:
         raise NoMapError(f"{path} lacks the column {lacking[0]}, so it is no map of it")
-    values = np.asarray(finished_values(table, measure), dtype=np.float64)
+    values = np.asarray(usable_values(table, measure), dtype=np.float64)
     points = table[list(KEYS)].to_numpy(dtype=np.float64)[np.isfinite(values)]
     try:
         truth = fit_emulator(measure, points, values[np.isfinite(values)])
@@ -164,4 +164,4 @@ def _measures_of(run: Run) -> Measures:
         simulate(run_folder)
         write_measures(run.scenario, run_folder, run_folder / "measures.tsv")
         summary = gather(folder).summary
-    return {m: float(finished_values(summary, m).iloc[0]) for m in (ANGLE, SECOND)}
+    return {m: float(usable_values(summary, m).iloc[0]) for m in (ANGLE, SECOND)}

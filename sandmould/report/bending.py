@@ -25,15 +25,17 @@ from sandmould.runs.columns import (
     SOLID_FRACTION,
     TIME_S,
     VIBRATION_TIME_S,
-    finished,
 )
-from sandmould.runs.formatting import number, setting_text
+from sandmould.runs.formatting import number, setting_text, with_margin
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.evidence import barred, usable_values
+from sandmould.statistics.settings import group_settings, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.study.kinds.sand.bending import convergence_log_of, verdict_of
 
 TIP = "pattern_tip_deflection_m"
+RECOVERED = "pattern_tip_recovered_m"
 ROJEK = (
     "Rojek et al. (2004, section 4.3) state of their L, in experiment and computation: filling "
     "distorts it and leaves loose sand below its horizontal part; vibration lets sand flow in "
@@ -56,7 +58,8 @@ class BendingPages:
     convergence: tuple[ConvergenceChart, ...]
     pictured_run: str
     runs: Table
-    paper: str = ROJEK
+    paper: tuple[str, ...]
+    """On the paper's L; empty under another scene."""
 
 
 def bending_pages(
@@ -102,6 +105,7 @@ def bending_pages(
         convergence=() if log is None else convergence_charts(log, _begins_s(own)),
         pictured_run=pictured_run,
         runs=_runs_table(study_folder, href, collected, verdict, verdicts),
+        paper=paper_sentences(scenario, collected, pictured_run),
     )
 
 
@@ -130,14 +134,54 @@ def _tip_sentences(
         way = "hardly moved it"
         if abs(back) > _RECOVERS:
             way = "gave back a part of it" if back > 0.0 else "bent it farther"
-        like = "as the paper states" if back > _RECOVERS else "other than the paper states"
-        if verdict is None or verdict.state != "holds":
-            like = "by a loop that does not hold"
         said.append(
-            f"{last[VIBRATION_TIME_S]:.3g} s of vibration {way}, {like}: "
-            f"{_mm(last[TIP])} mm at the end{_under(last)}."
+            f"{last[VIBRATION_TIME_S]:.3g} s of vibration {way}: {_mm(last[TIP])} mm at the "
+            f"end{_under(last)}."
         )
     return tuple(said)
+
+
+def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str) -> tuple[str, ...]:
+    """What the paper states of its L, and whether the fillings of one setting say the same.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the run that is shown.
+    collected : Collected
+        Of the sweep.
+    pictured_run : str
+        Whose setting is judged, by the mean over its fillings.
+
+    Returns
+    -------
+    tuple of str
+        Empty under a scene that is none of the paper's: only an L that is filled in layers and
+        then vibrated is.
+    """
+    pattern = scenario.pattern
+    is_l = pattern is not None and pattern.shape.kind == "l_shape"
+    if not is_l or len(scenario.fill.each_layer()) < 2 or not scenario.vibration:
+        return ()
+    summary, keys = collected.summary, collected.keys
+    groups = group_settings(summary, keys)
+    at, rows = next((at, own) for at, own in groups if pictured_run in set(own[RUN].astype(str)))
+    fillings = setting_of(at, len(rows), 1e3 * usable_values(rows, RECOVERED).dropna())
+    where = f" at {fillings.label}" if keys else ""
+    if fillings.n < 2:
+        few = "one filling" if fillings.n else "no filling"
+        return ROJEK, f"Here {few}{where} can be used: too few to judge that statement by."
+    mean, reach = fillings.mean, fillings.ci_half_width
+    if mean - reach > 0.0:
+        so = "the tip comes back, as the paper states"
+    elif mean + reach < 0.0:
+        so = "the tip goes on sinking, other than the paper states"
+    else:
+        so = "whether the tip comes back is not told by so few fillings"
+    return ROJEK, (
+        f"Here vibration gave back {with_margin(mean, reach)} mm of the tip's sinking{where}, the "
+        f"mean of {fillings.n} fillings with its 95 % interval: {so}."
+    )
 
 
 def _under(row: pd.Series[Any]) -> str:
@@ -182,10 +226,10 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     areas = []
     for setting in part.settings:
         rows = runs_of(drawn.summary, setting)
-        complete = rows.loc[finished(rows), RUN]
-        area = _area(aligned[aligned[RUN].isin(complete)])
+        used = rows.loc[barred(rows, TIP) == "", RUN]
+        area = _area(aligned[aligned[RUN].isin(used)])
         if area is not None:
-            said = f"{setting.label}: from the least to the greatest of {len(complete)} runs"
+            said = f"{setting.label}: from the least to the greatest of {len(used)} runs"
             areas.append(replace(area, tint=tint[setting.label], title=said))
     clock = (
         "time since vibration began, s"

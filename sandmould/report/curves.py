@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from sandmould.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
-from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, finished
+from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S
 from sandmould.runs.formatting import (
     display_scale,
     name_of,
@@ -22,8 +22,9 @@ from sandmould.runs.formatting import (
     value_text,
     with_margin,
 )
+from sandmould.statistics.evidence import barred, left_out, reason_text, usable_values
 from sandmould.statistics.settings import Setting, group_settings
-from sandmould.statistics.verdict import Verdict, finished_values
+from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
 
@@ -118,13 +119,14 @@ def time_chart(
         rows = rows_of[setting.label]
         tint = colour[setting.label]
         complete: list[NDArray[np.float64]] = []
-        for run, is_complete, outcome in zip(rows[RUN], finished(rows), rows[OUTCOME], strict=True):
+        reasons = barred(rows, measure)
+        for run, why, outcome in zip(rows[RUN], reasons, rows[OUTCOME], strict=True):
             if str(run) not in by_run:
                 continue
             xy = by_run[str(run)]
-            ended = "" if is_complete else f", {outcome}"
+            ended = f", {reason_text(why, outcome)}" if why else ""
             lines.append(Line(_thinned(xy, stride), tint, title=f"{run}: {setting.label}{ended}"))
-            if is_complete:
+            if not why:
                 complete.append(xy[np.isfinite(xy).all(axis=1)])
         mean = _mean_curve(complete)
         if mean is not None:
@@ -194,7 +196,7 @@ def objective_charts(
         return (_scale_chart(summary, verdict, keys[0]),)
     if len(verdict.settings) <= _MOST_ROWS:
         return (_row_chart(summary, verdict),)
-    values = finished_values(summary, verdict.measure)
+    values = usable_values(summary, verdict.measure)
     factor, what = display_scale(verdict.measure)
     numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
     return tuple(
@@ -270,15 +272,17 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
 
 def _run_marks(rows: pd.DataFrame, verdict: Verdict, tint: Tint) -> list[Mark]:
     """Marks of a setting's runs, given their rows; x is left to the caller."""
-    values = finished_values(rows, verdict.measure)
+    values = usable_values(rows, verdict.measure)
     factor = display_scale(verdict.measure)[0]
     marks = []
-    for run, outcome, value in zip(rows[RUN], rows[OUTCOME], values, strict=True):
+    reasons = left_out(rows, verdict.measure)
+    for run, why, outcome, value in zip(rows[RUN], reasons, rows[OUTCOME], values, strict=True):
         if math.isfinite(value):
             title = f"{run}: {number(value)}"
             marks.append(Mark(math.nan, factor * value, "run", tint, title=title))
         else:
-            marks.append(Mark(math.nan, math.nan, "failed", tint, title=f"{run}: {outcome}"))
+            title = f"{run}: {reason_text(why, outcome)}"
+            marks.append(Mark(math.nan, math.nan, "failed", tint, title=title))
     return marks
 
 
@@ -308,14 +312,14 @@ def best_passage(
     Returns
     -------
     (float, float, float) or None
-        Means over its finished runs; None where no run tells.
+        Means over its usable runs; None where no run tells.
     """
     if verdict.best is None:
         return None
     rows = runs_of(collected.summary, verdict.best)
-    complete = rows.loc[finished(rows), RUN]
+    used = rows.loc[barred(rows, measure) == "", RUN]
     curves = collected.curves
-    shaken = curves[curves[RUN].isin(complete) & (curves[VIBRATION_TIME_S] >= 0)]
+    shaken = curves[curves[RUN].isin(used) & (curves[VIBRATION_TIME_S] >= 0)]
     passages = []
     for _, run in shaken.groupby(RUN):
         time_s = run[VIBRATION_TIME_S].to_numpy(dtype=np.float64)

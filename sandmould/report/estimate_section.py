@@ -19,8 +19,9 @@ from sandmould.runs.columns import CPU_S, RUN
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
+from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting
-from sandmould.statistics.verdict import Verdict, finished_values
+from sandmould.statistics.verdict import Verdict
 from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
@@ -133,7 +134,7 @@ def _value_sentences(settings: Sequence[Setting], measure: str, study: Study) ->
 
 
 def _touching(summary: pd.DataFrame) -> list[str]:
-    """Name runs whose heap leans on a wall: they have no angle of repose."""
+    """Name runs whose heap leans on a wall: neither its slope nor its front is the sand's own."""
     if "heap_touches" not in summary:
         return []
     # An empty cell is read as NaN.
@@ -142,9 +143,10 @@ def _touching(summary: pd.DataFrame) -> list[str]:
         return []
     walls = sorted({str(w) for w in leaning["heap_touches"]})
     names = [str(run) for run in leaning[RUN]]
+    nothing = "no run-out" if "run_out_m" in summary else "no angle of repose"
     return [
-        f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and "
-        f"so has no angle of repose: {listed(names)}. Widen the box or fill in less sand."
+        f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and so "
+        f"has {nothing}: {listed(names)}. Widen the box or fill in less sand."
     ]
 
 
@@ -175,7 +177,7 @@ def _map_picture(
     summary: pd.DataFrame, keys: Sequence[str], measure: str, calibrated: Calibrated | None
 ) -> str:
     pair, points = (keys[0], keys[1]), summary[list(keys)].to_numpy(dtype=np.float64)
-    values = np.asarray(finished_values(summary, measure), dtype=np.float64)
+    values = np.asarray(usable_values(summary, measure), dtype=np.float64)
     emulator = calibrated.emulators.get(measure) if calibrated else None
     try:
         emulator = emulator or fit_emulator(measure, points, values)

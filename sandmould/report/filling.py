@@ -13,9 +13,10 @@ from scipy.stats import t as student
 from analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.report.chart import Chart, Line, tints
 from sandmould.report.curves import reported_lines, runs_by_setting, runs_of
-from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, finished
+from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.evidence import barred
 from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
@@ -57,7 +58,7 @@ def filling_pages(
     best, measure = verdict.best, verdict.measure
     if best is None or not scenario.vibration or not measure.endswith("_fill_fraction"):
         return None
-    shaken = _shaken(collected)
+    shaken = _shaken(collected, measure)
     if measure not in shaken or shaken.empty:
         return None
     keys = collected.keys
@@ -74,11 +75,11 @@ def filling_pages(
     )
 
 
-def _shaken(collected: Collected) -> pd.DataFrame:
-    """Curves of finished runs during vibration."""
+def _shaken(collected: Collected, measure: str) -> pd.DataFrame:
+    """Curves of usable runs during vibration."""
     summary, curves = collected.summary, collected.curves
-    complete = summary.loc[finished(summary), RUN]
-    return curves[curves[RUN].isin(complete) & (curves[VIBRATION_TIME_S] >= 0)]
+    used = summary.loc[barred(summary, measure) == "", RUN]
+    return curves[curves[RUN].isin(used) & (curves[VIBRATION_TIME_S] >= 0)]
 
 
 def _drive(scenario: Scenario, best: Setting) -> str:

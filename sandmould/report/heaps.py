@@ -13,7 +13,8 @@ from sandmould.report.repose_figures import draw_heap
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import number
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import Verdict, finished_values
+from sandmould.statistics.evidence import usable_values
+from sandmould.statistics.verdict import Verdict
 from sandmould.study.kinds.sand.moments import list_moments
 
 PICTURED_HEAPS = 3
@@ -44,7 +45,7 @@ def steepest_heaps(
     """
     if scenario.gate is None or not scenario.gate.is_level:
         return ()
-    values = finished_values(summary, verdict.measure).dropna().sort_values()
+    values = usable_values(summary, verdict.measure).dropna().sort_values()
     places = np.unique(np.linspace(0, len(values) - 1, PICTURED_HEAPS).round().astype(int))
     heaps = []
     for index in [values.index[i] for i in places] if len(values) else []:

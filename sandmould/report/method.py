@@ -103,7 +103,7 @@ def statistics_method(objective: Objective, ends: str) -> Row:
     return Row(
         "Statistics",
         f"{name_of(objective.measure)} at {at}, {objective.better} is better; a setting's ± is the "
-        "95 % interval of its mean (Student). Settings with the same finished replicates are "
+        "95 % interval of its mean (Student). Settings with the same usable replicates are "
         "compared by paired differences, others by Welch's test; intervals and p values of the "
         "best against the others carry Bonferroni's factor.",
     )

@@ -21,7 +21,14 @@ from sandmould.report.time_series import (
     measure_curves,
     whole_conclusion,
 )
-from sandmould.runs.columns import BED_HEIGHT_M, RUN, SOLID_FRACTION, TIME_S, VIBRATION_TIME_S
+from sandmould.runs.columns import (
+    BED_HEIGHT_M,
+    RUN,
+    SOLID_FRACTION,
+    TIME_S,
+    VIBRATION_TIME_S,
+    finished,
+)
 from sandmould.runs.formatting import listed, name_of, number, setting_text
 from sandmould.scenario.geometry import Bore
 from sandmould.scenario.scenario import Scenario
@@ -102,7 +109,7 @@ def sand_pages(
         scene=figures.draw_dimensions(scenario, bed_m),
         scene_alt=_scene_alt(scenario, bed_m),
         pictured_run=run,
-        role=_role_text(next(iter(roles), ""), verdict),
+        role=_role_text(next(iter(roles), ""), verdict, collected.summary),
         panels=tuple(
             Panel(
                 f"{heading}, {_clock_s(moment):.2f} s",
@@ -142,7 +149,7 @@ def _clock_s(moment: Moment) -> float:
 def pictured_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
     """Runs to be looked at, by role: best, median and worst, or what there is.
 
-    Where one run finished it is the only one. Where none did, that with most snapshots stands
+    Where one run can be used it is the only one. Where none can, that with most snapshots stands
     alone: to see how it failed.
     """
     ranks = rank_runs(summary, verdict.measure, verdict.better)
@@ -156,12 +163,13 @@ def pictured_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -
     return {"longest": longest} if count.get(longest) else {}
 
 
-def _role_text(role: str, verdict: Verdict) -> str:
+def _role_text(role: str, verdict: Verdict, summary: pd.DataFrame) -> str:
     """Why a run is the one to be looked at."""
     if role == "only":
-        return "the only one that finished"
+        return f"the only one with a {name_of(verdict.measure)} that can be used"
     if role == "longest":
-        return "which got farthest: none finished"
+        none = "none gives a value that can be used" if finished(summary).any() else "none finished"
+        return f"which got farthest: {none}"
     return f"the {role} run by {name_of(verdict.measure)}"
 
 

@@ -20,11 +20,13 @@ from sandmould.runs.columns import (
     LARGEST_OVERLAP_FRACTION,
     OUTCOME,
     OUTCOME_CODE,
+    PART,
     PEAK_MEMORY_BYTES,
     REPLICATE,
     RUN,
     SEED,
     SIMULATED_S,
+    SWEEP,
     TIME_STEP_FRACTION,
     WALL_S,
     finished,
@@ -32,7 +34,9 @@ from sandmould.runs.columns import (
 from sandmould.runs.formatting import name_of, number, seconds, size, titled, with_margin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.evidence import NOT_FINISHED, left_out, reason_text
 from sandmould.statistics.verdict import Verdict
+from sandmould.study.collect import CHECKS, CURVES, SUMMARY
 from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE
 
 
@@ -94,7 +98,9 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
         mean = f"mean of {best.n} runs" if best.n > 1 else "one run"
         numbers.append(KeyNumber(number(best.mean), label, mean))
     complete = summary[finished(summary)]
-    numbers.append(KeyNumber(f"{len(complete)} of {len(summary)}", "runs finished"))
+    checks = PART in summary and (summary[PART] != SWEEP).any()
+    label = "runs finished, checks included" if checks else "runs finished"
+    numbers.append(KeyNumber(f"{len(complete)} of {len(summary)}", label))
     # a run that failed may have stopped before it had all its grains
     typical = complete if len(complete) else summary
     for what in ("grains", "elements", "particles"):
@@ -226,7 +232,7 @@ def runs_table(
     Returns
     -------
     Table
-        Runs that did not finish are marked and say why.
+        Runs that are left out of the verdict are marked and say why.
     """
     cost = [c for c in _COST if c[0] in summary]
     blocks = [c for c in (REPLICATE, SEED) if c in summary]
@@ -241,19 +247,19 @@ def runs_table(
     )
     rows, marked = [], []
     listed = listed_runs(summary, verdict)
-    for row, is_complete in zip(listed.to_dict("records"), finished(listed), strict=True):
-        failed = not is_complete
+    reasons = left_out(listed, verdict.measure)
+    for row, why in zip(listed.to_dict("records"), reasons, strict=True):
         rows.append(
             (
                 Cell(str(row[RUN]), str(row[RUN]), f"{runs_href}/{quote(str(row[RUN]))}/"),
                 *(_parameter_cell(row[k]) for k in keys),
                 *(_parameter_cell(row[b]) for b in blocks),
-                Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, failed)),
+                Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, why)),
                 *([_number_cells((_float(row[verdict.measure]), 4))[0]] if has_value else []),
                 *(_cost_cell(row[name], show) for name, _, show in cost),
             )
         )
-        marked.append(failed)
+        marked.append(bool(why))
     failed_and_best = "those without a value and then the best; summary.tsv has all"
     note = listed_note(len(rows), len(summary), "runs", failed_and_best)
     return Table(columns, tuple(rows), tuple(marked), note)
@@ -276,14 +282,15 @@ def _float(value: Any) -> float:
         return math.nan
 
 
-def _why(row: Mapping[Any, Any], failed: bool) -> str:
-    """Sentence of an outcome with what the engine or the collection said."""
+def _why(row: Mapping[Any, Any], why: str) -> str:
+    """Why a run is left out, with what the engine or the collection said."""
     detail = row[DETAIL] if isinstance(row[DETAIL], str) else ""
     code = _float(row[OUTCOME_CODE])
-    meaning = ""
-    if failed and math.isfinite(code):
+    if why != NOT_FINISHED:
+        meaning = f"{reason_text(why, '').capitalize()}." if why else ""
+    elif math.isfinite(code):
         meaning = Outcome(int(code)).meaning
-    elif failed:
+    else:
         meaning = "The run was not started, or was killed before it could say how it ended."
     return " ".join(s for s in (meaning, detail) if s)
 
@@ -300,8 +307,10 @@ class DataFile:
 _FILES = (
     (STUDY_FILE, "the study as planned"),
     ("runs.tsv", "the plan: every run, its parameters, replicate and seed"),
-    ("summary.tsv", "one row a run: parameters, outcome, final measures, cost"),
-    ("curves.tsv", "one row a snapshot: all measures of all runs against time"),
+    (SUMMARY, "one row a run of the sweep: parameters, outcome, final measures, cost"),
+    (CURVES, "one row a snapshot of the sweep: all measures against time"),
+    (CHECKS[0], "the runs that check the sweep, on another engine or as controls: a row a run"),
+    (CHECKS[1], "the same runs: a row a snapshot"),
     (FIGURES, "main figures as files: charts as SVG, sand as PNG"),
     ("agreement.tsv", "one row a pair of settings and measure that the study compares"),
     ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "

@@ -9,8 +9,9 @@ import pandas as pd
 
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import setting_text
+from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting, setting_rows
-from sandmould.statistics.verdict import Verdict, finished_values
+from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
 MOST_SETTINGS = 120
@@ -79,7 +80,7 @@ def listed_runs(summary: pd.DataFrame, verdict: Verdict) -> pd.DataFrame:
     """Rows that the table of runs lists: all, or those that failed and then the best."""
     if len(summary) <= MOST_RUNS:
         return summary
-    values = finished_values(summary, verdict.measure)
+    values = usable_values(summary, verdict.measure)
     best_first = values.sort_values(ascending=verdict.better == "smaller", kind="stable").index
     failed = summary.index[values.isna()]
     order = [*failed, *best_first.difference(failed, sort=False)]

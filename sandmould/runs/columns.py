@@ -55,6 +55,8 @@ SOLID_FRACTION: Final = "solid_fraction"
 BED_HEIGHT_M: Final = "bed_height_m"
 CLASSIFICATION: Final = "classification"
 """Of a run of flow: excellent, good or failed."""
+LOOP: Final = "pattern_loop"
+"""State of the loop between sand and pattern at the end of a run: holds, lags, one way, ..."""
 HOPS: Final = "hops"
 SOLIDIFICATION_TIME_S: Final = "solidification_time_s"
 

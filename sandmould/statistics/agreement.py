@@ -22,8 +22,8 @@ from sandmould.runs.columns import (
 from sandmould.runs.formatting import listed, name_of, number, setting_text, value_text
 from sandmould.statistics.config import Equivalence
 from sandmould.statistics.equivalence import Agreement, agree
+from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import by_block, group_settings
-from sandmould.statistics.verdict import finished_values
 
 COLUMNS = (
     "at", "key", "first", "second", "measure", "mean_first", "mean_second", "difference",
@@ -103,7 +103,7 @@ def compare_pair(
     at_values = ", ".join(value_text(k, v) for k, v in at.items())
     comparisons = []
     for measure, margin in equivalence.margins.items():
-        values = [finished_values(r, measure).dropna() for r in rows]
+        values = [usable_values(r, measure).dropna() for r in rows]
         first, second = (by_block(r, v, over) for r, v in zip(rows, values, strict=True))
         agreement = agree(first, second, margin, equivalence.confidence)
         comparisons.append(Compared(measure, key, *pair, where, at_values, agreement))

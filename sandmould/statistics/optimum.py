@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from sandmould.statistics.emulator import Array, Emulator, fit_emulator
+from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import CONFIDENCE
-from sandmould.statistics.verdict import Better, finished_values
+from sandmould.statistics.verdict import Better
 
 DRAWS = 2000
 LOG_RATIO = 4.0
@@ -127,7 +128,7 @@ def find_optimum(
     TooFewRunsError
     """
     points = summary[list(keys)].to_numpy(dtype=np.float64)
-    values = np.asarray(finished_values(summary, measure), dtype=np.float64)
+    values = np.asarray(usable_values(summary, measure), dtype=np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
     logs = (low > 0.0) & (high > LOG_RATIO * low)
     emulator = fit_emulator(measure, _scaled(points, logs), values)

@@ -14,8 +14,8 @@ from sandmould.runs.columns import PART, RUN, SWEEP, finished
 from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective
 from sandmould.statistics.control_case import ControlCase
+from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import CONFIDENCE
-from sandmould.statistics.verdict import finished_values
 
 ShiftVerdict = Literal["up", "down", "held", "unclear", "no result"]
 Cause = Literal[
@@ -105,7 +105,7 @@ def assess_robustness(
         {
             PART: summary.get(PART, SWEEP),
             "hz": summary[key].astype(float),
-            "value": sign * finished_values(summary, measure),
+            "value": sign * usable_values(summary, measure),
         }
     ).dropna(subset=["value"])
     groups = table.groupby([PART, "hz"])["value"]

@@ -21,13 +21,13 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Setting:
-    """One combination of swept values and the objective of its finished runs."""
+    """One combination of swept values and the objective of its usable runs."""
 
     values: Mapping[str, Any]
     label: str
     planned: int
     n: int
-    """Finished runs with a value."""
+    """Runs with a value that can be used."""
     mean: float
     sd: float
     """Standard deviation over replicates; NaN for fewer than two."""

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
 import pandas as pd
 
 from sandmould.runs.columns import RUN, finished
 from sandmould.runs.formatting import listed, name_of, number, value_text, with_margin
 from sandmould.scenario.vibration import VibrationStage
+from sandmould.statistics.evidence import one_way_caveat, reasons_sentence, usable_values
 from sandmould.statistics.settings import (
     Comparison,
     Setting,
@@ -67,10 +67,11 @@ def compare_settings(
 ) -> Verdict:
     """Compare the settings of a study by the mean of the objective.
 
-    Replicates share their seeds across settings, so two settings with the same finished
-    replicates are compared by paired differences, others by Welch's test. The best is picked
-    after seeing the data among all settings: intervals and p values carry Bonferroni's factor, the
-    number of other settings that can be tested.
+    Only runs that are evidence of the objective count, see ``evidence``. Replicates share their
+    seeds across settings, so two settings with the same usable replicates are compared by paired
+    differences, others by Welch's test. The best is picked after seeing the data among all
+    settings: intervals and p values carry Bonferroni's factor, the number of other settings that
+    can be tested.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def compare_settings(
     -------
     Verdict
     """
-    values = finished_values(summary, measure)
+    values = usable_values(summary, measure)
     in_blocks = values.set_axis(number_blocks(summary))
     groups = [(at, len(rows), in_blocks.iloc[rows].dropna())
               for at, rows in setting_rows(summary, keys)]  # fmt: skip
@@ -105,7 +106,7 @@ def compare_settings(
     resolved = first is not None and first.separated
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
     caveats = [
-        *_run_caveats(settings, len(summary), int(values.notna().sum()), seeks_best),
+        *_run_caveats(settings, summary, measure, seeks_best),
         *(_edge_caveats(best, settings, keys) if seeks_best else ()),
         *_identical([c.other for c in comparisons if _is_identical(c, of_setting, best)]),
         *notes,
@@ -121,21 +122,15 @@ def compare_settings(
         p=first.p if first else math.nan,
         resolved=resolved,
         comparisons=comparisons,
-        sentences=_sentences(measure, better, settings, ranked, comparisons, resolved),
+        sentences=_sentences(measure, better, settings, ranked, comparisons, resolved)
+        if ranked
+        else (_without_value(summary, measure),),
         caveats=tuple(caveats),
     )
 
 
-def finished_values(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
-    """Objective of each run, NaN where the run did not finish or lacks the measure."""
-    if measure not in summary:
-        return pd.Series(np.nan, index=summary.index)
-    values = pd.to_numeric(summary[measure], errors="coerce")
-    return values.where(finished(summary))
-
-
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
-    """Best, median and worst finished run by the objective.
+    """Best, median and worst usable run by the objective.
 
     Parameters
     ----------
@@ -147,11 +142,11 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
     -------
     dict
         ``best``, ``median`` and ``worst`` to the run's name, ``highest``, ``median`` and
-        ``lowest`` where neither is better; fewer where fewer runs finished. Of an even number of
+        ``lowest`` where neither is better; fewer where fewer runs are usable. Of an even number of
         runs the better of the two middle ones is the median.
     """
     first, last = ("highest", "lowest") if better == "neither" else ("best", "worst")
-    values = finished_values(summary, measure).dropna()
+    values = usable_values(summary, measure).dropna()
     values = values.sort_values(ascending=better == "smaller", kind="stable")
     runs = [str(r) for r in summary.loc[values.index, RUN]]
     ranks: dict[str, str] = {}
@@ -219,23 +214,22 @@ def _identical(others: list[str]) -> list[str]:
 
 
 def _run_caveats(
-    settings: Sequence[Setting], planned: int, used: int, seeks_best: bool
+    settings: Sequence[Setting], summary: pd.DataFrame, measure: str, seeks_best: bool
 ) -> list[str]:
     caveats = []
+    planned, used = len(summary), sum(s.n for s in settings)
     if used < planned:
-        were = "was" if planned - used == 1 else "were"
         caveats.append(
-            f"{planned - used} of {planned} runs did not finish or lack the measure and {were} "
-            "left out."
+            f"Not used: {planned - used} of {planned} runs ({reasons_sentence(summary, measure)})."
         )
     empty = [s.label for s in settings if s.n == 0]
     if empty and used:
         so = ": the best may lie there" if seeks_best else ""
-        caveats.append(f"No run finished at {listed(empty)}{so}.")
+        caveats.append(f"No run can be used at {listed(empty)}{so}.")
     few = [s.label for s in settings if 0 < s.n < _FEW]
     if few:
-        caveats.append(f"Fewer than {_FEW} finished replicates at {listed(few)}.")
-    return caveats
+        caveats.append(f"Fewer than {_FEW} usable replicates at {listed(few)}.")
+    return [*caveats, *filter(None, [one_way_caveat(summary)])]
 
 
 def _edge_caveats(
@@ -266,12 +260,10 @@ def _sentences(
     resolved: bool,
 ) -> tuple[str, ...]:
     what = name_of(measure)
-    if not ranked:
-        return (f"Not resolved: no run finished with a value of the {what}.",)
     best = ranked[0]
     mean = with_margin(best.mean, best.ci_half_width)
     if len(ranked) == 1:
-        only = "One setting was run" if len(settings) == 1 else "Runs of one setting only finished"
+        only = "One setting was run" if len(settings) == 1 else "Only one setting has usable runs"
         return (
             f"Not resolved: nothing to compare with. {only}, {best.label}, with a {what} of "
             f"{mean}.",
@@ -296,6 +288,17 @@ def _sentences(
         f"{mean}, is that of {best.label}, but it cannot be told apart from "
         f"{listed(like)} at 95 % confidence.",
         again,
+    )
+
+
+def _without_value(summary: pd.DataFrame, measure: str) -> str:
+    """Why no setting has a mean."""
+    complete = int(finished(summary).sum())
+    if not complete:
+        return "Not resolved: no run finished."
+    return (
+        f"Not resolved: {complete} of {len(summary)} runs finished, but none gives a "
+        f"{name_of(measure)} that can be used ({reasons_sentence(summary, measure)})."
     )
 
 

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
-from sandmould.runs.outcome import Outcome
+from sandmould.runs.columns import DETAIL, OUTCOME, RUN, finished
+from sandmould.study.collect import read_summary
 
 
-def failed_runs(summary: Path) -> None:
+def failed_runs(study_folder: Path) -> None:
     """Fail loudly when a run of the study failed.
 
     Parameters
     ----------
-    summary : Path
-        ``summary.tsv`` of the study.
+    study_folder : Path
+        With the tables that ``collect`` wrote.
 
     Raises
     ------
     SystemExit
         Naming each run that did not finish, with its outcome and what was said of it.
     """
-    with summary.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file, delimiter="\t"))
-    failed = [row for row in rows if row["outcome"] != Outcome.FINISHED.label]
+    summary = read_summary(study_folder)
+    failed = summary[~finished(summary)].to_dict("records")
     if failed:
-        lines = [f"  {row['run']}: {row['outcome']}. {row['detail']}".rstrip() for row in failed]
-        said = "\n".join([f"{len(failed)} of {len(rows)} runs did not finish:", *lines])
+        lines = [f"  {row[RUN]}: {row[OUTCOME]}. {row[DETAIL]}".rstrip() for row in failed]
+        said = "\n".join([f"{len(failed)} of {len(summary)} runs did not finish:", *lines])
         raise SystemExit(said)

@@ -1,4 +1,9 @@
-"""Gather the runs of a study into two tables: one row a run, and one row a snapshot."""
+"""Gather the runs of a study into two tables: one row a run, and one row a snapshot.
+
+On disk each table holds the sweep alone, so that whoever groups it by a swept key compares like
+with like. The runs that check the sweep, on another engine or as controls, lie beside it in tables
+of their own, ``summary_checks.tsv`` and ``curves_checks.tsv``.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +22,7 @@ from sandmould.runs.columns import (
     CLOCK,
     CROSS_CHECK,
     DETAIL,
+    ENGINE,
     GRAINS,
     LARGEST_OVERLAP_FRACTION,
     OUTCOME,
@@ -27,6 +33,7 @@ from sandmould.runs.columns import (
     RUN,
     SEED,
     SIMULATED_S,
+    SWEEP,
     TIME_S,
     VIBRATION_TIME_S,
 )
@@ -46,6 +53,9 @@ from sandmould.study.plan.plan_files import STUDY_FILE
 from sandmould.study.run_tables import PLACE, UNREADABLE, RunTables, problem_text, read_tables
 
 NO_OUTCOME = "no outcome written"
+SUMMARY, CURVES = "summary.tsv", "curves.tsv"
+CHECKS = ("summary_checks.tsv", "curves_checks.tsv")
+"""Tables of the runs that are no part of the sweep; only studies that have such runs."""
 _PARAMETER_FREE = (RUN, REPLICATE, SEED, PART)
 # The summary has these of the run; those of the snapshot get a prefix there.
 _OF_SNAPSHOT = (*CLOCK, GRAINS, LARGEST_OVERLAP_FRACTION)
@@ -67,8 +77,8 @@ class Collected:
 
     @property
     def of_sweep(self) -> Collected:
-        """Without the runs that check a point of the sweep on another engine."""
-        return replace(self, summary=sweep_part(self.summary))
+        """Without the runs that check the sweep, on another engine or as controls."""
+        return replace(self, summary=sweep_part(self.summary), curves=sweep_part(self.curves))
 
 
 def swept_keys(table: pd.DataFrame) -> tuple[str, ...]:
@@ -80,8 +90,8 @@ def swept_keys(table: pd.DataFrame) -> tuple[str, ...]:
 def collect(study_folder: Path) -> None:
     """Write the tables of a study beside ``runs.tsv``, each moved into place last.
 
-    ``summary.tsv`` has a row a run, ``curves.tsv`` one a snapshot, ``agreement.tsv`` one a pair of
-    settings and measure that the study compares.
+    ``summary.tsv`` has a row a run of the sweep, ``curves.tsv`` one a snapshot, ``CHECKS`` the same
+    of all other runs, ``agreement.tsv`` one a pair of settings and measure that the study compares.
 
     Raises
     ------
@@ -91,13 +101,18 @@ def collect(study_folder: Path) -> None:
     study = read_study(study_folder)
     gathered = gather(study_folder, study.objective.at_vibration_s)
     compared = compare_study(gathered.summary, gathered.keys, study)
+    sweep = gathered.of_sweep
     tables = {
-        "summary": gathered.summary,
-        "curves": gathered.curves,
-        "agreement": agreement_table(compared),
+        SUMMARY: sweep.summary,
+        CURVES: sweep.curves,
+        "agreement.tsv": agreement_table(compared),
     }
+    if len(sweep.summary) < len(gathered.summary):
+        parts = gathered.summary, gathered.curves
+        checks = (table[table[PART] != SWEEP] for table in parts)
+        tables |= dict(zip(CHECKS, checks, strict=True))
     for name, table in tables.items():
-        with replaced(study_folder / f"{name}.tsv") as partial:
+        with replaced(study_folder / name) as partial:
             table.to_csv(partial, sep="\t", index=False, na_rep=_NAN)
 
 
@@ -110,20 +125,34 @@ def read_collected(study_folder: Path) -> Collected:
         When a table is missing or cannot be read.
     """
     summary = read_summary(study_folder)
-    return Collected(summary, _read_table(study_folder / "curves.tsv"), swept_keys(summary))
+    curves = _read_both(study_folder, CURVES, CHECKS[1])
+    return Collected(summary, curves, swept_keys(summary))
 
 
-def read_summary(study_folder: Path) -> pd.DataFrame:
-    """The first table alone; see ``read_collected``."""
-    return _read_table(study_folder / "summary.tsv")
+def read_summary(study_folder: Path, words: Sequence[str] = ()) -> pd.DataFrame:
+    """The first table alone, of all runs, those of the sweep first; see ``read_collected``.
+
+    Columns in ``words`` are read as text even where they look like numbers.
+    """
+    return _read_both(study_folder, SUMMARY, CHECKS[0], words)
 
 
-def _read_table(path: Path) -> pd.DataFrame:
+def _read_both(
+    study_folder: Path, sweep: str, checks: str, words: Sequence[str] = ()
+) -> pd.DataFrame:
+    """Table of the sweep with that of the runs that check it, where there is one."""
+    tables = [_read_table(study_folder / sweep, words)]
+    if (study_folder / checks).exists():
+        tables.append(_read_table(study_folder / checks, words))
+    return pd.concat(tables, ignore_index=True) if len(tables) > 1 else tables[0]
+
+
+def _read_table(path: Path, words: Sequence[str]) -> pd.DataFrame:
     columns = pd.read_csv(path, sep="\t", nrows=0).columns
     return pd.read_csv(
         path,
         sep="\t",
-        dtype=dict.fromkeys(_TEXTS, str),
+        dtype=dict.fromkeys((*_TEXTS, *words), str),
         keep_default_na=False,
         na_values={str(c): [_NAN] for c in columns if c not in _TEXTS},
         low_memory=False,
@@ -192,6 +221,8 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
         When ``runs.tsv`` itself cannot be read.
     """
     runs = pd.read_csv(study_folder / "runs.tsv", sep="\t", dtype={RUN: str})
+    if PART not in runs:
+        runs[PART] = SWEEP
     folders = [study_folder / "runs" / str(run) for run in runs[RUN]]
     outcomes, problems = _read_outcomes(folders)
     costs = read_tables([folder / "cost.tsv" for folder in folders])
@@ -214,9 +245,8 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
         PLANNED_S: [o.planned_s if o else np.nan for o in outcomes],
         **_of_measures_and_costs(outcomes, measures, costs, at_vibration_s),
     }
-    return Collected(
-        pd.DataFrame(summary).infer_objects(), _curves(runs, measures), swept_keys(runs)
-    )
+    table = pd.DataFrame(summary).infer_objects()
+    return Collected(table, _curves(table, swept_keys(runs), measures), swept_keys(runs))
 
 
 def _sentences(texts: Sequence[str]) -> str:
@@ -249,12 +279,12 @@ def _in_order(measures: RunTables) -> RunTables:
     return replace(measures, rows=measures.rows.take(order).reset_index(drop=True))
 
 
-def _curves(runs: pd.DataFrame, measures: RunTables) -> pd.DataFrame:
-    """Parameters and measures of every snapshot."""
-    names = [c for c in (RUN, *swept_keys(runs), REPLICATE) if c in runs.columns]
+def _curves(summary: pd.DataFrame, keys: Sequence[str], measures: RunTables) -> pd.DataFrame:
+    """Parameters, part, engine and measures of every snapshot."""
+    names = [c for c in (RUN, *keys, REPLICATE, PART, ENGINE) if c in summary.columns]
     if measures.rows.empty:
         return pd.DataFrame(columns=[*names, *CLOCK])
-    own = runs[names].take(measures.rows[PLACE].to_numpy()).reset_index(drop=True)
+    own = summary[names].take(measures.rows[PLACE].to_numpy()).reset_index(drop=True)
     return pd.concat([own, measures.rows.drop(columns=PLACE)], axis=1)
 
 

@@ -23,6 +23,7 @@ rule collect:
             labels={"table": "measures against time"},
         ),
         agreement=f"{FOLDER}/agreement.tsv",
+        checks=CHECKS,
     log:
         f"{FOLDER}/logs/collect.log",
     conda:

@@ -4,7 +4,9 @@ import os
 import sys
 
 from sandmould import ROOT
+from sandmould.runs.columns import SWEEP
 from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.collect import CHECKS as CHECK_TABLES
 from sandmould.study.plan.batches import alone
 from sandmould.study.plan.build_plan import (
     RESULTS,
@@ -37,6 +39,12 @@ STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"
 # Studies whose runs help to calibrate: they are finished before this one is.
 ALSO = [f"results/{name}/summary.tsv" for name in STUDY.study.calibration.also]
+# Tables of the runs that check the sweep, where there are such runs.
+CHECKS = [
+    f"{FOLDER}/{name}"
+    for name in CHECK_TABLES
+    if any(run.part != SWEEP for run in PLAN.runs)
+]
 BATCHES = {batch.name: [run.run for run in batch.runs] for batch in BATCHED}
 SIDE_BY_SIDE = {batch.name: batch.side_by_side for batch in BATCHED}
 ALONE = alone(PLAN.runs, BATCHED)

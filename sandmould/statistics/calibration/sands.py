@@ -25,7 +25,7 @@ from sandmould.statistics.calibration.posterior import (
     posterior,
 )
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
-from sandmould.statistics.verdict import finished_values
+from sandmould.statistics.evidence import usable_values
 
 CANDIDATES = (
     "heap_angle_deg", "residue_angle_deg", "outflow_time_s", "outflow_fraction",
@@ -84,7 +84,7 @@ def calibrate(
     left_out = []
     for measure, table, column in _measures(calibration, summary, others or {}):
         points = table[list(keys)].to_numpy(dtype=np.float64)
-        values = np.asarray(finished_values(table, column), dtype=np.float64)
+        values = np.asarray(usable_values(table, column), dtype=np.float64)
         try:
             emulators[measure] = fit_emulator(measure, points, values)
         except TooFewRunsError as error:

@@ -137,7 +137,8 @@ def test_failed_run_is_marked_with_its_sentence(text: str) -> None:
     assert row.startswith('<tr class="marked">')
     assert "Grains left the box or passed through a wall." in row
     assert "3 grains passed through the floor" in row
-    assert "1 of 9 runs did not finish" in Page(text).text
+    assert "Not used: 1 of 9 runs (1 did not finish)" in Page(text).text
+    assert "8 of 9" in Page(text).text
 
 
 def test_method_is_told(text: str) -> None:
@@ -189,7 +190,17 @@ def test_all_failed_still_shows_the_sand(tmp_path: Path) -> None:
 
 def test_a_run_alone_is_neither_best_nor_worst(tmp_path: Path) -> None:
     text = report(write_study(tmp_path / "alone", {50.0: 0.55}, replicates=1, failed=()))
-    assert "</code>, the only one that finished." in text
+    assert "</code>, the only one with a fill of the tube that can be used." in text
+
+
+def test_finished_runs_without_the_measure_are_counted_as_finished(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "typo")
+    with (study / "study.yaml").open("a") as file:
+        file.write("objective: {measure: pipe_fill_fraction}\n")
+    text = report(study)
+    assert first_sentence(text).startswith("Not resolved: 8 of 9 runs finished, but none gives")
+    assert "</code>, which got farthest: none gives a value that can be used." in text
+    assert "none finished" not in text
 
 
 def test_nothing_but_a_plan(tmp_path: Path) -> None:

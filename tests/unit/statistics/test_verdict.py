@@ -78,7 +78,7 @@ def test_unpaired_settings_are_compared_by_welch() -> None:
     assert not verdict.comparisons[0].paired
     assert verdict.p == pytest.approx(expected.pvalue)
     assert verdict.ci == pytest.approx(tuple(expected.confidence_interval(0.95)))
-    assert "2 of 8 runs did not finish" in verdict.caveats[0]
+    assert verdict.caveats[0] == "Not used: 2 of 8 runs (2 did not finish)."
 
 
 def test_tie_is_not_resolved() -> None:
@@ -129,12 +129,47 @@ def test_setting_too_thin_to_test_does_not_block_but_is_told() -> None:
 
 def test_all_failed() -> None:
     verdict = compare_settings(table({25: [None, None], 50: [None, None]}), [KEY], FILL)
-    assert verdict.sentences == (
-        "Not resolved: no run finished with a value of the fill of the tube.",
-    )
+    assert verdict.sentences == ("Not resolved: no run finished.",)
     assert verdict.best is None
     assert not verdict.resolved
     assert rank_runs(table({25: [None]}), FILL) == {}
+
+
+LOOPS = table({25: [0.30, 0.32, 0.31, 0.9], 50: [0.60, 0.63, 0.61, 0.62], 100: [0.95] * 4}).assign(
+    pattern_loop=["holds"] * 3 + ["lags"] + ["one way"] + ["holds"] * 3
+    + ["cycles", "diverged", "diverged", "lags"]
+)  # fmt: skip
+
+
+def test_runs_whose_loop_fails_enter_no_mean_and_no_recommendation() -> None:
+    verdict = compare_settings(LOOPS, [KEY], FILL)
+    assert verdict.best is not None
+    assert verdict.best.label == "50 Hz"
+    assert [(s.n, s.planned) for s in verdict.settings] == [(3, 4), (4, 4), (0, 4)]
+    assert verdict.settings[0].mean == pytest.approx(0.31)
+    assert verdict.caveats[:2] == (
+        "Not used: 5 of 12 runs (in 2 the loop lags, in 1 the loop goes in cycles and in 2 the "
+        "loop diverged).",
+        "No run can be used at 100 Hz: the best may lie there.",
+    )
+    one_way = "In 1 of 12 runs the loop is one way: the sand never felt the pattern give way."
+    assert one_way in verdict.caveats
+    assert "f100_r1" not in rank_runs(LOOPS, FILL).values()
+
+
+def test_a_study_of_the_loop_itself_counts_runs_whose_loop_fails() -> None:
+    summary = LOOPS.rename(columns={FILL: "pattern_residual_fraction"})
+    verdict = compare_settings(summary, [KEY], "pattern_residual_fraction")
+    assert [s.n for s in verdict.settings] == [4, 4, 4]
+
+
+def test_finished_runs_without_a_value_are_not_called_unfinished() -> None:
+    summary = table({25: [0.1, None], 50: [0.2, 0.3]})
+    verdict = compare_settings(summary, [KEY], "pipe_fill_fraction")
+    assert verdict.sentences == (
+        "Not resolved: 3 of 4 runs finished, but none gives a fill of the pipe that can be used "
+        "(1 did not finish and 3 have no value).",
+    )
 
 
 def test_measure_that_no_run_has() -> None:

@@ -29,6 +29,7 @@ from tests.unit.report_study import (
     KEY,
     PLANTED,
     scenario,
+    write_cross_check,
     write_study,
 )
 
@@ -135,10 +136,38 @@ def test_collect_writes_what_reads_back(study: Path) -> None:
     assert not list(study.glob("*.partial"))
 
 
+def test_a_naive_grouping_of_any_table_holds_the_sweep_alone(tmp_path: Path) -> None:
+    folder = write_cross_check(tmp_path / "demo")
+    collect(folder)
+    planned = pd.read_csv(folder / "runs.tsv", sep="\t")
+    sweep = planned[planned["part"] == "sweep"]
+    for name in ("summary", "curves"):
+        table = pd.read_csv(folder / f"{name}.tsv", sep="\t")
+        assert table.groupby(KEY)["run"].nunique().to_dict() == sweep.groupby(KEY).size().to_dict()
+        assert set(table["part"]) == {"sweep"}
+        assert set(table["engine"]) == {"reference"}
+        checks = pd.read_csv(folder / f"{name}_checks.tsv", sep="\t")
+        assert set(checks["run"]) == set(planned["run"]) - set(sweep["run"])
+        assert set(checks["part"]) == {"cross_check"}
+        assert set(checks["engine"]) == {"lammps"}
+
+
+def test_tables_of_the_sweep_and_of_its_checks_read_back_together(tmp_path: Path) -> None:
+    folder = write_cross_check(tmp_path / "demo")
+    collect(folder)
+    gathered, found = gather(folder), read_collected(folder)
+    # the part says where a row was written, so it alone decides the order
+    for name in ("summary", "curves"):
+        table = getattr(gathered, name)
+        in_order = table.sort_values("part", ascending=False, kind="stable", ignore_index=True)
+        pd.testing.assert_frame_equal(getattr(found, name), in_order, check_exact=True)
+    assert set(found.of_sweep.curves["part"]) == {"sweep"}
+
+
 def test_failed_runs_fail_loudly(study: Path) -> None:
     collect(study)
     with pytest.raises(SystemExit, match=rf"1 of 9 runs did not finish:\n  {FAILED}: lost grains"):
-        failed_runs(study / "summary.tsv")
+        failed_runs(study)
 
 
 def test_no_failed_run_passes(tmp_path: Path) -> None:
@@ -146,7 +175,7 @@ def test_no_failed_run_passes(tmp_path: Path) -> None:
     collect(study)
     summary = pd.read_csv(study / "summary.tsv", sep="\t")
     assert list(summary["outcome"]) == [Outcome.FINISHED.label] * 9
-    failed_runs(study / "summary.tsv")  # no SystemExit
+    failed_runs(study)  # no SystemExit
 
 
 def test_study_without_any_run_started(tmp_path: Path) -> None:

@@ -135,7 +135,7 @@ def test_run_out_counts_from_the_far_side_of_an_upright_gate(mirrored: bool) -> 
         gate = DAM["obstacles"][0] | {"centre_m": [BOX_WIDTH_M - 0.06, 0.06]}
         changes = {"obstacles": [gate], "fill": {"over_x_m": [0.142, BOX_WIDTH_M]}}
     row = measure_outflow(hopper_scene(**changes), grains_at(grains, R))
-    assert set(row) == {"outflow_fraction", "run_out_m"}
+    assert set(row) == {"outflow_fraction", "run_out_m", "heap_touches"}
     beyond = len(lattice((far_m, 0.0), (tip_m, 0.02), R)) + 2
     assert row["outflow_fraction"] == pytest.approx(beyond / len(grains))
     # Up to the tip, to a cell of one grain; the two that rolled on are no heap.
@@ -144,7 +144,46 @@ def test_run_out_counts_from_the_far_side_of_an_upright_gate(mirrored: bool) -> 
 
 def test_no_sand_has_run_out_as_the_gate_opens() -> None:
     row = measure_outflow(hopper_scene(**DAM), grains_at(lattice((0, 0), (0.05, 0.05), R), R))
-    assert row == {"outflow_fraction": 0.0, "run_out_m": 0.0}
+    assert row == {"outflow_fraction": 0.0, "run_out_m": 0.0, "heap_touches": ""}
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_run_out_is_the_front_of_the_heap_and_not_sand_that_lies_apart(dimension: int) -> None:
+    far_m, tip_m = 0.06 + WALL_M / 2, 0.12
+    deep = [(0.0, DEPTH_M)] if dimension == 3 else []
+    parts = [((0.0, far_m), 0.05), ((far_m, tip_m), 0.02), ((0.15, 0.165), 0.02)]
+    grains = np.vstack(
+        [lattice(*zip(along, *deep, (0.0, top_m), strict=True), R) for along, top_m in parts]
+    )
+    high = [0.17, *([DEPTH_M / 2] if dimension == 3 else []), 0.05]
+    dam = DAM if dimension == 2 else DEEP | {
+        "obstacles": [_upright_in_space(DAM["obstacles"][0])], "fill": DAM["fill"],
+    }  # fmt: skip
+    row = measure_outflow(hopper_scene(**dam), grains_at(np.vstack([grains, high]), R))
+    # Neither the pile at 0.15 m nor the grain that flies over it: a gap parts both from the heap.
+    assert row["run_out_m"] == pytest.approx(tip_m - far_m, abs=2 * R)
+    assert row["heap_touches"] == ""
+
+
+@pytest.mark.parametrize("wall", ["right", "left"])
+def test_a_heap_at_the_far_wall_has_no_run_out(wall: str) -> None:
+    grains = lattice((0.0, 0.0), (BOX_WIDTH_M, 0.02), R)
+    changes = DAM
+    if wall == "left":
+        grains[:, 0] = BOX_WIDTH_M - grains[:, 0]
+        gate = DAM["obstacles"][0] | {"centre_m": [BOX_WIDTH_M - 0.06, 0.06]}
+        changes = {"obstacles": [gate], "fill": {"over_x_m": [0.142, BOX_WIDTH_M]}}
+    row = measure_outflow(hopper_scene(**changes), grains_at(grains, R))
+    assert math.isnan(row["run_out_m"])
+    assert row["heap_touches"] == wall
+
+
+def _upright_in_space(gate: dict[str, Any]) -> dict[str, Any]:
+    """A gate of 2D over the depth of a box in 3D."""
+    centre, size = gate["centre_m"], gate["size_m"]
+    return gate | {
+        "centre_m": [centre[0], DEPTH_M / 2, centre[1]], "size_m": [size[0], DEPTH_M, size[1]],
+    }  # fmt: skip
 
 
 def measured(fractions: list[float], opened_s: float = 1.0) -> pd.DataFrame:

@@ -97,6 +97,7 @@ def test_record_is_stale_when_its_study_changes(
     for name, kept in (
         ("good", {"study": study, "study_sha256": digest}),
         ("old", {"study": study, "study_sha256": "0" * 64}),
+        ("new", {"study": study, "study_sha256": "0" * 64, "defaults": records.DEFAULTS}),
         ("gone", {"study": "config/studies/no_such.yaml", "study_sha256": digest}),
     ):
         (tmp_path / name).mkdir()
@@ -104,7 +105,8 @@ def test_record_is_stale_when_its_study_changes(
     monkeypatch.setattr(records, "RECORDS", tmp_path)
     told = dict(records.stale_records())
     assert told["good"] == ""
-    assert "changed" in told["old"]
+    assert told["old"] == records.OLD_DEFAULTS
+    assert "changed" in told["new"]
     assert "gone" in told["gone"]
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from analysis.repose import (
     Slope,
     Surface,
+    connected,
     free_surface,
     heap_slope,
     lying,
@@ -82,14 +83,30 @@ def _heap(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, Any]
 
 
 def _run_out(scenario: Scenario, gate: Plate, snapshot: Snapshot) -> dict[str, Any]:
-    """How far a column ran out beyond its gate; sand poured on its right runs to the left."""
+    """How far a column ran out beyond its gate; sand poured on its right runs to the left.
+
+    The run-out is the front of the heap that hangs together with the sand at the gate: from the
+    far side of the gate to the last place deeper than ``HEAP_DEPTH``. Grains that rolled or flew on
+    are no part of it. Where that heap leans on the far wall the run-out is NaN: the wall
+    stopped it.
+    """
     way = 1.0 if sum(scenario.pouring_m[0]) < 2 * gate.centre_m[0] else -1.0
     far_side = way * gate.centre_m[0] + gate.size_m[0] / 2
+    depth_m = HEAP_DEPTH * scenario.largest_diameter_m
     surface = _surface_of(scenario, snapshot, np.ones(len(snapshot.id), dtype=bool))
-    deep = surface.height_m > HEAP_DEPTH * scenario.largest_diameter_m
-    reach = float((way * surface.point_m[deep, 0]).max(initial=far_side)) - far_side
+    along = way * surface.point_m[:, 0]
+    heap = connected(surface, depth_m, along < far_side + scenario.largest_diameter_m)
+    front = float(along[heap].max(initial=far_side))
+    beyond = heap & (along > far_side)
+    of_heap = Surface(surface.point_m[beyond], surface.height_m[beyond])
+    far_wall = "right" if way > 0.0 else "left"
+    touches = far_wall in walls_touched(of_heap, *_floor(scenario), depth_m)
     out = way * snapshot.position_m[:, 0] > far_side
-    return {"outflow_fraction": _share(snapshot, out), "run_out_m": reach}
+    return {
+        "outflow_fraction": _share(snapshot, out),
+        "run_out_m": math.nan if touches else front - far_side,
+        "heap_touches": far_wall if touches else "",
+    }
 
 
 def _fallen(gate: Plate, snapshot: Snapshot) -> NDArray[np.bool_]:
