@@ -45,6 +45,12 @@ def test_work_lost_on_the_way_is_no_fault() -> None:
     assert judged(work_j=0.05).state == "holds"
 
 
+def test_what_contact_took_of_the_work_is_not_in_the_foam() -> None:
+    assert judged(work_j=0.03, contact_j=0.01).made_j == pytest.approx(judged().made_j, rel=0.1)
+    # A floor that gave the energy would be a fault as any other.
+    assert judged(work_j=0.02, contact_j=0.01).state == "cycles"
+
+
 def test_only_the_last_part_counts() -> None:
     early = np.where(np.arange(WINDOWS) < 150, 0.1, 1e-4)
     assert judged(residual_m=early).state == "holds"
