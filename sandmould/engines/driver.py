@@ -147,7 +147,7 @@ class Driver:
                 self._begin_stage(session, stage)
             self._guard.start_stage(stage, session.snapshot())
             while not session.stage_over:
-                self._advance(session)
+                self._window(session)
             self._check_rest(session, stage)
             session.end_stage()
         if session.is_root:
@@ -177,7 +177,7 @@ class Driver:
         if (stage.counts_as_vibration or stage.opens) and self._recorder is not None:
             self._recorder.save(snapshot)
 
-    def _advance(self, session: Session) -> None:
+    def _window(self, session: Session) -> None:
         """Compute up to the next check, look at it, and record it where a record is due."""
         before, began = session.steps, time.monotonic()
         session.advance()

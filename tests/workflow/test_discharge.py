@@ -43,7 +43,7 @@ class KilledError(Exception):
 
 
 class KilledDriver(Driver):
-    """Dies in a stage, one record after its first checkpoint there."""
+    """Dies in a stage, one check after its first checkpoint there."""
 
     def __init__(self, *given: Any, dies_in: str) -> None:
         super().__init__(*given)
@@ -109,7 +109,8 @@ def test_engines_let_as_much_flow_out(engine: str, emptied: Emptied) -> None:
     assert ends[0].outflow_fraction == pytest.approx(ends[1].outflow_fraction, abs=0.1)
     for end in ends:
         # OUTFLOW in sandmould/engines/program.py foretells 0.2 s, without the last of the sand.
-        assert 0.1 < end.outflow_time_s < 0.8
+        # Checks of rest follow the last grains longer than one record below the limit did.
+        assert 0.1 < end.outflow_time_s < 1.2
         assert 0.1 < end.side_load_fraction < 1.5
 
 

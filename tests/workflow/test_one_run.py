@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 from sandmould.engines.guard import grain_masses_kg
+from sandmould.engines.program import build_program
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
@@ -43,15 +44,21 @@ def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
     assert cost.time_step_fraction == pytest.approx(0.5)
 
 
-def test_next_layer_enters_only_after_the_last_met_its_rule(straight: Path) -> None:
+def test_next_layer_enters_only_when_speed_and_loads_say_that_the_last_one_rests(
+    straight: Path,
+) -> None:
     series = pd.read_csv(straight / "series.tsv", sep="\t")
-    settling = tube_scene().fill.settling
-    for stage, grains in (("settle_1", 60), ("settle_2", 120)):
-        rows = series[series.stage == stage]
+    loads = pd.read_csv(straight / "loads.tsv", sep="\t")
+    scene = tube_scene()
+    program = build_program(scene)
+    for layer, grains in ((1, 60), (2, 120)):
+        rows = series[series.stage == f"settle_{layer}"]
         assert set(rows.grains) == {grains}
-        assert rows.rms_speed_m_s.iloc[-1] < settling.rms_speed_m_s
-        earlier = rows[rows.time_s > rows.time_s.iloc[0] + settling.shortest_s].iloc[:-1]
-        assert (earlier.rms_speed_m_s >= settling.rms_speed_m_s).all()
+        assert rows.rms_speed_m_s.iloc[-1] < scene.rest.rms_speed_m_s
+        support_n = -loads[loads.time_s == rows.time_s.iloc[-1]].force_y_n.sum()
+        weight_n = program.mass_kg(layer) * scene.gravity_m_s2
+        # rest.load_tolerance
+        assert support_n == pytest.approx(weight_n, rel=0.01)
 
 
 def test_vibration_has_snapshots_at_both_its_ends(straight: Path) -> None:
