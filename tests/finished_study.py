@@ -23,7 +23,7 @@ def study_text(
         for exchange in exchanges
     )
     return (
-        "based_on: plates\nscenario: {until_s: 100}\n"
+        "based_on: plates\nscenario: {until_s: 100, heat_transfer_w_m2_k: null}\n"
         f"sweep:\n  design: list\n  points:\n{points}"
         f"reference: {{exchange: {exchanges[0]}, element_m: {elements_m[0]:g}}}\n"
     )

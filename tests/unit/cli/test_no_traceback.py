@@ -43,6 +43,8 @@ MAINS = [
     and ENTRY in (text := path.read_text(encoding="utf-8"))
     and "ArgumentParser" not in text
     and "BENCHMARK" not in text
+    # started by the renderer alone, with numbers of its own
+    and path.stem != "template_process"
 ]
 
 

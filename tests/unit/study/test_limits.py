@@ -124,7 +124,8 @@ def test_records_of_sand(
     key: str, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (
-        "based_on: tube\nscenario: {record: {series_every_s: 1e-4, snapshot_every_s: 1e-4}, "
+        "based_on: tube\nscenario: {rest: {check_every_s: 1e-4}, "
+        "record: {series_every_s: 1e-4, snapshot_every_s: 1e-4}, "
         "vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 1000}]}"
     )
     assert f"record.{key} = 0.0001 cannot be used: valid is one with at most" in (

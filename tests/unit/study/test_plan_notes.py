@@ -206,7 +206,11 @@ def test_a_note_of_several_points_is_told_once(tmp_path: Path) -> None:
 
 
 def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
-    study: dict[str, Any] = {"kind": "flow", "scenario": {"case": {"kind": "shoulder"}}}
+    study: dict[str, Any] = {
+        "kind": "flow",
+        "scenario": {"case": {"kind": "shoulder"}},
+        "objective": {"measure": "mean_speed_m_s"},
+    }
     told = {}
     for distance in (0.0, 0.8):
         study["scenario"]["collision_distance"] = distance
@@ -224,7 +228,9 @@ def test_obstacles_thinner_than_a_grain_are_told(tmp_path: Path) -> None:
         obstacle = {"kind": "polygon", "name": "shelf", "vertices_m": vertices}
         scene = {**TUBE_SCENE, "obstacles": [obstacle]}
         path = tmp_path / "shelf.yaml"
-        path.write_text(yaml.safe_dump({"scenario": scene}))
+        path.write_text(
+            yaml.safe_dump({"scenario": scene, "objective": {"measure": "solid_fraction"}})
+        )
         return plan_table(expand(open_study(path)), {}, 1)
 
     told = [line for line in table(0.0005).splitlines() if line.startswith("Note: ")]

@@ -146,9 +146,9 @@ def test_shipped_decks_run_with_numbers_alone(tmp_path: Path) -> None:
 def test_a_copy_of_a_shipped_deck_is_foreign(tmp_path: Path) -> None:
     text = CHUTE.read_text(encoding="utf-8")
     values = {"angle_deg": 16, "friction": 0.5, "rolling": 0.1, "number_of_steps": 10}
-    assert "probe.in.j2 is not shipped" in refused(
-        study_file(tmp_path, text, scenario={"values": values})
-    )
+    scenario = {"values": values, "measures": {"x_m": "v_height"}}
+    told = refused(study_file(tmp_path, text, scenario=scenario))
+    assert "probe.in.j2 is not shipped" in told
 
 
 DECK = """\
