@@ -52,6 +52,12 @@ def _raster(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Raster
 
 
 @lru_cache(maxsize=8)
+def _drawn(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Raster:
+    solids = [solid_of(shape, f"shapes.{i}") for i, shape in enumerate(shapes)]
+    return with_cut(_raster(box, shapes, element_m), solids)
+
+
+@lru_cache(maxsize=8)
 def _elements(
     box: Rectangle, shapes: tuple[Any, ...], element_m: float, layers: tuple[int, ...]
 ) -> Elements:
@@ -59,13 +65,14 @@ def _elements(
 
 
 @lru_cache(maxsize=8)
-def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Cooled:
-    return cooled(_raster(box, shapes, element_m))
+def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float, of_kernel: bool) -> Cooled:
+    return cooled((_raster if of_kernel else _drawn)(box, shapes, element_m))
 
 
 def cooled_of(scenario: Solidification) -> Cooled:
     """The casting as its sand sees it; ValueErrors are those of ``painted``."""
-    return _cooled(scenario.box, scenario.shapes, scenario.element_m)
+    of_kernel = scenario.exchange in KERNEL_FORMS
+    return _cooled(scenario.box, scenario.shapes, scenario.element_m, of_kernel)
 
 
 def raster_of(scenario: Solidification) -> Raster:
@@ -83,10 +90,8 @@ def drawn_raster(scenario: Solidification) -> Raster:
 
     Kernels know no faces: theirs are the painted cells.
     """
-    raster = raster_of(scenario)
-    if scenario.exchange in KERNEL_FORMS:
-        return raster
-    return with_cut(raster, solids_of(scenario))
+    raster_as = _raster if scenario.exchange in KERNEL_FORMS else _drawn
+    return raster_as(scenario.box, scenario.shapes, scenario.element_m)
 
 
 def filling_of(scenario: Solidification) -> Filling:
@@ -200,8 +205,8 @@ def expected_s(scenario: Solidification) -> float:
 
 
 def held_volume_m3(scenario: Solidification) -> float:
-    """Volume of the elements that are casting; area in m2 in 2D."""
-    elements = elements_of(scenario)
+    """Volume of the casting's elements as the run has them; area in m2 in 2D."""
+    elements = placed(drawn_raster(scenario), scenario.layers)
     return float(elements.volume_m3[elements.material == CASTING].sum())
 
 
