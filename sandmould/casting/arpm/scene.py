@@ -65,6 +65,19 @@ def _elements(
 
 
 @lru_cache(maxsize=8)
+def _size_fault(
+    box: Rectangle, shapes: tuple[Any, ...], element_m: float, layers: tuple[int, ...],
+    kernel_size: float,
+) -> str:  # fmt: skip
+    """Why a kernel refuses these sizes of elements; nothing where it takes them."""
+    try:
+        check_sizes(_elements(box, shapes, element_m, layers), kernel_size)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+@lru_cache(maxsize=8)
 def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float, of_kernel: bool) -> Cooled:
     return cooled((_raster if of_kernel else _drawn)(box, shapes, element_m))
 
@@ -179,10 +192,10 @@ def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
 def _ratio(scenario: Solidification) -> Iterator[Problem]:
     """Sizes of elements that a kernel's rule forbids."""
     if scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.refuse_ratio:
-        try:
-            check_sizes(elements_of(scenario), scenario.kernel_size)
-        except ValueError as error:
-            valid = f"layers whose sizes keep the rule of 1/c_k ({error})"
+        it = scenario
+        fault = _size_fault(it.box, it.shapes, it.element_m, it.layers, it.kernel_size)
+        if fault:
+            valid = f"layers whose sizes keep the rule of 1/c_k ({fault})"
             yield Problem("layers", list(scenario.layers), valid)
 
 
