@@ -36,7 +36,7 @@ def read_grains(path: Path) -> Array:
     header = _HEADER.unpack_from(data)
     rows, columns = header[1], header[-2]
     values = np.frombuffer(data, dtype=np.float64, offset=_HEADER.size + 4)
-    if values.size != rows * columns:
+    if columns < 1 or values.size != rows * columns:
         raise ValueError(f"{path}: {values.size} numbers instead of {rows} x {columns}")
     table = values.reshape(rows, columns)
     return table[np.argsort(table[:, 0])]
