@@ -17,9 +17,9 @@ based_on: plates
 sweep:
   design: list
   points:
-    - {exchange: corrected, element_m: 0.01, layers: []}
+    - {exchange: difference, element_m: 0.01, layers: []}
     - {exchange: faces, element_m: 0.01, layers: []}
-reference: {exchange: corrected, element_m: 0.01}
+reference: {exchange: faces, element_m: 0.01}
 """
 
 
