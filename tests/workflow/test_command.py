@@ -14,12 +14,13 @@ from sandmould.cli.commands import app
 
 COARSE = """\
 based_on: plates
+scenario: {heat_transfer_w_m2_k: null}
 sweep:
   design: list
   points:
-    - {exchange: difference, element_m: 0.01, layers: []}
+    - {exchange: corrected, element_m: 0.01, layers: []}
     - {exchange: faces, element_m: 0.01, layers: []}
-reference: {exchange: faces, element_m: 0.01}
+reference: {exchange: corrected, element_m: 0.01}
 """
 
 
