@@ -21,7 +21,7 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.process import _folder_lock, launch
 from tests.scenes import open_lammps, tube_scene
-from tests.workflow.runs import SOON, computed, drive, last_snapshot, run_folder
+from tests.workflow.runs import computed, drive, last_snapshot, run_folder
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +121,7 @@ def test_time_step_past_the_critical_one_is_called_unstable(
 
 
 def test_two_ranks_fill_the_same_bed(straight: Path, tmp_path: Path) -> None:
-    scene = tube_scene(engine={"ranks": 2}, rest=SOON)
+    scene = tube_scene(engine={"ranks": 2})
     folder = run_folder(scene, tmp_path)
     launch(folder, tmp_path / "log", ranks=2)
     outcome = RunOutcome.read(folder / "outcome.json")
