@@ -3,6 +3,7 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= $(shell nproc)
 STUDY ?= config/studies/tube_demo.yaml
+MINUTES ?= 60
 BIN := .venv/bin
 INSTALLED := .venv/installed
 
@@ -12,7 +13,7 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
 .PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
-.PHONY: twins verification stability at-rest benchmarks peers scaling solidification flow
+.PHONY: twins verification stability at-rest reliability fuzz benchmarks peers scaling solidification flow
 
 help:
 	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
@@ -91,6 +92,14 @@ stability: $(INSTALLED)
 ## packing measured at speed and at rest: docs/measured_at_rest.md
 at-rest: $(INSTALLED)
 	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.at_rest $(QUICK)
+
+## studies killed, disks that fail: docs/reliability.md, half an hour
+reliability: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.reliability $(QUICK)
+
+## damaged files for every reader, MINUTES long
+fuzz: $(INSTALLED)
+	@$(BIN)/python -m tests.fuzz.campaign --minutes $(MINUTES)
 
 ## how fast the engines are: docs/speed.md
 benchmarks: $(INSTALLED)

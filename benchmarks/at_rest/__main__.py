@@ -12,8 +12,8 @@ import numpy as np
 
 from benchmarks.at_rest.shaken_beds import (
     MEASURES,
+    Beds,
     Drive,
-    Extent,
     Row,
     at_rest,
     filled_bed,
@@ -24,8 +24,8 @@ from benchmarks.frame import Benchmark, BenchmarkRun, render
 from sandmould.scenario.vibration import STOP_PERIODS
 
 DRIVES = (Drive(12, 3.0), Drive(25, 1.5), Drive(50, 1.5))
-WHOLE = Extent(DRIVES, fillings=2, moments=8, duration_s=2.0, stops=(0.5, 1.0, 2.0, 4.0))
-LITTLE = Extent(DRIVES[1:2], fillings=1, moments=2, duration_s=0.2, stops=(1.0, 2.0))
+WHOLE = Beds(DRIVES, fillings=2, moments=8, duration_s=2.0, stops=(0.5, 1.0, 2.0, 4.0))
+LITTLE = Beds(DRIVES[1:2], fillings=1, moments=2, duration_s=0.2, stops=(1.0, 2.0))
 
 
 def _summary(fillings: list[list[Row]]) -> dict[str, dict[str, float]]:
@@ -43,7 +43,7 @@ def drives(run: BenchmarkRun) -> list[dict[str, Any]]:
 
     Stops of other lengths are compared in the first filling.
     """
-    extent: Extent = run.extent
+    extent: Beds = run.extent
     beds = [(scene, filled_bed(scene)) for scene in scenes(extent.fillings)]
     rows = []
     for drive in extent.drives:

@@ -32,7 +32,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Extent:
+class Beds:
     """How much is measured."""
 
     drives: tuple[Drive, ...]
@@ -45,7 +45,7 @@ class Extent:
 
 
 @dataclass(frozen=True)
-class Moment:
+class MovingBed:
     """A moment of a vibration."""
 
     at_speed: Row
@@ -107,7 +107,7 @@ def moments(
     filled: tuple[ReferenceSession, Any],
     drive: Drive,
     periods: Sequence[float],
-) -> Iterator[Moment]:
+) -> Iterator[MovingBed]:
     """Compute one vibration, and stand still at some of its periods.
 
     Parameters
@@ -134,13 +134,13 @@ def moments(
         while session.steps - began < end:
             left_s = (end - session.steps + began) * counts.step_s
             session.advance(min(scene.record.series_every_s, left_s))
-        yield Moment(measured(scene, session), session.save_checkpoint(), end)
+        yield MovingBed(measured(scene, session), session.save_checkpoint(), end)
 
 
 def at_rest(
     scene: Scenario,
     session: ReferenceSession,
-    moment: Moment,
+    moment: MovingBed,
     drive: Drive,
     stop_periods: float = STOP_PERIODS,
 ) -> Row:

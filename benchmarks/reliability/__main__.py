@@ -20,7 +20,7 @@ WORK = SCRATCH / "reliability"
 
 
 @dataclass(frozen=True)
-class Extent:
+class Faults:
     """How much is done to how many studies."""
 
     kinds: tuple[str, ...]
@@ -29,8 +29,8 @@ class Extent:
     seed: int = 1
 
 
-WHOLE = Extent(tuple(faults.KINDS), kills=6, torn=3)
-A_LITTLE = Extent(("casting",), kills=1, torn=0)
+WHOLE = Faults(tuple(faults.KINDS), kills=6, torn=3)
+A_LITTLE = Faults(("casting",), kills=1, torn=0)
 _SAND = ("sand", "sand_lammps", "sand_liggghts", "pattern")
 """Studies that leave checkpoints within seconds."""
 

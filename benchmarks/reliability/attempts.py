@@ -56,10 +56,10 @@ def started(words: Sequence[str], folder: Path) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-def ended(process: subprocess.Popen[str], begun_s: float) -> Attempt:
-    """Wait for a command; what hangs is killed and told by the status -9."""
+def ended(process: subprocess.Popen[str], begun_s: float, limit_s: float = LIMIT_S) -> Attempt:
+    """Wait for a command; one that takes longer is killed and told by the status -9."""
     try:
-        text, _ = process.communicate(timeout=LIMIT_S)
+        text, _ = process.communicate(timeout=limit_s)
     except subprocess.TimeoutExpired:
         kill_group(process)
         text, _ = process.communicate()
@@ -75,13 +75,7 @@ def run_to_its_end(study: str, folder: Path, *options: str) -> Attempt:
 def run_and_kill(study: str, folder: Path, after_s: float) -> Attempt:
     """Call the command and kill all its processes at once, as a loss of power does."""
     begun_s = time.perf_counter()
-    process = started(command(study), folder)
-    try:
-        text, _ = process.communicate(timeout=after_s)
-    except subprocess.TimeoutExpired:
-        kill_group(process)
-        text, _ = process.communicate()
-    return Attempt(process.returncode, text, time.perf_counter() - begun_s)
+    return ended(started(command(study), folder), begun_s, after_s)
 
 
 def kill_group(process: subprocess.Popen[str]) -> None:

@@ -299,6 +299,7 @@ class StagedSession(ABC):
                 "stage_start": self._stage_start,
                 "vibration_start": self._vibration_start,
                 "checks_at_rest": [self._watch.in_row, self._watch.all_in_row],
+                "held": self._watch.held,
             }
             (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
 
@@ -318,4 +319,5 @@ class StagedSession(ABC):
         self._stage_end = self._stage_start + self._stage_steps()
         self._vibration_start = state["vibration_start"]
         self._watch.in_row, self._watch.all_in_row = state["checks_at_rest"]
+        self._watch.held = state["held"]
         self._ended_check = True

@@ -23,7 +23,7 @@ _MOST_ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Pieces:
+class CutShells:
     """Triangles that meet those of other shells in whole edges and corners only."""
 
     vertices: Array
@@ -34,7 +34,7 @@ class Pieces:
     """(mt,) int64: the shell that each was cut from."""
 
 
-def cut(vertices: Array, triangles: Ints, shell: Ints, near: float) -> Pieces:
+def cut(vertices: Array, triangles: Ints, shell: Ints, near: float) -> CutShells:
     """Cut shells where they meet.
 
     Parameters
@@ -47,11 +47,11 @@ def cut(vertices: Array, triangles: Ints, shell: Ints, near: float) -> Pieces:
 
     Returns
     -------
-    Pieces
+    CutShells
     """
     pairs = _meeting(vertices, triangles, shell, near)
     if not len(pairs):
-        return Pieces(vertices, triangles, shell)
+        return CutShells(vertices, triangles, shell)
     points = _with(vertices, _crossings(vertices, triangles, pairs, near), near)
     for _ in range(_MOST_ROUNDS):
         scene = _Lines(points, triangles, pairs, 2.0 * near)
@@ -268,13 +268,13 @@ class _Lines:
         lines = [self.side(corner[k], corner[(k + 1) % 3]) for k in range(3)]
         return {(min(s), max(s)) for line in lines for s in pairwise(line)}
 
-    def pieces(self, shell: Ints) -> Pieces:
+    def pieces(self, shell: Ints) -> CutShells:
         """Cut every triangle at the points and lines on it."""
         cut_up = {t: self._cut(t) for t, on in self.on.items() if len(on) > 3}
         left = np.setdiff1d(np.arange(len(self.triangles)), np.array(list(cut_up), dtype=np.int64))
         of = [t for t, parts in cut_up.items() for _ in parts]
         new = [part for parts in cut_up.values() for part in parts]
-        return Pieces(
+        return CutShells(
             self.points,
             np.concatenate([self.triangles[left], np.array(new, dtype=np.int64).reshape(-1, 3)]),
             np.concatenate([shell[left], shell[np.array(of, dtype=np.int64)]]),

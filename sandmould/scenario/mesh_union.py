@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from sandmould.scenario.mesh_cuts import Pieces, cut
+from sandmould.scenario.mesh_cuts import CutShells, cut
 from sandmould.scenario.mesh_search import MeshSearch
 from sandmould.scenario.mesh_shells import (
     BESIDE,
@@ -84,7 +84,7 @@ def _without_cuts(
     return simplified(cut_vertices, triangles, new, near * extent(vertices))
 
 
-def _bounds(pieces: Pieces, search: MeshSearch, shell: Ints, beside: float) -> NDArray[np.bool_]:
+def _bounds(pieces: CutShells, search: MeshSearch, shell: Ints, beside: float) -> NDArray[np.bool_]:
     """Which pieces bound the union.
 
     Pieces that an edge of no other piece parts are of one kind: their largest is asked.

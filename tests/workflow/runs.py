@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import Program, build_program
@@ -24,6 +25,9 @@ from sandmould.study.definition.run import Run
 from sandmould.study.kinds.sand.execution import EXECUTION
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.simulate import render_run
+
+SOON: dict[str, Any] = {"rms_speed_m_s": 0.05, "load_tolerance": 0.1, "checks": 3}
+"""Rest that a bed finds soon, in a third of the steps: for runs asked about other things."""
 
 
 def run_folder(scenario: Scenario, folder: Path) -> Path:

@@ -14,6 +14,7 @@ from sandmould.cli.commands import app
 
 COARSE = """\
 based_on: plates
+scenario: {heat_transfer_w_m2_k: null}
 sweep:
   design: list
   points:

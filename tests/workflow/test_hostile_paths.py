@@ -19,6 +19,7 @@ from tests.scenes import open_lammps, tube_scene
 
 TINY = """\
 based_on: plates
+scenario: {heat_transfer_w_m2_k: null}
 sweep: {design: list, points: [{exchange: corrected, element_m: 0.01, layers: []}]}
 reference: {exchange: corrected, element_m: 0.01}
 """

@@ -24,10 +24,13 @@ from tests.instep import bed_scene
 from tests.scenes import tube_scene
 
 BRIEF: dict[str, Any] = {
-    "fill": {"layers": [{"count": 40}], "settling": {"rms_speed_m_s": 10, "shortest_s": 0.01}},
+    "fill": {"layers": [{"count": 40}], "settling": {"shortest_s": 0.01}},
+    "rest": {
+        "rms_speed_m_s": 10, "discharge_rms_speed_m_s": 10, "load_tolerance": None, "checks": 1,
+    },
     "vibration": [],
     "engine": {"name": "reference"},
-}
+}  # fmt: skip
 """One layer that counts as settled at once: columns are asked for here, not numbers."""
 TUBE_IN_3D = {"dimension": 3, "box": {"depth_m": 0.03}, "time_step": {"fraction": 0.5}}
 DAM = {
@@ -36,7 +39,7 @@ DAM = {
         {"kind": "plate", "name": "gate", "centre_m": [0.06, 0.06], "size_m": [0.004, 0.12]}
     ],
     "sand": {"size_scale": 4.0, "size_classes": 3},
-    "discharge": {"gate": "gate", "settling": {"rms_speed_m_s": 10, "shortest_s": 0.01}},
+    "discharge": {"gate": "gate", "settling": {"shortest_s": 0.01}},
 }
 STEEL = {
     "name": "steel", "density_kg_m3": 7200, "heat_capacity_j_kg_k": 711, "conductivity_w_m_k": 29,
@@ -66,13 +69,9 @@ def bed(scheme: str) -> Scenario:
 
 
 def hopper(**changes: Any) -> Scenario:
-    lots = {"layers": [{"count": 40}], "settling": BRIEF["fill"]["settling"]}
-    rest = {"rms_speed_m_s": 10, "shortest_s": 0.01}
-    return hopper_scene(
-        "reference",
-        **{"fill": lots, "discharge": {"gate": "gate", "settling": rest}, "vibration": []}
-        | changes,
-    )
+    brief = {key: BRIEF[key] for key in ("fill", "rest", "vibration")}
+    discharge = {"gate": "gate", "settling": {"shortest_s": 0.01}}
+    return hopper_scene("reference", **brief | {"discharge": discharge} | changes)
 
 
 def casting(dimensions: int) -> Solidification:

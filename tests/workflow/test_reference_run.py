@@ -19,6 +19,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.study.process import RESTARTABLE_EXIT
 from tests.scenes import tube_scene
 from tests.workflow.runs import (
+    SOON,
     computed,
     drive,
     kill_after_a_checkpoint,
@@ -27,7 +28,11 @@ from tests.workflow.runs import (
     simulate,
 )
 
-TWO_LAYERS = {"fill": {"layers": [{"count": 60, "repeat": 2}]}, "engine": {"name": "reference"}}
+TWO_LAYERS = {
+    "fill": {"layers": [{"count": 60, "repeat": 2}]},
+    "engine": {"name": "reference"},
+    "rest": SOON,
+}
 SPHERES = {
     "dimension": 3,
     "box": {"depth_m": 0.03},

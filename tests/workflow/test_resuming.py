@@ -20,6 +20,7 @@ from sandmould.study.plan.load_study import open_study
 from sandmould.study.process import RESTARTABLE_EXIT
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import (
+    SOON,
     computed,
     kill_after_a_checkpoint,
     last_snapshot,
@@ -31,7 +32,7 @@ from tests.workflow.runs import (
 @pytest.fixture(scope="module")
 def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Compute the small scene without a stop."""
-    return computed(tube_scene(), tmp_path_factory.mktemp("straight"))
+    return computed(tube_scene(rest=SOON), tmp_path_factory.mktemp("straight"))
 
 
 def _state(folder: Path) -> dict[str, Any]:
@@ -41,7 +42,7 @@ def _state(folder: Path) -> dict[str, Any]:
 
 
 def test_killed_run_resumes_and_ends_as_if_never_stopped(straight: Path, tmp_path: Path) -> None:
-    folder = run_folder(tube_scene(), tmp_path)
+    folder = run_folder(tube_scene(rest=SOON), tmp_path)
     kill_after_a_checkpoint(folder)
     assert simulate(folder) == 0
     for name, values in _state(straight).items():
@@ -58,25 +59,25 @@ def test_killed_run_resumes_and_ends_as_if_never_stopped(straight: Path, tmp_pat
 def test_damaged_checkpoint_is_told_and_the_run_starts_from_the_one_before(
     tmp_path: Path,
 ) -> None:
-    scene = tube_scene(guard={"wall_limit_s": 0.5})
+    scene = tube_scene(rest=SOON, guard={"wall_limit_s": 0.5})
     folder = run_folder(scene, tmp_path)
     assert simulate(folder) == RESTARTABLE_EXIT
     assert RunOutcome.read(folder / "work" / "outcome.json").outcome is Outcome.OUT_OF_WALL_TIME
     newest = max(folder.glob("work/checkpoint_*/lammps.restart"), key=lambda p: p.stat().st_mtime)
     newest.write_bytes(newest.read_bytes()[:1000])
-    program = build_program(tube_scene())
+    program = build_program(tube_scene(rest=SOON))
     outcome = Driver(program, folder, "test", scenario_hash(scene)).run()
     assert outcome.outcome is Outcome.FINISHED
     assert "cannot be used" in outcome.detail
 
 
 def test_checkpoint_of_another_scenario_is_left_alone(tmp_path: Path) -> None:
-    folder = run_folder(tube_scene(guard={"wall_limit_s": 0.5}), tmp_path)
+    folder = run_folder(tube_scene(rest=SOON, guard={"wall_limit_s": 0.5}), tmp_path)
     assert simulate(folder) == RESTARTABLE_EXIT
     newest, _ = newest_checkpoint(folder / "work")
     assert newest is not None
     kept = {p.name: p.read_bytes() for p in newest[0].iterdir()}
-    other = Driver(build_program(tube_scene()), folder, "test", "another").run()
+    other = Driver(build_program(tube_scene(rest=SOON)), folder, "test", "another").run()
     assert other.outcome is Outcome.FINISHED
     assert "checkpoints of another scenario were set aside" in other.detail
     (aside,) = folder.glob("checkpoints_of_*")

@@ -46,7 +46,10 @@ class Cooled:
 
 
 def cooled(raster: Raster) -> Cooled:
-    """Volumes and surfaces of a casting on a grid; the surface is that of the smoothed cells."""
+    """Volumes and surfaces of a casting on a grid; the surface is that of the smoothed cells.
+
+    Volumes are those of the elements: of the drawing where the grid has its cut.
+    """
     mask, d, cell_m = raster.material != MOULD, raster.material.ndim, raster.cell_m
     smooth = gaussian_filter(mask.astype(np.float64), 1.0, mode="nearest")
     slopes = [np.gradient(smooth, axis=k) for k in range(d) if mask.shape[k] > 1]
@@ -54,6 +57,9 @@ def cooled(raster: Raster) -> Cooled:
     if mask.all():
         volume_m3 = float(mask.sum()) * cell_m**d
         return Cooled(math.inf, math.inf, volume_m3, 0.0, 0.0)
+    volume = np.full(mask.shape, cell_m**d)
+    if raster.cut is not None:
+        volume.reshape(-1)[raster.cut.cell] *= raster.cut.volume_share
     depth, nearest = distance_transform_edt(mask, return_indices=True)
     # of equally thick places the middle one, which is far from ends
     thickest = np.argwhere(depth >= depth.max() - 1e-9)
@@ -62,14 +68,14 @@ def cooled(raster: Raster) -> Cooled:
     reach2 = (WINDOW * radius + 1.0) ** 2
     near = _away2(np.indices(mask.shape, sparse=True), centre) <= reach2
     # what cools through a surface is what lies nearest to it
-    window_m3 = float((mask & (_away2(nearest, centre) <= reach2)).sum()) * cell_m**d
+    window_m3 = float(volume[mask & (_away2(nearest, centre) <= reach2)].sum())
     of_window = float(surface[near].sum())
     return Cooled(
         thickest_m=radius * cell_m,
         modulus_m=window_m3 / of_window if of_window > 0.0 else math.inf,
-        volume_m3=float(mask.sum()) * cell_m**d,
+        volume_m3=float(volume[mask].sum()),
         surface_m2=float(surface.sum()),
-        sand_m3=float((~mask).sum()) * cell_m**d,
+        sand_m3=float(volume[~mask].sum()),
     )
 
 

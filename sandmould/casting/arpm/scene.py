@@ -52,6 +52,12 @@ def _raster(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Raster
 
 
 @lru_cache(maxsize=8)
+def _drawn(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Raster:
+    solids = [solid_of(shape, f"shapes.{i}") for i, shape in enumerate(shapes)]
+    return with_cut(_raster(box, shapes, element_m), solids)
+
+
+@lru_cache(maxsize=8)
 def _elements(
     box: Rectangle, shapes: tuple[Any, ...], element_m: float, layers: tuple[int, ...]
 ) -> Elements:
@@ -59,13 +65,27 @@ def _elements(
 
 
 @lru_cache(maxsize=8)
-def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Cooled:
-    return cooled(_raster(box, shapes, element_m))
+def _size_fault(
+    box: Rectangle, shapes: tuple[Any, ...], element_m: float, layers: tuple[int, ...],
+    kernel_size: float,
+) -> str:  # fmt: skip
+    """Why a kernel refuses these sizes of elements; nothing where it takes them."""
+    try:
+        check_sizes(_elements(box, shapes, element_m, layers), kernel_size)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+@lru_cache(maxsize=8)
+def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float, of_kernel: bool) -> Cooled:
+    return cooled((_raster if of_kernel else _drawn)(box, shapes, element_m))
 
 
 def cooled_of(scenario: Solidification) -> Cooled:
     """The casting as its sand sees it; ValueErrors are those of ``painted``."""
-    return _cooled(scenario.box, scenario.shapes, scenario.element_m)
+    of_kernel = scenario.exchange in KERNEL_FORMS
+    return _cooled(scenario.box, scenario.shapes, scenario.element_m, of_kernel)
 
 
 def raster_of(scenario: Solidification) -> Raster:
@@ -83,10 +103,8 @@ def drawn_raster(scenario: Solidification) -> Raster:
 
     Kernels know no faces: theirs are the painted cells.
     """
-    raster = raster_of(scenario)
-    if scenario.exchange in KERNEL_FORMS:
-        return raster
-    return with_cut(raster, solids_of(scenario))
+    raster_as = _raster if scenario.exchange in KERNEL_FORMS else _drawn
+    return raster_as(scenario.box, scenario.shapes, scenario.element_m)
 
 
 def filling_of(scenario: Solidification) -> Filling:
@@ -174,10 +192,10 @@ def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
 def _ratio(scenario: Solidification) -> Iterator[Problem]:
     """Sizes of elements that a kernel's rule forbids."""
     if scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.refuse_ratio:
-        try:
-            check_sizes(elements_of(scenario), scenario.kernel_size)
-        except ValueError as error:
-            valid = f"layers whose sizes keep the rule of 1/c_k ({error})"
+        it = scenario
+        fault = _size_fault(it.box, it.shapes, it.element_m, it.layers, it.kernel_size)
+        if fault:
+            valid = f"layers whose sizes keep the rule of 1/c_k ({fault})"
             yield Problem("layers", list(scenario.layers), valid)
 
 
@@ -200,8 +218,8 @@ def expected_s(scenario: Solidification) -> float:
 
 
 def held_volume_m3(scenario: Solidification) -> float:
-    """Volume of the elements that are casting; area in m2 in 2D."""
-    elements = elements_of(scenario)
+    """Volume of the casting's elements as the run has them; area in m2 in 2D."""
+    elements = placed(drawn_raster(scenario), scenario.layers)
     return float(elements.volume_m3[elements.material == CASTING].sum())
 
 

@@ -68,8 +68,10 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     begun, cpu_begun = time.monotonic(), cpu_time_s()
     cost = Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
     # run folders lie in the folder runs of their study's
-    study_folder, key = folder.parent.parent, deck_key(scenario, render(scenario, run, study))
-    known = found_missing(study_folder, key, run)
+    study_folder, key, known = folder.parent.parent, "", ""
+    if is_root:
+        key = deck_key(scenario, render(scenario, run, study))
+        known = found_missing(study_folder, key, run)
     if world is not None:
         known = world.bcast(known)
     if known:

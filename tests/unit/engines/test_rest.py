@@ -72,6 +72,21 @@ def test_a_held_stage_goes_on_until_the_checks_pass_without_it() -> None:
     assert seen(held, [SLOW_M_S] * 3, [1.0] * 3) == [False, False, True]
 
 
+def test_a_held_stage_is_held_after_a_pause_too(tmp_path: Path) -> None:
+    scenario = tube_scene(engine={"name": "reference"}, fill={"layers": [{"count": 5}]})
+    straight = open_engine(scenario, tmp_path)
+    straight.start_stage(build_program(scenario).stages[0])
+    straight.insert_layer(1)
+    straight.advance()
+    straight.hold_rest("the pattern creeps")
+    straight.write_checkpoint(tmp_path)
+    paused = open_engine(scenario, tmp_path, tmp_path)
+    for session in (straight, paused):
+        session.advance()
+    assert straight.rest_sentence.endswith("the pattern creeps")
+    assert paused.rest_sentence == straight.rest_sentence
+
+
 def ringing(engine: str) -> Scenario:
     """A grain on a floor without damping."""
     wall = {"damping_ratio": 0.0, "friction": 0.0, "normal_stiffness_n_m": SPRING_N_M}

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from pattern_fe.inner_forces import _BY_DIMENSION
 from sandmould import ROOT, compiled
 from sandmould.compiled import PACKAGES, cache_folder, cache_key, is_own, kernel_sources
 
@@ -110,6 +111,12 @@ def test_what_is_compiled_is_kept_for_the_next_process(house: Path) -> None:
     assert kept
     printed(house, ARPM)
     assert {path: path.stat().st_mtime_ns for path in (house / "cache").rglob("*.nbc")} == kept
+
+
+def test_kernels_of_one_source_are_kept_under_names_of_their_own() -> None:
+    """With one name a process that loads one and compiles the other can mix up their symbols."""
+    names = {kernel.py_func.__qualname__ for kernel in _BY_DIMENSION.values()}  # type: ignore[attr-defined]
+    assert len(names) == len(_BY_DIMENSION)
 
 
 def test_the_key_tells_processors_and_versions_apart() -> None:

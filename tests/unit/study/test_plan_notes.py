@@ -104,14 +104,22 @@ def test_walls_of_a_picture(tmp_path: Path) -> None:
     assert "the thinnest measures 3" in walls
 
 
-def test_elements_that_hold_another_volume_than_drawn_are_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert notes_of(tmp_path, **around(0.04, 0.04), element_m=0.004) == []
-    monkeypatch.setattr(scene, "held_volume_m3", lambda scenario: 0.001736)
-    assert notes_of(tmp_path, **around(0.04, 0.04), element_m=0.004) == [
-        "The elements hold 8.5% more than the drawn casting: 1\u202f736 instead of 1\u202f600 mm2."
+def test_elements_that_hold_another_volume_than_drawn_are_told(tmp_path: Path) -> None:
+    off = around(0.043, 0.04)
+    off["box"]["high_m"] = [0.124, 0.124]
+    kernel = {"exchange": "symmetric", "heat_transfer_w_m2_k": None}
+    assert notes_of(tmp_path, **around(0.04, 0.04), **kernel, element_m=0.004) == []
+    # eleven cells a side have their centre inside
+    assert notes_of(tmp_path, **off, **kernel, element_m=0.004) == [
+        "The elements hold 4.7% more than the drawn casting: 1\u202f936 instead of 1\u202f849 mm2."
     ]
+    # faces have the drawing's volume, whatever cells are painted
+    assert notes_of(tmp_path, **off, element_m=0.004) == []
+    (run,) = expand(open_study(opened(tmp_path, **off, element_m=0.004)))
+    it = scene.cooled_of(run.scenario)
+    # counted at 256 points of each cut cell
+    assert it.volume_m3 == pytest.approx(0.043**2, rel=2e-3)
+    assert it.volume_m3 + it.sand_m3 == pytest.approx(0.124**2, rel=1e-9)
 
 
 def test_too_little_sand_is_told(tmp_path: Path) -> None:

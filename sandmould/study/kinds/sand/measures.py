@@ -84,6 +84,11 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
                 "side_load_fraction",
                 "Horizontal load on all that holds the sand before it flows, over its weight.",
             ),
+            Measure(
+                "heap_touches",
+                "Walls that hold the heap: it has no slope then, and no run-out.",
+                is_number=False,
+            ),
         ),
     ),
     MeasureGroup(
@@ -92,9 +97,6 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
         (
             Measure("heap_angle_deg", "Slope of the heap on the floor."),
             Measure("heap_angle_se_deg", "Its standard error."),
-            Measure(
-                "heap_touches", "Walls that hold the heap: it has no slope then.", is_number=False
-            ),
             Measure("residue_angle_deg", "Slope of the sand that stays over the gate."),
             Measure("residue_angle_se_deg", "Its standard error."),
         ),

@@ -11,7 +11,7 @@ from sandmould.scenario.casting_shapes import with_file_hash
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.kinds.casting import casting_planning
 from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.kinds.solidification.limits import exchange_problems, limit_problems
+from sandmould.study.kinds.solidification.limits import limit_problems
 from sandmould.study.kinds.solidification.measures import MEASURES
 from sandmould.study.kinds.solidification.notes import notes
 
@@ -31,7 +31,7 @@ def resolved(scenario: Solidification) -> Solidification:
 
 def problems(scenario: Solidification) -> list[Problem]:
     """What keeps it from being computed, too much of it first: that cannot be laid out."""
-    return [*limit_problems(scenario)] or scene.problems(scenario) or [*exchange_problems(scenario)]
+    return [*limit_problems(scenario)] or scene.problems(scenario)
 
 
 def threads(scenario: Solidification) -> int:
