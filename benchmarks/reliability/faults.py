@@ -6,6 +6,7 @@ import random
 import shutil
 import subprocess
 import time
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ KINDS = {
 }
 
 
+@cache
 def undisturbed(study: str, scratch: Path) -> tuple[Path, float]:
     """Compute a study without a fault: its working folder, and how long it took."""
     folder = _emptied(scratch / f"{study}_undisturbed")
