@@ -113,7 +113,8 @@ class Driver:
         except OSError as error:
             if error.errno not in DISK_ERRORS:
                 raise
-            outcome, detail = Outcome.DISK_REFUSED, f"{error.strerror}: {error.filename}"
+            where = f": {error.filename}" if error.filename else ""
+            outcome, detail = Outcome.DISK_REFUSED, f"{error.strerror}{where}"
         simulated_s = self.cost.steps * self.cost.time_step_s
         detail = "; ".join([detail, *notes] if detail else notes)
         return RunOutcome(outcome, detail, simulated_s, self._program.expected_s)
