@@ -132,7 +132,7 @@ def _parsed(path: Path) -> tuple[Array, Triangles]:
             mesh = meshio.stl.read(str(path))
         cells = mesh.cells_dict.get("triangle", np.empty((0, 3)))
         points = np.asarray(mesh.points, dtype=np.float64).reshape(-1, 3)
-    except (meshio.ReadError, OSError, ValueError, IndexError, TypeError) as error:
+    except (meshio.ReadError, OSError, ValueError, IndexError, TypeError, MemoryError) as error:
         raise MeshFileError("an STL file, ASCII or binary") from error
     if len(cells) == 0:
         raise MeshFileError("an STL file with triangles; here are none")

@@ -123,7 +123,9 @@ def test_record_of_a_study_with_rounds_rests_on_the_runs_they_added(
     write_rounds(log, folder)
     runs = records.runs_in(opened, folder)
     assert len(runs) > len(expand(opened)) + 1
-    kept = {"study": study, "study_sha256": records.study_hash(runs)}
+    kept = {
+        "study": study, "study_sha256": records.study_hash(runs), "defaults": records.DEFAULTS,
+    }  # fmt: skip
     (folder / "record.json").write_text(json.dumps(kept))
     monkeypatch.setattr(records, "RECORDS", tmp_path)
     assert records.stale_records() == [("tube_certified", "")]
