@@ -31,8 +31,10 @@ def started(*prefix: str) -> tuple[subprocess.Popen[str], int]:
     """Start the command as a terminal does, in a group of its own; the process of its job."""
     command = [*prefix, sys.executable, "-c", COMMAND]
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0
-    )
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0,
+        # whoever runs the tests may ignore a closed terminal, which children inherit
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
+    )  # fmt: skip
     assert process.stdout is not None
     return process, int(process.stdout.readline())
 
