@@ -74,9 +74,10 @@ def monolithic(
     pattern: Pattern, scenario: Scenario, folder: Path, checkpoint: Path | None = None, **foam: Any
 ) -> MonolithicSession:
     """The monolithic scheme of a scene; see ``ExplicitFoam`` for the settings of the foam."""
-    body = ExplicitFoam(pattern, scenario.step_s, ContactBound.of(scenario, pattern), **foam)
+    explicit = ExplicitFoam(pattern, scenario.step_s, ContactBound.of(scenario, pattern), **foam)
     sand, counts = open_engine(scenario, folder, checkpoint), StepCounts.of(scenario)
-    return MonolithicSession(sand, body, "pattern", 0.01, counts, folder, checkpoint)
+    body = FoamBody(pattern)
+    return MonolithicSession(sand, explicit, body, "pattern", 0.01, counts, folder, checkpoint)
 
 
 def staggered(pattern: Pattern, scenario: Scenario, folder: Path, **changes: Any) -> CoupledSession:

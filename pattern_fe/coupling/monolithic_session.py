@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pattern_fe.coupling.body import ElasticBody
 from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog, force_n, rms_m
 from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.explicit_foam import ExplicitFoam
+from pattern_fe.coupling.pattern_rest import PatternRest
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
@@ -63,11 +65,13 @@ class MonolithicSession(DelegatingSession):
         self,
         sand: Session,
         foam: ExplicitFoam,
+        body: ElasticBody,
         surface: str,
         largest_m: float,
         counts: StepCounts,
         work: Path,
         checkpoint: Path | None = None,
+        load_tolerance: float | None = None,
     ) -> None:
         """Start with the pattern at rest, or where a checkpoint left it.
 
@@ -76,6 +80,8 @@ class MonolithicSession(DelegatingSession):
         sand : Session
             Of any engine that gives the loads of every step.
         foam : ExplicitFoam
+        body : ElasticBody
+            The same pattern at rest, for where the loads bend it.
         surface : str
             Its name in the engine, vertex for vertex that of the foam.
         largest_m : float
@@ -86,11 +92,16 @@ class MonolithicSession(DelegatingSession):
             Folder of the tables.
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
+        load_tolerance : float, optional
+            See ``PatternRest``.
         """
         super().__init__(sand)
+        self._body, self._rest = body, PatternRest(sand, load_tolerance)
         self._foam, self._surface, self._largest_m = foam, surface, largest_m
         self._counts = counts
         self._load = np.zeros_like(foam.vertices_m)
+        self._load_sum, self._load_steps = np.zeros_like(self._load), 0
+        """Of the loads in this call of ``advance``, N."""
         log_bytes, rows = None, 0
         if checkpoint is not None:
             with np.load(checkpoint / CHECKPOINT, allow_pickle=False) as saved:
@@ -117,6 +128,10 @@ class MonolithicSession(DelegatingSession):
         ahead = check - now % check if duration_s is None else self._counts.steps(duration_s)
         while self.sand.steps < now + ahead and not self.sand.stage_over:
             self._step()
+        if self._load_steps:
+            mean_n = self._load_sum / self._load_steps
+            self._rest.see(self.displacement_m, self._body.solve(mean_n).displacement_m)
+            self._load_sum, self._load_steps = np.zeros_like(mean_n), 0
         self._write()
 
     def _step(self) -> None:
@@ -130,6 +145,7 @@ class MonolithicSession(DelegatingSession):
         load = self.sand.vertex_loads(self._surface)
         assert load is not None, "an engine that gives the loads of every step has one"
         self._load = load
+        self._load_sum, self._load_steps = self._load_sum + load, self._load_steps + 1
 
     def _check(self, displacement: Array) -> None:
         largest_m = float(np.abs(displacement).max())

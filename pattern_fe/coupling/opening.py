@@ -44,16 +44,18 @@ def open_coupled(
     name, loop, counts = config.name, config.loop, StepCounts.of(scenario)
     pattern, work, tolerance = pattern_of(scenario), log.parent, scenario.rest.load_tolerance
     open_session = engine_of(scenario).open_session
+    large = config.statics == "large"
+    around = surroundings_of(scenario, pattern)
+    body: ElasticBody = FoamBody(pattern, large, around)
     if loop.scheme == "monolithic":
         explicit = explicit_foam(scenario, pattern)
         sand = open_session(program, folder, log, checkpoint)
         with log.open("a", encoding="utf-8") as lines:
             lines.write(_explicit_masses(explicit))
         limit_m = loop.largest_displacement_m
-        return MonolithicSession(sand, explicit, name, limit_m, counts, work, checkpoint)
-    large = config.statics == "large"
-    around = surroundings_of(scenario, pattern)
-    body: ElasticBody = FoamBody(pattern, large, around)
+        return MonolithicSession(
+            sand, explicit, body, name, limit_m, counts, work, checkpoint, tolerance
+        )
     sand = open_session(program, folder, log, checkpoint)
     if loop.exchange == "files":
         body = FilesBody(pattern, large, folder / EXCHANGE, sand, around)

@@ -64,7 +64,19 @@ def sag_m(scene: Scenario, pattern_m: np.ndarray) -> float:
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_foam_sags_as_the_closed_form_says(scheme: str, tmp_path: Path) -> None:
     """Weight over the confined block: W H/(M A), with M the constrained modulus."""
-    scene = column(scheme)
+    assert_sags_exactly(column(scheme), tmp_path)
+
+
+def test_a_foam_that_creeps_in_every_step_is_waited_for(tmp_path: Path) -> None:
+    """Strong damping: sand is slow and carried long before the block has sunk (2.5 % before)."""
+    tree = column("monolithic").model_dump(mode="json", exclude_unset=True)
+    del tree["obstacles"]
+    tree["pattern"]["loop"]["damping_ratio"] = 10.0
+    tree["fill"]["layers"] = [{"count": 30}]
+    assert_sags_exactly(with_surface(Scenario.model_validate(tree)), tmp_path)
+
+
+def assert_sags_exactly(scene: Scenario, tmp_path: Path) -> None:
     program = build_program(scene)
     engine_of(scene).write_deck(program, {}, tmp_path, "test", "test")
     outcome = Driver(program, tmp_path, "test", "hash", open_coupled).run()
