@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
 
 from pattern_fe.coupling.explicit_foam import ContactBound
 from pattern_fe.pattern import Pattern
@@ -66,3 +67,47 @@ def shares_along(pattern: Pattern, apart_m: float) -> Array:
     shares[points, number[facet]] = 1.0 - along
     shares[points, following[facet]] = along
     return shares
+
+
+def shares_on_top(pattern: Pattern, apart_m: float, up: float) -> csr_array:
+    """Shape functions at points of an even grid on all that faces up, in 3D.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    apart_m : float, m
+        Least distance of two points; a face that is smaller has one, in its middle.
+    up : float
+        Share of a facet's area that must face up.
+
+    Returns
+    -------
+    (points, nv) float64
+        Shares of all vertices of the surface, sparse.
+    """
+    surface = pattern.surface
+    area = surface.facet_area_vector_m2
+    facets = surface.facets[area[:, 2] > up * np.linalg.norm(area, axis=1)]
+    none = csr_array((0, len(surface.vertices_m)), dtype=np.float64)
+    if not len(facets):
+        return none
+    corner_m = surface.vertices_m[facets][:, :, :2]
+    low_m, high_m = corner_m.min(axis=(0, 1)), corner_m.max(axis=(0, 1))
+    counts = [max(1, int(side / apart_m)) for side in high_m - low_m]
+    lines = [
+        a + (np.arange(n) + 0.5) * (b - a) / n
+        for a, b, n in zip(low_m, high_m, counts, strict=True)
+    ]
+    points_m = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, 2)
+    rows = [none]
+    for vertices, corner in zip(facets, corner_m, strict=True):
+        along = np.linalg.solve((corner[1:] - corner[0]).T, (points_m - corner[0]).T).T
+        shares = np.column_stack([1.0 - along.sum(axis=1), along])
+        inside = (shares > -1e-9).all(axis=1)
+        count = int(inside.sum())
+        entries = np.repeat(np.arange(count), 3), np.tile(vertices, count)
+        rows.append(csr_array((shares[inside].ravel(), entries), shape=(count, none.shape[1])))
+    found = csr_array(vstack(rows))
+    # A point on the edge of two facets lies on both of them.
+    place = np.rint(found @ surface.vertices_m / (1e-6 * apart_m))
+    return found[np.sort(np.unique(place, axis=0, return_index=True)[1])]

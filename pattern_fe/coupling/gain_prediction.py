@@ -15,8 +15,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import LinearOperator, eigsh
 
-from pattern_fe.coupling.contact_rows import shares_along
+from pattern_fe.coupling.contact_rows import shares_along, shares_on_top
 from pattern_fe.coupling.explicit_foam import ContactBound
 from pattern_fe.coupling.gain import Gain
 from pattern_fe.pattern import Pattern
@@ -35,7 +37,7 @@ def predicted_gain(scenario: Scenario, pattern: Pattern, window_s: float) -> Gai
     ----------
     scenario : Scenario
     pattern : Pattern
-        Of the scenario; in 2D.
+        Of the scenario.
     window_s : float
 
     Returns
@@ -44,24 +46,32 @@ def predicted_gain(scenario: Scenario, pattern: Pattern, window_s: float) -> Gai
         Its ``limit`` is the largest fixed factor that holds.
     """
     row = _row(scenario, pattern)
-    compliance_m_n = np.zeros((len(row), 2, len(row), 2))
-    for grain, shares in enumerate(row):
-        for axis in range(2):
-            load = np.zeros_like(pattern.surface.vertices_m)
-            load[:, axis] = shares
-            moved = pattern.on_surface(pattern.solve_linear(pattern.on_nodes(load)))
-            compliance_m_n[:, :, grain, axis] = row @ moved
-    square = compliance_m_n.reshape(2 * len(row), -1)
-    softest_m_n = float(np.linalg.eigvalsh(square)[-1]) if len(row) else 0.0
+    count, dimension = row.shape[0], scenario.dimension
+
+    def moved_m(forces_n: Array) -> Array:
+        load = row.T @ forces_n.reshape(count, dimension)
+        moved = pattern.on_surface(pattern.solve_linear(pattern.on_nodes(load)))
+        return np.asarray(row @ moved).ravel()
+
+    softest_m_n, size = 0.0, count * dimension
+    if count:
+        compliance = LinearOperator((size, size), matvec=moved_m, dtype=np.float64)
+        # Any start that is symmetric may be blind to the softest shape.
+        start = np.random.default_rng(0).standard_normal(size)
+        found = eigsh(compliance, 1, v0=start, tol=1e-6, return_eigenvectors=False)
+        softest_m_n = float(found[0])
     return Gain(_grain_n_m(scenario, window_s) * softest_m_n)
 
 
-def _row(scenario: Scenario, pattern: Pattern) -> Array:
+def _row(scenario: Scenario, pattern: Pattern) -> csr_array:
     """Shape functions under mean grains side by side on what faces up, (grains, nv) float64."""
+    diameter_m = _diameter_m(scenario)
+    if scenario.dimension == 3:
+        return shares_on_top(pattern, diameter_m, _UP)
     area = pattern.surface.vertex_area_vector_m2
     faces_up = area[:, 1] > _UP * np.linalg.norm(area, axis=1)
-    shares = shares_along(pattern, _diameter_m(scenario))
-    return np.asarray(shares[shares @ faces_up > 1.0 - 1e-9])
+    shares = shares_along(pattern, diameter_m)
+    return csr_array(shares[shares @ faces_up > 1.0 - 1e-9])
 
 
 def _grain_n_m(scenario: Scenario, window_s: float) -> float:
@@ -69,9 +79,13 @@ def _grain_n_m(scenario: Scenario, window_s: float) -> float:
     diameter_m = _diameter_m(scenario)
     contact = ContactBound.of_grain(scenario, diameter_m)
     contact_n_m = contact.stiffness_n_m + 2.0 * contact.damping_n_s_m / window_s
-    mass_kg = scenario.sand.grain_mass_kg(diameter_m, 2)
+    mass_kg = scenario.sand.grain_mass_kg(diameter_m, scenario.dimension)
     spring_n_m = scenario.contact.grain_grain.normal_stiffness_n_m
-    in_column = sum(plan_counts(scenario)) * diameter_m / scenario.box.width_m
+    box = scenario.box
+    in_column = sum(plan_counts(scenario)) * diameter_m / box.width_m
+    if scenario.dimension == 3:
+        assert box.depth_m is not None
+        in_column *= diameter_m / box.depth_m
     reached = window_s * math.sqrt(spring_n_m / mass_kg)
     column_n_m = 2.0 * mass_kg * max(1.0, min(in_column, reached)) / window_s**2
     return 1.0 / (1.0 / contact_n_m + 1.0 / column_n_m)

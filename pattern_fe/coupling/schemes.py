@@ -66,7 +66,7 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         raise _bad(
             "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"
         )
-    if scheme == "per_layer" and scenario.dimension == 2:
+    if scheme == "per_layer":
         _refuse_foam_by_layers(scenario, pattern, loop)
     if scheme == "monolithic":
         explicit_foam(scenario, pattern)

@@ -123,3 +123,39 @@ def test_a_long_window_lets_the_column_go() -> None:
     gains = [predicted_gain(scenario, pattern, window_s).gain for window_s in (0.02, 0.04)]
     # Whole columns move: their inertia falls with the square of the window.
     assert gains[0] / gains[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_one_grain_on_a_pillar_in_space_by_hand() -> None:
+    sand = {"size_scale": 8.0, "size_classes": 1}
+    scene: dict[str, Any] = {
+        "dimension": 3,
+        "box": {"width_m": 0.08, "depth_m": 0.08, "height_m": 0.09},
+        "sand": sand,
+        "pattern": {"shape": {"kind": "bar", "width_m": 0.04, "height_m": 0.02}},
+        "vibration": [],
+        "engine": {"name": "reference"},
+    }
+    (size,) = Scenario.model_validate(scene).sand.classes(3)
+    side_m = 1.5 * size.diameter_m
+    height_m = 4 * side_m
+    scene["pattern"] = {
+        "shape": {"kind": "bar", "width_m": side_m, "height_m": height_m},
+        "position_m": [0.03, 0.03, 0.0],
+        "depth_m": side_m,
+        "loop": {"scheme": "fixed"},
+    }
+    told = with_surface(Scenario.model_validate(scene))
+    window_s, beds = 1e-3, told.contact.grain_grain.normal_stiffness_n_m
+    mass_kg = told.sand.density_kg_m3 * math.pi * size.diameter_m**3 / 6
+    law = told.contact.grain_wall
+    dashpot = 2 * law.damping_ratio * math.sqrt(mass_kg * law.normal_stiffness_n_m)
+    stiffest = max(law.normal_stiffness_n_m, law.tangential_stiffness_n_m)
+    contact_n_m = stiffest + 2 * dashpot / window_s
+    in_column = sum(build_program(told).counts) * (size.diameter_m / 0.08) ** 2
+    reached = min(in_column, window_s * math.sqrt(beds / mass_kg))
+    column_n_m = 2 * mass_kg * max(1.0, reached) / window_s**2
+    grain_n_m = 1 / (1 / contact_n_m + 1 / column_n_m)
+    beam_m_n = height_m**3 / (3 * 6.4e6 * side_m**4 / 12)
+    found = predicted_gain(told, pattern_of(told), window_s)
+    # Shear and the clamped foot's and the point's own giving way add to a slender beam's bending.
+    assert 1.0 < found.gain / (grain_n_m * beam_m_n) < 1.4

@@ -192,6 +192,11 @@ def test_a_mesh_file_of_tetrahedra_meets_the_sand(tmp_path: Path) -> None:
         ({}, {"depth_m": 0.07}, r"pattern.position_m = .* reaches from \(0.06, 0.02, 0\) to"),
         ({}, {"loop": {"scheme": "in_step"}}, r"loop.scheme = 'in_step' .* with windows in 3D"),
         ({}, {"loop": {"scheme": "monolithic"}}, r"scheme = 'monolithic' .* with windows in 3D"),
+        (
+            {},
+            {"loop": {"scheme": "per_layer"}, "young_modulus_pa": 1e3},
+            r"scheme = 'per_layer' .* for so soft a foam",
+        ),
         ({}, {"loop": {"exchange": "files"}}, r"loop.exchange = 'files' .* memory in 3D"),
         ({"engine": {"name": "liggghts"}, "frame": "box"}, {}, r"engine.name = 'liggghts' .* lamm"),
         ({"dimension": 2}, {"depth_m": 0.1, "position_m": [0.06, 0.0]}, r"depth_m = 0.1 .* null"),
@@ -202,6 +207,10 @@ def test_what_is_not_coupled_in_space_is_told(
 ) -> None:
     with pytest.raises(BadInputError, match=says):
         with_surface(in_space({**SPACE, **scene}, **pattern))
+
+
+def test_layers_in_space_go_with_a_foam_that_is_stiff_enough() -> None:
+    with_surface(in_space(SPACE, young_modulus_pa=1e9, loop={"scheme": "per_layer"}))
 
 
 @pytest.mark.parametrize(
