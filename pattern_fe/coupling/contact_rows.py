@@ -109,5 +109,5 @@ def shares_on_top(pattern: Pattern, apart_m: float, up: float) -> csr_array:
         rows.append(csr_array((shares[inside].ravel(), entries), shape=(count, none.shape[1])))
     found = csr_array(vstack(rows))
     # A point on the edge of two facets lies on both of them.
-    place = np.rint(found @ surface.vertices_m / (1e-6 * apart_m))
+    place = np.rint(np.asarray(found @ surface.vertices_m) / (1e-6 * apart_m))
     return found[np.sort(np.unique(place, axis=0, return_index=True)[1])]

@@ -84,7 +84,6 @@ def _grain_n_m(scenario: Scenario, window_s: float) -> float:
     box = scenario.box
     in_column = sum(plan_counts(scenario)) * diameter_m / box.width_m
     if scenario.dimension == 3:
-        assert box.depth_m is not None
         in_column *= diameter_m / box.depth_m
     reached = window_s * math.sqrt(spring_n_m / mass_kg)
     column_n_m = 2.0 * mass_kg * max(1.0, min(in_column, reached)) / window_s**2
