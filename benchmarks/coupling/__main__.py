@@ -17,6 +17,7 @@ import pandas as pd
 from pattern_fe.coupling.schemes import in_step_foam
 from pattern_fe.scene import pattern_of
 from sandmould import ROOT
+from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.module_main import run_main
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.load_study import open_study
@@ -41,15 +42,19 @@ def step_s(scenario: Scenario) -> float:
 def main(record_folder: str) -> None:
     """Print the shares of each run and of all together."""
     folder = Path(record_folder)
-    record = json.loads((folder / "record.json").read_text())
-    study = open_study(ROOT / record["study"])
-    scenarios = {run.run: run.scenario for run in runs_in(study, folder)}
-    summary = pd.read_csv(folder / "summary.tsv", sep="\t").set_index("run")
-    shares = pd.DataFrame({"wall_s": summary["wall_s"]})
-    shares["outside_engine_s"] = summary["wall_s"] - summary["engine_wall_s"]
-    shares["solves_s"] = summary["pattern_outside_fraction"] * summary["wall_s"]
-    took_s = [step_s(scenarios[run]) for run in summary.index]
-    shares["pattern_steps_s"] = took_s * summary["steps"]
+    try:
+        record = json.loads((folder / "record.json").read_text())
+        study = open_study(ROOT / record["study"])
+        scenario = {run.run: run.scenario for run in runs_in(study, folder)}
+        summary = pd.read_csv(folder / "summary.tsv", sep="\t").set_index("run")
+        shares = pd.DataFrame({"wall_s": summary["wall_s"]})
+        shares["outside_engine_s"] = summary["wall_s"] - summary["engine_wall_s"]
+        shares["solves_s"] = summary["pattern_outside_fraction"] * summary["wall_s"]
+        steps, scenarios = summary["steps"], [scenario[run] for run in summary.index]
+    except (LookupError, TypeError, ValueError) as error:
+        valid = f"the folder of a whole record of bent patterns ({error})"
+        raise BadInputError([Problem("FOLDER", record_folder, valid)]) from error
+    shares["pattern_steps_s"] = [step_s(each) for each in scenarios] * steps
     shares.loc["all"] = shares.sum()
     for part in ("outside_engine", "solves", "pattern_steps"):
         shares[f"{part}_fraction"] = shares.pop(f"{part}_s") / shares["wall_s"]

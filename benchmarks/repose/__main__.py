@@ -12,7 +12,9 @@ import numpy as np
 from analysis import repose
 from benchmarks.frame import table
 from sandmould.engines.snapshot import Snapshot
+from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.module_main import run_main
+from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand.moments import list_moments
 from sandmould.study.kinds.sand.outflow import slopes
 from sandmould.study.plan.plan_files import read_run
@@ -20,13 +22,20 @@ from sandmould.study.plan.plan_files import read_run
 FEET = (0.2, 0.3, repose.HEAP_FOOT, 0.4, 0.5)
 
 
+def _heap(folder: Path) -> tuple[Scenario, Snapshot]:
+    """Scenario and last snapshot of a run."""
+    scenario = read_run(folder / "scenario.yaml").scenario
+    try:
+        return scenario, Snapshot.load(list_moments(folder)[-1].path)
+    except (LookupError, ValueError) as error:
+        valid = f"a folder of finished runs whose snapshots can be read ({error})"
+        raise BadInputError([Problem("FOLDER", str(folder), valid)]) from error
+
+
 def main(study_folder: str) -> None:
     """Measure, print."""
     study = Path(study_folder)
-    heaps = [
-        (read_run(folder / "scenario.yaml").scenario, Snapshot.load(list_moments(folder)[-1].path))
-        for folder in sorted((study / "runs").iterdir())
-    ]
+    heaps = [_heap(folder) for folder in sorted((study / "runs").iterdir())]
     rows = []
     for foot in FEET:
         repose.HEAP_FOOT = foot

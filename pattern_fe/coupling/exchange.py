@@ -9,13 +9,16 @@ above it. Numbers are written so that they read back the same.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+from pydantic import AfterValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 from pattern_fe.coupling.body import StaticSolution
 from pattern_fe.loads import vertex_pressure_pa
@@ -26,8 +29,11 @@ from pattern_fe.perimeter import Perimeter
 from pattern_fe.supports import Supports
 from pattern_fe.surroundings import Surroundings
 from sandmould.runs.files import write_text
+from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.geometry import Scene, Wall
 from sandmould.scenario.outline import Outline
+from sandmould.scenario.quantity import Section
+from sandmould.scenario.reading import Origin, read_yaml, validated
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -43,6 +49,39 @@ _TOUCHED = ("contact_x_n", "contact_y_n")
 _WHOLE = ("energy_j", "reaction_x_n", "reaction_y_n", "moment_left_n_m")
 _NEAR = 1e-6
 """Share of the drawing's extent by which a vertex may be off: other programs write fewer digits."""
+
+_Point = tuple[float, float]
+
+
+def _of_length_1(normal: _Point) -> _Point:
+    if abs(math.hypot(*normal) - 1.0) > _NEAR:
+        raise PydanticCustomError("normal", "a direction of length 1")
+    return normal
+
+
+class _Plane(Section):
+    """A floor or wall that the pattern must not enter."""
+
+    point_m: _Point
+    normal: Annotated[_Point, AfterValidator(_of_length_1)]
+
+
+class _PatternFile(Section):
+    """What ``pattern.yaml`` holds; another program may add keys of its own."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    mesh: str
+    order: int
+    thickness_m: float
+    young_modulus_pa: float
+    poisson_ratio: float
+    density_kg_m3: float
+    clamped: tuple[str, ...]
+    resting: tuple[str, ...]
+    statics: Literal["linear", "large"]
+    planes: tuple[_Plane, ...]
+    outlines_m: tuple[Annotated[tuple[_Point, ...], Field(min_length=3)], ...]
 
 
 def write_pattern(
@@ -94,33 +133,25 @@ def read_pattern(folder: Path) -> tuple[Pattern, bool, Surroundings]:
     """
     path = folder / PATTERN
     try:
-        section = yaml.safe_load(path.read_text(encoding="utf-8"))
-        foam = Foam(section["young_modulus_pa"], section["poisson_ratio"], section["density_kg_m3"])
-        supports = Supports(tuple(section["clamped"]), tuple(section["resting"]))
-        mesh, order, thickness_m = (
-            folder / section["mesh"],
-            section["order"],
-            section["thickness_m"],
-        )
-        large = section["statics"] == "large"
-        walls = [
-            Wall(f"plane_{i}", np.array(plane["point_m"]), np.array(plane["normal"]))
-            for i, plane in enumerate(section["planes"])
-        ]
-        outlines = [
-            Outline(f"outline_{i}", np.array(line)) for i, line in enumerate(section["outlines_m"])
-        ]
-    except OSError as error:
-        raise ValueError(f"{path} cannot be read: {error.strerror}") from error
-    except KeyError as error:
-        raise ValueError(
-            f"{path} has no key {error}; valid is what the sand's run wrote"
-        ) from error
-    except (TypeError, RecursionError, yaml.YAMLError) as error:
-        raise ValueError(f"{path} is not a list of keys and values") from error
-    pattern = Pattern(read_mesh(mesh), supports, foam, order, thickness_m)
-    scene = Scene(2, tuple(walls), (), (), tuple(outlines))
-    return pattern, large, pattern.surrounded(scene)
+        tree = read_yaml(path, str(path))
+        if missing := [key for key in _PatternFile.model_fields if key not in tree]:
+            valid = "what the sand's run wrote"
+            raise ValueError(f"{path} has no key '{missing[0]}'; valid is {valid}")
+        file = validated(_PatternFile, tree, Origin({"": str(path)}))
+    except BadInputError as error:
+        raise ValueError(str(error)) from error
+    walls = tuple(
+        Wall(f"plane_{i}", np.array(plane.point_m), np.array(plane.normal))
+        for i, plane in enumerate(file.planes)
+    )
+    outlines = tuple(
+        Outline(f"outline_{i}", np.array(line)) for i, line in enumerate(file.outlines_m)
+    )
+    foam = Foam(file.young_modulus_pa, file.poisson_ratio, file.density_kg_m3)
+    supports = Supports(file.clamped, file.resting)
+    mesh = read_mesh(folder / file.mesh)
+    pattern = Pattern(mesh, supports, foam, file.order, file.thickness_m)
+    return pattern, file.statics == "large", pattern.surrounded(Scene(2, walls, (), (), outlines))
 
 
 def write_loads(path: Path, outer: Perimeter, load_n: Array, time_s: float) -> None:

@@ -184,6 +184,7 @@ def measures(study: StudyFile) -> None:
 def report(study: StudyFile) -> None:
     """Write the report of a study again from its results."""
     from sandmould.report.page import write_report
+    from sandmould.study.collect import SUMMARY
     from sandmould.study.plan.build_plan import RESULTS
     from sandmould.study.plan.ownership import check_owner
 
@@ -192,6 +193,9 @@ def report(study: StudyFile) -> None:
     if not (folder / "runs.tsv").is_file():
         valid = f"a study with results: sandmould run {study.stem} comes first"
         raise BadInputError([Problem("STUDY", study.stem, valid)])
+    if not (folder / SUMMARY).is_file():
+        valid = f"a folder with {SUMMARY}, which is missing: sandmould run {study.stem} writes it"
+        raise BadInputError([Problem("results", str(folder), valid)])
     page = folder / "report.html"
     try:
         write_report(folder, page)

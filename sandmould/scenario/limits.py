@@ -108,8 +108,12 @@ FRAMES = Limit(
 PIXELS = Limit(
     25_000_000, "pixels", "a smaller picture and a larger pixel_m", "some 60 bytes a pixel"
 )
+TRIANGLES = Limit(
+    5_000_000, "triangles", "a coarser surface",
+    "0.5 kB a triangle to read it (301 MB at 720 000), more where shells touch",
+)  # fmt: skip
 
 LIMITS = (
     YAML_BYTES, YAML_DEPTH, YAML_ALIASES, YAML_VALUES, RUNS, REPLICATES, GRAINS, CELLS, PARTICLES,
-    PATTERN_ELEMENTS, RECORDS, FRAMES, PIXELS,
+    PATTERN_ELEMENTS, RECORDS, FRAMES, PIXELS, TRIANGLES,
 )  # fmt: skip

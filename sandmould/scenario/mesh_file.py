@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from sandmould.digest import file_digest
+from sandmould.scenario.limits import TRIANGLES
 from sandmould.scenario.mesh import signed_volumes_m3
 from sandmould.scenario.mesh_shells import (
     SAME,
@@ -85,7 +86,10 @@ def filled_shells(path: Path) -> int:
 @lru_cache(maxsize=8)
 def _read(path: Path, sha256: str) -> tuple[Array, Triangles, int]:
     """Read a file once for each state of it: a sweep asks for the same one at every point."""
-    vertices, triangles = _merged(*_parsed(path))
+    points, cells = _parsed(path)
+    if len(cells) > TRIANGLES.most:
+        raise MeshFileError(f"an STL file {TRIANGLES.sentence(len(cells))}")
+    vertices, triangles = _merged(points, cells)
     _check_triangles(vertices, triangles)
     # from the lowest vertex on: shells that touch may have one triangle in both ways
     start = triangles.argmin(axis=1)[:, None]

@@ -17,7 +17,7 @@ from sandmould import ROOT
 from sandmould.statistics.agreement import sweep_part
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.build_plan import RESULTS, open_plan
-from sandmould.study.plan.trust import check_places, check_trust
+from sandmould.study.plan.trust import check_letters, check_places, check_trust
 from sandmould.study.rounds.decide import decision_text, next_runs
 from sandmould.study.rounds.round_log import read_rounds, write_rounds
 from sandmould.study.stopping import run_snakemake, until_stopped
@@ -50,6 +50,7 @@ def run_study(path: Path, options: Sequence[str]) -> int:
 def _run_study(path: Path, options: Sequence[str]) -> int:
     plan = open_plan(path)
     check_places(plan.study)
+    check_letters(plan.runs)
     check_trust(plan.study, plan.runs)
     folder, study = RESULTS / plan.study.name, plan.study.study
     while study.refine.rounds or study.certificate.controls:

@@ -9,6 +9,7 @@ import argparse
 import itertools
 import random
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,8 +39,13 @@ def corpus_findings(watched: Watched, names: tuple[str, ...] = tuple(READERS)) -
     return found
 
 
-def fuzz(watched: Watched, seconds: float, seed: int) -> tuple[dict[str, int], list[Finding]]:
-    """Damage files of all readers in turn until the time is up.
+def fuzz(
+    watched: Watched,
+    seconds: float,
+    seed: int,
+    tell: Callable[[Finding], None] = lambda _: None,
+) -> tuple[dict[str, int], list[Finding]]:
+    """Damage files of all readers in turn until the time is up, and tell of each finding at once.
 
     Returns
     -------
@@ -59,6 +65,7 @@ def fuzz(watched: Watched, seconds: float, seed: int) -> tuple[dict[str, int], l
         count[name] += 1
         if what := watched.finding(name, data, suffix):
             found.append(Finding(name, data, suffix, what))
+            tell(found[-1])
     return count, found
 
 
@@ -79,14 +86,18 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("results/fuzz"))
     options = parser.parse_args()
+
+    def tell(finding: Finding) -> None:
+        print(f"{keep(finding, options.out)}: {finding.what.splitlines()[-1]}", flush=True)
+
     watched = Watched()
     found = corpus_findings(watched)
-    count, more = fuzz(watched, 60.0 * options.minutes, options.seed)
+    for finding in found:
+        tell(finding)
+    count, more = fuzz(watched, 60.0 * options.minutes, options.seed, tell)
     watched.close()
     for name, files in count.items():
         print(f"{name}: {files} damaged files")
-    for finding in [*found, *more]:
-        print(f"{keep(finding, options.out)}: {finding.what.splitlines()[-1]}")
     return 1 if found or more else 0
 
 

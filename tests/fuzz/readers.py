@@ -6,6 +6,7 @@ Anything else is a finding.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,9 +23,13 @@ class Reader:
     read: Callable[[Path], object]
     refusals: tuple[type[Exception], ...] = ()
 
-    def seeds(self, name: str) -> list[Path]:
-        """Files that mutations begin from, in a fixed order."""
+    def sound(self, name: str) -> list[Path]:
+        """Files that the reader takes, in a fixed order."""
         return sorted(path for path in (CORPUS / name).iterdir() if path.is_file())
+
+    def seeds(self, name: str) -> list[Path]:
+        """Files that mutations begin from: sound ones, and ones that once were findings."""
+        return [*self.sound(name), *sorted((CORPUS / name).glob("refused/*"))]
 
 
 def _study(path: Path) -> object:
@@ -83,9 +88,10 @@ def _snapshot(path: Path) -> object:
 
 
 def _exchange_pattern(path: Path) -> object:
-    from pattern_fe.coupling.exchange import PATTERN, read_pattern
+    from pattern_fe.coupling.exchange import MESH, PATTERN, read_pattern
 
     path.replace(path.parent / PATTERN)
+    shutil.copyfile(CORPUS / "pattern_mesh" / "square.vtu", path.parent / MESH)
     return read_pattern(path.parent)
 
 

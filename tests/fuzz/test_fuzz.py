@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import random
+import shutil
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -25,6 +27,17 @@ def watched() -> Iterator[Watched]:
 @pytest.mark.slow
 def test_files_of_the_corpus_are_read_or_refused(watched: Watched) -> None:
     assert corpus_findings(watched) == []
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_files_of_the_corpus_are_sound_unless_told_otherwise(name: str, tmp_path: Path) -> None:
+    """A damaged seed is refused at its damage: no damage behind it is ever reached."""
+    reader = READERS[name]
+    for number, seed in enumerate(reader.sound(name)):
+        place = tmp_path / str(number) / f"file{seed.suffix}"
+        place.parent.mkdir()
+        shutil.copyfile(seed, place)
+        assert reader.read(place) is not None, seed.name
 
 
 @pytest.mark.slow

@@ -69,6 +69,25 @@ def test_the_installation_counts_too(tmp_path: Path, monkeypatch: pytest.MonkeyP
         trust.check_places(study)
 
 
+def test_lammps_is_not_started_where_it_cannot_read_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[object] = []
+    monkeypatch.setattr(run_study, "run_snakemake", started.append)
+    folder = tmp_path / "\u00fcbung"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    text = "based_on: tube\nscenario: {engine: {name: %s}}\nsweep: {}\n"
+    Path("tiny.yaml").write_text(text % "lammps")
+    with pytest.raises(BadInputError, match="valid is a folder of ASCII letters alone") as fault:
+        run_study.run_study(Path("tiny.yaml"), [])
+    assert len(str(fault.value).splitlines()) == 1
+    assert started == []
+    Path("tiny.yaml").write_text(text % "reference")
+    run_study.run_study(Path("tiny.yaml"), [])
+    assert len(started) == 1
+
+
 def test_slurm_is_handed_no_command(tmp_path: Path) -> None:
     fakes = tmp_path / "fakes"
     fakes.mkdir()

@@ -21,6 +21,7 @@ from sandmould.runs.manifest import MANIFEST_FILE
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.lacking import Need
 from tests.finished_study import finished_study, study_text
+from tests.workflow.dry_runs import dry_run
 
 SNAKEMAKE = [sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile")]
 ALONE = ("--config", "batch_wall_s=0")
@@ -60,7 +61,11 @@ def snakemake(study: str, *arguments: str, target: str = "summary.tsv") -> str:
 
 def told_by_dry_run(study: str) -> tuple[set[str], set[str]]:
     """Runs that plain Snakemake would compute, and those that it would measure."""
-    said = snakemake(study, "-n", *ALONE)
+    place = ("--configfile", f"{study}.yaml", "--cores", "2")
+    target = str(RESULTS / study / "summary.tsv")
+    ran = dry_run(*place, *ALONE, "--", target, folder=Path.cwd())
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    said = ran.stdout + ran.stderr
     computed = re.findall(r"^Job \d+: Compute (\w+)$", said, re.M)
     return set(computed), set(re.findall(r"^Job \d+: Measure (\w+)$", said, re.M))
 

@@ -15,6 +15,7 @@ from sandmould.runs.outcome import Outcome
 from sandmould.study.kinds.registry import kind_named, kind_of
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from tests.workflow.dry_runs import dry_run
 from tests.workflow.runs import kill_at_a_checkpoint
 
 SNAKEMAKE = Path(sys.executable).parent / "snakemake"
@@ -65,7 +66,7 @@ def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
         targets = [name for sand in opened.calibration.sands for name in sand.targets]
         header = "\t".join(name.removeprefix(f"{other}__") for name in targets)
         (checkout / "results" / other / "summary.tsv").write_text(header + "\n")
-    ran = snakemake("-n", "--configfile", str(study), folder=checkout)
+    ran = dry_run("--cores", "2", "--configfile", str(study), folder=checkout)
     assert ran.returncode == 0, ran.stderr
     assert kind_named(opened.kind).planning.work_unit in ran.stderr
     assert "wall time on 2 cores" in ran.stderr
@@ -75,7 +76,7 @@ def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
 def test_a_dry_run_starts_no_engine(checkout: Path) -> None:
     stored = checkout / "results" / "calibration.json"
     stored.unlink()
-    ran = snakemake("-n", folder=checkout)
+    ran = dry_run("--cores", "2", folder=checkout)
     assert ran.returncode == 0, ran.stderr
     assert ", an estimate" in ran.stderr
     assert not stored.exists()
@@ -83,7 +84,7 @@ def test_a_dry_run_starts_no_engine(checkout: Path) -> None:
 
 def test_a_study_that_rests_on_another_says_what_comes_first(checkout: Path) -> None:
     study = ROOT / "config" / "studies" / "calibrate_sand.yaml"
-    ran = snakemake("-n", "--configfile", str(study), folder=checkout)
+    ran = dry_run("--cores", "2", "--configfile", str(study), folder=checkout)
     assert ran.returncode != 0
     assert (
         "calibrate_sand.yaml: calibration.also.0 = 'repose_map' cannot be used: valid is a study "
@@ -92,18 +93,18 @@ def test_a_study_that_rests_on_another_says_what_comes_first(checkout: Path) -> 
 
 
 def test_single_values_and_second_files_are_refused(checkout: Path) -> None:
-    ran = snakemake("-n", "--config", "density=3", folder=checkout)
+    ran = dry_run("--cores", "2", "--config", "density=3", folder=checkout)
     assert ran.returncode != 0
     assert "--config = {'density': 3} cannot be used: valid is no value" in ran.stderr
     files = [str(path) for path in STUDIES[:2]]
-    ran = snakemake("-n", "--configfile", *files, folder=checkout)
+    ran = dry_run("--cores", "2", "--configfile", *files, folder=checkout)
     assert ran.returncode != 0
     assert "valid is one study at a time" in ran.stderr
     assert not list((checkout / "results").glob("*/"))
 
 
 def test_bare_snakemake_is_the_demo(checkout: Path) -> None:
-    ran = snakemake("-n", folder=checkout)
+    ran = dry_run("--cores", "2", folder=checkout)
     assert ran.returncode == 0, ran.stderr
     assert (checkout / "results" / "tube_demo" / "runs.tsv").exists()
 

@@ -21,7 +21,7 @@ from sandmould.study.plan.build_plan import (
 from sandmould.study.plan.lacking import Need, notes_of
 from sandmould.study.process import take_turn
 from sandmould.study.definition.run import RUN_NAME
-from sandmould.study.plan.trust import check_places, check_trust
+from sandmould.study.plan.trust import check_letters, check_places, check_trust
 
 OVERRIDES = dict(workflow.config_settings.config)
 # Set by a profile: how long a job should last at least, where jobs cost more than short runs, how
@@ -35,6 +35,7 @@ CORES = workflow._cores or os.cpu_count()
 try:
     PLAN = open_plan(study_path(workflow.configfiles, OVERRIDES))
     check_places(PLAN.study)
+    check_letters(PLAN.runs)
     check_trust(PLAN.study, PLAN.runs)
     BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
     if workflow.is_main_process and "--lint" not in sys.argv:

@@ -82,6 +82,23 @@ def check_places(study: OpenStudy) -> None:
         raise BadInputError(problems)
 
 
+def check_letters(runs: Sequence[Run]) -> None:
+    """See that LAMMPS can read the names of its files, if any run needs it.
+
+    In a working folder with other letters than ASCII a run fails while it is computed, with
+    "'utf-8' codec can't decode byte".
+
+    Raises
+    ------
+    BadInputError
+    """
+    engines = {getattr(getattr(run.scenario, "engine", None), "name", "") for run in runs}
+    here = str(Path.cwd())
+    if "lammps" in engines and not here.isascii():
+        valid = "a folder of ASCII letters alone, since LAMMPS reads no other names"
+        raise BadInputError([Problem("working folder", here, valid)])
+
+
 _SPECIAL = "$`\\*%"
 
 

@@ -116,8 +116,16 @@ def test_no_report_without_results(elsewhere: Path) -> None:
     said = sandmould("report", "tube_demo")
     assert said.exit_code == 1
     assert isinstance(said.exception, SystemExit)
+    assert said.stderr == (
+        "results = 'results/tube_demo' cannot be used: valid is a folder with summary.tsv, which "
+        "is missing: sandmould run tube_demo writes it.\n"
+    )
+    (broken / "summary.tsv").write_bytes(b"\x00")
+    said = sandmould("report", "tube_demo")
+    assert said.exit_code == 1
+    assert isinstance(said.exception, SystemExit)
     (sentence,) = said.stderr.splitlines()
-    assert sentence.startswith("results = 'results/tube_demo' cannot be used: valid is a folder")
+    assert sentence.startswith("results = 'results/tube_demo' cannot be used: valid is a folder of")
 
 
 def test_run_hands_options_on_to_snakemake(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 
+from sandmould.scenario import mesh_file
+from sandmould.scenario.limits import TRIANGLES
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.mesh_file import MeshFileError, read_surface
 from tests.bracket import BRACKET
+from tests.fuzz.readers import CORPUS
 from tests.unit.meshes import CORNERS, CUBE, FACETS, SHIPPED
 
 RNG = np.random.default_rng(5)
@@ -133,3 +138,15 @@ def test_more_shells_than_can_be_told_apart_are_refused(tmp_path: Path) -> None:
     path = write_stl(tmp_path / "many.stl", (CORNERS + at).reshape(-1, 3), facets.reshape(-1, 3))
     with pytest.raises(MeshFileError, match="at most 1000 shells in one file; here are 1001"):
         read_surface(path)
+
+
+def test_more_triangles_than_the_limit_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "cube.stl"
+    shutil.copyfile(CORPUS / "surface" / "cube.stl", path)
+    monkeypatch.setattr(mesh_file, "TRIANGLES", replace(TRIANGLES, most=11))
+    with pytest.raises(MeshFileError, match="with at most 11 triangles, not 12: a coarser"):
+        read_surface(path)
+    monkeypatch.setattr(mesh_file, "TRIANGLES", replace(TRIANGLES, most=12))
+    assert len(read_surface(path)[1]) == 12
