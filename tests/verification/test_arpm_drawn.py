@@ -11,7 +11,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from sandmould.arrays import Floats
-from sandmould.casting.arpm.cut import LEAST_SHARE, casting_share, with_cut
+from sandmould.casting.arpm.cut import with_cut
+from sandmould.casting.arpm.cut_volume import LEAST_SHARE, held_of
 from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.exact import stefan_front
 from sandmould.casting.arpm.filling import Filling
@@ -269,7 +270,7 @@ def test_parts_that_touch_off_the_grid_have_no_surface_between_them() -> None:
     m, n = 0.5 * (a + b), 0.5 * (c + d)
     halves = [Outline("one", np.array([a, m, n, d])), Outline("two", np.array([m, b, c, n]))]
     assert area_of(drawn(halves, 8)) == pytest.approx(8 * R, rel=1e-9)
-    one, two = (casting_share(drawn(bodies, 8), bodies) for bodies in ([whole], halves))
+    one, two = (held_of(drawn(bodies, 8), bodies).share for bodies in ([whole], halves))
     np.testing.assert_allclose(two, one, atol=1 / 256)
 
 
