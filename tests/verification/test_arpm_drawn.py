@@ -171,7 +171,7 @@ def test_a_disc_converges(case: str) -> None:
 def test_where_the_surface_lies_between_middles_counts_little(cells: float) -> None:
     found = [frozen(drawn([turned(0.0)], cells, shift), "steel in sand").solidification_time_s
              for shift in (0.0, 0.25, 0.5)]  # fmt: skip
-    # 0.2 % measured, of third order; 0.5 % at 8 where what a cell holds counts at its middle
+    # 0.2 % measured; 0.5 % at 8 where what a cell holds counts at its middle
     assert np.ptp(found) / found[0] < 0.003
 
 
