@@ -11,7 +11,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from sandmould.arrays import Floats
-from sandmould.casting.arpm.cut import LEAST_SHARE, casting_share, with_cut
+from sandmould.casting.arpm.cut import with_cut
+from sandmould.casting.arpm.cut_volume import LEAST_SHARE, held_of
 from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.exact import stefan_front
 from sandmould.casting.arpm.filling import Filling
@@ -151,18 +152,42 @@ def test_a_disc_freezes_as_the_radial_solution(
 ) -> None:
     for shift in (0.0, 0.3):
         found = frozen(drawn([disc()], 8, shift), case, way, layers)
-        # 0.85 % measured in sand, 0.1 % in a die; -3.5 and -15 % with a staircase's area
+        # 0.56 % measured in sand, 0.1 % in a die; -3.5 and -15 % with a staircase's area
         assert found.solidification_time_s == pytest.approx(exact(case, 2), rel=0.01)
         assert np.abs(found.drift_percent).max() < 1e-10
 
 
 @pytest.mark.parametrize("case", list(CASES))
 def test_a_disc_converges(case: str) -> None:
-    off = [frozen(drawn([disc()], n), case).solidification_time_s / exact(case, 2) - 1
-           for n in (4, 8, 16)]  # fmt: skip
-    # 2.3, 0.85 and 0.18 % in sand; in a die 0.2 % and then what the polygon is off the circle
-    assert abs(off[2]) < max(0.35 * abs(off[1]), 5e-4)
-    assert abs(off[1]) < max(0.5 * abs(off[0]), 1e-3)
+    # at the worst of three positions on the grid
+    off = [max(abs(frozen(drawn([disc()], n, shift), case).solidification_time_s / exact(case, 2)
+                   - 1) for shift in (0.0, 0.25, 0.5)) for n in (4, 8, 16)]  # fmt: skip
+    # 0.5 and 0.14 % with 8 and 16 in sand; in a die what the polygon is off the circle
+    assert off[2] < max(0.35 * off[1], 5e-4)
+    assert off[1] < max(0.5 * off[0], 1e-3)
+
+
+@pytest.mark.parametrize("cells", [8.0, 8.5])
+def test_where_the_surface_lies_between_middles_counts_little(cells: float) -> None:
+    found = [frozen(drawn([turned(0.0)], cells, shift), "steel in sand").solidification_time_s
+             for shift in (0.0, 0.25, 0.5)]  # fmt: skip
+    # 0.2 % measured; 0.5 % at 8 where what a cell holds counts at its middle
+    assert np.ptp(found) / found[0] < 0.003
+
+
+@pytest.mark.parametrize("degrees", [0.0, 20.0, 45.0])
+@pytest.mark.parametrize("shift", [0.0, 0.25, 0.5])
+def test_sloping_temperatures_hold_the_drawings_heat(degrees: float, shift: float) -> None:
+    raster = drawn([turned(degrees)], 8.4, shift)
+    volume = np.ones(raster.material.size)
+    volume[cut_of(raster).cell] = cut_of(raster).volume_share
+    volume = np.where(raster.material.ravel() == 1, volume, 0.0) * raster.cell_m**2
+    # of a square about its middle; a plain grid's squares leave out their own
+    expected = (2 * R) ** 4 / 6 - (2 * R) ** 2 * raster.cell_m**2 / 6
+    found = float((volume * np.sum(raster.centre_m**2, axis=1)).sum())
+    # 0.24 % measured: squares of places in cells half cut; 2.2 % upright, 1.1 % at 45 degrees
+    # where all that a cell holds counts at its middle
+    assert found == pytest.approx(expected, rel=3e-3)
 
 
 @pytest.mark.parametrize("case", list(CASES))
@@ -172,7 +197,7 @@ def test_a_turned_bar_freezes_as_the_bar_upright(case: str, way: str) -> None:
     expected = frozen(upright, case, way).solidification_time_s
     for degrees in (45.0, 20.0, 7.0):
         found = frozen(drawn([turned(degrees)], 8), case, way)
-        # 0.82 % measured at 45 degrees in sand, 0.3 % at most in a die
+        # 0.59 % measured at 45 degrees in sand, 0.3 % at most in a die
         assert found.solidification_time_s == pytest.approx(expected, rel=0.01)
 
 
@@ -269,7 +294,7 @@ def test_parts_that_touch_off_the_grid_have_no_surface_between_them() -> None:
     m, n = 0.5 * (a + b), 0.5 * (c + d)
     halves = [Outline("one", np.array([a, m, n, d])), Outline("two", np.array([m, b, c, n]))]
     assert area_of(drawn(halves, 8)) == pytest.approx(8 * R, rel=1e-9)
-    one, two = (casting_share(drawn(bodies, 8), bodies) for bodies in ([whole], halves))
+    one, two = (held_of(drawn(bodies, 8), bodies).share for bodies in ([whole], halves))
     np.testing.assert_allclose(two, one, atol=1 / 256)
 
 

@@ -12,23 +12,18 @@ follows the grid, all of this is the plain grid.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from sandmould.arrays import Flags, Floats, Ints
+from sandmould.casting.arpm.cut_volume import held_of, inside_any, volumes
 from sandmould.casting.arpm.drawn_surface import Pieces, pieces_of
-from sandmould.casting.arpm.raster import MOULD, Cut, Raster, inside_solid
-from sandmould.scenario.casting_shapes import Body, Pixels
+from sandmould.casting.arpm.raster import MOULD, Cut, Raster
+from sandmould.scenario.casting_shapes import Body
 
-SAMPLES = {2: 256, 3: 64}
-"""Points of a cut cell in 2D and 3D at which it is asked what lies there."""
-LEAST_SHARE = 0.125
-"""Of its cell every element keeps: what a cube's corner holds that just holds the centre."""
 _OFF = 1e-3
 """Sizes of a cell beside a piece of surface where it is asked what lies there."""
 _ALONG = 0.3
@@ -36,7 +31,6 @@ _ALONG = 0.3
 on its own line of centres come before nearer ones beside."""
 _FAR = 2.0
 """Sizes of a cell beyond which a piece of surface has no face: a wall too thin to hold centres."""
-_CHUNK = 500_000
 
 
 @dataclass(frozen=True)
@@ -68,66 +62,15 @@ def with_cut(raster: Raster, solids: Sequence[Body]) -> Raster:
     faces = _faces(casting)
     if not len(faces.low):
         return raster
-    share = casting_share(raster, solids)
+    held = held_of(raster, solids)
     area, low_part = _surface(raster, faces, _bare(raster, solids))
-    flat = share.reshape(-1)
-    plain = np.abs(flat[faces.low] - flat[faces.high]) == 1.0
+    plain = np.abs(held.share[faces.low] - held.share[faces.high]) == 1.0
     area[plain], low_part[plain] = 1.0, 0.5
-    volume = _volume(casting, flat, faces, area)
+    volume = volumes(casting, held, (faces.low, faces.high), area)
     cell = np.flatnonzero(volume != 1.0)
     if not len(cell) and plain.all():
         return raster
     return replace(raster, cut=Cut(cell, volume[cell], faces.low, faces.axis, area, low_part))
-
-
-def casting_share(raster: Raster, solids: Sequence[Body]) -> Floats:
-    """Of each cell that which lies in the casting.
-
-    Parameters
-    ----------
-    raster : Raster
-        Painted with the solids.
-    solids : sequence of Body
-
-    Returns
-    -------
-    (nx, ny) or (nx, ny, nz) float64
-        Counted at points in each cell beside one of the other material; 0 or 1 in all others.
-    """
-    casting = raster.material != MOULD
-    share = casting.astype(np.float64)
-    near = maximum_filter(casting, 3, mode="nearest") & ~minimum_filter(casting, 3, mode="nearest")
-    cells, d, centre = np.flatnonzero(near), casting.ndim, raster.centre_m
-    if not any(isinstance(solid, Pixels) for solid in solids):
-        # cells that no surface reaches are whole; a picture tells distances too coarsely
-        away_m = [np.abs(solid.distance_m(centre[cells])) for solid in solids]
-        cells = cells[np.min(away_m, axis=0) <= 0.5 * math.sqrt(d) * raster.cell_m * (1.0 + 1e-9)]
-    flat = share.reshape(-1)
-    for part in np.array_split(cells, max(1, -(-len(cells) * SAMPLES[d] // _CHUNK))):
-        place = centre[part][:, None] + (_even_points(part, d) - 0.5) * raster.cell_m
-        flat[part] = _inside(solids, place.reshape(-1, d)).reshape(len(part), -1).mean(axis=1)
-    return share
-
-
-def _even_points(cells: Ints, d: int) -> Floats:
-    """Points spread evenly over a unit square or cube for each of some cells, (c, k, d) float64.
-
-    Additive recurrence of the root of x^(d+1) = x + 1 (Roberts, "The unreasonable effectiveness of
-    quasirandom sequences", 2018): no rows that lie on a slope all at once. It goes on from cell to
-    cell, for a slope may cut all cells alike.
-    """
-    root = 2.0
-    for _ in range(60):
-        root = (1.0 + root) ** (1.0 / (d + 1))
-    number = cells[:, None] * SAMPLES[d] + np.arange(SAMPLES[d]) + 0.5
-    return np.asarray((number[:, :, None] * root ** -np.arange(1.0, d + 1.0)) % 1.0)
-
-
-def _inside(solids: Sequence[Body], place_m: Floats) -> Flags:
-    found = np.zeros(len(place_m), dtype=np.bool_)
-    for solid in solids:
-        found[~found] = inside_solid(solid, place_m[~found])
-    return found
 
 
 def _faces(casting: Flags) -> _Faces:
@@ -153,7 +96,7 @@ def _bare(raster: Raster, solids: Sequence[Body]) -> Pieces:
         np.concatenate([some.area_m2 for some in found]),
     )
     step = _OFF * raster.cell_m * pieces.normal
-    ahead, behind = (_inside(solids, pieces.place_m + side * step) for side in (1.0, -1.0))
+    ahead, behind = (inside_any(solids, pieces.place_m + side * step) for side in (1.0, -1.0))
     normal = np.where(ahead[:, None], -pieces.normal, pieces.normal)
     outer = pieces.place_m + np.where(ahead[:, None], -step, step)
     high_m = raster.low_m + np.array(raster.material.shape) * raster.cell_m
@@ -204,38 +147,3 @@ def _nearest(middle_m: Floats, place_m: Floats, axis: int, cell_m: float) -> tup
     along = off[:, axis].copy()
     off[:, axis] = 0.0
     return face, (off.max(axis=1) <= 0.5 + 1e-6) & (along <= _FAR)
-
-
-def _volume(casting: Flags, share: Floats, faces: _Faces, area: Floats) -> Floats:
-    """What each cell holds over its own volume, (n,) float64; the sum of all stays."""
-    own = np.where(casting.reshape(-1), share, 1.0 - share)
-    # never so much that less than the least is left
-    gives = np.minimum(1.0 - own, 1.0 - LEAST_SHARE)
-    giver = np.concatenate([faces.low, faces.high])
-    taker = np.concatenate([faces.high, faces.low])
-    weight = np.tile(area + 1e-9, 2)
-    # where a surface cuts off a cell's corner alone, what lies there goes across edges and corners
-    alone = np.setdiff1d(np.flatnonzero(gives), giver)
-    far_giver, far_taker = _across_corners(casting, alone)
-    giver, taker = np.concatenate([giver, far_giver]), np.concatenate([taker, far_taker])
-    weight = np.concatenate([weight, np.ones(len(far_giver))])
-    moved = gives[giver] * weight / np.bincount(giver, weight, len(share))[giver]
-    volume = np.ones(len(share))
-    np.add.at(volume, taker, moved)
-    np.subtract.at(volume, giver, moved)
-    return volume
-
-
-def _across_corners(casting: Flags, cells: Ints) -> tuple[Ints, Ints]:
-    """Pairs of each cell and all those of the other material that it touches."""
-    flat, shape = casting.reshape(-1), np.array(casting.shape)
-    place = np.stack(np.unravel_index(cells, casting.shape), axis=1)
-    pairs = [(cells[:0], cells[:0])]
-    for offset in np.ndindex(*[3] * casting.ndim):
-        other = place + np.array(offset) - 1
-        there = ((other >= 0) & (other < shape)).all(axis=1)
-        number = np.ravel_multi_index(tuple(other[there].T), casting.shape)
-        unlike = flat[number] != flat[cells[there]]
-        pairs.append((cells[there][unlike], number[unlike]))
-    giver, taker = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    return giver, taker
