@@ -104,7 +104,7 @@ def mean_restitution(engine: str, dimension: int, damping_ratio: float) -> Itera
         h = STEP * math.sqrt(stiffness(dimension) / mass_kg(dimension, radius)) / omega
         tolerance = h * h / 8
         if engine == "lammps":
-            tolerance += wall_compromise(damping_ratio, STEP / omega, dimension)
+            tolerance += wall_compromise(damping_ratio, STEP / omega, dimension, radius)
         yield Measured(
             f"zeta = {damping_ratio:g}, {size} grain on floor",
             found["floor"].mean(),
@@ -119,18 +119,20 @@ def mean_restitution(engine: str, dimension: int, damping_ratio: float) -> Itera
     )
 
 
-def wall_compromise(damping_ratio: float, step_s: float, dimension: int) -> float:
+def wall_compromise(damping_ratio: float, step_s: float, dimension: int, radius_m: float) -> float:
     """Relative error of the restitution at walls of LAMMPS, one coefficient for two sizes.
 
-    Half of what the two damping ratios zeta/(1 + zeta omega dt/2) differ by, times the slope of
+    The mean of the two damping ratios, zeta/(1 + zeta omega dt/2) each, acts on a grain as
+    zeta_m/sqrt(1 - zeta_m omega dt); the error is what that differs from zeta, times the slope of
     the logarithm of the restitution.
     """
     z = damping_ratio
-    ends = [
-        z / (1 + 0.5 * z * step_s * math.sqrt(stiffness(dimension) / mass_kg(dimension, radius)))
+    lag = {
+        radius: step_s * math.sqrt(stiffness(dimension) / mass_kg(dimension, radius))
         for radius in (SMALL_M, LARGE_M)
-    ]
-    slope = math.log(
-        closed_forms.restitution(ends[0], "total") / closed_forms.restitution(ends[1], "total")
-    )
-    return abs(slope) / 2
+    }
+    mean = sum(z / (1 + 0.5 * z * h) for h in lag.values()) / 2
+    acts = mean / math.sqrt(1 - mean * lag[radius_m])
+    below = closed_forms.restitution(0.9 * z, "total")
+    slope = math.log(below / closed_forms.restitution(z, "total")) / (0.1 * z)
+    return abs(acts - z) * slope
