@@ -91,7 +91,10 @@ def scenario_of(scene: str, engine: str, damping_ratio: float, **changes: Any) -
     merged = _BASE
     for more in (
         SCENES[scene],
-        {"engine": {"name": engine}, "contact": {"grain_grain": law, "grain_wall": law, "dashpot": "plain"}},
+        {
+            "engine": {"name": engine},
+            "contact": {"grain_grain": law, "grain_wall": law, "dashpot": "plain"},
+        },
         changes,
     ):
         merged = merge(merged, more, Origin(), "benchmark")

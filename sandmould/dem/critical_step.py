@@ -30,7 +30,6 @@ from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Ints
 from sandmould.dem.solver import Solver
 
-
 _SETTLED = 1e-10
 """Relative growth of the step of corrected dashpots below which it has been found; each round
 leaves about a tenth of the last."""
@@ -233,7 +232,6 @@ def grain_step(contacts: ActiveContacts) -> StableStep:
     whole lies between this one and sqrt(2) times it, its damped step between half of this one
     and this one.
     """
-
     sides = contacts.rows_first, contacts.rows_second
     stiffness = _per_grain(contacts, *(np.einsum("cri,crj->cij", rows, rows) for rows in sides))
     squares, modes = np.linalg.eigh(stiffness)

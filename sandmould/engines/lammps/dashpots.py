@@ -1,4 +1,4 @@
-"""How LAMMPS is told its dashpots: by a restitution, one a pair of size classes and one for walls."""
+"""How LAMMPS is told its dashpots: one restitution a pair of size classes, one for walls."""
 
 from __future__ import annotations
 
