@@ -168,8 +168,12 @@ def active_contacts(solver: Solver) -> ActiveContacts:
     """
     between = _rows(solver, _pair_ends(solver), solver.scene.grain_law)
     at_walls = _rows(solver, _wall_ends(solver), solver.scene.wall_law)
-    arrays = [np.concatenate(parts) for parts in zip(between[:-1], at_walls[:-1], strict=True)]
-    return ActiveContacts(*arrays, between.grains)
+    first, second, rows_first, rows_second, dashpot, correction = (
+        np.concatenate(parts) for parts in zip(between[:-1], at_walls[:-1], strict=True)
+    )
+    return ActiveContacts(
+        first, second, rows_first, rows_second, dashpot, correction, between.grains
+    )
 
 
 def _per_grain(contacts: ActiveContacts, values: Floats, of_second: Floats) -> Floats:

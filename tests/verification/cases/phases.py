@@ -83,8 +83,8 @@ def rebounds(
 
 @case(
     "(15)-(21)",
-    "what c' leaves is of second order in the step, (omega dt of two grains)^2/8 of the restitution; at walls of "
-    "LAMMPS also the one coefficient of all sizes",
+    "what c' leaves is of second order in the step, (omega dt of two grains)^2/8 of the "
+    "restitution; at walls of LAMMPS also the one coefficient of all sizes",
     damping_ratio=[0.3, 1.0],
 )
 def mean_restitution(engine: str, dimension: int, damping_ratio: float) -> Iterator[Measured]:
