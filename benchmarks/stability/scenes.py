@@ -83,12 +83,18 @@ class Limits:
 
 
 def scenario_of(scene: str, engine: str, damping_ratio: float, **changes: Any) -> Scenario:
-    """Make a scenario of a scene; what a study checks, such as its time step, is not."""
+    """Make a scenario of a scene; what a study checks, such as its time step, is not.
+
+    Dashpots are plain unless told: (42) is the limit of those.
+    """
     law = {"damping_ratio": damping_ratio}
     merged = _BASE
     for more in (
         SCENES[scene],
-        {"engine": {"name": engine}, "contact": {"grain_grain": law, "grain_wall": law}},
+        {
+            "engine": {"name": engine},
+            "contact": {"grain_grain": law, "grain_wall": law, "dashpot": "plain"},
+        },
         changes,
     ):
         merged = merge(merged, more, Origin(), "benchmark")

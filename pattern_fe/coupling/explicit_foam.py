@@ -30,7 +30,7 @@ class ContactBound:
         """One contact of a grain, eq. (19)."""
         law = scenario.contact.grain_wall
         mass_kg = scenario.sand.grain_mass_kg(diameter_m, scenario.dimension)
-        dashpot = 2.0 * law.damping_ratio * math.sqrt(mass_kg * law.normal_stiffness_n_m)
+        dashpot = law.dashpot_n_s_m(mass_kg, scenario.contact.lag_s(scenario.step_s))
         return cls(max(law.normal_stiffness_n_m, law.tangential_stiffness_n_m), dashpot)
 
     @classmethod

@@ -42,6 +42,8 @@ class Law(NamedTuple):
     """Whether 'no tension' (18) holds for the total normal force or for its elastic part alone."""
     torsion: bool
     """Whether rolling resistance also resists spin about the normal in 3D, as (31) reads."""
+    lag_s: float = 0.0
+    """Time step, s, whose lag the dashpot makes up for, or 0: see ``pair_coefficients``."""
 
     @property
     def springs_n_m(self) -> tuple[float, float, float]:
@@ -78,9 +80,15 @@ def pair_coefficients(law: Law, mass: float, smaller: float, effective: float) -
         Smaller of the two radii, eq. (33), or r1 at a surface.
     effective : float, m
         r1 r2 / (r1 + r2), or r1 at a surface.
+
+    Notes
+    -----
+    A dashpot c that sees the velocity of half a step ago damps as one of c / sqrt(1 - c dt / (2 m))
+    would (docs/stability.md); c' = c / (1 + c dt / (4 m)) takes the bias of first order away.
     """
+    damping = 2.0 * law.damping_ratio * math.sqrt(mass * law.k_n)
     return PairCoefficients(
-        2.0 * law.damping_ratio * math.sqrt(mass * law.k_n),
+        damping / (1.0 + damping * law.lag_s / (4.0 * mass)),
         law.k_roll * effective * effective,
         law.rolling_arm * smaller,
     )

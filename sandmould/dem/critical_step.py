@@ -18,6 +18,7 @@ of the normals under the contact forces is left out, of the order of the overlap
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -28,6 +29,10 @@ from scipy.sparse.linalg import eigsh
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Ints
 from sandmould.dem.solver import Solver
+
+_SETTLED = 1e-10
+"""Relative growth of the step of corrected dashpots below which it has been found; each round
+leaves about a tenth of the last."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,10 @@ class ActiveContacts(NamedTuple):
     rows_second: Floats
     """(c, r, d + s) float64, rad/s: of the second grain, zero at a surface."""
     dashpot: Floats
-    """(c,) float64, s: damping constant over normal stiffness."""
+    """(c,) float64, s: damping constant over normal stiffness, that of a plain dashpot."""
+    correction: Floats
+    """(c,) float64, 1/s: c / (4 m) with m of eq. (21); 0 where dashpots are plain. At a step dt the
+    dashpot is that over 1 + correction dt."""
     grains: int
     """How many grains there are, touched or not."""
 
@@ -145,8 +153,9 @@ def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
         return np.where((grain < 0)[:, None, None], 0.0, moving)
 
     damping = 2.0 * law.damping_ratio * np.sqrt(ends.mass * k_n)
+    correction = damping / (4.0 * ends.mass) * (law.lag_s > 0.0)
     rows = rows_of_side(0, ends.first), rows_of_side(1, ends.second)
-    return ActiveContacts(ends.first, ends.second, *rows, damping / k_n, len(grains.id))
+    return ActiveContacts(ends.first, ends.second, *rows, damping / k_n, correction, len(grains.id))
 
 
 def active_contacts(solver: Solver) -> ActiveContacts:
@@ -159,10 +168,12 @@ def active_contacts(solver: Solver) -> ActiveContacts:
     """
     between = _rows(solver, _pair_ends(solver), solver.scene.grain_law)
     at_walls = _rows(solver, _wall_ends(solver), solver.scene.wall_law)
-    first, second, rows_first, rows_second, dashpot = (
+    first, second, rows_first, rows_second, dashpot, correction = (
         np.concatenate(parts) for parts in zip(between[:-1], at_walls[:-1], strict=True)
     )
-    return ActiveContacts(first, second, rows_first, rows_second, dashpot, between.grains)
+    return ActiveContacts(
+        first, second, rows_first, rows_second, dashpot, correction, between.grains
+    )
 
 
 def _per_grain(contacts: ActiveContacts, values: Floats, of_second: Floats) -> Floats:
@@ -174,12 +185,22 @@ def _per_grain(contacts: ActiveContacts, values: Floats, of_second: Floats) -> F
     return total
 
 
-def _stable(omega_rad_s: float, damped_rate_rad_s: float) -> StableStep:
-    """Steps of a frequency and of the rate omega (sqrt(1 + xi^2) + xi) that (42) puts for it."""
-    undamped, damped = (
-        2.0 / rate if rate > 0.0 else math.inf for rate in (omega_rad_s, damped_rate_rad_s)
-    )
-    return StableStep(float(omega_rad_s), undamped, damped)
+def _stable(
+    omega_rad_s: float, contacts: ActiveContacts, damped_rate_rad_s: Callable[[Floats], float]
+) -> StableStep:
+    """Steps of a frequency and of the rate omega (sqrt(1 + xi^2) + xi) that (42) puts for it.
+
+    The rate is that of dashpots, (c,) float64, s. Corrected ones are the weaker the longer the
+    step: from the limit of the plain ones up, each limit is that of the dashpots of the last one.
+    """
+    if not omega_rad_s > 0.0:
+        return StableStep(0.0, math.inf, math.inf)
+    damped = 2.0 / damped_rate_rad_s(contacts.dashpot)
+    last = 0.0
+    while contacts.correction.any() and damped > last * (1.0 + _SETTLED):
+        last = damped
+        damped = 2.0 / damped_rate_rad_s(contacts.dashpot / (1.0 + contacts.correction * damped))
+    return StableStep(float(omega_rad_s), 2.0 / omega_rad_s, damped)
 
 
 def simplified_step(contacts: ActiveContacts) -> StableStep:
@@ -191,17 +212,20 @@ def simplified_step(contacts: ActiveContacts) -> StableStep:
     """
     d = contacts.rows_first.shape[1] // 3 + 1
 
-    def square(rows: Floats) -> Floats:
+    def square(rows: Floats, dashpot: Floats) -> Floats:
         normal = (rows[:, 0] ** 2).sum(axis=1)
         # In 3D both tangents turn the grain, each about an axis of its own.
         turning = (rows[:, 1:d, d:] ** 2).sum(axis=(1, 2)) / (d - 1)
-        return np.column_stack([normal, contacts.dashpot * normal, turning])
+        return np.column_stack([normal, dashpot * normal, turning])
 
-    total = _per_grain(contacts, square(contacts.rows_first), square(contacts.rows_second))
-    k, c, turning = total.T
-    along, about = 0.5 * (np.sqrt(c**2 + 4.0 * k) + c), np.sqrt(turning)
-    omega = np.maximum(np.sqrt(k), about)
-    return _stable(omega.max(initial=0.0), np.maximum(along, about).max(initial=0.0))
+    def swings(dashpot: Floats) -> tuple[Floats, Floats]:
+        sides = (square(rows, dashpot) for rows in (contacts.rows_first, contacts.rows_second))
+        k, c, turning = _per_grain(contacts, *sides).T
+        along, about = 0.5 * (np.sqrt(c**2 + 4.0 * k) + c), np.sqrt(turning)
+        return np.maximum(np.sqrt(k), about), np.maximum(along, about)
+
+    omega = swings(contacts.dashpot)[0].max(initial=0.0)
+    return _stable(omega, contacts, lambda dashpot: float(swings(dashpot)[1].max()))
 
 
 def grain_step(contacts: ActiveContacts) -> StableStep:
@@ -212,18 +236,19 @@ def grain_step(contacts: ActiveContacts) -> StableStep:
     whole lies between this one and sqrt(2) times it, its damped step between half of this one
     and this one.
     """
-
-    def outer(rows: Floats) -> Floats:
-        k = np.einsum("cri,crj->cij", rows, rows)
-        c = np.einsum("c,ci,cj->cij", contacts.dashpot, rows[:, 0], rows[:, 0])
-        return np.stack([k, c], axis=1)
-
-    total = _per_grain(contacts, outer(contacts.rows_first), outer(contacts.rows_second))
-    squares, modes = np.linalg.eigh(total[:, 0])
+    sides = contacts.rows_first, contacts.rows_second
+    stiffness = _per_grain(contacts, *(np.einsum("cri,crj->cij", rows, rows) for rows in sides))
+    squares, modes = np.linalg.eigh(stiffness)
     omega = np.sqrt(np.maximum(squares, 0.0))
     root = (modes * omega[:, None]) @ modes.transpose(0, 2, 1)
-    both = np.block([[total[:, 1], root], [root, np.zeros_like(root)]])
-    return _stable(omega.max(initial=0.0), np.linalg.eigvalsh(both).max(initial=0.0))
+
+    def rate(dashpot: Floats) -> float:
+        outer = (np.einsum("c,ci,cj->cij", dashpot, rows[:, 0], rows[:, 0]) for rows in sides)
+        damping = _per_grain(contacts, *outer)
+        both = np.block([[damping, root], [root, np.zeros_like(root)]])
+        return float(np.linalg.eigvalsh(both).max())
+
+    return _stable(omega.max(initial=0.0), contacts, rate)
 
 
 def _largest(matrix: csr_array) -> float:
@@ -243,7 +268,7 @@ def whole_step(contacts: ActiveContacts) -> StableStep:
     The damped step is exact for central differences, whether or not the modes are damped alike.
     """
     if not len(contacts.first):
-        return _stable(0.0, 0.0)
+        return StableStep(0.0, math.inf, math.inf)
     c, r, f = contacts.rows_first.shape
     pair = np.flatnonzero(contacts.second >= 0)
     values = np.concatenate([contacts.rows_first, contacts.rows_second[pair]])
@@ -256,5 +281,9 @@ def whole_step(contacts: ActiveContacts) -> StableStep:
     ).tocsr()
     omega = math.sqrt(_largest(b.T @ b))
     normal = b[::r]
-    damping = normal.T @ diags_array(contacts.dashpot) @ normal
-    return _stable(omega, _largest(block_array([[damping, b.T], [b, None]], format="csr")))
+
+    def rate(dashpot: Floats) -> float:
+        damping = normal.T @ diags_array(dashpot) @ normal
+        return _largest(block_array([[damping, b.T], [b, None]], format="csr"))
+
+    return _stable(omega, contacts, rate)

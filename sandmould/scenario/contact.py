@@ -46,14 +46,32 @@ class ContactLaw(Section):
         le=1e12,
     )
 
-    @property
-    def restitution(self) -> float:
-        """Restitution of the undamped-tension reading, e = exp(-pi zeta / sqrt(1 - zeta^2)).
+    def dashpot_ratio(self, mass_kg: float, lag_s: float) -> float:
+        """Damping ratio that a dashpot is given, c'/C_cr with c' = c/(1 + c lag/(4 m)).
 
-        Critical damping gives 0, for which LAMMPS takes a number too small to matter.
+        Parameters
+        ----------
+        mass_kg : float
+            m of eq. (21): m1 m2/(m1 + m2) of two grains, m1 at a wall.
+        lag_s : float
+            As ``Contact.lag_s`` gives it.
         """
-        z = self.damping_ratio
-        return 1e-100 if z == 1.0 else max(math.exp(-math.pi * z / math.sqrt(1 - z * z)), 1e-100)
+        omega = math.sqrt(self.normal_stiffness_n_m / mass_kg)
+        return self.damping_ratio / (1 + 0.5 * self.damping_ratio * omega * lag_s)
+
+    def dashpot_n_s_m(self, mass_kg: float, lag_s: float) -> float:
+        """Coefficient of the dashpot, eqs. (19)-(21); the parameters of ``dashpot_ratio``."""
+        critical = 2.0 * math.sqrt(mass_kg * self.normal_stiffness_n_m)
+        return self.dashpot_ratio(mass_kg, lag_s) * critical
+
+
+def restitution(damping_ratio: float) -> float:
+    """Restitution of the undamped-tension reading, e = exp(-pi zeta / sqrt(1 - zeta^2)).
+
+    Critical damping gives 0, for which LAMMPS takes a number too small to matter.
+    """
+    z = damping_ratio
+    return 1e-100 if z == 1.0 else max(math.exp(-math.pi * z / math.sqrt(1 - z * z)), 1e-100)
 
 
 SYMBOLS = {
@@ -91,7 +109,18 @@ class Contact(Section):
         source=ARGUED,
     )
 
-    def parameters(self, law: ContactLaw, dimension: int) -> dict[str, Any]:
+    dashpot: Literal["corrected", "plain"] = quantity(
+        "corrected",
+        "Whether dashpots make up for the half step by which they see the velocity late, "
+        "c' = c/(1 + c dt/(4 m)), so that the mean restitution does not depend on the time step.",
+        source=ARGUED,
+    )
+
+    def lag_s(self, step_s: float) -> float:
+        """Time step whose lag the dashpots make up for, 0 where they do not."""
+        return step_s if self.dashpot == "corrected" else 0.0
+
+    def parameters(self, law: ContactLaw, dimension: int, step_s: float) -> dict[str, Any]:
         """Give all that one law computes with, by the short names of decks and solvers.
 
         Parameters
@@ -99,11 +128,14 @@ class Contact(Section):
         law : ContactLaw
             One of the two.
         dimension : int
+        step_s : float
+            Time step.
         """
         return {
             **{symbol: getattr(law, key) for symbol, key in SYMBOLS.items()},
             "clip_total": self.no_tension == "total",
             "torsion": dimension == 3 and self.rolling_axes == "all",
+            "lag_s": self.lag_s(step_s),
         }
 
 

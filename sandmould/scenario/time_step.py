@@ -44,13 +44,39 @@ class CriticalStep:
     cause: str
 
 
-def _damped(omega_rad_s: float, damping_ratio: float) -> float:
-    """Critical step of one mode, eq. (42)."""
-    return 2 / omega_rad_s * (math.sqrt(1 + damping_ratio**2) - damping_ratio)
+def damped_step(omega_rad_s: float, damping_ratio: float, correction_per_s: float = 0.0) -> float:
+    """Critical step of one mode, eq. (42), h = omega dt: h^2 + 4 xi h = 4.
+
+    Corrected dashpots, c' = c/(1 + b dt), are the weaker the longer the step that they are found
+    for: h^2 + 4 xi h/(1 + b h/omega) = 4.
+
+    Parameters
+    ----------
+    omega_rad_s : float
+    damping_ratio : float
+        xi of the mode, that of plain dashpots.
+    correction_per_s : float
+        b = c/(4 m) of its contacts with m of eq. (21), at most xi omega; 0 of plain dashpots.
+    """
+    xi, b = damping_ratio, correction_per_s / omega_rad_s
+    if b == 0.0:
+        return 2 / omega_rad_s * (math.sqrt(1 + xi**2) - xi)
+    # Newton's way down a convex cubic that grows, from above its one positive root.
+    h, last = 2.0, math.inf
+    while h < last:
+        last = h
+        value = ((b * h + 1) * h + 4 * (xi - b)) * h - 4
+        h -= value / ((3 * b * h + 2) * h + 4 * (xi - b))
+    return last / omega_rad_s
 
 
 def _modes(
-    law: ContactLaw, mass_kg: float, contacts: float, inertia_factor: float, pair_masses: int
+    law: ContactLaw,
+    mass_kg: float,
+    contacts: float,
+    inertia_factor: float,
+    pair_masses: int,
+    corrected: bool,
 ) -> tuple[float, float]:
     """Critical steps of the stiffest normal and rotational mode of equal grains.
 
@@ -63,7 +89,10 @@ def _modes(
     omega_pair = math.sqrt(pair_masses * law.normal_stiffness_n_m / mass_kg)
     inertia_kg = inertia_factor * mass_kg
     omega_r = math.sqrt(pair_masses * contacts * law.tangential_stiffness_n_m / inertia_kg)
-    return _damped(omega_n, law.damping_ratio * omega_n / omega_pair), 2 / omega_r
+    # c / (4 m) of a contact, m = mass_kg / pair_masses.
+    correction = 0.5 * law.damping_ratio * omega_pair if corrected else 0.0
+    xi = law.damping_ratio * omega_n / omega_pair
+    return damped_step(omega_n, xi, correction), 2 / omega_r
 
 
 def inertia_factor(sand: Sand, contact: Contact, time_step: TimeStep, dimension: int) -> float:
@@ -104,9 +133,10 @@ def critical_step(
     factor = inertia_factor(sand, contact, time_step, dimension)
     smallest = sand.classes(dimension)[0].diameter_m
     mass = sand.grain_mass_kg(smallest, dimension)
-    grain_n, grain_r = _modes(contact.grain_grain, mass, contacts, factor, 2)
+    corrected = contact.dashpot == "corrected"
+    grain_n, grain_r = _modes(contact.grain_grain, mass, contacts, factor, 2, corrected)
     # At most `dimension` walls meet in a corner.
-    wall_n, wall_r = _modes(contact.grain_wall, mass, dimension, factor, 1)
+    wall_n, wall_r = _modes(contact.grain_wall, mass, dimension, factor, 1, corrected)
     steps = {
         "normal grain-grain contact": grain_n,
         "rotation at grain-grain contacts": grain_r,

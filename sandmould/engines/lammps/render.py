@@ -13,6 +13,7 @@ from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines, simulation_box
 from sandmould.engines.lammps import OLDEST_VERSION
+from sandmould.engines.lammps.dashpots import Dashpots
 from sandmould.engines.program import Program
 from sandmould.scenario.geometry import Array, Block
 from sandmould.scenario.placement import PlannedLayer
@@ -82,6 +83,7 @@ def render_deck(
     context |= {
         "scene": scenario.scene,
         "laws": {"grain": contact.grain_grain, "wall": contact.grain_wall},
+        "dashpots": Dashpots(contact, context["classes"], contact.lag_s(context["step_s"])),
         "simulation_box": simulation_box(scenario, program),
         "half_slab": HALF_SLAB_M,
         "blocks": [_solid(b) for b in scenario.scene.blocks],

@@ -33,7 +33,7 @@ class PairTable:
                 for i, row in enumerate(self.rows)]  # fmt: skip
 
 
-def damping_per_s(law: ContactLaw, mass_kg: float) -> float:
+def damping_per_s(law: ContactLaw, mass_kg: float, lag_s: float) -> float:
     """LIGGGHTS's ``gamman``: it makes the dashpot c = m_eff gamman, and c = 2 zeta sqrt(k m_eff).
 
     Parameters
@@ -41,8 +41,11 @@ def damping_per_s(law: ContactLaw, mass_kg: float) -> float:
     law : ContactLaw
     mass_kg : float
         Effective mass m1 m2/(m1 + m2) of a pair, m1 at a wall.
+    lag_s : float
+        That the dashpot makes up for.
     """
-    return 2 * law.damping_ratio * math.sqrt(law.normal_stiffness_n_m / mass_kg)
+    ratio = law.dashpot_ratio(mass_kg, lag_s)
+    return 2 * ratio * math.sqrt(law.normal_stiffness_n_m / mass_kg)
 
 
 def rolling_friction(law: ContactLaw, first: SizeClass, second: SizeClass) -> float:
@@ -52,7 +55,11 @@ def rolling_friction(law: ContactLaw, first: SizeClass, second: SizeClass) -> fl
 
 
 def pair_tables(
-    contact: Contact, classes: list[SizeClass], lines: Lines, has_gate: bool = False
+    contact: Contact,
+    classes: list[SizeClass],
+    lines: Lines,
+    step_s: float,
+    has_gate: bool = False,
 ) -> list[PairTable]:
     """All tables of a scenario.
 
@@ -63,11 +70,15 @@ def pair_tables(
         As ``sandmould.engines.deck_lines.size_classes`` gives them.
     lines : Lines
         Knows the source of each key.
+    step_s : float
+        Time step.
     has_gate : bool
         Whether a plate has a type of its own, alike to that of the walls until it is taken away.
     """
     flat = 2 if has_gate else 1
     grain, wall = contact.grain_grain, contact.grain_wall
+    lag_s = contact.lag_s(step_s)
+    ratio = "zeta/(1 + zeta omega dt/2)" if lag_s else "zeta"
 
     def table(
         name: str,
@@ -91,14 +102,14 @@ def pair_tables(
 
     def damping(i: SizeClass, j: SizeClass) -> float:
         mass = i["mass_kg"] * j["mass_kg"] / (i["mass_kg"] + j["mass_kg"])
-        return damping_per_s(grain, mass)
+        return damping_per_s(grain, mass, lag_s)
 
     tables = [
         table("k_n", "kn", "N/m", "normal spring", **constant("normal_stiffness_n_m")),
         table("k_t", "kt", "N/m", "tangential spring", **constant("tangential_stiffness_n_m")),
         table(
-            "damping_n", "gamman", "1/s", "2 zeta sqrt(k_n/m_eff)", "damping_ratio",
-            damping, lambda i: damping_per_s(wall, i["mass_kg"]),
+            "damping_n", "gamman", "1/s", f"2 omega {ratio}, omega^2 = k_n/m_eff", "damping_ratio",
+            damping, lambda i: damping_per_s(wall, i["mass_kg"], lag_s),
         ),
         table(
             "damping_t", "gammat", "1/s", "no tangential dashpot", "damping_ratio",

@@ -85,7 +85,11 @@ def render_deck(
     context = deck_context(program, lines, run, study)
     context |= {
         "tables": pair_tables(
-            scenario.contact, context["classes"], lines, scenario.discharge is not None
+            scenario.contact,
+            context["classes"],
+            lines,
+            context["step_s"],
+            scenario.discharge is not None,
         ),
         "rolling_model": rolling_model(scenario.contact),
         "simulation_box": bounds_m(program),

@@ -22,8 +22,8 @@ SKIN_OVER_DIAMETER = 0.3
 than twice as long at 0.15, one busy machine, two runs each."""
 
 
-def _law(scenario: Scenario, law: ContactLaw) -> Law:
-    return Law(**scenario.contact.parameters(law, scenario.dimension))
+def _law(scenario: Scenario, law: ContactLaw, step_s: float) -> Law:
+    return Law(**scenario.contact.parameters(law, scenario.dimension, step_s))
 
 
 def _damping(scenario: Scenario) -> Damping:
@@ -42,8 +42,8 @@ def scene_of(scenario: Scenario, stage: Stage, step_s: float) -> DemScene:
     up = (0.0,) * (d - 1) + (1.0,)
     direction = up if stage.vibration is None else stage.vibration.unit_direction(d)
     return DemScene(
-        _law(scenario, scenario.contact.grain_grain),
-        _law(scenario, scenario.contact.grain_wall),
+        _law(scenario, scenario.contact.grain_grain, step_s),
+        _law(scenario, scenario.contact.grain_wall, step_s),
         _damping(scenario),
         (0.0,) * (d - 1) + (-scenario.gravity_m_s2,),
         direction,

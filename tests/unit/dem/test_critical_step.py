@@ -160,3 +160,14 @@ def test_grains_that_touch_nothing_allow_any_step() -> None:
     for step in ALL_STEPS:
         found = step(contacts)
         assert (found.omega_rad_s, found.undamped_s, found.damped_s) == (0, math.inf, math.inf)
+
+
+@pytest.mark.parametrize("zeta", [0.3, 1.0])
+def test_corrected_dashpots_bear_the_step_that_they_are_found_for(zeta: float) -> None:
+    law = SMOOTH._replace(damping_ratio=zeta, lag_s=1e-9)
+    contacts = active_contacts(network([[0, 1]], law, floor=True))
+    for step in ALL_STEPS:
+        h = step(contacts).damped_s * UNIT_RAD_S
+        # c' = c / (1 + c dt / (4 m)) with c dt / m = 2 zeta h, put into (42).
+        assert h**2 + 4 * zeta * h / (1 + zeta * h / 2) == pytest.approx(4)
+        assert h * (1 + 1e-9) > damped(1.0, zeta) * UNIT_RAD_S * (1 + 0.1 * zeta)

@@ -17,7 +17,7 @@ def test_the_scenario_gives_all_that_the_solver_computes_with() -> None:
     contact = Contact()
     assert set(SYMBOLS.values()) == set(ContactLaw.model_fields)
     for dimension in (2, 3):
-        parameters = contact.parameters(contact.grain_wall, dimension)
+        parameters = contact.parameters(contact.grain_wall, dimension, 1e-6)
         assert set(parameters) == set(Law._fields)
         assert parameters["k_n"] == contact.grain_wall.normal_stiffness_n_m
 

@@ -9,6 +9,7 @@ from tests.verification.cases.case import CASES as CASES
 MODULES = (
     "flight",
     "restitution",
+    "phases",
     "oblique",
     "floor",
     "incline",

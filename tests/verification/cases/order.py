@@ -33,9 +33,10 @@ STEPS = (25, 50, 100, 200, 400)
 def order_in_the_step(engine: str, dimension: int) -> Iterator[Measured]:
     """Errors of two impacts over the step, which is a whole part of either contact's duration.
 
-    A damped impact on the floor is of first order: the dashpot (19) takes the velocity half a step
-    late. An undamped oblique impact of two grains is of second order: central differences, and the
-    friction (25) adds up displacements of whole steps. Its grip (omega_t = 1.5 omega) lasts until
+    A damped impact on the floor is of first order: the plain dashpot (19) takes the velocity half a
+    step late. An undamped oblique impact of two grains is of second order: central differences,
+    and the friction (25) adds up displacements of whole steps. Its grip (omega_t = 1.5 omega)
+    lasts until
     the friction's limit vanishes with the normal force.
     """
     z, speed, mu = 0.5, 1e-5, 10.0
@@ -53,8 +54,9 @@ def order_in_the_step(engine: str, dimension: int) -> Iterator[Measured]:
     errors: dict[str, list[float]] = {"floor": [], "pair": []}
     for steps in STEPS:
         given = scene(
-            engine, dimension, 4, (SMALL_M, LARGE_M), pair, law(dimension, z), lasts / steps
-        )
+            engine, dimension, 4, (SMALL_M, LARGE_M), pair, law(dimension, z), lasts / steps,
+            contact={"dashpot": "plain"},
+        )  # fmt: skip
         with Bench(given) as bench:
             (hits, idle), (falls, is_hit) = bench.by_size()
             place, velocity = np.zeros((4, dimension)), np.zeros((4, dimension))
