@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from benchmarks.frame import render
+from benchmarks.stability.phases import errors
 from benchmarks.stability.runs import BLOWS_UP, DRIFTS, STABLE
 
 OUTCOMES = (STABLE, DRIFTS, BLOWS_UP)
@@ -162,6 +163,7 @@ def page(results: dict[str, Any]) -> str:
         "of_one_mode": of_one_mode,
         "largest_error": _largest_error(results),
         "agreement": _agreement(results),
+        "impacts": errors(),
         "blow_up": {scene: _first_blow_up(results, scene) for scene in scenes},
         "one_contact": [
             step_s / row["whole_s"]

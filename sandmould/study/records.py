@@ -38,8 +38,8 @@ COPIED = ("runs.tsv", "summary.tsv")
 DEFAULTS = 3
 """Which set of defaults records are computed with; a record without the number has the first. The
 second: rest is decided by checks of its own, sand rests after vibration before it is measured, and
-castings have the drawing's volume and area. The third: dashpots
-make up for the half step by which they see the velocity late."""
+castings have the drawing's volume and area. The third: dashpots make up for the half step by
+which they see the velocity late."""
 OLD_DEFAULTS = "old defaults"
 SAME = {
     "tube_fill_fraction": 0.05,
