@@ -30,16 +30,13 @@ onstart:
         workflow.scheduler.job_rate_limiter = None
     # Not where the plan is made: a dry run starts no engine.
     if workflow.is_main_process and measure_speeds(PLAN, RESULTS):
-        print(price(PLAN, RESULTS, CORES), file=sys.stderr)
+        say(price(PLAN, RESULTS, CORES))
 
 
 onerror:
     # After Ctrl-C too; "sandmould run" says it by itself.
     if workflow.is_main_process and (left := len(PLAN.lacks(RESULTS))):
-        print(
-            f"{left} of {len(PLAN.runs)} runs are left: the same command goes on with them.",
-            file=sys.stderr,
-        )
+        say(f"{left} of {len(PLAN.runs)} runs are left: the same command goes on with them.")
 
 
 rule all:

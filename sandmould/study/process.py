@@ -18,6 +18,7 @@ from types import FrameType
 from typing import TextIO
 
 from sandmould.runs.parent import end_with_parent
+from sandmould.runs.words import say
 
 RESTARTABLE_EXIT = 75
 """Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
@@ -84,7 +85,7 @@ def _folder_lock(folder: Path) -> Iterator[TextIO]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            print(f"{folder}: waiting for the process that computes it already", file=sys.stderr)
+            say(f"{folder}: waiting for the process that computes it already")
             fcntl.flock(file, fcntl.LOCK_EX)
         file.truncate(0)
         file.write(f"{socket.gethostname()}\n")
@@ -106,7 +107,7 @@ def take_turn(study_folder: Path) -> TextIO | None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        print(f"{study_folder}: waiting for the command that computes it already", file=sys.stderr)
+        say(f"{study_folder}: waiting for the command that computes it already")
         fcntl.flock(file, fcntl.LOCK_EX)
     return file
 

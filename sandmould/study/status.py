@@ -7,6 +7,7 @@ import json
 import math
 import time
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -15,12 +16,12 @@ import pandas as pd
 
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
-from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.plan.build_plan import Plan
+from sandmould.study.plan.build_plan import Plan, stored_speeds
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.process import computed_elsewhere, is_locked
 from sandmould.study.rounds.round_log import read_rounds
 from sandmould.study.tidy import freed_bytes, orphans, size_text
+from sandmould.study.time_left import TimeLeft
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
@@ -40,8 +41,8 @@ class RunStatus:
     said: str = ""
     """How it failed, how far it is, or what of it is lost."""
     cpu_s: float = 0.0
-    left_s: float = math.nan
-    """Of a run that is being computed."""
+    share: float = 0.0
+    """What is done of a run that has begun."""
     wall_s: float = math.nan
     """Of a run that is done."""
 
@@ -60,18 +61,18 @@ def run_status(folder: Path, lack: Lack) -> RunStatus:
     if lack.need is Need.NOTHING:
         return _ended(folder)
     path = folder / "work" / "progress.json"
-    said, left_s, fresh = "", math.nan, False
+    said, share, fresh = "", 0.0, False
     with contextlib.suppress(*_DAMAGED):
         now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         fresh = time.time() - path.stat().st_mtime < FRESH_S
-        left_s = float(now["left_s"])
+        share = float(now["percent"]) / 100
         said = f"{now['percent']:.0f} %, {now['stage']}, {now['time_s']:.3g} s simulated"
     running = is_locked(folder) or (fresh and computed_elsewhere(folder))
     if not said:
         return RunStatus(name, "running" if running else "waiting", "" if running else lack.why)
     if running:
-        return RunStatus(name, "running", said, left_s=left_s)
-    return RunStatus(name, "stopped", said)
+        return RunStatus(name, "running", said, share=share)
+    return RunStatus(name, "stopped", said, share=share)
 
 
 def _ended(folder: Path) -> RunStatus:
@@ -83,9 +84,9 @@ def _ended(folder: Path) -> RunStatus:
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
     if outcome.outcome is Outcome.FINISHED:
-        return RunStatus(folder.name, "done", "", cpu_s, 0.0, wall_s)
+        return RunStatus(folder.name, "done", "", cpu_s, wall_s=wall_s)
     said = f"{outcome.outcome.label}. {outcome.detail}".strip()
-    return RunStatus(folder.name, "failed", said, cpu_s, 0.0)
+    return RunStatus(folder.name, "failed", said, cpu_s)
 
 
 def status_text(plan: Plan, results: Path, cores: int) -> str:
@@ -108,7 +109,9 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
     parts = [f"{count[state]} {state}" for state in STATES if count[state]]
     lines = [f"{plan.study.name}: {', '.join(parts)} of {len(plan.runs)} runs"]
     spent_s = sum(status.cpu_s for status in statuses.values())
-    lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
+    lines.append(
+        f"processor time so far: {duration_text(spent_s)}; {_left(plan, results, statuses, cores)}"
+    )
     log = read_rounds(folder, plan.study.study)
     if plan.study.study.refine.rounds:
         ended = log.ended or f"of at most {plan.study.study.refine.rounds}"
@@ -138,32 +141,18 @@ def _orphans(plan: Plan, results: Path) -> list[str]:
     return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
 
 
-def _left(plan: Plan, statuses: dict[str, RunStatus], cores: int) -> str:
-    """Wall time of what is left, at the speed of the runs like it that are done."""
-    planning = plan.kind.planning
-    speeds: dict[SpeedClass, list[float]] = {}
-    for run in plan.runs:
-        wall_s = statuses[run.run].wall_s
-        if math.isfinite(wall_s):
-            core_s = wall_s * planning.threads(run.scenario)
-            each = core_s / planning.planned_work(run.scenario)
-            speeds.setdefault(planning.speed_class(run.scenario), []).append(each)
-    left_s, unknown = 0.0, 0
-    for run in plan.runs:
-        status = statuses[run.run]
-        if status.state == "running" and math.isfinite(status.left_s):
-            left_s += status.left_s
-        elif status.state in ("running", "stopped", "waiting"):
-            costs = speeds.get(planning.speed_class(run.scenario))
-            if costs is None:
-                unknown += 1
-            else:
-                typical = sorted(costs)[len(costs) // 2]
-                left_s += planning.planned_work(run.scenario) * typical
-    if unknown:
-        return f"time left unknown: no run like {unknown} of them is done"
+def _left(plan: Plan, results: Path, statuses: Mapping[str, RunStatus], cores: int) -> str:
+    """Wall time until the report is written."""
+    time_left = TimeLeft(plan.runs, stored_speeds(plan, results))
+    for status in statuses.values():
+        time_left.learn(status.run, status.wall_s)
+    begun = {s.run: s.share for s in statuses.values() if s.state in ("running", "stopped")}
+    waiting = [s.run for s in statuses.values() if s.state == "waiting"]
+    left_s = time_left.seconds(begun, waiting, cores)
+    if not left_s:
+        return "nothing left"
+    left = [run for run in plan.runs if run.run in {*begun, *waiting}]
     return (
-        f"time left: about {duration_text(left_s / cores)} on {cores} cores"
-        if left_s
-        else ("nothing left")
+        f"time left with its report: about {duration_text(left_s)} on {cores} cores, "
+        f"{time_left.prices.basis(left)}"
     )

@@ -5,6 +5,7 @@ import sys
 
 from sandmould import ROOT
 from sandmould.runs.columns import SWEEP
+from sandmould.runs.words import say
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.collect import CHECKS as CHECK_TABLES
 from sandmould.study.plan.batches import alone
@@ -41,11 +42,12 @@ try:
     if workflow.is_main_process and "--lint" not in sys.argv:
         # Held until this process ends.
         turn = starts_jobs(sys.argv) and take_turn(RESULTS / PLAN.study.name)
-        print(announce(PLAN, RESULTS, CORES), file=sys.stderr)
+        say(announce(PLAN, RESULTS, CORES))
         if said := prepare(PLAN, RESULTS):
-            print(f"{said}\n", file=sys.stderr)
+            say(f"{said}\n")
 except BadInputError as error:
-    sys.exit(str(error))
+    say(str(error))
+    sys.exit(1)
 
 STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"

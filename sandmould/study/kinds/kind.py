@@ -33,6 +33,11 @@ class Note(NamedTuple):
     """One sentence or two, with figures."""
 
 
+def nothing_beside(scenario: Any) -> float:
+    """No time beside the work."""
+    return 0.0
+
+
 def no_notes(scenario: Any) -> Sequence[Note]:
     """Nothing to tell."""
     return ()
@@ -105,6 +110,8 @@ class Planning(Generic[ScenarioT]):
     """Scenarios of one class are computed at one speed."""
     plan_cells: Callable[[ScenarioT], Mapping[str, str]]
     """What the plan says of a run, by heading."""
+    beside_s: Callable[[ScenarioT], float] = nothing_beside
+    """Wall time of a run that does not grow with its work."""
     notes: Callable[[ScenarioT], Sequence[Note]] = no_notes
     """What a user should know of a run before it starts, though it can be run."""
     speed: MachineSpeed[ScenarioT] | None = None

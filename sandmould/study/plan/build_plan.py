@@ -25,6 +25,7 @@ from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import plan_table, write_plan, write_study
+from sandmould.study.plan.price import Prices
 from sandmould.study.rounds.round_log import read_rounds
 
 RESULTS = Path("results")
@@ -197,7 +198,7 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
         When the results cannot be written.
     """
     folder = results / plan.study.name
-    with _writing(folder):
+    with writing(folder):
         write_owner(plan.study.path, folder)
         write_plan(plan.runs, folder)
         write_study(plan.study.study, folder)
@@ -221,12 +222,12 @@ def prepare(plan: Plan, results: Path) -> str:
         When the results cannot be written.
     """
     folder = results / plan.study.name
-    with _writing(folder):
+    with writing(folder):
         return note_lacks([run.run for run in plan.runs], plan.lacks(results), folder)
 
 
 @contextlib.contextmanager
-def _writing(folder: Path) -> Iterator[None]:
+def writing(folder: Path) -> Iterator[None]:
     """Say in one sentence that results cannot be written."""
     try:
         yield
@@ -237,7 +238,7 @@ def _writing(folder: Path) -> Iterator[None]:
 
 def price(plan: Plan, results: Path, cores: int) -> str:
     """Say what the runs will take, as far as the machine's speed is known at what was measured."""
-    return plan_table(plan.runs, stored_speeds(plan, results), cores)
+    return plan_table(plan.runs, Prices(stored_speeds(plan, results)), cores)
 
 
 def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
