@@ -34,7 +34,13 @@ class TimeLeft:
         self._runs = {run.run: run for run in runs}
         self._rate_per_s = rate_per_s
         self._finished: list[tuple[Run, float]] = []
+        self._foreseen: dict[str, float] = {}
         self._prices: Prices | None = None
+
+    def foresee(self, run: str, wall_s: float) -> None:
+        """Take in what a run that is being computed will have taken, until one like it ends."""
+        self._foreseen[run] = wall_s
+        self._prices = None
 
     def learn(self, run: str, wall_s: float) -> None:
         """Take in what a finished run has taken; ``NaN`` teaches nothing."""
@@ -46,7 +52,9 @@ class TimeLeft:
     def prices(self) -> Prices:
         """What runs take by what has been learnt."""
         if self._prices is None:
-            ratios = ratios_of(self._finished, self._rate_per_s)
+            foreseen = [(self._runs[run], wall_s) for run, wall_s in self._foreseen.items()]
+            ratios = ratios_of(foreseen, self._rate_per_s)
+            ratios |= ratios_of(self._finished, self._rate_per_s)
             self._prices = Prices(self._rate_per_s, ratios)
         return self._prices
 

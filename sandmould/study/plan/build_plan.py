@@ -26,6 +26,7 @@ from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import plan_table, write_plan, write_study
 from sandmould.study.plan.price import Prices
+from sandmould.study.plan.trust import may_run
 from sandmould.study.rounds.round_log import read_rounds
 
 RESULTS = Path("results")
@@ -253,13 +254,15 @@ def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
 def measure_speeds(plan: Plan, results: Path) -> bool:
     """Measure and store how fast this machine is where that is not known: seconds an engine.
 
+    A program that the user has not allowed to run is not started for that either.
+
     Returns
     -------
     bool
         Whether anything was measured, so that the plan has another price.
     """
     speed = plan.kind.planning.speed
-    if speed is None:
+    if speed is None or not may_run(plan.study, plan.runs):
         return False
     before = stored_speeds(plan, results)
     missing = [scenario for each, scenario in plan.classes.items() if each not in before]

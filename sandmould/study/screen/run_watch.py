@@ -73,6 +73,8 @@ class RunWatch:
         """Where a run is; None while it has not begun since the watch did."""
         folder = self.folder / run
         begun_s = _time_ns(folder / "lock") / 1e9
+        if _time_ns(folder / "outcome.json") / 1e9 >= self.since_s:
+            return Running(run, "measures", 100.0, begun_s=max(begun_s, self.since_s))
         path = folder / "work" / "progress.json"
         if _time_ns(path) / 1e9 >= self.since_s:
             with contextlib.suppress(*_DAMAGED):

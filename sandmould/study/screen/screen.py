@@ -11,6 +11,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.live import Live
 
+from sandmould.runs.progress import duration_text
 from sandmould.runs.words import Words
 from sandmould.study.plan.build_plan import Plan, stored_speeds
 from sandmould.study.screen.run_watch import Ended, Running, RunWatch, failure, file_time_s
@@ -21,9 +22,12 @@ from sandmould.study.time_left import TimeLeft, computed_wall_s
 
 LOOK_EVERY_S = 1.0
 SHARE_OF_TIME = 0.02
-"""Of a core, that looking may take."""
+"""Of a core, that looking may take: at thousands of runs it is done less often."""
+SELDOM_S = 5.0
 LINE_EVERY_S = 30.0
 """Between two plain lines on the whole study."""
+_TELLING = 20.0
+"""Percent from which a run tells how long it takes: grains that fall are cheap."""
 _NEARLY = 0.95
 """Most that is called done of a run that does not say how far it is."""
 
@@ -96,6 +100,9 @@ class Screen:
             if self._table is not None:
                 self._table.stop()
                 self._table = None
+        if error is None:
+            passed = duration_text(time.monotonic() - self._begun_s)
+            self._print(f"{self._plan.study.name}: {counts_text(self._view())} after {passed}")
 
     def environment(self) -> dict[str, str]:
         """Environment of what is started."""
@@ -103,7 +110,7 @@ class Screen:
 
     def look(self) -> float:
         """Look once and show what is new; gives the seconds until the next look."""
-        begun = time.monotonic()
+        begun = time.process_time()
         if words := self._words.new().strip("\n"):
             self._print(words)
         ended = self._watch.look()
@@ -115,7 +122,8 @@ class Screen:
             self._table.update(study_table(view, size.width, size.height), refresh=True)
         else:
             self._lines(ended)
-        return max(LOOK_EVERY_S, (time.monotonic() - begun) / SHARE_OF_TIME)
+        spent_s = time.process_time() - begun
+        return min(max(LOOK_EVERY_S, spent_s / SHARE_OF_TIME), SELDOM_S)
 
     @property
     def is_explained(self) -> bool:
@@ -152,6 +160,10 @@ class Screen:
     def _view(self) -> StudyView:
         time_left, running = self._time_left_known(), self._watch.running
         passed_s = time.monotonic() - self._begun_s
+        for run, at in running.items():
+            if at.percent >= _TELLING and at.percent < 100.0:
+                taken_s = self._watch.since_s + passed_s - at.begun_s
+                time_left.foresee(run, 100 * taken_s / at.percent)
         shares = {run: self._share(at, passed_s) for run, at in running.items()}
         waiting = [run for run in self._watch.waiting if run not in running]
         left_s = time_left.seconds(shares, waiting, self._cores)

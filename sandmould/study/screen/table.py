@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from rich.cells import cell_len, set_cell_size
 from rich.console import Group, RenderableType
-from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
@@ -74,13 +73,15 @@ def _whole(view: StudyView, width: int) -> Table:
     """The bar of the whole study with its times."""
     times = times_text(view)
     row = Table.grid(padding=(0, 1), expand=False)
-    bar = max(10, width - cell_len(times) - 7)
+    bar = max(10, min(width - cell_len(times) - 8, 60))
     row.add_row(_bar(view.share, bar), f"{100 * view.share:3.0f} %", times)
     return row
 
 
-def _bar(share: float, width: int) -> ProgressBar:
-    return ProgressBar(100.0, 100.0 * share, width, complete_style="blue", finished_style="blue")
+def _bar(share: float, width: int) -> Text:
+    """A bar whose length tells without colour, in letters that any terminal has."""
+    full = round(min(max(share, 0.0), 1.0) * (width - 2))
+    return Text(f"[{'#' * full}{'.' * (width - 2 - full)}]", no_wrap=True)
 
 
 def _running_table(running: tuple[RunView, ...], width: int) -> Table:
@@ -90,16 +91,16 @@ def _running_table(running: tuple[RunView, ...], width: int) -> Table:
     for each in running:
         at = each.at
         name = set_cell_size(_cut(at.run, name_width), name_width)
-        left = duration_text(each.left_s) if each.left_s >= 0.0 else "?"
+        left = f"{duration_text(each.left_s)} left" if each.left_s >= 1.0 else "soon"
         cells: list[RenderableType] = [
             Text(name, no_wrap=True),
-            _bar(at.percent / 100, 20 if width >= _WIDE else 10),
+            _bar(at.percent / 100, 22 if width >= _WIDE else 12),
             f"{at.percent:3.0f} %",
             Text(_cut(at.stage or "begins", 12), no_wrap=True),
         ]
         if width >= _WIDE:
             cells += [f"{at.simulated_s:.3f} s", f"{at.work_per_s / 1e6:.2f} M/s"]
-        table.add_row(*cells, Text(f"{left} left", no_wrap=True))
+        table.add_row(*cells, Text(left, no_wrap=True))
     return table
 
 
