@@ -153,6 +153,6 @@ def _left(plan: Plan, results: Path, statuses: Mapping[str, RunStatus], cores: i
         return "nothing left"
     left = [run for run in plan.runs if run.run in {*begun, *waiting}]
     return (
-        f"time left with its report: about {duration_text(left_s)} on {cores} cores, "
+        f"time left: about {duration_text(left_s)} on {cores} cores with the report, "
         f"{time_left.prices.basis(left)}"
     )

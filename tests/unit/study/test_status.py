@@ -66,7 +66,8 @@ def begun(plan: Plan, place: int, ago_s: float) -> Path:
 def test_nothing_begun_has_no_time_left_that_is_known(plan: Plan) -> None:
     said = status_text(plan, Path("results"), 2)
     assert said.startswith("trial: 6 waiting of 6 runs\nprocessor time so far: 0 s; ")
-    assert "time left unknown: no run like 6 of them is done" in said
+    assert "; time left: about " in said
+    assert said.splitlines()[1].endswith(" on 2 cores with the report, an estimate")
 
 
 def test_every_state_is_told(plan: Plan) -> None:
