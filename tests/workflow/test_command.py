@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import pty
 import re
 import subprocess
 import sys
@@ -53,3 +56,42 @@ def test_a_study_from_an_empty_folder(tmp_path: Path, monkeypatch: pytest.Monkey
     again = CliRunner().invoke(app, ["report", "coarse.yaml"])
     assert again.exit_code == 0, again.output
     assert page.stat().st_size > 1e5
+
+
+HIDE_CURSOR, SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
+
+
+def test_on_a_terminal_a_table_is_drawn_and_taken_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TERM", "xterm")
+    Path("coarse.yaml").write_text(COARSE)
+    command = [sys.executable, "-m", "sandmould.cli", "run", "coarse.yaml", "--cores", "2"]
+    stopped, said = on_a_terminal(command, until="0 of 2 runs done", types="\x03")
+    assert stopped == 130, said
+    assert said.count("coarse was stopped: the same command goes on with it.") == 1
+    assert "Traceback" not in said
+    assert said.rindex(SHOW_CURSOR) > said.rindex(HIDE_CURSOR)
+    status, said = on_a_terminal(command)
+    assert status == 0, said
+    assert "2 of 2 runs done after " in said
+    assert said.rindex(SHOW_CURSOR) > said.rindex(HIDE_CURSOR)
+    *_, last = said.splitlines()
+    assert last.endswith(" The report: results/coarse/report.html")
+
+
+def on_a_terminal(command: list[str], until: str = "", types: str = "") -> tuple[int, str]:
+    """Run a command on a terminal of its own; type something once it has said something."""
+    pid, terminal = pty.fork()
+    if not pid:
+        os.execv(command[0], command)
+    said = b""
+    with contextlib.suppress(OSError):  # that is how a terminal says that nobody is left on it
+        while words := os.read(terminal, 65536):
+            said += words
+            if types and until.encode() in said:
+                os.write(terminal, types.encode())
+                types = ""
+    os.close(terminal)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), said.decode(errors="replace")

@@ -96,6 +96,8 @@ def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
     """
     measure, better = study.objective.measure, study.objective.better
     swept = sweep_part(summary)
+    if swept.empty:
+        return ""
     keys = swept_keys(swept)
     verdict = compare_settings(swept, keys, measure, better)
     used = [setting for setting in verdict.settings if setting.n]

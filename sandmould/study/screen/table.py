@@ -28,11 +28,11 @@ def study_table(view: StudyView, width: int, height: int) -> RenderableType:
     width, height : int
         Columns and lines of the terminal.
     """
-    head: list[RenderableType] = [_counts(view), _whole(view, width)]
+    head = [_counts(view), _whole(view, width)]
     if view.so_far:
         head.append(Text(f"So far: {view.so_far}", style="bold"))
-    above = sum(-(-cell_len(text.plain) // width) for text in head if isinstance(text, Text)) + 1
-    failures, running, ended = _shares(view, max(_FEWEST_ROWS, height - above - 2))
+    above = sum(-(-cell_len(text.plain) // width) for text in head)
+    failures, running, ended = _shares(view, max(_FEWEST_ROWS, height - above - 3))
     return Group(
         *head,
         *([_running_table(view.running[:running], width)] if running else []),
@@ -69,13 +69,10 @@ def _counts(view: StudyView) -> Text:
     return Text.assemble((view.name, "bold"), f"  {counts_text(view)}")
 
 
-def _whole(view: StudyView, width: int) -> Table:
+def _whole(view: StudyView, width: int) -> Text:
     """The bar of the whole study with its times."""
-    times = times_text(view)
-    row = Table.grid(padding=(0, 1), expand=False)
-    bar = max(10, min(width - cell_len(times) - 8, 60))
-    row.add_row(_bar(view.share, bar), f"{100 * view.share:3.0f} %", times)
-    return row
+    times = f" {100 * view.share:3.0f} % {times_text(view)}"
+    return Text.assemble(_bar(view.share, max(10, min(width - cell_len(times), 60))), times)
 
 
 def _bar(share: float, width: int) -> Text:
@@ -123,5 +120,5 @@ def _line(text: str, width: int, style: str = "") -> Text:
 
 def _cut(text: str, width: int) -> str:
     """Text of one line, cut where it is too wide."""
-    flat = " ".join(text.split())
+    flat = " ".join(text.splitlines())
     return flat if cell_len(flat) <= width else f"{set_cell_size(flat, width - 3)}..."
