@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -114,9 +115,8 @@ def run_snakemake(
         preexec_fn=partial(end_with_parent, signal.SIGKILL),
     )
     try:
-        while look is not None:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                return process.wait(look())
+        while not _has_ended(process, look() if look is not None else None):
+            pass
         return process.wait()
     except Stopped:
         if any(option.split("=")[0] in _ELSEWHERE for option in command):
@@ -124,8 +124,19 @@ def run_snakemake(
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(GRACE_S)
         _signal(process, signal.SIGKILL)
-        process.wait()
+        # Not its wait(): the signal may have come while that held a lock, which it never got free.
+        with contextlib.suppress(ChildProcessError):
+            os.waitpid(process.pid, 0)
         raise
+
+
+def _has_ended(process: subprocess.Popen[bytes], wait_s: float | None) -> bool:
+    """Whether a process ends within some seconds; waits for it without a limit for None."""
+    end = os.pidfd_open(process.pid)
+    try:
+        return bool(select.select([end], [], [], wait_s)[0])
+    finally:
+        os.close(end)
 
 
 def _signal(process: subprocess.Popen[bytes], number: signal.Signals) -> None:

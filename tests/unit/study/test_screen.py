@@ -230,7 +230,7 @@ def test_the_verdict_so_far(plan: Plan) -> None:
     assert so_far_text(SUMMARY[:2], study, 2) == (
         "fill of the tube 0.705 (2 runs); nothing to compare with yet"
     )
-    best = "highest fill of the tube at 25 Hz 0.71 (3 runs), then 50 Hz 0.51 (3 runs)"
+    best = "highest fill of the tube at 25 Hz 0.710 (3 runs), then 50 Hz 0.510 (3 runs)"
     assert so_far_text(SUMMARY, study, 2) == f"resolved, {best}"
     # A third point has no run yet.
     assert so_far_text(SUMMARY, study, 3) == f"not resolved yet, {best}"
