@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sandmould.runs.checkpoint_folders import END_CHECKPOINT
 from sandmould.runs.manifest import files_below, write_manifest
 from sandmould.runs.outcome import RunOutcome
 
@@ -69,15 +70,9 @@ def peak_memory_bytes() -> int:
 
 LAST_WORK = "last_work"
 """Folder of what a failed run leaves besides its products, its last checkpoint above all."""
-SAND_PRODUCTS = (
-    "series.tsv",
-    "loads.tsv",
-    "snapshots",
-    "engine.log",
-    "pattern.log",
-    "pattern.tsv",
-    "pattern_shapes.f8",
-)
+SAND_TABLES = ("series.tsv", "loads.tsv", "snapshots", "pattern.tsv", "pattern_shapes.f8")
+"""What a run of sand writes on and on; a run that begins with a shared fill takes up the fill's."""
+SAND_PRODUCTS = (*SAND_TABLES, "engine.log", "pattern.log", END_CHECKPOINT)
 
 
 def finish(

@@ -73,6 +73,17 @@ def template_hash(scenario: Scenario) -> str:
     return registry.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
 
 
+def fill(scenario: Scenario) -> Scenario | None:
+    """The scene up to its first vibration; None where there is none.
+
+    Another program that bends a pattern answers every run for itself.
+    """
+    pattern = scenario.pattern
+    if not scenario.vibrations or (pattern is not None and pattern.loop.exchange == "files"):
+        return None
+    return scenario.before_vibration
+
+
 def computed_hash(scenario: Scenario) -> str:
     """Hash of what the engine is told to compute, and of the pattern beside it."""
     of_engine = registry.computed_hash(scenario)
@@ -109,7 +120,7 @@ def allowed_s(scenario: Scenario) -> float:
 def planned_work(scenario: Scenario) -> float:
     """Steps times grains in the box at the time, and again where windows are repeated."""
     most = 1 if scenario.pattern is None else scenario.pattern.loop.most_passes
-    return min(most, PASSES) * build_program(scenario).expected_grain_steps
+    return min(most, PASSES) * build_program(scenario).expected_grain_steps()
 
 
 def predicted_s(scenario: Scenario) -> float:
@@ -185,6 +196,7 @@ PLANNING = Planning[Scenario](
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
+    fill=fill,
     notes=notes,
     speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
 )
