@@ -36,6 +36,8 @@ class Cost:
     peak_memory_bytes: int = 0
     """Of the first rank."""
     largest_overlap_fraction: float = 0.0
+    fill: str = ""
+    """Fill that it shares, whose own cost counts apart."""
 
     def row(self) -> dict[str, Any]:
         """Values by name, as a continued run takes them up."""
@@ -44,7 +46,10 @@ class Cost:
     def columns(self) -> dict[str, Any]:
         """Columns of ``cost.tsv`` and their values."""
         rate = self.grain_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
-        return {**self.row(), "grain_steps_per_s": rate}
+        columns = {**self.row(), "grain_steps_per_s": rate}
+        if not self.fill:
+            del columns["fill"]
+        return columns
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def lay_tables(source: Path, work: Path, names: Iterable[str]) -> None:
 
 
 def lay_checkpoint(
-    source: Path, work: Path, owner_hash: str, run_hash: str, cost: Cost, stages: int
+    source: Path, work: Path, owner_hash: str, run_hash: str, cost: Cost, stages: int, fill: str
 ) -> None:
     """Give a run the checkpoint that another one left, as its newest.
 
@@ -62,6 +62,8 @@ def lay_checkpoint(
         the grains and the largest overlap of the whole.
     stages : int
         That the other one has computed.
+    fill : str
+        Its name.
 
     Raises
     ------
@@ -77,6 +79,7 @@ def lay_checkpoint(
         steps=taken.steps,
         grains=taken.grains,
         largest_overlap_fraction=taken.largest_overlap_fraction,
+        fill=fill,
     )
     partial = checkpoints.empty(work / "checkpoint_of_fill")
     for file in source.iterdir():

@@ -43,7 +43,10 @@ def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
         world = registry.deck_reader(run.scenario.engine.name).communicator()
         is_root = world.rank == 0
         failed = world.bcast(_lay(run, folder, program) if is_root else None, root=0)
-    return None if failed is None else Computed(failed, cost_before(run.scenario), is_root)
+    if failed is None:
+        return None
+    cost = replace(cost_before(run.scenario), fill=run.fill)
+    return Computed(failed, cost, is_root)
 
 
 def _lay(run: Run, folder: Path, program: Program) -> RunOutcome | None:
@@ -63,6 +66,7 @@ def _lay(run: Run, folder: Path, program: Program) -> RunOutcome | None:
             scenario_hash(scenario),
             cost_before(scenario),
             program.fill_stages,
+            run.fill,
         )
     except (OSError, ValueError, KeyError, TypeError) as error:
         why = f"the fill {run.fill} cannot be used ({error}), and the run fills by itself"
