@@ -25,7 +25,8 @@ rule render:
 
 rule fill:
     input:
-        scenarios=ancient(f"{FOLDER}/fills/{{fill}}/scenario.yaml"),
+        # A list, as of a batch.
+        scenarios=[ancient(f"{FOLDER}/fills/{{fill}}/scenario.yaml")],
         note=fill_note_of,
     output:
         outcome=f"{FOLDER}/fills/{{fill}}/outcome.json",

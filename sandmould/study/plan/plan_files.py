@@ -224,9 +224,10 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     """How many runs share how many fills, and what the fills take of the disk."""
     sharing = sum(bool(run.fill) for run in runs)
     state_bytes = sum(kind_of(fill.scenario).planning.state_bytes(fill.scenario) for fill in fills)
+    number = "1 fill" if len(fills) == 1 else f"{len(fills)} fills"
     return (
-        f"{sharing} runs share {len(fills)} fills, each computed and counted once; "
-        f"the fills keep about {size_text(state_bytes)} on the disk"
+        f"{sharing} runs share {number}, each computed and counted once: "
+        f"about {size_text(state_bytes)} of the disk"
     )
 
 
