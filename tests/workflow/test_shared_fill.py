@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import shutil
 import threading
 from pathlib import Path
 from typing import Any
@@ -10,22 +11,26 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from pattern_fe.coupling.interface import with_surface
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.again import _failed_fill
+from sandmould.study.batch_job import compute_batch
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.sand.planning import PLANNING
+from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, prepare
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run, write_plan
 from sandmould.study.process import launch
 from sandmould.study.simulate import render_run, simulate
+from sandmould.study.status import status_text
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.patterns import _one_thread  # noqa: F401
-from tests.scenes import tube_scene
+from tests.scenes import TUBE_SCENE, tube_scene
 from tests.workflow.runs import SOON, computed, kill_after_a_checkpoint, last_snapshot
 from tests.workflow.test_records_change_nothing import PLANK
 
@@ -194,3 +199,29 @@ def test_two_jobs_never_make_one_fill(tmp_path: Path, capsys: pytest.CaptureFixt
         launch(fill, tmp_path / "log")
     assert "waiting for the process that computes it already" in capsys.readouterr().err
     assert RunOutcome.read(fill / "outcome.json").detail == "by the other job"
+
+
+def test_what_is_lost_of_a_study_is_computed_from_its_fills(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tree = {"scenario": {**TUBE_SCENE, **REFERENCE},
+            "sweep": {"keys": {"vibration.0.frequency_hz": [50, 100]}}}  # fmt: skip
+    Path("small.yaml").write_text(yaml.safe_dump(tree))
+    plan, folder = open_plan(Path("small.yaml")), RESULTS / "small"
+    announce(plan, RESULTS, 1)
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    (fill,), (run, _) = plan.fills, plan.runs
+    compute_batch([folder / fill.place], logs, 1, "")
+    compute_batch([folder / each.place for each in plan.runs], logs, 1, "")
+    assert plan.lacks(RESULTS) == {}
+    assert "2 done of 2 runs\nprocessor time" in status_text(plan, RESULTS, 1)
+    # a torn fill matters only to a run that goes on from it
+    (folder / fill.place / END_CHECKPOINT / "solver.npz").write_bytes(b"")
+    assert plan.lacks(RESULTS) == {}
+    shutil.rmtree(folder / run.place)
+    announce(plan, RESULTS, 1)
+    assert set(plan.lacks(RESULTS)) == {fill.run, run.run}
+    again = f"computed again: {fill.run} (end_checkpoint/solver.npz has 0 of "
+    assert prepare(plan, RESULTS).startswith(again)

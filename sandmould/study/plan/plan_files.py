@@ -210,12 +210,12 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
     whole = duration_text(max(core_s / cores, longest_s))
     basis = "at the speed measured on this machine" if measured else "an estimate"
     fills = [run for run in runs if run.part == FILL]
+    if fills:
+        lines.append(_fills_line(runs, fills))
     lines.append(
         f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}, "
         f"wall time on {cores} cores: {whole}, {basis}"
     )
-    if fills:
-        lines.append(_fills_line(runs, fills))
     lines += [_note_line(told, len(points)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
 

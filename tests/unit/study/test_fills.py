@@ -15,8 +15,10 @@ from sandmould.study.definition.run import FILL
 from sandmould.study.fill_costs import shares_of_fills
 from sandmould.study.kinds.sand.planning import PLANNING
 from sandmould.study.plan.build_plan import Plan, announce, open_plan, prepare
+from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import own_work, predicted_s, share_fills
 from sandmould.study.plan.lacking import Need
+from sandmould.study.plan.load_study import STUDIES, open_study
 from sandmould.study.plan.plan_files import plan_table, read_run
 from sandmould.study.status import status_text
 from sandmould.study.tidy import orphans
@@ -148,3 +150,24 @@ def test_each_run_bears_its_part_of_a_fill(tmp_path: Path) -> None:
     assert table[FILL_CPU_S].fillna(-1).tolist() == [4.0, 4.0, 3.0, -1.0, -1.0]
     assert table[FILL_WALL_S].fillna(-1).tolist() == [8.0, 8.0, 6.0, -1.0, -1.0]
     assert total_s(table, CPU_S) == 5.0 + 8.0 + 3.0
+
+
+def test_rounds_and_controls_of_the_vibration_go_on_from_the_fills_of_the_sweep() -> None:
+    study = open_study(STUDIES[0] / "tube_certified.yaml")
+    swept = expand(study)
+    point = {FREQUENCY: 77.0}
+    runs, fills = share_fills(expand(study, [(point, 1)], (40.0, 80.0, 160.0)), PLANNING)
+    of_sweep = {run.seed: run.fill for run in runs if run.part == "sweep"}
+    assert len(of_sweep) == len({run.seed for run in swept})
+    (added,) = (run for run in runs if run.parameters == point)
+    assert added.fill == of_sweep[added.seed]
+    controls = {run.part.split()[1] for run in runs if run.part.startswith("control")}
+    sharing = {
+        run.part.split()[1]
+        for run in runs
+        if run.part.startswith("control") and run.fill == of_sweep.get(run.seed)
+    }
+    # The weak shake is checked and recorded more often, so it is another scene from the start.
+    assert sharing == {"hold"}
+    assert {"hold", "spectrum", "stiffness"} <= controls
+    assert len({fill.run for fill in fills}) == len(fills)
