@@ -141,10 +141,36 @@ numba.config.CACHE_DIR = str(_FOLDER)  # type: ignore[attr-defined]
 binding.set_option("sandmould", "-align-all-functions=6")
 
 
+_DISPATCHERS: dict[str, Any] = {}
+"""Functions that this process may call on one thread, by module and name."""
+
+
 def njit(**options: Any) -> Callable[[_Function], _Function]:
     """Compile a function for compiled code and for Python; options are those of ``numba.njit``."""
-    compiled: Callable[[_Function], _Function] = numba.njit(cache=KEEPS, **options)
+
+    def compiled(function: _Function) -> _Function:
+        dispatcher: Any = numba.njit(cache=KEEPS, **options)(function)
+        if not options.get("parallel"):  # loading one of these may start threads
+            _DISPATCHERS[f"{function.__module__}.{function.__qualname__}"] = dispatcher
+        return dispatcher
+
     return compiled
+
+
+def loaded_kernels() -> set[tuple[str, Any]]:
+    """Functions that Python has called in this process, each with the types of its arguments."""
+    return {
+        (name, types)
+        for name, dispatcher in _DISPATCHERS.items()
+        for types in dispatcher.signatures
+    }
+
+
+def load_kernels(kernels: Iterable[tuple[str, Any]]) -> None:
+    """Load functions before they are called, as another process did; none is computed with."""
+    for name, types in kernels:
+        if name in _DISPATCHERS:
+            _DISPATCHERS[name].compile(types)
 
 
 def cfunc(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:

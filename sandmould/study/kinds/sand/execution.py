@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
 from sandmould.engines import recording, registry
@@ -47,6 +48,15 @@ def measure(run: Run, folder: Path) -> None:
     measure_sand(run.scenario, folder)
 
 
+def load(scenario: Scenario) -> None:
+    """Import the engine's side of the house, the pattern's where there is one, and measuring."""
+    registry.engine_of(scenario)
+    importlib.import_module("sandmould.study.kinds.sand.measure")
+    if scenario.pattern is not None:
+        importlib.import_module("pattern_fe.coupling.opening")
+        importlib.import_module("sandmould.study.kinds.sand.bent_files")
+
+
 EXECUTION = Execution[Scenario](
     products=SAND_PRODUCTS,
     render=render,
@@ -54,4 +64,5 @@ EXECUTION = Execution[Scenario](
     complete=complete,
     no_cost=cost_before,
     measure=measure,
+    load=load,
 )

@@ -1,0 +1,91 @@
+"""A worker: it loads all libraries once and forks a process for each run.
+
+A run that crashes takes no other with it. MPI, engines and threads begin in the run's process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import pickle
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from sandmould.compiled import load_kernels, loaded_kernels
+from sandmould.runs.provenance import commit, processor, versions
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.module_main import in_a_sentence
+from sandmould.study.definition.run import Run
+from sandmould.study.forked import ForkedProcess, Work
+from sandmould.study.kinds.registry import kind_of
+from sandmould.study.plan.plan_files import read_run
+from sandmould.study.process import listen, passed_on, watch
+from sandmould.study.simulate import measure, simulate, write_crash
+
+
+def load(folders: Sequence[Path]) -> None:
+    """Load what runs need; all of a batch are of one kind and engine.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Of the runs.
+    """
+    with contextlib.suppress(BadInputError):  # the run says so itself
+        scenario = read_run(folders[0] / "scenario.yaml").scenario
+        kind_of(scenario).execution.load(scenario)
+    for asked_once in (commit, versions, processor):
+        asked_once()
+
+
+def compute_forked(folder: Path, log: Path) -> None:
+    """Compute a run in a process that is forked from this one; see ``process.watch``."""
+
+    def crash(detail: str) -> None:
+        writer = ForkedProcess(partial(write_crash, folder, detail))
+        with log.open("a", encoding="utf-8") as log_file:
+            status, said = listen(writer, log_file, folder.name)
+        if status:
+            raise RuntimeError(said)
+
+    with _kernels_taken_over() as noted:
+        watch(folder, log, lambda lock: ForkedProcess(noted(simulate, folder)), crash)
+
+
+def measure_forked(run: Run, folder: Path, log: Path) -> None:
+    """Measure a run in a process that is forked from this one.
+
+    Raises
+    ------
+    RuntimeError
+        With the last words of one that did not end well.
+    """
+    with _kernels_taken_over() as noted, log.open("a", encoding="utf-8") as log_file:
+        process = ForkedProcess(noted(measure, run, folder))
+        with passed_on(process):
+            status, said = listen(process, log_file, run.run)
+    if status:
+        raise RuntimeError(f"measuring ended with status {status}: {said}")
+
+
+@contextlib.contextmanager
+def _kernels_taken_over() -> Iterator[Callable[..., Work]]:
+    """Load what a forked process loaded, so that the next finds it; gives what wraps its work.
+
+    Reading compiled code takes longer than a short run.
+    """
+    before = loaded_kernels()
+    with tempfile.TemporaryFile() as file:
+
+        def work(function: Callable[..., int | None], *given: Any) -> int | None:
+            status = in_a_sentence(function, *given)
+            pickle.dump(loaded_kernels() - before, file)
+            file.flush()
+            return status
+
+        yield lambda function, *given: partial(work, function, *given)
+        file.seek(0)
+        with contextlib.suppress(EOFError, pickle.UnpicklingError):  # it crashed before
+            load_kernels(pickle.load(file))
