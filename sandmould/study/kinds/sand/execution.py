@@ -9,6 +9,7 @@ from sandmould.engines import recording, registry
 from sandmould.engines.cost import cost_before
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.program import build_program
+from sandmould.engines.snapshot_file import close_torn
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.products import SAND_PRODUCTS, Computed
 from sandmould.scenario.scenario import Scenario
@@ -37,8 +38,9 @@ def compute(run: Run, folder: Path) -> Computed:
 
 
 def complete(scenario: Scenario, work: Path) -> None:
-    """Make empty tables, so that collection finds them."""
+    """Make empty tables, so that collection finds them, and end the file of snapshots."""
     recording.create_tables(work, scenario.dimension)
+    close_torn(work)
 
 
 def measure(run: Run, folder: Path) -> None:
