@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from sandmould.runs.columns import REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
@@ -86,7 +86,7 @@ def setting_of(values: dict[str, Any], planned: int, measured: pd.Series[float])
     """Mean, spread and interval of one setting's finished values."""
     n = len(measured)
     sd = float(measured.std(ddof=1)) if n > 1 else math.nan
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * sd / math.sqrt(n) if n > 1 else sd
+    half = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) * sd / math.sqrt(n) if n > 1 else sd
     mean = float(measured.mean()) if n else math.nan
     return Setting(values, setting_text(values), planned, n, mean, sd, half)
 
@@ -149,6 +149,8 @@ def compare_means(first: pd.Series[float], second: pd.Series[float]) -> tuple[An
     """
     if len(first) < 2 or len(second) < 2:
         return None
+    from scipy import stats  # a third of a second
+
     index = first.index
     paired = index.is_unique and second.index.is_unique and set(index) == set(second.index)
     x = np.asarray(first, dtype=np.float64)

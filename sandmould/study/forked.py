@@ -9,10 +9,12 @@ import traceback
 from collections.abc import Callable
 from typing import NoReturn, TextIO
 
-from sandmould.runs.parent import end_with_parent
+from sandmould.runs.parent import call_process, end_with_parent
 
 Work = Callable[[], int | None]
 """Gives the exit status; None for 0."""
+PROCESS_NAME = "sandmould-run"
+"""What lists of processes call it, where Linux takes a name of fifteen letters."""
 BROKEN = 1
 """Exit status of work that raised."""
 
@@ -67,6 +69,7 @@ def _work_on(work: Work, write: int, parent: int) -> NoReturn:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
         end_with_parent()
+        call_process(PROCESS_NAME)
         for number in (1, 2):
             os.dup2(write, number)
         os.close(write)
