@@ -48,7 +48,7 @@ def compute_batch(
     """
     stop = _Stop()
     log.touch()
-    load(folders)
+    load(folders, ahead=side_by_side > 1)
 
     def work(place_of_next: Callable[[], int]) -> None:
         """Take the next run until none is left or the job is asked to end."""
@@ -115,7 +115,7 @@ def _compute(folder: Path, log: Path, ranks: int, mpi: str) -> None:
             (folder / old).unlink(missing_ok=True)  # damaged, or of another scenario or deck
         render(run, folder)
         if ranks == 1:
-            compute_forked(folder, log)
+            compute_forked(run, folder, log)
         else:
             launch(folder, log, ranks, mpi)
     else:

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from sandmould.compiled import load_kernels, loaded_kernels
 from sandmould.runs.provenance import commit, processor, versions
@@ -24,22 +24,32 @@ from sandmould.study.process import listen, passed_on, watch
 from sandmould.study.simulate import measure, simulate, write_crash
 
 
-def load(folders: Sequence[Path]) -> None:
+def load(folders: Sequence[Path], ahead: bool = True) -> None:
     """Load what runs need; all of a batch are of one kind and engine.
 
     Parameters
     ----------
     folders : sequence of Path
         Of the runs.
+    ahead : bool
+        Load what measures, too; else that is done while the first run is computed.
     """
     with contextlib.suppress(BadInputError):  # the run says so itself
         scenario = read_run(folders[0] / "scenario.yaml").scenario
-        kind_of(scenario).execution.load(scenario)
+        execution = kind_of(scenario).execution
+        execution.load_computing(scenario)
+        if ahead:
+            _load_rest(scenario)
+
+
+def _load_rest(scenario: Any) -> None:
+    """Load what is not needed before a run begins."""
+    kind_of(scenario).execution.load_measuring(scenario)
     for asked_once in (commit, versions, processor):
         asked_once()
 
 
-def compute_forked(folder: Path, log: Path) -> None:
+def compute_forked(run: Run, folder: Path, log: Path) -> None:
     """Compute a run in a process that is forked from this one; see ``process.watch``."""
 
     def crash(detail: str) -> None:
@@ -50,7 +60,13 @@ def compute_forked(folder: Path, log: Path) -> None:
             raise RuntimeError(said)
 
     with _kernels_taken_over() as noted:
-        watch(folder, log, lambda lock: ForkedProcess(noted(simulate, folder)), crash)
+
+        def start(lock: TextIO) -> ForkedProcess:
+            process = ForkedProcess(noted(simulate, folder))
+            _load_rest(run.scenario)
+            return process
+
+        watch(folder, log, start, crash)
 
 
 def measure_forked(run: Run, folder: Path, log: Path) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from sandmould.study.definition.run import LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
 
-START_S = 2.0
+START_S = 0.3
 """What a run takes beside its steps: its process and its measures (docs/scaling.md)."""
 
 

@@ -97,18 +97,17 @@ class Jobs:
         self.measured: list[str] = []
         self.stops = stops
         monkeypatch.setattr(batch_job, "render", self.render)
-        monkeypatch.setattr(batch_job, "load", lambda folders: None)
+        monkeypatch.setattr(batch_job, "load", lambda folders, ahead: None)
         monkeypatch.setattr(batch_job, "compute_forked", self.compute)
         monkeypatch.setattr(batch_job, "measure_forked", self.measure)
 
     def render(self, run: Run, folder: Path) -> None:
         (folder / "deck.in").write_text("run 1\n")
 
-    def compute(self, folder: Path, log: Path) -> None:
+    def compute(self, run: Run, folder: Path, log: Path) -> None:
         if folder.name == self.stops:
             raise SystemExit(f"{folder} stopped early: the same command continues it.")
         self.computed.append(folder.name)
-        run = batch_job.read_run(folder / "scenario.yaml")
         origin = {"scenario_sha256": scenario_hash(run.scenario),
                   "template_sha256": deck_hash(run.scenario)}  # fmt: skip
         (folder / "provenance.json").write_text(json.dumps(origin))

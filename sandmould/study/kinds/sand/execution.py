@@ -50,12 +50,17 @@ def measure(run: Run, folder: Path) -> None:
     measure_sand(run.scenario, folder)
 
 
-def load(scenario: Scenario) -> None:
-    """Import the engine's side of the house, the pattern's where there is one, and measuring."""
+def load_computing(scenario: Scenario) -> None:
+    """Import the engine's side of the house, and the pattern's where there is one."""
     registry.engine_of(scenario)
-    importlib.import_module("sandmould.study.kinds.sand.measure")
     if scenario.pattern is not None:
         importlib.import_module("pattern_fe.coupling.opening")
+
+
+def load_measuring(scenario: Scenario) -> None:
+    """Import what measures and draws."""
+    importlib.import_module("sandmould.study.kinds.sand.measure")
+    if scenario.pattern is not None:
         importlib.import_module("sandmould.study.kinds.sand.bent_files")
 
 
@@ -66,5 +71,6 @@ EXECUTION = Execution[Scenario](
     complete=complete,
     no_cost=cost_before,
     measure=measure,
-    load=load,
+    load_computing=load_computing,
+    load_measuring=load_measuring,
 )
