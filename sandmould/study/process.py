@@ -87,6 +87,7 @@ def watch(
     log: Path,
     start: Callable[[TextIO], StartedRun],
     write_crash: Callable[[str], None],
+    meanwhile: Callable[[], None] = lambda: None,
 ) -> None:
     """Compute a run in a process that is started here, and see to its outcome.
 
@@ -99,6 +100,8 @@ def watch(
         Starts the process, which must hold the file that it is given: the run's lock.
     write_crash : callable
         Writes the outcome of a process that could not; takes what is known of its end.
+    meanwhile : callable
+        Done once the process has begun.
 
     Raises
     ------
@@ -111,6 +114,7 @@ def watch(
             return  # finished meanwhile by a process that outlived its own snakemake
         process = start(lock)
         with passed_on(process):
+            meanwhile()
             status, tail = listen(process, log_file, folder.name)
         if status == 0 or (folder / "outcome.json").exists():
             return  # killed after its outcome was there: nothing is left to do

@@ -6,6 +6,7 @@ A run that crashes takes no other with it. MPI, engines and threads begin in the
 from __future__ import annotations
 
 import contextlib
+import gc
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -47,6 +48,7 @@ def _load_rest(scenario: Any) -> None:
     kind_of(scenario).execution.load_measuring(scenario)
     for asked_once in (commit, versions, processor):
         asked_once()
+    gc.freeze()  # a child that looks through what is here would copy it
 
 
 def compute_forked(run: Run, folder: Path, log: Path) -> None:
@@ -62,11 +64,9 @@ def compute_forked(run: Run, folder: Path, log: Path) -> None:
     with _kernels_taken_over() as noted:
 
         def start(lock: TextIO) -> ForkedProcess:
-            process = ForkedProcess(noted(simulate, folder))
-            _load_rest(run.scenario)
-            return process
+            return ForkedProcess(noted(simulate, folder))
 
-        watch(folder, log, start, crash)
+        watch(folder, log, start, crash, partial(_load_rest, run.scenario))
 
 
 def measure_forked(run: Run, folder: Path, log: Path) -> None:

@@ -83,8 +83,8 @@ def measure_sand(scenario: Scenario, folder: Path) -> None:
 
 def write_picture(scenario: Scenario, folder: Path, out: Path) -> None:
     """Draw the last snapshot of a run by layer; the empty scene where there is none."""
-    figure = Figure(figsize=(6, 4.5), dpi=150, layout="constrained")
-    ax = figure.add_subplot()
+    figure = Figure(figsize=(6, 4.5), dpi=150)
+    ax = figure.add_axes((0.12, 0.12, 0.84, 0.8))  # a layout of its own would draw all twice
     moments = list_moments(folder)
     last = moments[-1].load() if moments else None
     scene = scenario.scene if last is None else scene_at(scenario, last)
