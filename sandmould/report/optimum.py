@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.curves import reported_lines
@@ -34,7 +34,7 @@ WRONG = {"frequency_hz": 10.0}
 """By how much a key may be set wrong in a foundry; others by a tenth of their range."""
 SHARE_LOST = 0.05
 """Of the best value, what counts as no worse where the study sets no margin."""
-_TWO_SIDED = float(norm.ppf(0.5 + CONFIDENCE / 2))
+_TWO_SIDED = float(ndtri(0.5 + CONFIDENCE / 2))
 
 
 @dataclass(frozen=True)

@@ -320,7 +320,7 @@ _FILES = (
     (FIGURES, "main figures as files: charts as SVG, sand as PNG"),
     ("agreement.tsv", "one row a pair of settings and measure that the study compares"),
     ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "
-     "snapshots; exports/ holds some of them for ParaView (.vtu) and OVITO (.dump)"),
+     "snapshots; exports.zip holds some of them for ParaView (.vtu) and OVITO (.dump)"),
 )  # fmt: skip
 
 

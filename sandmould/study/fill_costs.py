@@ -8,7 +8,7 @@ import pandas as pd
 
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, WALL_S
 from sandmould.study.definition.run import FILLS
-from sandmould.study.run_tables import PLACE, read_tables
+from sandmould.study.run_tables import PLACE, read_costs
 
 
 def shares_of_fills(fills: pd.Series[str], study_folder: Path) -> dict[str, pd.Series[float]]:
@@ -26,7 +26,7 @@ def shares_of_fills(fills: pd.Series[str], study_folder: Path) -> dict[str, pd.S
         Columns for the summary, s.
     """
     names = fills.dropna().unique()
-    costs = read_tables([study_folder / FILLS / name / "cost.tsv" for name in names])
+    costs = read_costs([study_folder / FILLS / name for name in names])
     last = costs.rows.drop_duplicates(PLACE, keep="last").set_index(PLACE)
     cost = last.reindex(index=range(len(names)), columns=[WALL_S, CPU_S])
     sharing = fills.map(fills.value_counts())

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import pandas as pd
-
 from sandmould.runs.formatting import size_text
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
@@ -24,6 +22,7 @@ from sandmould.study.plan.fills import own_work
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.process import computed_elsewhere, is_locked
 from sandmould.study.rounds.round_log import read_rounds
+from sandmould.study.run_tables import read_costs
 from sandmould.study.tidy import freed_bytes, orphans
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
@@ -83,7 +82,7 @@ def _ended(folder: Path) -> RunStatus:
     outcome = RunOutcome.read(folder / "outcome.json")
     cpu_s = wall_s = math.nan
     with contextlib.suppress(*_DAMAGED):
-        cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[-1]
+        cost = read_costs([folder]).rows.iloc[-1]
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
     if outcome.outcome is Outcome.FINISHED:

@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from pattern_fe.coupling.interface import with_surface
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
@@ -26,6 +27,7 @@ from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run, write_plan
 from sandmould.study.process import launch
+from sandmould.study.run_tables import read_costs
 from sandmould.study.simulate import render_run, simulate
 from sandmould.study.status import status_text
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
@@ -69,7 +71,7 @@ def assert_same(one: Path, other: Path) -> None:
             )  # fmt: skip
         elif (one / table).exists():
             assert (one / table).read_bytes() == (other / table).read_bytes(), table
-    snapshots = [sorted(path.name for path in (f / "snapshots").iterdir()) for f in (one, other)]
+    snapshots = [[each.name for each in stored_snapshots(f)] for f in (one, other)]
     assert snapshots[0] == snapshots[1]
     for name in ("position_m", "velocity_m_s", "spin_rad_s", "pattern_m"):
         values = (getattr(last_snapshot(f), name) for f in (one, other))
@@ -88,7 +90,7 @@ def test_a_branch_is_bit_for_bit_the_run_that_fills_by_itself(
     (shorter, longer), fill = pair(tube_scene(**REFERENCE), tmp_path)
     assert [compute(folder) for folder in (fill, shorter, longer)] == [Outcome.FINISHED] * 3
     assert_same(shorter, straight)
-    costs = {f: pd.read_csv(f / "cost.tsv", sep="\t").iloc[-1] for f in (fill, shorter, straight)}
+    costs = {f: read_costs([f]).rows.iloc[-1] for f in (fill, shorter, straight)}
     # each pays for what it computes, and a sum counts the fill once
     own = costs[fill].grain_steps + costs[shorter].grain_steps
     assert own == costs[straight].grain_steps
@@ -156,7 +158,7 @@ def test_a_fill_that_cannot_be_used_is_told_and_the_run_fills_by_itself(
     assert compute(shorter) is Outcome.FINISHED
     assert f"the fill {fill.name} cannot be used" in capsys.readouterr().err
     assert_same(shorter, straight)
-    assert "fill" not in pd.read_csv(shorter / "cost.tsv", sep="\t")
+    assert "fill" not in read_costs([shorter]).rows
 
 
 def test_runs_end_as_the_fill_that_failed(tmp_path: Path) -> None:
@@ -179,7 +181,7 @@ def test_a_killed_fill_and_a_killed_branch_go_on(straight: Path, tmp_path: Path)
         kill_after_a_checkpoint(folder)
         assert compute(folder) is Outcome.FINISHED
     assert_same(shorter, straight)
-    costs = [pd.read_csv(f / "cost.tsv", sep="\t").iloc[-1] for f in (fill, shorter, straight)]
+    costs = [read_costs([f]).rows.iloc[-1] for f in (fill, shorter, straight)]
     assert costs[0].grain_steps + costs[1].grain_steps == costs[2].grain_steps
 
 

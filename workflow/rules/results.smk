@@ -7,7 +7,6 @@ rule collect:
         table=f"{FOLDER}/runs.tsv",
         batches=expand(rules.batch.output.done, batch=COLLECTED),
         outcomes=expand(rules.simulate.output.outcome, run=ALONE),
-        costs=expand(rules.simulate.output.cost, run=ALONE),
         measures=expand(rules.measure.output.measures, run=ALONE),
     output:
         summary=report(

@@ -59,8 +59,7 @@ rule simulate:
         fill=fill_of,
     output:
         outcome=f"{FOLDER}/runs/{{run}}/outcome.json",
-        provenance=f"{FOLDER}/runs/{{run}}/provenance.json",
-        cost=f"{FOLDER}/runs/{{run}}/cost.tsv",
+        products=f"{FOLDER}/runs/{{run}}/products.json",
         series=f"{FOLDER}/runs/{{run}}/series.tsv",
     log:
         f"{FOLDER}/logs/simulate_{{run}}.log",

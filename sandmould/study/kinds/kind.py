@@ -142,6 +142,10 @@ class Execution(Generic[ScenarioT]):
     """Cost of a run that has not begun."""
     measure: Callable[[Run, Path], None]
     """Measure what a run left behind; the picture last."""
+    load_computing: Callable[[ScenarioT], None] = lambda scenario: None
+    load_measuring: Callable[[ScenarioT], None] = lambda scenario: None
+    """Import what computing or measuring needs, for a worker that forks for each run: what starts
+    threads, MPI or an engine must stay for the run's own process."""
 
 
 def _nothing() -> dict[str, Any]:

@@ -11,7 +11,7 @@ from sandmould.study.definition.run import FILLS, LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.fills import predicted_s
 
-START_S = 2.0
+START_S = 0.3
 """What a run takes beside its steps: its process and its measures (docs/scaling.md)."""
 
 

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
 
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.manifest import MANIFEST_FILE, Manifest, damage, deck_damage, read_manifest
+from sandmould.runs.manifest import (
+    MANIFEST_FILE,
+    OLDER_COST,
+    Manifest,
+    damage,
+    deck_damage,
+    read_manifest,
+    read_origin,
+)
 from sandmould.runs.outcome import RunOutcome
 from sandmould.study.definition.run import FILL, LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
@@ -20,7 +26,7 @@ from sandmould.study.kinds.registry import kind_of
 UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError)
 """What reading a broken file may raise."""
 LISTED = 12
-_OF_ANY_COMPUTED = ("cost.tsv", "series.tsv")
+_OF_ANY_COMPUTED = (OLDER_COST, "series.tsv")
 _OF_ANY_MEASURED = ("measures.tsv", LAST_MEASURED)
 
 
@@ -68,17 +74,16 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     except UNREADABLE:
         return Lack(Need.COMPUTE, "outcome.json cannot be read")
     try:
-        origin: dict[str, Any] = json.loads((folder / "provenance.json").read_text("utf-8"))
+        origin = read_origin(folder)
         if origin["scenario_sha256"] != scenario_hash(run.scenario):
             return Lack(Need.COMPUTE, "it is of another scenario")
         if origin["template_sha256"] != wanted(run):
             return Lack(Need.COMPUTE, "its deck or its solver has changed since")
         manifest = read_manifest(folder)
     except FileNotFoundError:
-        return Lack(Need.COMPUTE, "provenance.json is missing")
+        return Lack(Need.COMPUTE, f"{MANIFEST_FILE} is missing")
     except UNREADABLE:
-        return Lack(Need.COMPUTE, f"provenance.json or {MANIFEST_FILE} cannot be read")
-    lack = _lack_of_files(folder, manifest)
+        lack = _lack_of_files(folder, manifest)
     return WHOLE if run.part == FILL and lack.need is Need.MEASURE else lack
 
 
