@@ -20,11 +20,11 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import pandas as pd
 import yaml
 
 from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, render
 from sandmould import ROOT
+from sandmould.study.run_tables import read_costs
 
 CORES = 2
 STUDIES = ("sweep", "certified", "short_runs")
@@ -103,21 +103,17 @@ def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
     wall_s = time.perf_counter() - begun
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     folder = study.parent / "results" / study.stem
-    summary = pd.concat([pd.read_csv(path, sep="\t") for path in folder.glob("summary*.tsv")])
     if ran.returncode and not (folder / "report.html").exists():
         raise SystemExit(f"{study} failed with {root}:\n{ran.stdout[-2000:]}{ran.stderr[-2000:]}")
-    loop_s = summary["engine_wall_s"].sum()
-    fills = [pd.read_csv(path, sep="\t") for path in folder.glob("fills/*/cost.tsv")]
+    costs = read_costs([*folder.glob("runs/*"), *folder.glob("fills/*")]).rows
     return {
         "core_s": sum(
             getattr(after, name) - getattr(before, name) for name in ("ru_utime", "ru_stime")
         ),
         "wall_s": wall_s,
-        "loop_s": float(loop_s + sum(fill["engine_wall_s"].iloc[-1] for fill in fills)),
-        "runs": len(summary),
-        "grain_steps": float(
-            summary["grain_steps"].sum() + sum(fill["grain_steps"].iloc[-1] for fill in fills)
-        ),
+        "loop_s": float(costs["engine_wall_s"].sum()),
+        "runs": sum(1 for _ in folder.glob("runs/*")),
+        "grain_steps": float(costs["grain_steps"].sum()),
         "files": sum(path.is_file() for path in folder.rglob("*")),
         "bytes": sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()),
     }

@@ -20,8 +20,6 @@ def has_begun(work: Path) -> bool:
 def lay_tables(source: Path, work: Path, names: Iterable[str]) -> None:
     """Give a run the tables that another one left, so that it writes on in them.
 
-    Files of a folder, which are never written again, are shared by links; other files are copied.
-
     Parameters
     ----------
     source : Path
@@ -29,17 +27,12 @@ def lay_tables(source: Path, work: Path, names: Iterable[str]) -> None:
     work : Path
         Of the run; what it has of those names is replaced.
     names : iterable of str
-        Files and folders; those that the source lacks are left out.
+        Files; those that the source lacks are left out.
     """
     work.mkdir(parents=True, exist_ok=True)
     for name in names:
-        target = work / name
-        if target.is_dir():
-            shutil.rmtree(target)
-        if (source / name).is_dir():
-            shutil.copytree(source / name, target, copy_function=_link)
-        elif (source / name).exists():
-            shutil.copyfile(source / name, target)
+        if (source / name).exists():
+            shutil.copyfile(source / name, work / name)
 
 
 def lay_checkpoint(
@@ -90,7 +83,7 @@ def lay_checkpoint(
     partial.rename(work / "checkpoint_a")
 
 
-def _link(source: str | Path, target: str | Path) -> None:
+def _link(source: Path, target: Path) -> None:
     """Give a file a second name; copy it where the file system has no such names."""
     try:
         os.link(source, target)
