@@ -215,8 +215,8 @@ def test_what_is_lost_of_a_study_is_computed_from_its_fills(
     logs = tmp_path / "logs"
     logs.mkdir()
     (fill,), (run, _) = plan.fills, plan.runs
-    compute_batch([folder / fill.place], logs, 1, "")
-    compute_batch([folder / each.place for each in plan.runs], logs, 1, "")
+    compute_batch([folder / fill.place], logs / "one", 1, "")
+    compute_batch([folder / each.place for each in plan.runs], logs / "one", 1, "")
     assert plan.lacks(RESULTS) == {}
     assert "2 done of 2 runs\nprocessor time" in status_text(plan, RESULTS, 1)
     # a torn fill matters only to a run that goes on from it

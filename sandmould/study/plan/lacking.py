@@ -83,7 +83,8 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     except FileNotFoundError:
         return Lack(Need.COMPUTE, f"{MANIFEST_FILE} is missing")
     except UNREADABLE:
-        lack = _lack_of_files(folder, manifest)
+        return Lack(Need.COMPUTE, f"{MANIFEST_FILE} cannot be read")
+    lack = _lack_of_files(folder, manifest)
     return WHOLE if run.part == FILL and lack.need is Need.MEASURE else lack
 
 
