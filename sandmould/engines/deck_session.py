@@ -57,9 +57,10 @@ class DeckSession(StagedSession):
         self._setup_due = True
 
     def _compute_to(self, target: int) -> None:
-        # Setup computes forces with whole-step velocities; only without it do parts add up to
-        # the deck's own uncut run, bit for bit.
-        self.send(f"run {target - self.steps} pre {'yes' if self._setup_due else 'no'} post no")
+        # A checkpoint forces a setup, which computes forces with whole-step velocities. Every check
+        # begins with one, as in the deck, so that it counts for nothing whether a file is written.
+        due = self._setup_due or self.steps % self._counts.check == 0
+        self.send(f"run {target - self.steps} pre {'yes' if due else 'no'} post no")
         self._setup_due = False
 
     def end_stage(self) -> None:
