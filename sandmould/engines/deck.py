@@ -21,7 +21,7 @@ TEMPLATES = ROOT / "templates"
 _LONGEST_REMARK = 200
 """Characters; LIGGGHTS reads lines of 2048."""
 _BLOCK = re.compile(r"^#--- block: (\w+) ---.*?\n(.*?)^#--- end: \1 ---$", re.M | re.S)
-_RUNS = re.compile(r"(?:^run [1-9]\d*\b[^\n]*\n)+", re.M)
+_RUNS = re.compile(r'(?:^(?:run|if [^\n]* then "run) (?!0\b)[^\n]*\n)+', re.M)
 
 
 def exact(number: float) -> str:

@@ -76,6 +76,7 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
         "obstacle_top": scenario.pouring_top_m,
         "down": "0 -1 0" if scenario.dimension == 2 else "0 0 -1",
         "check_steps": counts.check,
+        "setup_steps": counts.setup,
         "first_check": first_check,
         "most_checks": most_checks,
         "load_steps": counts.load,

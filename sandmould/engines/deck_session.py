@@ -57,9 +57,9 @@ class DeckSession(StagedSession):
         self._setup_due = True
 
     def _compute_to(self, target: int) -> None:
-        # A checkpoint forces a setup, which computes forces with whole-step velocities. Every check
-        # begins with one, as in the deck, so that it counts for nothing whether a file is written.
-        due = self._setup_due or self.steps % self._counts.check == 0
+        # Setup computes forces with whole-step velocities, and a checkpoint forces one. So it comes
+        # at fixed steps, as in the deck, whether a file is written there or not.
+        due = self._setup_due or self.steps % self._counts.setup == 0
         self.send(f"run {target - self.steps} pre {'yes' if due else 'no'} post no")
         self._setup_due = False
 

@@ -102,9 +102,10 @@ def assert_sags_exactly(scene: Scenario, tmp_path: Path) -> None:
 )
 def test_secants_of_the_sands_noise_are_refused(engine: str, says: str) -> None:
     """Windows that are computed once differ by what the sand does, not by the foam's answer."""
-    tree = column("quasi_newton", engine).model_dump(mode="json", exclude_unset=True)
+    tree = column("aitken").model_dump(mode="json", exclude_unset=True)
     del tree["obstacles"]
-    tree["pattern"]["loop"]["repeats"] = 0
+    tree["pattern"]["loop"] |= {"scheme": "quasi_newton", "repeats": 0}
+    tree["engine"]["name"] = engine
     if engine == "liggghts":
         tree |= {"background_damping": {"form": "none"}}
         tree["sand"]["disc_inertia"] = "sphere"

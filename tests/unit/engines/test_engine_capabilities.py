@@ -22,6 +22,7 @@ BARE = Capabilities(
     repeats_windows=False,
     calls_movers=False,
     loads_of_every_step=False,
+    checkpoints_at_setups=False,
 )
 
 
