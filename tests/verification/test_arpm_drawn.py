@@ -207,7 +207,8 @@ def test_a_turned_bar_freezes_as_the_bar_upright(case: str, way: str) -> None:
 
 @pytest.mark.parametrize("case", list(CASES))
 def test_a_ball_freezes_as_the_radial_solution(case: str) -> None:
-    for shift, way, layers in ((0.0, "difference", ()), (0.5, "difference", ()), (0.25, "faces", ()),
+    plain, ways = (), ("difference", "faces")
+    for shift, way, layers in (*((x, way, plain) for x in (0.0, 0.5) for way in ways),
                                (0.0, "faces", (2,))):  # fmt: skip
         raster = drawn([ball()], 8, shift)
         assert volume_of(raster) == pytest.approx(4 / 3 * math.pi * R**3, rel=2e-3)
