@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sandmould.runs.checkpoint_folders import END_CHECKPOINT
 from sandmould.runs.manifest import files_below, write_manifest
 from sandmould.runs.outcome import RunOutcome
 
@@ -35,6 +36,8 @@ class Cost:
     peak_memory_bytes: int = 0
     """Of the first rank."""
     largest_overlap_fraction: float = 0.0
+    fill: str = ""
+    """Fill that it shares, whose own cost counts apart."""
 
     def row(self) -> dict[str, Any]:
         """Values by name, as a continued run takes them up."""
@@ -43,7 +46,10 @@ class Cost:
     def columns(self) -> dict[str, Any]:
         """Columns of ``cost.tsv`` and their values."""
         rate = self.grain_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
-        return {**self.row(), "grain_steps_per_s": rate}
+        columns = {**self.row(), "grain_steps_per_s": rate}
+        if not self.fill:
+            del columns["fill"]
+        return columns
 
 
 @dataclass(frozen=True)
@@ -69,15 +75,9 @@ def peak_memory_bytes() -> int:
 
 LAST_WORK = "last_work"
 """Folder of what a failed run leaves besides its products, its last checkpoint above all."""
-SAND_PRODUCTS = (
-    "series.tsv",
-    "loads.tsv",
-    "snapshots",
-    "engine.log",
-    "pattern.log",
-    "pattern.tsv",
-    "pattern_shapes.f8",
-)
+SAND_TABLES = ("series.tsv", "loads.tsv", "snapshots", "pattern.tsv", "pattern_shapes.f8")
+"""What a run of sand writes on and on; a run that begins with a shared fill takes up the fill's."""
+SAND_PRODUCTS = (*SAND_TABLES, "engine.log", "pattern.log", END_CHECKPOINT)
 
 
 def finish(

@@ -23,6 +23,7 @@ from sandmould.runs.columns import (
     CROSS_CHECK,
     DETAIL,
     ENGINE,
+    FILL,
     GRAINS,
     LARGEST_OVERLAP_FRACTION,
     OUTCOME,
@@ -48,6 +49,7 @@ from sandmould.statistics.agreement import (
     sweep_part,
 )
 from sandmould.study.definition.study import Study
+from sandmould.study.fill_costs import shares_of_fills
 from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
 from sandmould.study.plan.plan_files import STUDY_FILE
 from sandmould.study.run_tables import PLACE, UNREADABLE, RunTables, problem_text, read_tables
@@ -246,6 +248,8 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
         **_of_measures_and_costs(outcomes, measures, costs, at_vibration_s),
     }
     table = pd.DataFrame(summary).infer_objects()
+    if FILL in table:
+        table = table.assign(**shares_of_fills(table[FILL], study_folder))
     return Collected(table, _curves(table, swept_keys(runs), measures), swept_keys(runs))
 
 

@@ -11,8 +11,9 @@ from sandmould.engines.program import build_program
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.products import SAND_PRODUCTS, Computed
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.definition.run import Run
+from sandmould.study.definition.run import FILL, Run
 from sandmould.study.kinds.kind import Execution
+from sandmould.study.kinds.sand.shared_fill import lay_fill
 
 
 def render(run: Run, folder: Path) -> None:
@@ -23,14 +24,18 @@ def render(run: Run, folder: Path) -> None:
 
 
 def compute(run: Run, folder: Path) -> Computed:
-    """Take the scenario through its program."""
+    """Take the scenario through its program, or through what its shared fill leaves of it."""
     program = build_program(run.scenario)
+    failed = lay_fill(run, folder, program)
+    if failed is not None:
+        return failed
     opening: Opening = registry.engine_of(run.scenario).open_session
     if run.scenario.pattern is not None:
         from pattern_fe.coupling.opening import open_coupled
 
         opening = open_coupled
-    driver = Driver(program, folder, run.run, scenario_hash(run.scenario), opening)
+    run_hash, is_fill = scenario_hash(run.scenario), run.part == FILL
+    driver = Driver(program, folder, run.run, run_hash, opening, keeps_end=is_fill)
     outcome = driver.run()
     return Computed(outcome, driver.cost, driver.is_root)
 
