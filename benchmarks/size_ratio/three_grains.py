@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 
 from sandmould.arrays import Floats
+from sandmould.scenario.scenario import Scenario
 from tests.verification.cases.bench import Bench, scene
 
 LARGE_M = 2e-3
@@ -68,8 +67,13 @@ class Groove:
         share = 2.0 / (3.0 + 0.4 / cos2)
         return np.degrees(np.arccos(share * np.cos(np.radians(self.starts_deg()))))
 
+    @property
+    def scenario(self) -> Scenario:
+        """The scene of all pairs."""
+        return _scene(self)
 
-def _scene(groove: Groove) -> Any:
+
+def _scene(groove: Groove) -> Scenario:
     mass = DENSITY_KG_M3 * 4 / 3 * math.pi * groove.small_m**3
     pair = {
         "normal_stiffness_n_m": SPRING_N_M,
@@ -108,7 +112,7 @@ def leaving_deg(groove: Groove) -> Floats:
     start = np.radians(groove.starts_deg())
     row = (np.arange(STARTS) + 1.0) * PITCH_M
     turned, left = start.copy(), np.zeros(STARTS, dtype=bool)
-    with Bench(_scene(groove)) as bench:
+    with Bench(groove.scenario) as bench:
         smalls, larges = (np.array(rows) for rows in bench.by_size())
         place = np.zeros((4 * STARTS, 3))
         for side, x in enumerate((LARGE_M, 3 * LARGE_M)):
