@@ -66,6 +66,6 @@ def compared(beds: list[dict[str, dict[str, float]]]) -> list[dict[str, Any]]:
     for name, margin in MARGINS.items():
         for both in pairs:
             first, second = (pd.Series([rows[key][name] for rows in beds]) for key in both)
-            agreed = vars(agree(first, second, margin))
-            found.append({"measure": name, "settings": both, **agreed})
+            agreed = agree(first, second, margin)
+            found.append({"measure": name, "settings": both, "agreed": agreed})
     return found

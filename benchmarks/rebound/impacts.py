@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.stability.phases import Impacts, exact
 from sandmould.arrays import Floats
-from tests.verification.cases.bench import OMEGA_RAD_S, RADIUS_M, Bench, law, mass_kg, scene
+from tests.verification.cases.bench import OMEGA_RAD_S, RADIUS_M, Bench, law, scene
 
 PHASES = 64
 """Impacts whose first touch falls at as many places within a step, evenly."""

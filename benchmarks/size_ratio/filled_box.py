@@ -68,5 +68,5 @@ def compared(rows: dict[str, list[dict[str, float]]]) -> list[dict[str, Any]]:
     found = []
     for name, margin in MARGINS.items():
         half, full = (pd.Series([row[name] for row in rows[plane]]) for plane in PLANES)
-        found.append({"measure": name, **vars(agree(half, full, margin))})
+        found.append({"measure": name, "agreed": agree(half, full, margin)})
     return found
