@@ -1,4 +1,4 @@
-"""The tube's bed filled and shaken with corrected and with plain dashpots, in pairs of equal starts."""
+"""The tube's bed with corrected and with plain dashpots, in pairs of equal starts."""
 
 from __future__ import annotations
 

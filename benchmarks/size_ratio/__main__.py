@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.frame import Benchmark, BenchmarkRun, render
+from benchmarks.size_ratio.cost import cost
 from benchmarks.size_ratio.filled_box import MARGINS, PLANES, box, compared, filled_box
 from benchmarks.size_ratio.three_grains import STARTS, Groove, leaving_deg
 from sandmould.engines.registry import engine_problem
@@ -28,10 +29,11 @@ class Extent(NamedTuple):
     steps: tuple[float, ...]
     """The first on all engines, the others on the reference."""
     boxes: int
+    turns: int
 
 
-WHOLE = Extent((3.3, 5.0, 10.0), (0.2, 0.05), 12)
-LITTLE = Extent((5.0,), (0.2,), 2)
+WHOLE = Extent((3.3, 5.0, 10.0), (0.2, 0.05), 12, 15)
+LITTLE = Extent((5.0,), (0.2,), 2, 1)
 
 
 def grooves(run: BenchmarkRun) -> list[dict[str, Any]]:
@@ -71,6 +73,11 @@ def boxes(run: BenchmarkRun) -> list[dict[str, dict[str, float]]]:
     ]  # fmt: skip
 
 
+def costs(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """What the mend costs on the engines that have it."""
+    return [cost(engine, run.extent.turns) for engine in ("reference", "lammps")]
+
+
 def page(results: dict[str, Any]) -> str:
     """The page of the results."""
     rows = {plane: [pair[plane] for pair in results["boxes"]] for plane in PLANES}
@@ -89,7 +96,7 @@ def page(results: dict[str, Any]) -> str:
 BENCHMARK = Benchmark(
     __file__,
     __doc__,
-    parts={"grooves": grooves, "boxes": boxes},
+    parts={"grooves": grooves, "boxes": boxes, "costs": costs},
     pages={"size_ratio.md": page},
     extent=WHOLE,
     quick=LITTLE,

@@ -1,4 +1,4 @@
-"""A small grain rolls down the groove between two large ones: where does it leave them?
+"""A small grain rolls down the groove between two large ones, and leaves them.
 
 The large grains lie side by side on the floor between two walls, which hold them. Without rolling
 resistance the small one leaves where nothing presses it any more, at an angle from the vertical
