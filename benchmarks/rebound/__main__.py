@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -46,7 +47,7 @@ def impacts(run: BenchmarkRun) -> list[Row]:
         for dashpot in DASHPOTS
         for row in run.parts.get(
             f"{engine}, {ratio}, {step}, {dashpot}",
-            lambda at=(engine, ratio, step, dashpot): errors(*at),
+            partial(errors, engine, ratio, step, dashpot),
         )
     ]
 
@@ -68,8 +69,7 @@ def walls(run: BenchmarkRun) -> list[dict[str, Any]]:
 def beds(run: BenchmarkRun) -> list[dict[str, dict[str, float]]]:
     """Measures of filled beds, a row a start."""
     return [
-        run.parts.get(f"bed {seed}", lambda s=seed: bed(s))
-        for seed in range(1, run.extent.beds + 1)
+        run.parts.get(f"bed {seed}", partial(bed, seed)) for seed in range(1, run.extent.beds + 1)
     ]
 
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,31 +26,32 @@ ENGINES = {"reference": PLANES, "lammps": PLANES, "liggghts": PLANES[1:]}
 class Extent(NamedTuple):
     """How much is measured."""
 
-    ratios: tuple[float, ...]
+    grooves: tuple[tuple[float, float], ...]
+    """Rolling arms, and ratios of the radii."""
     steps: tuple[float, ...]
     """The first on all engines, the others on the reference."""
     boxes: int
     turns: int
 
 
-WHOLE = Extent((3.3, 5.0, 10.0), (0.2, 0.05), 12, 15)
-LITTLE = Extent((5.0,), (0.2,), 2, 1)
+GROOVES = ((0.0, 3.3), (0.0, 5.0), (0.0, 10.0), (0.1, 3.3), (0.1, 5.0))
+WHOLE = Extent(GROOVES, (0.2, 0.05), 8, 7)
+LITTLE = Extent(GROOVES[1:2], (0.2,), 2, 1)
 
 
 def grooves(run: BenchmarkRun) -> list[dict[str, Any]]:
     """Where small grains leave the groove, a row a setting."""
     rows = []
-    for arm in (0.0, 0.1):
-        for ratio in run.extent.ratios:
-            for step in run.extent.steps:
-                for engine, planes in ENGINES.items():
-                    for plane in planes:
-                        groove = Groove(engine, plane, ratio, arm, step)
-                        if engine != "reference" and step != run.extent.steps[0]:
-                            continue
-                        if engine_problem(groove.scenario) is not None:
-                            continue
-                        rows.append(run.parts.get(f"groove, {groove}", lambda g=groove: _row(g)))
+    for arm, ratio in run.extent.grooves:
+        for step in run.extent.steps:
+            for engine, planes in ENGINES.items():
+                for plane in planes:
+                    groove = Groove(engine, plane, ratio, arm, step)
+                    if engine != "reference" and step != run.extent.steps[0]:
+                        continue
+                    if engine_problem(groove.scenario) is not None:
+                        continue
+                    rows.append(run.parts.get(f"groove, {groove}", partial(_row, groove)))
     return rows
 
 
@@ -67,7 +69,7 @@ def _row(groove: Groove) -> dict[str, Any]:
 def boxes(run: BenchmarkRun) -> list[dict[str, dict[str, float]]]:
     """Measures of filled boxes, a row a start."""
     return [
-        {plane: run.parts.get(f"box {seed}, {plane}", lambda p=plane, s=seed: box(p, s))
+        {plane: run.parts.get(f"box {seed}, {plane}", partial(box, plane, seed))
          for plane in PLANES}
         for seed in range(1, run.extent.boxes + 1)
     ]  # fmt: skip
