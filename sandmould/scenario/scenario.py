@@ -151,6 +151,17 @@ class Scenario(Section):
         return bool(self.vibrations) and rests
 
     @property
+    def before_vibration(self) -> Scenario:
+        """The same scene up to its first vibration: scenes with equal ones share that part."""
+        first = next(
+            (n for n, s in enumerate(self.vibration) if isinstance(s, VibrationStage)), None
+        )
+        rests_alone = type(self).model_fields["measure_at_rest"].default
+        return self.model_copy(
+            update={"vibration": self.vibration[:first], "measure_at_rest": rests_alone}
+        )
+
+    @property
     def largest_diameter_m(self) -> float:
         """Diameter of the grains of the largest class."""
         return self.sand.classes(self.dimension)[-1].diameter_m

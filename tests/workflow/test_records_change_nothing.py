@@ -20,6 +20,7 @@ from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import liggghts_scene
 from tests.patterns import _one_thread  # noqa: F401
 from tests.scenes import tube_scene
+from tests.workflow.runs import last_snapshot
 
 RECORDS: tuple[dict[str, Any], ...] = (
     {"series_every_s": 0.005, "snapshot_every_s": 0.01, "checkpoint_every_s": 0.01},
@@ -51,7 +52,7 @@ def last_of(scene: Scenario, folder: Path) -> Snapshot:
     opening = open_coupled if scene.pattern is not None else None
     outcome = Driver(program, folder, "test", "hash", opening).run()
     assert outcome.outcome is Outcome.FINISHED, outcome.detail
-    return Snapshot.load(max((folder / "work" / "snapshots").iterdir()))
+    return last_snapshot(folder / "work")
 
 
 def assert_same(one: Snapshot, other: Snapshot) -> None:
