@@ -140,15 +140,16 @@ def pair_forces(
             reach = r + r_j
             if distance2 < reach * reach:
                 distance = math.sqrt(distance2)
-                overlap = reach - distance
+                overlap, closeness = reach - distance, 1.0 / distance
                 press, turn_i, turn_j, slide, roll, _ = contact(
-                    times(apart, 1.0 / distance),
+                    times(apart, closeness),
                     overlap,
                     plus(load(dim, velocity, j), -1.0, v),
                     w,
                     load_spin(dim, spin, j),
                     r - 0.5 * overlap,
                     r_j - 0.5 * overlap,
+                    law.lead_s * closeness,
                     pair_coefficients_of(coefficients, kind_i, index(kind[j])),
                     law,
                     dt,
