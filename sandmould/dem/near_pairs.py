@@ -1,4 +1,4 @@
-"""Second stage of the contact search: of the listed pairs those that may touch before the next look.
+"""Second stage of the contact search: which listed pairs may touch before the next look.
 
 Most listed pairs lie further apart than grains go in many steps. A look at all of them keeps the
 pairs with a gap below some length; none of the others can touch before the two grains have gone
@@ -73,7 +73,7 @@ class NearPairs(NamedTuple):
     left: Floats
     """(1,) float64, m: how far any grain can still go before a look is due."""
     gap: Floats
-    """(1,) float64, m: largest gap of near pairs where a look is due in this step, else negative."""
+    """(1,) float64, m: largest gap of near pairs where a look is due in this step, or negative."""
 
 
 @njit(**OPTIONS)
