@@ -64,7 +64,9 @@ SIDE_BY_SIDE = {batch.name: batch.side_by_side for batch in BATCHED}
 COLLECTED = [batch.name for batch in BATCHED if batch.runs[0].part != FILL]
 ALONE = alone(PLAN.runs, BATCHED)
 # What tells that a fill is there: its outcome, or its batch's mark.
-FILL_MARKS = {fill.run: f"{FOLDER}/{fill.place}/outcome.json" for fill in PLAN.fills} | {
+FILL_MARKS = {
+    fill.run: f"{FOLDER}/{fill.place}/outcome.json" for fill in PLAN.fills
+} | {
     fill: f"{FOLDER}/batches/{name}.done"
     for name, fills in BATCHES.items()
     for fill in fills
@@ -142,7 +144,9 @@ def labels_of(wildcards):
 
 
 def scenarios_of(wildcards):
-    return [f"{FOLDER}/{RUNS[run].place}/scenario.yaml" for run in BATCHES[wildcards.batch]]
+    return [
+        f"{FOLDER}/{RUNS[run].place}/scenario.yaml" for run in BATCHES[wildcards.batch]
+    ]
 
 
 def batch_notes_of(wildcards):
