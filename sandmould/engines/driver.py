@@ -72,7 +72,10 @@ class Driver:
         counts, record = StepCounts.of(program.scenario), program.scenario.record
         self._record_steps = counts.record
         self._snapshot_steps = counts.records(record.snapshot_every_s)
-        self._checkpoint_steps = counts.records(record.checkpoint_every_s)
+        self._checkpoint_steps = counts.checkpoints(
+            record.checkpoint_every_s,
+            at_setups=engine_of(program.scenario).CAPABILITIES.checkpoints_at_setups,
+        )
         self._stop_requested = False
         self._recorder: Recorder | None = None
         self.is_root = True

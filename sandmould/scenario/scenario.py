@@ -52,7 +52,8 @@ class Recording(Section):
     )
     checkpoint_every_s: float = quantity(
         0.1,
-        "Interval of checkpoints in simulated time, so that a run does not depend on the clock.",
+        "Interval of checkpoints in simulated time, so that a run does not depend on the clock; on "
+        "LAMMPS and LIGGGHTS rounded to whole times of 20 checks.",
         unit="s",
         source=ARGUED,
         gt=0,

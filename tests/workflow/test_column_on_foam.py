@@ -92,6 +92,27 @@ def assert_sags_exactly(scene: Scenario, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("engine", "says"),
+    [
+        ("reference", r"pattern\.loop\.repeats = 0 .* at least 1 in the scheme quasi_newton"),
+        ("lammps", r"pattern\.loop\.repeats = 0 .* at least 1 in the scheme quasi_newton"),
+        ("liggghts", r"scheme = 'quasi_newton' .* one_way, per_layer, fixed, aitken on engine"),
+    ],
+)
+def test_secants_of_the_sands_noise_are_refused(engine: str, says: str) -> None:
+    """Windows that are computed once differ by what the sand does, not by the foam's answer."""
+    tree = column("aitken").model_dump(mode="json", exclude_unset=True)
+    del tree["obstacles"]
+    tree["pattern"]["loop"] |= {"scheme": "quasi_newton", "repeats": 0}
+    tree["engine"]["name"] = engine
+    if engine == "liggghts":
+        tree |= {"background_damping": {"form": "none"}}
+        tree["sand"]["disc_inertia"] = "sphere"
+    with pytest.raises(BadInputError, match=says):
+        planning.resolved(Scenario.model_validate(tree))
+
+
 def test_layers_are_refused_on_a_foam_too_soft_for_their_share() -> None:
     scene = column("per_layer")
     assert scene.pattern is not None

@@ -29,6 +29,7 @@ CAPABILITIES = Capabilities(
     repeats_windows=True,
     calls_movers=True,
     loads_of_every_step=True,
+    checkpoints_at_setups=False,
 )
 
 
