@@ -13,7 +13,7 @@ from sandmould.dem.solver import Solver
 
 # Operations counted by hand in pairs.py, contact_law.py and motion.py; a multiply-add is two,
 # comparisons, signs and what leaves the loop are none. First discs, then spheres.
-FLOPS_PER_LISTED = (
+FLOPS_PER_PAIR = (
     ("vector between the centres", 2, 3),
     ("its square", 3, 5),
     ("sum of the radii and its square", 2, 2),
@@ -56,7 +56,7 @@ def flops(dimension: int, listed: float, contacts: float) -> float:
     """Operations of a grain-step, square roots and quotients apart."""
     per_listed, per_contact, per_grain = (
         sum(row[1:][dimension - 2] for row in counted)
-        for counted in (FLOPS_PER_LISTED, FLOPS_PER_CONTACT, FLOPS_PER_GRAIN)
+        for counted in (FLOPS_PER_PAIR, FLOPS_PER_CONTACT, FLOPS_PER_GRAIN)
     )
     return listed * per_listed + contacts * per_contact + per_grain
 
