@@ -131,7 +131,7 @@ def measure_rest(run: BenchmarkRun) -> dict[str, Any]:
     extent: Extent = run.extent
     bed = settled(2, extent.rest_discs)
     with started({"before": tree_of(BEFORE), "now": ROOT}, bed, "rest") as both:
-        step_s = [turn(process, 4)["step_s"] for process in both.values()][0]
+        step_s = {name: turn(process, 4)["step_s"] for name, process in both.items()}["now"]
         tenth = max(1, round(0.1 * extent.rest_s / step_s))
         marks = {name: [turn(p, tenth) for _ in range(10)] for name, p in both.items()}
     return {
