@@ -31,9 +31,9 @@ class NearGrains:
     """Groups of near grains of one scene."""
 
     scenario: Scenario
-    most_steps: ClassVar[int] = 200
+    most_steps: ClassVar[int] = 100
     """Steps after which groups are made again at the latest."""
-    spare_steps: ClassVar[int] = 10
+    spare_steps: ClassVar[int] = 8
     """Steps by which they are made again before the fastest grain could have gone the slack."""
     speed_check_steps: ClassVar[int] = 5
     """Steps after which the speed of the fastest grain is looked at."""
