@@ -13,7 +13,7 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
 .PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
-.PHONY: twins verification stability at-rest reliability fuzz benchmarks peers scaling solidification flow
+.PHONY: twins verification stability lammps-decks at-rest reliability fuzz benchmarks peers scaling solidification flow
 
 help:
 	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
@@ -88,6 +88,10 @@ verification: $(INSTALLED)
 ## where each engine becomes unstable: docs/stability.md
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
+
+## what LAMMPS decks cost with near grains and sorting: docs/lammps_speed.md
+lammps-decks: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.lammps_decks $(QUICK)
 
 ## packing measured at speed and at rest: docs/measured_at_rest.md
 at-rest: $(INSTALLED)

@@ -40,10 +40,13 @@ class Extent:
 _LAMMPS = {
     "engine": {"name": "lammps", "ranks": 1},
     "measure_at_rest": False,
-    "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.08}],
+    "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.04}],
 }
-_DISCS = _LAMMPS | {"sand": {"size_scale": 3.5}, "fill": {"layers": [{"count": 1500}]}}
-_SPHERES = _LAMMPS | {"fill": {"layers": [{"count": 2000}]}}
+_DISCS = _LAMMPS | {
+    "sand": {"size_scale": 3.5},
+    "fill": {"layers": [{"count": 1000}], "settling": {"longest_s": 0.22}},
+}
+_SPHERES = _LAMMPS | {"fill": {"layers": [{"count": 2000}], "settling": {"longest_s": 0.3}}}
 _FEW = {"fill": {"layers": [{"count": 60}]}, "rest": {"load_tolerance": 0.5}}
 WHOLE = Extent(
     turns=3, scenes={"discs": ("tube_demo", _DISCS), "spheres": ("tube_3d_small", _SPHERES)}

@@ -1,4 +1,4 @@
-"""One run of a deck as it is, or with one of its savings taken out: its time, and a digest of its end.
+"""One run of a deck as it is, or with savings taken out: its time, and a digest of its end.
 
 ``python -m benchmarks.lammps_decks.variants SCENE.json NAME`` prints what ``timed`` gives.
 """
