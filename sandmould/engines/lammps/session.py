@@ -168,9 +168,7 @@ class LammpsSession(DeckSession):
     def _compute_to(self, target: int) -> None:
         if self._kernel is not None:
             self._kernel.show_motion(self.stage, self._stage_start, self.steps, target)
-        if self._setup_due:
-            # Setup computes forces with whole-step velocities; only without it do pieces add up
-            # to one uncut run, bit for bit.
+        if self._setup_due or self.steps % self._counts.setup == 0:
             self.send(f"{_MAKE_AGAIN}\nrun 0 post no")
             self._setup_due, self._near_until = False, self.steps
         if self._wall_loads is None:
