@@ -13,7 +13,7 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
 .PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
-.PHONY: twins verification stability rebound size-ratio at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow
+.PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow
 
 help:
 	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
@@ -88,6 +88,10 @@ verification: $(INSTALLED)
 ## where each engine becomes unstable: docs/stability.md
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
+
+## what LAMMPS decks cost with near grains and sorting: docs/lammps_speed.md
+lammps-decks: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.lammps_decks $(QUICK)
 
 ## impacts on all engines and beds with both dashpots: docs/rebound.md
 rebound: $(INSTALLED)
