@@ -172,6 +172,56 @@ def tidy(
 
 
 @app.command()
+def pack(
+    study: StudyFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", show_default="STUDY_runs.tar.xz",
+            help="File to write; a folder takes one more, of the runs that no pack in it holds.",
+        ),
+    ] = None,
+    last_state: Annotated[
+        bool,
+        typer.Option(
+            "--last-state", help="Leave out exports and all snapshots but the last: no films."
+        ),
+    ] = False,
+    checkpoints: Annotated[
+        bool, typer.Option("--checkpoints", help="Take along runs that were stopped.")
+    ] = False,
+) -> None:  # fmt: skip
+    """Pack the runs of a study that are at their end into one file, to go on elsewhere."""
+    from sandmould.study.packs.pack import pack as pack_study
+    from sandmould.study.plan.build_plan import RESULTS, open_plan
+
+    packed = pack_study(
+        open_plan(study), RESULTS, output, last_state=last_state, checkpoints=checkpoints
+    )
+    typer.echo(packed.text())
+
+
+@app.command()
+def unpack(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="What sandmould pack wrote.")
+    ],
+    checkpoints: Annotated[
+        bool,
+        typer.Option(
+            "--checkpoints", help="Take stopped runs too; engines read their files unchecked."
+        ),
+    ] = False,
+) -> None:
+    """Take packed runs into ./results; runs that are here already stay as they are."""
+    from sandmould.study.packs.unpack import unpack as unpack_runs
+    from sandmould.study.plan.build_plan import RESULTS
+
+    for file in files:
+        typer.echo(unpack_runs(file, RESULTS, checkpoints).text())
+
+
+@app.command()
 def measures(study: StudyFile) -> None:
     """List what runs of a study can be measured by, with units."""
     from sandmould.study.plan.load_study import open_study

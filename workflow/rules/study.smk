@@ -7,6 +7,7 @@ from sandmould import ROOT
 from sandmould.runs.columns import SWEEP
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.collect import CHECKS as CHECK_TABLES
+from sandmould.study.packs.recorded import take_up
 from sandmould.study.plan.batches import alone
 from sandmould.study.plan.build_plan import (
     RESULTS,
@@ -37,12 +38,16 @@ try:
     check_places(PLAN.study)
     check_letters(PLAN.runs)
     check_trust(PLAN.study, PLAN.runs)
+    if workflow.is_main_process and starts_jobs(sys.argv):
+        # Held until this process ends.
+        turn = take_turn(RESULTS / PLAN.study.name)
+        PLAN, taken = take_up(PLAN, RESULTS)
+        if taken:
+            print(taken, file=sys.stderr)
     BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
     if workflow.is_main_process and "--lint" not in sys.argv:
-        # Held until this process ends.
-        turn = starts_jobs(sys.argv) and take_turn(RESULTS / PLAN.study.name)
         print(announce(PLAN, RESULTS, CORES), file=sys.stderr)
-        if said := prepare(PLAN, RESULTS):
+        if said := prepare(PLAN, RESULTS, BATCHED):
             print(f"{said}\n", file=sys.stderr)
 except BadInputError as error:
     sys.exit(str(error))

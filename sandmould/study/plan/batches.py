@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -78,6 +78,24 @@ def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Bat
     for alike in list(waiting):
         close(alike)
     return batches
+
+
+def mark_done(batches: Iterable[Batch], lacking: Container[str], folder: Path) -> None:
+    """Mark batches whose runs lack nothing, such as unpacked ones, so that no job looks at them.
+
+    Parameters
+    ----------
+    batches : iterable of Batch
+    lacking : container of str
+        Names of runs that lack something.
+    folder : Path
+        ``results/<study>``.
+    """
+    for batch in batches:
+        mark = folder / "batches" / f"{batch.name}.done"
+        if not mark.exists() and not any(run.run in lacking for run in batch.runs):
+            mark.parent.mkdir(exist_ok=True)
+            mark.touch()
 
 
 def alone(runs: Sequence[Run], batches: Sequence[Batch]) -> list[str]:

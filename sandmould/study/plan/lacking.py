@@ -12,7 +12,14 @@ from typing import Any
 
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.manifest import MANIFEST_FILE, Manifest, damage, deck_damage, read_manifest
+from sandmould.runs.manifest import (
+    LEFT_OUT,
+    MANIFEST_FILE,
+    Manifest,
+    damage,
+    deck_damage,
+    read_manifest,
+)
 from sandmould.runs.outcome import RunOutcome
 from sandmould.study.definition.run import LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
@@ -95,6 +102,8 @@ def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
         why = "it is not measured"
     else:
         why = damage(folder, manifest["measured"])
+    if why and manifest and LEFT_OUT in manifest:
+        return Lack(Need.COMPUTE, f"{why}, and its snapshots were left out of a pack")
     return Lack(Need.MEASURE, why) if why else WHOLE
 
 
@@ -120,6 +129,13 @@ def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
     folder : Path
         ``results/<study>``.
     """
+    template_hash = template_hashes()
+    found = {run.run: lack_of(run, folder / "runs" / run.run, template_hash) for run in runs}
+    return {run: lack for run, lack in found.items() if lack.need}
+
+
+def template_hashes() -> Callable[[Run], str]:
+    """Hash of what turns a run into its deck, for many runs."""
     hashes: dict[tuple[Path, ...], str] = {}
 
     def template_hash(run: Run) -> str:
@@ -129,8 +145,7 @@ def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
             hashes[sources] = _template_hash(run)
         return hashes[sources]
 
-    found = {run.run: lack_of(run, folder / "runs" / run.run, template_hash) for run in runs}
-    return {run: lack for run, lack in found.items() if lack.need}
+    return template_hash
 
 
 def note_lacks(runs: Iterable[str], found: dict[str, Lack], folder: Path) -> str:
