@@ -22,8 +22,8 @@ MOST_BYTES = 500 * 10**9
 MOST_FILE_BYTES = 8**11 - 1
 """More does not fit into the header of a tar archive."""
 MOST_INDEX_BYTES = 2 * 10**8
-OUTCOME_FILE, ORIGIN_FILE = "outcome.json", "provenance.json"
-AT_END = ("scenario.yaml", DECK_FILE, ORIGIN_FILE, OUTCOME_FILE, MANIFEST_FILE)
+OUTCOME_FILE = "outcome.json"
+AT_END = ("scenario.yaml", DECK_FILE, OUTCOME_FILE, MANIFEST_FILE)
 """Files that every run has at its end."""
 WORK = "work"
 """Folder of a run that is not at its end: its checkpoints and its tables so far."""
@@ -46,7 +46,7 @@ class PackedRun(Section):
     """Or it is a checkpoint to go on from."""
     scenario_sha256: Annotated[str, Field(max_length=64)] = ""
     template_sha256: Annotated[str, Field(max_length=64)] = ""
-    """Both as ``provenance.json`` has them; of a run at its end."""
+    """Both as the provenance has them; of a run at its end."""
     files: Annotated[dict[str, PackedFile], Field(min_length=1)]
     """By path from the run's folder."""
 
@@ -156,7 +156,7 @@ def may_travel(path: str, at_end: bool) -> bool:
 
 
 def same_computation(run: PackedRun, origin: Mapping[str, object]) -> bool:
-    """Whether a run of a pack is of the scenario, deck and solver that a ``provenance`` names."""
+    """Whether a run of a pack is of the scenario, deck and solver that a provenance names."""
     return (run.scenario_sha256, run.template_sha256) == (
         origin.get("scenario_sha256"),
         origin.get("template_sha256"),
@@ -165,5 +165,5 @@ def same_computation(run: PackedRun, origin: Mapping[str, object]) -> bool:
 
 def read_origin(place: Path) -> dict[str, Any]:
     """Where a run comes from, as its ``provenance.json`` has it."""
-    origin: dict[str, Any] = json.loads((place / ORIGIN_FILE).read_text(encoding="utf-8"))
+    origin: dict[str, Any] = json.loads((place / "provenance.json").read_text(encoding="utf-8"))
     return origin

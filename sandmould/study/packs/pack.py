@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from PIL import Image
+
 from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, Manifest, read_manifest
 from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.study.definition.run import LAST_MEASURED
 from sandmould.study.packs.archive import Archive, Source, write_archive
 from sandmould.study.packs.index import (
     WORK,
@@ -27,6 +31,7 @@ from sandmould.study.tidy import size_text
 
 SUFFIX = ".tar.xz"
 _DIGITS = 8
+_COLOURS = 32
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,8 @@ def pack(
         File to write; a folder takes one more file, of what no pack of the study in it holds.
     last_state : bool
         Whether snapshots before the last and exports are left out: films and pictures of earlier
-        moments are not to be had from such a run any more, its tables are.
+        moments are not to be had from such a run any more, its tables are. Its own picture has
+        few colours.
     checkpoints : bool
         Whether runs that were stopped go along.
 
@@ -185,8 +191,13 @@ def _last_state(files: Mapping[str, Source], manifest: Manifest) -> dict[str, So
     """Leave out what shows how a run came to its end, and say so in its list of products."""
     shots = sorted(name for name in files if name.startswith("snapshots/"))
     dropped = {*shots[:-1], *(name for name in files if name.startswith("exports/"))}
+    changed = {name: _few_colours(files[name]) for name in (LAST_MEASURED,) if name in files}
     kept: Manifest = {
-        step: {name: size for name, size in sizes.items() if name not in dropped}
+        step: {
+            name: changed[name].packed().size if name in changed else size
+            for name, size in sizes.items()
+            if name not in dropped
+        }
         for step, sizes in manifest.items()
     }
     sizes = {name: size for step in manifest.values() for name, size in step.items()}
@@ -196,5 +207,14 @@ def _last_state(files: Mapping[str, Source], manifest: Manifest) -> dict[str, So
     text = json.dumps(kept, indent=1) + "\n"
     return {
         **{name: source for name, source in files.items() if name not in dropped},
+        **changed,
         MANIFEST_FILE: Source(text=text.encode()),
     }
+
+
+def _few_colours(picture: Source) -> Source:
+    """A picture in a fifth of its bytes: it would be most of what a run weighs."""
+    out = io.BytesIO()
+    with Image.open(io.BytesIO(b"".join(picture.chunks()))) as image:
+        image.convert("RGB").quantize(_COLOURS).save(out, "png", optimize=True)
+    return Source(text=out.getvalue())

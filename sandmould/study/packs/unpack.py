@@ -185,18 +185,22 @@ def _take(
     """Write a run's files beside what lies in its folder; once all are whole they move there."""
     part = place / _PART
     shutil.rmtree(part, ignore_errors=True)
-    for member, chunks in files:
-        (part / member.path).parent.mkdir(parents=True, exist_ok=True)
-        with (part / member.path).open("wb") as out:
-            out.writelines(chunks)
-    if run.at_end:
-        _check(part, run)
-    if is_locked(place):
-        unpacked.left[place.name] = _BUSY
-    else:
-        _move(part, place)
-        (unpacked.taken if run.at_end else unpacked.checkpoints).append(place.name)
-    shutil.rmtree(part)
+    try:
+        for member, chunks in files:
+            (part / member.path).parent.mkdir(parents=True, exist_ok=True)
+            with (part / member.path).open("wb") as out:
+                out.writelines(chunks)
+        if run.at_end:
+            _check(part, run)
+        if is_locked(place):
+            unpacked.left[place.name] = _BUSY
+        else:
+            _move(part, place)
+            (unpacked.taken if run.at_end else unpacked.checkpoints).append(place.name)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+        with contextlib.suppress(OSError):
+            place.rmdir()  # of a damaged pack nothing stays
 
 
 def _check(part: Path, run: PackedRun) -> None:
