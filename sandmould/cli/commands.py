@@ -106,13 +106,20 @@ def run(
     ] = None,
     cores: Cores = None,
     adopt: Adopt = False,
+    cluster: Annotated[
+        bool,
+        typer.Option(
+            "--cluster", help="Submit the runs to Slurm; ./cluster.yaml says to which partition."
+        ),
+    ] = False,
 ) -> None:
     """Compute a study, or what is missing of it; write its report."""
     from sandmould.study.run_study import run_study
 
     if adopt:
         _adopt(study)
-    raise typer.Exit(run_study(study, [*_cores_option(cores), *(options or [])]))
+    profile = ["--workflow-profile", "slurm"] if cluster else []
+    raise typer.Exit(run_study(study, [*_cores_option(cores), *profile, *(options or [])]))
 
 
 @app.command()

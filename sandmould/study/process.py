@@ -8,15 +8,17 @@ from __future__ import annotations
 import collections
 import contextlib
 import fcntl
+import os
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TextIO
 
+from sandmould.runs.claim import Claim, owner_of
 from sandmould.runs.parent import end_with_parent
 
 RESTARTABLE_EXIT = 75
@@ -74,61 +76,70 @@ def _under_mpi(command: list[str], ranks: int, mpi: str) -> list[str]:
 
 @contextlib.contextmanager
 def _folder_lock(folder: Path) -> Iterator[TextIO]:
-    """Wait for any other process that computes in a run's folder.
+    """Wait for any other process that computes in a run's folder, of this machine or another.
 
-    One can outlive a killed snakemake; the next snakemake then finds what it finished. The file
-    names this machine, since a lock may not be seen from another.
+    One can outlive a killed snakemake; the next snakemake then finds what it finished.
     """
     (folder / "work").mkdir(exist_ok=True)
     with (folder / "lock").open("a") as file:
+        alone = _locked(file, f"{folder}: waiting for the process that computes it already")
+        claim = Claim(folder, alone, partial(_lost, folder))
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            print(f"{folder}: waiting for the process that computes it already", file=sys.stderr)
-            fcntl.flock(file, fcntl.LOCK_EX)
-        file.truncate(0)
-        file.write(f"{socket.gethostname()}\n")
-        file.flush()
-        yield file
+            yield file
+        finally:
+            claim.let_go()
 
 
-def take_turn(study_folder: Path) -> TextIO | None:
-    """Wait for any other Snakemake that computes a study; ends with the file that it gives.
+def _locked(file: TextIO, waiting: str) -> bool:
+    """Hold a file's lock; False where the file system has none, even for one machine."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        print(waiting, file=sys.stderr)
+        fcntl.flock(file, fcntl.LOCK_EX)
+    except OSError:
+        return False
+    return True
+
+
+def _lost(folder: Path) -> None:
+    """End what computes in a folder that another process has taken over."""
+    print(f"{folder}: another process has taken over, since this one stood still", file=sys.stderr)
+    for children in Path("/proc/self/task").glob("*/children"):
+        for pid in children.read_text(encoding="ascii").split():
+            os.kill(int(pid), signal.SIGKILL)
+
+
+def take_turn(study_folder: Path) -> contextlib.ExitStack | None:
+    """Wait for any other Snakemake that computes a study; ends with what it gives.
 
     Two would remove and compute again what the other has just finished. None where the folder
     takes no file: the plan says so then.
     """
-    try:
-        study_folder.mkdir(parents=True, exist_ok=True)
-        file = (study_folder / "lock").open("a")
-    except OSError:
-        return None
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        print(f"{study_folder}: waiting for the command that computes it already", file=sys.stderr)
-        fcntl.flock(file, fcntl.LOCK_EX)
-    return file
+    with contextlib.ExitStack() as turn:
+        try:
+            study_folder.mkdir(parents=True, exist_ok=True)
+            file = turn.enter_context((study_folder / "lock").open("a"))
+            waiting = f"{study_folder}: waiting for the command that computes it already"
+            claim = Claim(study_folder, _locked(file, waiting))
+        except OSError:
+            return None
+        turn.callback(claim.let_go)
+        return turn.pop_all()
 
 
 def is_locked(folder: Path) -> bool:
-    """Whether a process of this machine computes in a run's folder."""
+    """Whether a process computes in a run's folder, on this machine or on another."""
     try:
         with (folder / "lock").open() as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False
-    except OSError:
+    except BlockingIOError:
         return True
-    return False
-
-
-def computed_elsewhere(folder: Path) -> bool:
-    """Whether another machine computed in a run's folder last."""
-    with contextlib.suppress(OSError, ValueError):
-        host = (folder / "lock").read_text(encoding="utf-8").strip()
-        return host not in ("", socket.gethostname())
-    return False
+    except OSError:
+        return owner_of(folder, here=True) is not None
+    return owner_of(folder) is not None
 
 
 def _watch(command: list[str], log: TextIO, lock: TextIO) -> tuple[int, str]:

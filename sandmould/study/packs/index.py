@@ -146,7 +146,7 @@ def may_travel(path: str, at_end: bool) -> bool:
         and 0 < len(part.encode()) <= _NAME_BYTES
         for part in parts
     )  # fmt: skip
-    if not harmless or path.endswith((".partial", "_again.txt")) or parts[0] in _NEVER:
+    if not harmless or path.endswith((".partial", "_again.txt")) or parts[0].startswith(_NEVER):
         return False
     return (
         (parts[0] != WORK and not re.match("checkpoints_of_", path))
