@@ -13,7 +13,7 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
 .PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
-.PHONY: twins verification stability at-rest reliability fuzz benchmarks peers scaling solidification flow
+.PHONY: twins verification stability rebound size-ratio at-rest reliability fuzz benchmarks peers scaling solidification flow
 
 help:
 	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
@@ -88,6 +88,14 @@ verification: $(INSTALLED)
 ## where each engine becomes unstable: docs/stability.md
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
+
+## impacts on all engines and beds with both dashpots: docs/rebound.md
+rebound: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.rebound $(QUICK)
+
+## small grains between large ones: docs/size_ratio.md
+size-ratio: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.size_ratio $(QUICK)
 
 ## packing measured at speed and at rest: docs/measured_at_rest.md
 at-rest: $(INSTALLED)

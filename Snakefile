@@ -35,9 +35,10 @@ onstart:
 
 onerror:
     # After Ctrl-C too; "sandmould run" says it by itself.
-    if workflow.is_main_process and (left := len(PLAN.lacks(RESULTS))):
+    left = PLAN.lacks(RESULTS).keys() & {run.run for run in PLAN.runs}
+    if workflow.is_main_process and left:
         print(
-            f"{left} of {len(PLAN.runs)} runs are left: the same command goes on with them.",
+            f"{len(left)} of {len(PLAN.runs)} runs are left: the same command goes on with them.",
             file=sys.stderr,
         )
 

@@ -7,7 +7,7 @@ from typing import Any
 from benchmarks.engines.beds import Bed, settled, solver_on, tiled
 from benchmarks.engines.peaks import bandwidth, measure_peaks
 from benchmarks.engines.phases import measure_listing, measure_phases
-from benchmarks.engines.scale import advance, bytes_of, cost_of
+from benchmarks.engines.scale import advance, bytes_of, cost_of, near_of
 from benchmarks.engines.timing import Extent, one_core, spread, steps_lasting
 from sandmould.dem.solver import Solver
 
@@ -42,8 +42,8 @@ CHAINED_PER_CONTACT = {2: 1, 3: 2}
 TRAFFIC = {
     "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains radius": 1,
     "kinds of_grain": 1, "grains mass": 1, "grains inertia": 1, "grains force": 2,
-    "grains moment": 2, "pairs start": 1, "pairs other": 1, "pairs touching": 2,
-    "pairs friction": 2, "pairs rolling": 2, "chunks grain": 1, "chunks incoming": 1,
+    "grains moment": 2, "near stop": 1, "near other": 1, "near touching": 2,
+    "near friction": 2, "near rolling": 2, "chunks grain": 1, "chunks incoming": 1,
     "chunks force": 2, "chunks moment": 2, "walls candidates rows": 1,
     "walls candidates start": 1, "walls candidates part": 1, "walls history used": 2,
     "walls history normal": 2, "walls history friction": 2, "walls history rolling": 2,
@@ -99,11 +99,12 @@ def _times(bed: Bed, extent: Extent, phases: bool) -> tuple[Solver, dict[str, An
 def _measure_bed(bed: Bed, peaks: dict[str, Any], extent: Extent, phases: bool) -> dict[str, Any]:
     """Time of a step against its limits."""
     solver, times = _times(bed, extent, phases)
-    step_ns, pairs = times["ns_per_grain_step"]["median"], solver.pairs
-    listed, contacts = len(pairs.other) / bed.grains, float(pairs.touching.sum()) / bed.grains
+    step_ns, pairs = times["ns_per_grain_step"]["median"], solver.moving.pairs
+    listed, contacts = len(pairs.other) / bed.grains, len(solver.contacts.first) / bed.grains
+    near = near_of(solver) / bed.grains
     held = sum(size for name, size in bytes_of(solver).items() if name in TRAFFIC)
     gb_s = bandwidth(held, extent.rounds)
-    bounds = _bounds(solver, contacts, listed, peaks, gb_s["median"])
+    bounds = _bounds(solver, contacts, near, peaks, gb_s["median"])
     chained_ns = peaks["ns_per_chained_root_and_quotient"]["median"]
     return {
         "bed": bed.name,
@@ -111,8 +112,9 @@ def _measure_bed(bed: Bed, peaks: dict[str, Any], extent: Extent, phases: bool) 
         "held_bytes": held,
         "gb_s": gb_s,
         "bytes_per_grain_step": traffic_bytes(solver),
-        "flops_per_grain_step": flops(bed.dimension, listed, contacts),
+        "flops_per_grain_step": flops(bed.dimension, near, contacts),
         "listed_per_grain": listed,
+        "near_per_grain": near,
         "contacts_per_grain": contacts,
         "bounds_ns": bounds,
         "fractions": {name: ns / step_ns for name, ns in bounds.items()},

@@ -160,8 +160,9 @@ def tidy(
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask first.")] = False,
 ) -> None:
     """Remove run folders that a study no longer lists."""
+    from sandmould.runs.formatting import size_text
     from sandmould.study.plan.build_plan import RESULTS, open_plan
-    from sandmould.study.tidy import leftovers, remove, size_text
+    from sandmould.study.tidy import leftovers, remove
 
     opened = open_plan(study)
     found = leftovers(opened, RESULTS)

@@ -23,6 +23,7 @@ from sandmould.digest import digest
 from sandmould.runs.columns import ENGINE, OUTCOME, RUN, VERSION, finished
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.module_main import run_main
 from sandmould.study.collect import CHECKS, read_summary
@@ -91,7 +92,7 @@ def record(path: Path, results: Path) -> Path:
     failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
     names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
     names += [name for name in (ROUNDS_FILE, CHECKS[0]) if (folder / name).exists()]
-    provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
+    provenance = read_origin(folder / "runs" / runs[0].run)
     record: dict[str, Any] = {
         "study": str(path),
         "study_sha256": study_hash(runs),

@@ -6,23 +6,25 @@ import contextlib
 import json
 import math
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import pandas as pd
-
 from sandmould.runs.claim import owner_of
+from sandmould.runs.formatting import size_text
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
 from sandmould.study.cluster.queue import jobs_of, live_jobs, queue_lines
+from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.plan.build_plan import Plan
+from sandmould.study.plan.fills import own_work
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.process import is_locked
 from sandmould.study.rounds.round_log import read_rounds
-from sandmould.study.tidy import freed_bytes, orphans, size_text
+from sandmould.study.run_tables import read_costs
+from sandmould.study.tidy import freed_bytes, orphans
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
@@ -87,7 +89,7 @@ def _ended(folder: Path) -> RunStatus:
     outcome = RunOutcome.read(folder / "outcome.json")
     cpu_s = wall_s = math.nan
     with contextlib.suppress(*_DAMAGED):
-        cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[-1]
+        cost = read_costs([folder]).rows.iloc[-1]
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
     if outcome.outcome is Outcome.FINISHED:
@@ -108,13 +110,19 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
     """
     folder = results / plan.study.name
     lacks, live = plan.lacks(results), live_jobs()
+    # A fill that no run waits for any more counts where it was computed.
+    fills = [
+        fill
+        for fill in plan.fills
+        if fill.run in lacks or (folder / fill.place / "outcome.json").exists()
+    ]
     statuses = {
-        run.run: run_status(folder / "runs" / run.run, lacks.get(run.run, WHOLE), live)
-        for run in plan.runs
+        run.run: run_status(folder / run.place, lacks.get(run.run, WHOLE), live)
+        for run in (*fills, *plan.runs)
     }
-    count = Counter(status.state for status in statuses.values())
-    parts = [f"{count[state]} {state}" for state in STATES if count[state]]
-    lines = [f"{plan.study.name}: {', '.join(parts)} of {len(plan.runs)} runs"]
+    lines = [f"{plan.study.name}: {_count(plan.runs, statuses)} of {len(plan.runs)} runs"]
+    if any(statuses[fill.run].state != "done" for fill in fills):
+        lines.append(f"{_count(fills, statuses)} of {len(fills)} fills that runs share")
     spent_s = sum(status.cpu_s for status in statuses.values())
     lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
     if live is not None:
@@ -131,9 +139,15 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
         lines += [f"  {state}: {s.run}  {s.said}".rstrip() for s in chosen[:LISTED_RUNS]]
         if len(chosen) > LISTED_RUNS:
             lines.append(f"  {state}: and {len(chosen) - LISTED_RUNS} more")
-    if count["failed"]:
+    if any(status.state == "failed" for status in statuses.values()):
         lines.append("a failed run is computed once more by: sandmould again RUN")
     return "\n".join([*lines, *_orphans(plan, results)])
+
+
+def _count(runs: Sequence[Run], statuses: dict[str, RunStatus]) -> str:
+    """How many of some runs are in which state."""
+    count = Counter(statuses[run.run].state for run in runs)
+    return ", ".join(f"{count[state]} {state}" for state in STATES if count[state])
 
 
 def _orphans(plan: Plan, results: Path) -> list[str]:
@@ -152,14 +166,15 @@ def _left(plan: Plan, statuses: dict[str, RunStatus], cores: int) -> str:
     """Wall time of what is left, at the speed of the runs like it that are done."""
     planning = plan.kind.planning
     speeds: dict[SpeedClass, list[float]] = {}
-    for run in plan.runs:
+    runs = [run for run in (*plan.fills, *plan.runs) if run.run in statuses]
+    for run in runs:
         wall_s = statuses[run.run].wall_s
         if math.isfinite(wall_s):
             core_s = wall_s * planning.threads(run.scenario)
-            each = core_s / planning.planned_work(run.scenario)
+            each = core_s / own_work(run)
             speeds.setdefault(planning.speed_class(run.scenario), []).append(each)
     left_s, unknown = 0.0, 0
-    for run in plan.runs:
+    for run in runs:
         status = statuses[run.run]
         if status.state == "running" and math.isfinite(status.left_s):
             left_s += status.left_s
@@ -169,7 +184,7 @@ def _left(plan: Plan, statuses: dict[str, RunStatus], cores: int) -> str:
                 unknown += 1
             else:
                 typical = sorted(costs)[len(costs) // 2]
-                left_s += planning.planned_work(run.scenario) * typical
+                left_s += own_work(run) * typical
     if unknown:
         return f"time left unknown: no run like {unknown} of them is done"
     return (

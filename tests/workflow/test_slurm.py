@@ -14,6 +14,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sandmould.study.forked import PROCESS_NAME
+from sandmould.study.run_tables import read_costs
 from tests.workflow.slurm_node import SlurmNode, missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=f"needs Debian's slurmd: {missing()}")
@@ -59,12 +61,12 @@ def wait_for(what: Callable[[], bool], process: subprocess.Popen[bytes], log: Pa
 def simulating(folder: Path) -> list[int]:
     """Processes that compute a run below a folder."""
     found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
+    for path in Path("/proc").glob("[0-9]*/comm"):
         try:
-            words, where = path.read_bytes().split(b"\0"), path.with_name("cwd").readlink()
+            name, where = path.read_text().strip(), path.with_name("cwd").readlink()
         except OSError:
             continue
-        if b"sandmould.study.simulate" in words and where == folder:
+        if name == PROCESS_NAME and where == folder:
             found.append(int(path.parent.name))
     return found
 
@@ -140,8 +142,8 @@ def test_a_run_of_two_ranks_gets_two_cores_and_the_time_that_its_partition_allow
     ran = call(slurm, folder, *COMMAND)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert slurm.jobs() == {}
-    (cost,) = (folder / "results" / "small" / "runs").glob("*/cost.tsv")
-    assert pd.read_csv(cost, sep="\t")["ranks"].tolist() == [2]
+    runs = list((folder / "results" / "small" / "runs").iterdir())
+    assert read_costs(runs).rows["ranks"].tolist() == [2]
 
 
 @pytest.mark.slow

@@ -51,10 +51,11 @@ class Submission:
         BadInputError
             Where it would take no job.
         """
-        names = [run.run for run in self._plan.runs]
+        every = (*self._plan.fills, *self._plan.runs)
+        names = [run.run for run in every]
         self._longest_min, why = longest_min(self._cluster)
-        single = set(alone(self._plan.runs, batches))
-        jobs = [*batches, *(Batch(r.run, (r,)) for r in self._plan.runs if r.run in single)]
+        single = set(alone(every, batches))
+        jobs = [*batches, *(Batch(run.run, (run,)) for run in every if run.run in single)]
         planned = max((self._planned_min(job) for job in jobs), default=0)
         demands = [self._demand(job) for job in jobs]
         check_jobs(self._cluster, self.runtime_min(planned), demands)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
-from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, Literal, NamedTuple
+from pathlib import PurePosixPath
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, ValidationError
 
@@ -161,9 +161,3 @@ def same_computation(run: PackedRun, origin: Mapping[str, object]) -> bool:
         origin.get("scenario_sha256"),
         origin.get("template_sha256"),
     )
-
-
-def read_origin(place: Path) -> dict[str, Any]:
-    """Where a run comes from, as its ``provenance.json`` has it."""
-    origin: dict[str, Any] = json.loads((place / "provenance.json").read_text(encoding="utf-8"))
-    return origin

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import io
 import json
+import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from PIL import Image
 
-from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, Manifest, read_manifest
+from sandmould.engines.snapshot_file import OLDER, SNAPSHOTS, SnapshotFile, stored_snapshots
+from sandmould.runs.formatting import size_text
+from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, Manifest, read_manifest, read_origin
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.definition.run import LAST_MEASURED
 from sandmould.study.packs.archive import Archive, Source, write_archive
@@ -20,14 +23,12 @@ from sandmould.study.packs.index import (
     PackedRun,
     PackIndex,
     may_travel,
-    read_origin,
     same_computation,
 )
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.lacking import WHOLE, Need
 from sandmould.study.process import is_locked
 from sandmould.study.rounds.round_log import ROUNDS_FILE
-from sandmould.study.tidy import size_text
 
 SUFFIX = ".tar.xz"
 _DIGITS = 8
@@ -169,7 +170,7 @@ def _files(
         listed = {name for step in ("computed", "measured") for name in manifest.get(step, {})}
         if lost := sorted(listed - set(files)):
             return f"with a file that cannot be packed, {lost[0]!r}", {}
-        return "", _last_state(files, manifest) if last_state else files
+        return "", _last_state(place, files, manifest) if last_state else files
     if not checkpoints:
         return "not at their end", {}
     if is_locked(place):
@@ -187,11 +188,13 @@ def _found(place: Path, at_end: bool) -> Iterator[tuple[str, Source]]:
             yield name, Source(path)
 
 
-def _last_state(files: Mapping[str, Source], manifest: Manifest) -> dict[str, Source]:
+def _last_state(place: Path, files: Mapping[str, Source], manifest: Manifest) -> dict[str, Source]:
     """Leave out what shows how a run came to its end, and say so in its list of products."""
-    shots = sorted(name for name in files if name.startswith("snapshots/"))
-    dropped = {*shots[:-1], *(name for name in files if name.startswith("exports/"))}
+    older = sorted(name for name in files if name.startswith(f"{OLDER}/"))
+    dropped = {*older[:-1], *(name for name in files if name.startswith("exports"))}
     changed = {name: _few_colours(files[name]) for name in (LAST_MEASURED,) if name in files}
+    if SNAPSHOTS in files:
+        changed[SNAPSHOTS] = _last_snapshot(place)
     kept: Manifest = {
         step: {
             name: changed[name].packed().size if name in changed else size
@@ -200,16 +203,30 @@ def _last_state(files: Mapping[str, Source], manifest: Manifest) -> dict[str, So
         }
         for step, sizes in manifest.items()
     }
-    sizes = {name: size for step in manifest.values() for name, size in step.items()}
-    left = {name: sizes[name] for name in sorted(dropped) if name in sizes}
+    left = {
+        name: size
+        for step in ("computed", "measured")
+        for name, size in manifest.get(step, {}).items()
+        if name in dropped or name == SNAPSHOTS
+    }
     if left:
-        kept[LEFT_OUT] = {**manifest.get(LEFT_OUT, {}), **left}
+        kept[LEFT_OUT] = {**left, **manifest.get(LEFT_OUT, {})}
     text = json.dumps(kept, indent=1) + "\n"
     return {
         **{name: source for name, source in files.items() if name not in dropped},
         **changed,
         MANIFEST_FILE: Source(text=text.encode()),
     }
+
+
+def _last_snapshot(place: Path) -> Source:
+    """The file of a run's snapshots with the last alone."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = SnapshotFile(Path(folder), 0)
+        for stored in stored_snapshots(place)[-1:]:
+            file.append(stored.load())
+        file.close()
+        return Source(text=(Path(folder) / SNAPSHOTS).read_bytes())
 
 
 def _few_colours(picture: Source) -> Source:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould.digest import file_digest
-from sandmould.runs.manifest import read_manifest
+from sandmould.runs.manifest import read_manifest, read_origin
 from sandmould.runs.outcome import RunOutcome
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.packs.archive import Archive
@@ -23,7 +23,6 @@ from sandmould.study.packs.index import (
     WORK,
     Member,
     PackedRun,
-    read_origin,
     same_computation,
 )
 from sandmould.study.packs.rounds import merge_rounds

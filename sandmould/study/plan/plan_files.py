@@ -12,13 +12,15 @@ import yaml
 from pydantic import create_model
 
 from sandmould.runs.files import write_text
+from sandmould.runs.formatting import size_text
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, read_planned, validated
-from sandmould.study.definition.run import Part, Run
+from sandmould.study.definition.run import FILL, Part, Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
+from sandmould.study.plan.fills import own_work, predicted_s
 
 STUDY_FILE = "study.yaml"
 """The study as planned, with all that it rests on."""
@@ -43,6 +45,7 @@ class _RunFile(Section):
     scenario: Any
     sources: dict[str, str]
     part: Part = "sweep"
+    fill: str = ""
 
 
 _OF_RUN = tuple(name for name in _RunFile.model_fields if name != "kind")
@@ -56,7 +59,7 @@ def _file_model(kind: str) -> type[_RunFile]:
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
-    """Write ``runs.tsv`` and ``runs/<run>/scenario.yaml``, files that would not change left alone.
+    """Write ``runs.tsv`` and each run's ``scenario.yaml``, files that would not change left alone.
 
     Rows keep the place they had in an earlier round; new ones are appended. Folders of runs that
     are no longer listed stay, since they may hold results.
@@ -64,18 +67,20 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
     Parameters
     ----------
     runs : sequence of Run
-        All runs of the study, those of earlier rounds included.
+        All runs of the study, those of earlier rounds included, and the fills that they share;
+        fills are no rows.
     folder : Path
         ``results/<study>``.
     """
     for run in runs:
         text, without_kind = _scenario_texts(run)
-        _write(folder / "runs" / run.run / "scenario.yaml", text, without_kind)
+        _write(folder / run.place / "scenario.yaml", text, without_kind)
     table = folder / "runs.tsv"
     text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
     earlier = text.splitlines()[1:]
     place = {line.split("\t", 1)[0]: n for n, line in enumerate(earlier)}
-    ordered = sorted(runs, key=lambda run: place.get(run.run, len(place)))
+    rows = (run for run in runs if run.part != FILL)
+    ordered = sorted(rows, key=lambda run: place.get(run.run, len(place)))
     _write(table, _table_text(ordered))
 
 
@@ -164,9 +169,12 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
     cores : int
         Cores that share the runs.
     """
-    points: dict[str, list[Run]] = {}
+    points: dict[tuple[Any, ...], list[Run]] = {}
     for run in runs:
-        points.setdefault(f"{run.part} {json.dumps(run.parameters)}", []).append(run)
+        # Fills of one size are one point; runs of a point may share a fill or not.
+        size = kind_of(run.scenario).planning.planned_work(run.scenario) if run.part == FILL else ""
+        alike_in = run.part, json.dumps(run.parameters), bool(run.fill), size
+        points.setdefault(alike_in, []).append(run)
     notes: dict[str, list[tuple[str, str]]] = {}
     planning = kind_of(runs[0].scenario).planning
     heads = [*planning.plan_cells(runs[0].scenario), planning.work_unit]
@@ -175,9 +183,9 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
     measured = True
     for alike in points.values():
         scenario = alike[0].scenario
-        work_a_run, threads = planning.planned_work(scenario), planning.threads(scenario)
+        work_a_run, threads = own_work(alike[0]), planning.threads(scenario)
         rate = rate_per_s.get(planning.speed_class(scenario))
-        wall_s = work_a_run / rate / threads if rate else planning.predicted_s(scenario)
+        wall_s = work_a_run / rate / threads if rate else predicted_s(alike[0])
         measured = measured and rate is not None
         work += work_a_run * len(alike)
         core_s += wall_s * threads * len(alike)
@@ -201,12 +209,26 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
     # No schedule is shorter than its longest run.
     whole = duration_text(max(core_s / cores, longest_s))
     basis = "at the speed measured on this machine" if measured else "an estimate"
+    fills = [run for run in runs if run.part == FILL]
+    if fills:
+        lines.append(_fills_line(runs, fills))
     lines.append(
-        f"{len(runs)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} cores: {whole}, "
-        f"{basis}"
+        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}, "
+        f"wall time on {cores} cores: {whole}, {basis}"
     )
     lines += [_note_line(told, len(points)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
+    """How many runs share how many fills, and what the fills take of the disk."""
+    sharing = sum(bool(run.fill) for run in runs)
+    state_bytes = sum(kind_of(fill.scenario).planning.state_bytes(fill.scenario) for fill in fills)
+    number = "1 fill" if len(fills) == 1 else f"{len(fills)} fills"
+    return (
+        f"{sharing} runs share {number}, each computed and counted once: "
+        f"about {size_text(state_bytes)} of the disk"
+    )
 
 
 def _note_line(told: Sequence[tuple[str, str]], points: int) -> str:

@@ -69,7 +69,9 @@ def test_unpacked_runs_lack_nothing_and_give_the_same_tables(packed: Path, there
         ).read_bytes()
     # Nothing is older than what it is made from, and no job looks at batches that are whole.
     folder = run_folder(plan)
-    assert folder.joinpath("deck.in").stat().st_mtime <= folder.joinpath("cost.tsv").stat().st_mtime
+    assert (
+        folder.joinpath("deck.in").stat().st_mtime <= folder.joinpath("series.tsv").stat().st_mtime
+    )
     mark_done(plan.batches(10.0), plan.lacks(RESULTS), RESULTS / "two")
     assert len(list((RESULTS / "two" / "batches").iterdir())) == 2
     # What was unpacked packs into the same bytes; a second time nothing is taken.
@@ -88,8 +90,9 @@ def test_packs_of_two_machines_merge_and_conflicts_are_told(packed: Path) -> Non
     # The other machine's last digits differ; its other run is of another solver.
     with (one / "series.tsv").open("a") as table:
         table.write("\n")
-    origin = json.loads((other / "provenance.json").read_text())
-    (other / "provenance.json").write_text(json.dumps({**origin, "template_sha256": "older"}))
+    manifest = json.loads((other / MANIFEST_FILE).read_text())
+    manifest["origin"]["template_sha256"] = "older"
+    (other / MANIFEST_FILE).write_text(json.dumps(manifest))
     said = unpack(packed, RESULTS).text()
     assert "0 runs taken, 1 here already" in said
     assert f"with other digits, ours stay: {one.name}" in said
@@ -217,8 +220,8 @@ def renamed(new: str) -> Callable[[dict[str, bytes]], None]:
     def change(members: dict[str, bytes]) -> None:
         index = json.loads(members["two/pack.json"])
         run, held = next(iter(index["runs"].items()))
-        held["files"] = {new if n == "cost.tsv" else n: f for n, f in held["files"].items()}
-        body = members.pop(f"two/runs/{run}/cost.tsv")
+        held["files"] = {new if n == "series.tsv" else n: f for n, f in held["files"].items()}
+        body = members.pop(f"two/runs/{run}/series.tsv")
         rest = {n: members.pop(n) for n in list(members) if n != "two/pack.json"}
         members["two/pack.json"] = json.dumps(index).encode()
         members[f"two/runs/{run}/{new}"] = body

@@ -21,7 +21,8 @@ from sandmould.study.plan.lacking import Lack, Need
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.status import run_status, status_text
 
-FREQUENCY = "vibration.0.frequency_hz"
+RECORDS = "record.series_every_s"
+"""Runs of other records share no fill: test_fills.py has those that do."""
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Plan:
     monkeypatch.chdir(tmp_path)
     tree = {
         "based_on": "tube", "scenario": {"engine": {"name": "reference"}},
-        "sweep": {"keys": {FREQUENCY: [25, 50, 100]}}, "replicates": 2,
+        "sweep": {"keys": {RECORDS: [0.01, 0.02, 0.04]}}, "replicates": 2,
     }  # fmt: skip
     Path("trial.yaml").write_text(yaml.safe_dump(tree), encoding="utf-8")
     plan = open_plan(Path("trial.yaml"))
