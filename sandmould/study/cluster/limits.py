@@ -93,5 +93,5 @@ def _answer(command: Sequence[str], asked: str = "") -> str:
     stated = " ".join([option for option in command[2:] if option.startswith("--")][:-1])
     valid = f"what this cluster takes: {command[0]} says {said!r}"
     if asked:
-        valid += f" of a job of {asked} ({stated})"
+        valid += f" of a job of {asked} ({stated}); batch_cores of the profile sets its cores"
     raise BadInputError([Problem(str(CLUSTER_FILE), "as it is", valid)])
