@@ -32,7 +32,7 @@ from sandmould.dem.vectors import (
 
 GAP_FACTOR = 2.0
 """Near is what has a gap below this times the root of skin times way per step: a longer gap has
-more pairs that do not touch, a shorter one asks for more looks. The cost is flat around it."""
+more pairs that do not touch, a shorter one asks for more looks. Estimated, not tuned."""
 
 
 class Contacts(NamedTuple):

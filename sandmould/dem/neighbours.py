@@ -1,8 +1,8 @@
-"""Contact search in two stages, section 3.6: a grid sorts the grains, a list keeps near pairs.
+"""First stage of the contact search, section 3.6: a grid sorts the grains, near pairs are listed.
 
-The grid is the first stage, in place of the paper's quadtree: sizes differ by less than a decade,
-and a counting sort is the cheapest there is. Grains are stored in the order of its cells, so that
-neighbours are near in memory. The second stage runs over the list of pairs at every step.
+The grid stands in place of the paper's quadtree: sizes differ by less than a decade, and a
+counting sort is the cheapest there is. Grains are stored in the order of its cells, so that
+neighbours are near in memory. ``near_pairs`` is the second stage.
 """
 
 from __future__ import annotations
