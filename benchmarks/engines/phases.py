@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from benchmarks.engines.timing import interleaved, seconds, spread
 from sandmould.compiled import njit
 from sandmould.dem.motion import drift, kick
-from sandmould.dem.near_pairs import NearPairs
 from sandmould.dem.pairs import gather_incoming, pair_forces
 from sandmould.dem.solver import Solver
 from sandmould.dem.steps import DemScene, Moving
@@ -51,24 +51,20 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
 
 
 def _with_near(moving: Moving, chosen: np.ndarray) -> Moving:
-    """Keep some of the near pairs, those of later chunks moved up; chunks fill their fronts."""
-    near, start = moving.near, moving.pairs.start
-    first = np.repeat(start[moving.chunks.bound[:-1]], np.diff(moving.chunks.bound))
-    begin = np.maximum(first, np.concatenate([[0], near.stop[:-1]]))
-    arrays = tuple(
-        array.copy() for array in (near.other, near.touching, near.friction, near.rolling)
-    )
+    """Keep some of the near pairs of grains; those of a chunk move up to its front."""
+    near, bound = moving.near, moving.chunks.bound
+    rows = {
+        name: getattr(near, name).copy() for name in ("other", "touching", "friction", "rolling")
+    }
     stop = near.stop.copy()
-    filled = 0
-    for i, k in enumerate(begin):
-        if first[i] != first[i - 1] or i == 0:
-            filled = first[i]
-        rows = k + np.flatnonzero(chosen[k : near.stop[i]])
-        for array in arrays:
-            array[filled : filled + len(rows)] = array[rows]
-        filled += len(rows)
-        stop[i] = filled
-    return moving._replace(near=NearPairs(stop, *arrays, near.slot, near.left, near.gap))
+    for begin, end in pairwise(bound):
+        first = moving.pairs.start[begin]
+        before = np.concatenate([[0], np.cumsum(chosen[first : near.stop[end - 1]])])
+        stop[begin:end] = first + before[near.stop[begin:end] - first]
+        kept = first + np.flatnonzero(chosen[first : near.stop[end - 1]])
+        for array in rows.values():
+            array[first : first + len(kept)] = array[kept]
+    return moving._replace(near=near._replace(stop=stop, **rows))
 
 
 def _block(solver: Solver, moving: Moving, parts: int, block_s: float) -> Callable[[], float]:

@@ -13,7 +13,7 @@ from sandmould.dem.solver import Solver
 
 # Operations counted by hand in pairs.py, contact_law.py and motion.py; a multiply-add is two,
 # comparisons, signs and what leaves the loop are none. First discs, then spheres.
-FLOPS_PER_LISTED = (
+FLOPS_PER_PAIR = (
     ("vector between the centres", 2, 3),
     ("its square", 3, 5),
     ("sum of the radii and its square", 2, 2),
@@ -52,13 +52,13 @@ TRAFFIC = {
 stays in the core's cache from its first contact to its drift."""
 
 
-def flops(dimension: int, listed: float, contacts: float) -> float:
+def flops(dimension: int, near: float, contacts: float) -> float:
     """Operations of a grain-step, square roots and quotients apart."""
-    per_listed, per_contact, per_grain = (
+    per_pair, per_contact, per_grain = (
         sum(row[1:][dimension - 2] for row in counted)
-        for counted in (FLOPS_PER_LISTED, FLOPS_PER_CONTACT, FLOPS_PER_GRAIN)
+        for counted in (FLOPS_PER_PAIR, FLOPS_PER_CONTACT, FLOPS_PER_GRAIN)
     )
-    return listed * per_listed + contacts * per_contact + per_grain
+    return near * per_pair + contacts * per_contact + per_grain
 
 
 def traffic_bytes(solver: Solver) -> float:
@@ -68,10 +68,10 @@ def traffic_bytes(solver: Solver) -> float:
 
 
 def _bounds(
-    solver: Solver, contacts: float, listed: float, peaks: dict[str, Any], gb_s: float
+    solver: Solver, contacts: float, near: float, peaks: dict[str, Any], gb_s: float
 ) -> dict[str, float]:
     """Least time of a grain-step by each limit, ns."""
-    operations = flops(solver.dimension, listed, contacts)
+    operations = flops(solver.dimension, near, contacts)
     roots = contacts * ROOTS_PER_CONTACT[solver.dimension]
     return {
         "bandwidth": traffic_bytes(solver) / gb_s,

@@ -24,7 +24,7 @@ ENGINES = ("reference", "lammps", "liggghts")
 DASHPOTS = ("plain", "corrected")
 
 
-class Extent(NamedTuple):
+class ReboundExtent(NamedTuple):
     """How much is measured."""
 
     damping_ratios: tuple[float, ...]
@@ -33,8 +33,8 @@ class Extent(NamedTuple):
     beds: int
 
 
-WHOLE = Extent((0.2, 0.5, 0.8, 1.0), (0.05, 0.1, 0.2), 80)
-LITTLE = Extent((1.0,), (0.2,), 2)
+WHOLE = ReboundExtent((0.2, 0.5, 0.8, 1.0), (0.05, 0.1, 0.2), 80)
+LITTLE = ReboundExtent((1.0,), (0.2,), 2)
 
 
 def impacts(run: BenchmarkRun) -> list[Row]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.stability.phases import Impacts, exact
+from benchmarks.frame.impact import Impacts, exact
 from sandmould.arrays import Floats
 from tests.verification.cases.bench import OMEGA_RAD_S, RADIUS_M, Bench, law, scene
 

@@ -23,7 +23,7 @@ BELOW_DEG = 95.0
 ENGINES = {"reference": PLANES, "lammps": PLANES, "liggghts": PLANES[1:]}
 
 
-class Extent(NamedTuple):
+class GrooveExtent(NamedTuple):
     """How much is measured."""
 
     grooves: tuple[tuple[float, float], ...]
@@ -35,8 +35,8 @@ class Extent(NamedTuple):
 
 
 GROOVES = ((0.0, 3.3), (0.0, 5.0), (0.0, 10.0), (0.1, 3.3), (0.1, 5.0))
-WHOLE = Extent(GROOVES, (0.2, 0.05), 8, 7)
-LITTLE = Extent(GROOVES[1:2], (0.2,), 2, 1)
+WHOLE = GrooveExtent(GROOVES, (0.2, 0.05), 12, 7)
+LITTLE = GrooveExtent(GROOVES[1:2], (0.2,), 2, 1)
 
 
 def grooves(run: BenchmarkRun) -> list[dict[str, Any]]:

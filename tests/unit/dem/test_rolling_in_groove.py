@@ -15,7 +15,7 @@ RADIUS_M, LARGE_M, SPEED_M_S, STEP_S = 6e-4, 2e-3, 0.1, 1e-6
 LAW = Law(7e4, 7e4, 10.0, 1.0, 0.0, 7e4, True, False)
 
 
-@numba.njit  # type: ignore[untyped-decorator]
+@numba.njit
 def friction_of(n: Any, v: Any, w: Any, turn: float, law: Law, dt: float) -> Any:
     zero = (0.0, 0.0, 0.0)
     sizes = pair_coefficients(law, 1.0, RADIUS_M, RADIUS_M)

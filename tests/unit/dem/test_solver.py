@@ -9,6 +9,7 @@ from sandmould.dem import pairs as pairs_module
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import ISOTROPIC, NONE, Damping
+from sandmould.dem.near_pairs import new_near_pairs
 from sandmould.dem.neighbours import list_pairs, make_grid, sort_into_cells
 from sandmould.dem.solver import NotANumberError, Solver
 from sandmould.dem.steps import DemScene
@@ -111,6 +112,29 @@ def test_listing_again_changes_nothing(dimension: int) -> None:
     # The order of sums differs, and round-off grows a thousandfold in a few collisions.
     np.testing.assert_allclose(one.position, two.position, atol=1e-11)
     np.testing.assert_allclose(one.spin, two.spin, atol=1e-5)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_looks_for_near_pairs_change_no_bit(dimension: int) -> None:
+    seldom, always, never = (solver(dimension, 200) for _ in range(3))
+    fewer = 0
+    for _ in range(1000):
+        always.moving.near.left[:] = -1.0
+        moving = never.moving
+        slots = len(moving.chunks.grain)
+        whole = new_near_pairs(never._dim, moving.pairs, slots, never.contacts)
+        whole.left[:] = np.inf
+        never.moving = moving._replace(near=whole)
+        for s in (seldom, always, never):
+            s.advance(np.zeros(5))
+        near, listed = seldom.moving.near, seldom.moving.pairs.start
+        fewer += int(near.stop[-1] < listed[-1] == never.moving.near.stop[-1])
+        np.testing.assert_array_equal(seldom.grains.position, never.grains.position)
+    assert fewer > 500  # some pairs were passed over, and looked at in every step by the other
+    assert len(never.contacts.first) > 3
+    for s in (seldom, always):
+        np.testing.assert_array_equal(s.grains.position, never.grains.position)
+        np.testing.assert_array_equal(s.contacts.friction, never.contacts.friction)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
