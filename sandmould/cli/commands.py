@@ -199,7 +199,7 @@ def pack(
         bool, typer.Option("--checkpoints", help="Take along runs that were stopped.")
     ] = False,
 ) -> None:  # fmt: skip
-    """Pack the runs of a study that are at their end into one file, to go on elsewhere."""
+    """Pack the finished runs of a study into one file."""
     from sandmould.study.packs.pack import pack as pack_study
     from sandmould.study.plan.build_plan import RESULTS, open_plan
 
@@ -221,7 +221,7 @@ def unpack(
         ),
     ] = False,
 ) -> None:
-    """Take packed runs into ./results; runs that are here already stay as they are."""
+    """Take packed runs into ./results."""
     from sandmould.study.packs.unpack import unpack as unpack_runs
     from sandmould.study.plan.build_plan import RESULTS
 
