@@ -28,7 +28,7 @@ demo: $(INSTALLED)
 
 ## compute STUDY, or what is missing of it, and write its report
 study: $(INSTALLED)
-	@$(BIN)/sandmould run $(STUDY) --cores $(CORES) -- --quiet rules host
+	@$(BIN)/sandmould run $(STUDY) --cores $(CORES)
 
 ## check STUDY and print its runs and their price; nothing starts
 plan: $(INSTALLED)

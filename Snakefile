@@ -30,17 +30,15 @@ onstart:
         workflow.scheduler.job_rate_limiter = None
     # Not where the plan is made: a dry run starts no engine.
     if workflow.is_main_process and measure_speeds(PLAN, RESULTS):
-        print(price(PLAN, RESULTS, CORES), file=sys.stderr)
+        say(price(PLAN, RESULTS, CORES))
 
 
 onerror:
     # After Ctrl-C too; "sandmould run" says it by itself.
     left = PLAN.lacks(RESULTS).keys() & {run.run for run in PLAN.runs}
     if workflow.is_main_process and left:
-        print(
-            f"{len(left)} of {len(PLAN.runs)} runs are left: the same command goes on with them.",
-            file=sys.stderr,
-        )
+        runs = f"{len(left)} of {len(PLAN.runs)} runs are left"
+        say(f"{runs}: the same command goes on with them.")
 
 
 rule all:

@@ -245,6 +245,7 @@ def report(study: StudyFile) -> None:
     from sandmould.study.collect import SUMMARY
     from sandmould.study.plan.build_plan import RESULTS
     from sandmould.study.plan.ownership import check_owner
+    from sandmould.study.screen.ending import last_line
 
     folder = RESULTS / study.stem
     check_owner(study, folder)
@@ -260,7 +261,7 @@ def report(study: StudyFile) -> None:
     except (OSError, ValueError) as error:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("results", str(folder), valid)]) from error
-    typer.echo(f"The report: {page}")
+    typer.echo(last_line(folder))
 
 
 def _adopt(study: Path) -> None:

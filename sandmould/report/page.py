@@ -27,7 +27,7 @@ from sandmould.report.sand import pictured_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
 from sandmould.runs.columns import RUN
-from sandmould.runs.files import replaced
+from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, number, setting_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.statistics.settings import setting_rows
@@ -35,7 +35,7 @@ from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, read_run
+from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
 
 TEMPLATES = ROOT / "templates" / "report"
@@ -45,7 +45,8 @@ LIMIT_BYTES = 15_000_000
 def write_report(study_folder: Path, out: Path) -> None:
     """Write the report of a study, under 15 MB and without a single outside address.
 
-    Its main figures are written as files too, into ``figures`` of the study's folder.
+    Its main figures are written as files too, into ``figures`` of the study's folder, and its first
+    sentence into ``VERDICT_FILE``.
 
     Parameters
     ----------
@@ -66,12 +67,13 @@ def write_report(study_folder: Path, out: Path) -> None:
     page = _page(study_folder, out.absolute().parent, study, collected)
     environment = _environment()
     for budget in (BUDGET_BYTES, BUDGET_BYTES // 4, BUDGET_BYTES // 20):
-        text, figures = _render(page, environment, budget)
+        text, figures, first = _render(page, environment, budget)
         if len(text.encode("utf-8")) < LIMIT_BYTES:
             break
     with replaced(out) as partial:
         partial.write_text(text, encoding="utf-8")
         write_figures(study_folder / FIGURES, environment, figures)
+    write_text(study_folder / VERDICT_FILE, f"{first}\n")
 
 
 @dataclass(frozen=True)
@@ -138,8 +140,8 @@ def _environment() -> Environment:
 
 def _render(
     page: _Page, environment: Environment, film_budget_bytes: int
-) -> tuple[str, dict[str, Chart | bytes]]:
-    """The page, and its figures for files."""
+) -> tuple[str, dict[str, Chart | bytes], str]:
+    """The page, its figures for files, and the sentence that it begins with."""
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
     summary = page.collected.summary
     seeks_best = page.study.seeks_best
@@ -165,6 +167,8 @@ def _render(
         *of_kind.method,
         statistics_method(page.study.objective, of_kind.ends),
     )
+    statement = optimum or (agreement if agreement and agreement.is_question else estimate)
+    is_verdict = statement is None or (seeks_best and optimum is None)
     text = environment.get_template(of_kind.template).render(
         title=page.study.title or page.study_folder.name,
         study_name=page.study_folder.name,
@@ -176,7 +180,8 @@ def _render(
         estimate=estimate,
         optimum=optimum,
         robustness=robustness,
-        statement=optimum or (agreement if agreement and agreement.is_question else estimate),
+        statement=statement,
+        is_verdict=is_verdict,
         key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
         objective_charts=[_both_sizes(c) for c in charts],
         drawn_note=drawn_note(of_sweep, verdict),
@@ -192,7 +197,9 @@ def _render(
         **of_kind.context,
     )
     of_estimate = estimate_figures(estimate) if estimate else {}
-    return text, {**numbered("objective", charts), **of_estimate, **of_kind.figures}
+    sentences = verdict.sentences if statement is None or is_verdict else statement.sentences
+    figures = {**numbered("objective", charts), **of_estimate, **of_kind.figures}
+    return text, figures, sentences[0]
 
 
 def _both_sizes(chart: Any) -> tuple[Any, Any]:

@@ -12,6 +12,8 @@ from pathlib import Path
 from sandmould.runs.files import write_text
 
 LINE_EVERY_S = 5.0
+STATE_EVERY_S = 1.0
+"""How often ``progress.json`` is written, which the table on the terminal is drawn from."""
 
 
 def duration_text(seconds: float) -> str:
@@ -44,16 +46,16 @@ class Progress:
         self._path = work / "progress.json"
         self._expected = math.inf if expected is None else max(expected, 1.0)
         self._unit = unit
-        self._last_line_s = -LINE_EVERY_S
+        self._last_line_s = self._last_state_s = -math.inf
         self.earlier_cpu_s = 0.0
         """Processor time of the processes that this run went on from."""
 
     def show(self, stage: str, time_s: float, done: float, rate: float, last: bool = False) -> None:
-        """Show simulated time, percent, work per second and time left."""
+        """Show simulated time, percent, work per second and time left: a line now and then."""
         now = time.monotonic()
-        if not last and now - self._last_line_s < LINE_EVERY_S:
+        if not last and now - self._last_state_s < STATE_EVERY_S:
             return
-        self._last_line_s = now
+        self._last_state_s = now
         # Settling times are guesses: nothing is at 100 % before its end.
         percent = 100.0 if last else min(99.0, 100 * done / self._expected)
         left = max(0.0, self._expected - done) / rate if rate > 0 else float("inf")
@@ -66,6 +68,9 @@ class Progress:
             "cpu_s": self.earlier_cpu_s + sum(os.times()[:4]),
         }
         write_text(self._path, json.dumps(state))
+        if not last and now - self._last_line_s < LINE_EVERY_S:
+            return
+        self._last_line_s = now
         bar = "#" * round(percent / 5)
         ending = "done" if last else _left_text(left)
         print(

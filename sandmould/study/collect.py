@@ -229,9 +229,21 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
     OSError, ValueError
         When ``runs.tsv`` itself cannot be read.
     """
+    return gather_runs(read_runs(study_folder), study_folder, at_vibration_s)
+
+
+def read_runs(study_folder: Path) -> pd.DataFrame:
+    """The planned runs of a study, one a row, with their parts."""
     runs = pd.read_csv(study_folder / "runs.tsv", sep="\t", dtype={RUN: str})
     if PART not in runs:
         runs[PART] = SWEEP
+    return runs
+
+
+def gather_runs(
+    runs: pd.DataFrame, study_folder: Path, at_vibration_s: float | None = None
+) -> Collected:
+    """The same of some of the runs: rows of ``read_runs``, numbered from 0."""
     folders = [study_folder / "runs" / str(run) for run in runs[RUN]]
     outcomes, problems = _read_outcomes(folders)
     costs = read_costs(folders)

@@ -20,6 +20,7 @@ from typing import IO, Protocol, TextIO
 
 from sandmould.runs.claim import Claim, owner_of
 from sandmould.runs.parent import end_with_parent
+from sandmould.runs.words import say
 
 RESTARTABLE_EXIT = 75
 """Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
@@ -175,7 +176,7 @@ def _flock(file: TextIO, waiting: str) -> bool:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        print(f"{waiting} already", file=sys.stderr)
+        say(f"{waiting} already")
         fcntl.flock(file, fcntl.LOCK_EX)
     except OSError:
         return False
@@ -184,7 +185,7 @@ def _flock(file: TextIO, waiting: str) -> bool:
 
 def _lost(folder: Path) -> None:
     """End what computes in a folder that another process has taken over."""
-    print(f"{folder}: another process has taken over, since this one stood still", file=sys.stderr)
+    say(f"{folder}: another process has taken over, since this one stood still")
     for children in Path("/proc/self/task").glob("*/children"):
         for pid in children.read_text(encoding="ascii").split():
             os.kill(int(pid), signal.SIGKILL)

@@ -8,6 +8,7 @@ go on to Snakemake.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -16,10 +17,12 @@ from pathlib import Path
 from sandmould import ROOT
 from sandmould.statistics.agreement import sweep_part
 from sandmould.study.collect import read_summary, swept_keys
-from sandmould.study.plan.build_plan import RESULTS, open_plan
+from sandmould.study.plan.build_plan import RESULTS, open_plan, starts_jobs, writing
 from sandmould.study.plan.trust import check_letters, check_places, check_trust
 from sandmould.study.rounds.decide import decision_text, next_runs
 from sandmould.study.rounds.round_log import read_rounds, write_rounds
+from sandmould.study.screen.ending import last_line, trouble
+from sandmould.study.screen.screen import Screen
 from sandmould.study.stopping import run_snakemake, until_stopped
 
 
@@ -64,18 +67,56 @@ def _run_study(path: Path, options: Sequence[str]) -> int:
         if log.ended:
             break
     status = _snakemake(path, options, [])
-    report = folder / "report.html"
-    if report.exists():
-        print(f"The report: {report}")
+    if starts_jobs(options) and (said := last_line(folder)):
+        print(said)
     return status
 
 
 def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> int:
-    cores = [] if any(o in ("--cores", "-c", "--jobs", "-j") for o in options) else _all_cores()
+    """Call Snakemake with a study that is shown while it is computed."""
+    stated = stated_cores(options)
+    cores = [] if stated is not None else ["--cores", str(_all_cores())]
     workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path.absolute())]
     command = [sys.executable, "-m", "snakemake", *cores, *workflow, *options]
-    return run_snakemake([*command, *(["--", *targets] if targets else [])])
+    command += ["--", *targets] if targets else []
+    if not starts_jobs(options):
+        return run_snakemake(command)
+    plan = open_plan(path)
+    with writing(RESULTS / plan.study.name):
+        screen = Screen(plan, RESULTS, stated or _all_cores())
+        log = screen.log.open("w", encoding="utf-8")
+    with log:
+        with screen:
+            status = run_snakemake(command, log, screen.environment(), screen.look)
+        screen.tell_failures()
+        if status and not screen.is_explained and (found := trouble(screen.log)):
+            for line in (*found, f"All that Snakemake said: {screen.log}"):
+                print(line, file=sys.stderr)
+    return status
 
 
-def _all_cores() -> list[str]:
-    return ["--cores", str(os.cpu_count() or 1)]
+def stated_cores(options: Sequence[str]) -> int | None:
+    """Cores, or jobs at a time, as the options of Snakemake state them; None where none does.
+
+    Parameters
+    ----------
+    options : sequence of str
+
+    Returns
+    -------
+    int or None
+        All cores of this machine for words such as ``all``.
+    """
+    for place, option in enumerate(options):
+        found = _CORES.match(option)
+        if found:
+            value = found["value"] or next(iter(options[place + 1 :]), "")
+            return int(value) if value.isdecimal() else _all_cores()
+    return None
+
+
+_CORES = re.compile(r"(?:--cores|--jobs|-c|-j)(?:=?(?P<value>\w+))?$")
+
+
+def _all_cores() -> int:
+    return os.cpu_count() or 1

@@ -6,7 +6,7 @@ import contextlib
 import json
 import math
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -17,14 +17,13 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
 from sandmould.study.cluster.queue import jobs_of, live_jobs, queue_lines
 from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.plan.build_plan import Plan
-from sandmould.study.plan.fills import own_work
+from sandmould.study.plan.build_plan import Plan, stored_speeds
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.process import is_locked
 from sandmould.study.rounds.round_log import read_rounds
 from sandmould.study.run_tables import read_costs
 from sandmould.study.tidy import freed_bytes, orphans
+from sandmould.study.time_left import TimeLeft
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
@@ -42,8 +41,8 @@ class RunStatus:
     said: str = ""
     """How it failed, how far it is, or what of it is lost."""
     cpu_s: float = 0.0
-    left_s: float = math.nan
-    """Of a run that is being computed."""
+    share: float = 0.0
+    """What is done of a run that has begun."""
     wall_s: float = math.nan
     """Of a run that is done."""
 
@@ -64,10 +63,10 @@ def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) ->
     if lack.need is Need.NOTHING:
         return _ended(folder)
     path = folder / "work" / "progress.json"
-    said, left_s, cpu_s = "", math.nan, 0.0
+    said, share, cpu_s = "", 0.0, 0.0
     with contextlib.suppress(*_DAMAGED):
         now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        left_s = float(now["left_s"])
+        share = float(now["percent"]) / 100
         said = f"{now['percent']:.0f} %, {now['stage']}, {now['time_s']:.3g} s simulated"
         cpu_s = float(now["cpu_s"])
     owner = owner_of(folder)
@@ -77,11 +76,11 @@ def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) ->
         return RunStatus(name, "running" if running else "waiting", "" if running else lack.why)
     if running:
         where = f", {owner.text()}" if owner else ""
-        return RunStatus(name, "running", f"{said}{where}", cpu_s, left_s)
+        return RunStatus(name, "running", f"{said}{where}", cpu_s, share=share)
     with contextlib.suppress(*_DAMAGED):
         stopped = RunOutcome.read(folder / "work" / "outcome.json").outcome
         said = f"{said}; {stopped.label}"
-    return RunStatus(name, "stopped", said, cpu_s)
+    return RunStatus(name, "stopped", said, cpu_s, share=share)
 
 
 def _ended(folder: Path) -> RunStatus:
@@ -93,9 +92,9 @@ def _ended(folder: Path) -> RunStatus:
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
     if outcome.outcome is Outcome.FINISHED:
-        return RunStatus(folder.name, "done", "", cpu_s, 0.0, wall_s)
+        return RunStatus(folder.name, "done", "", cpu_s, wall_s=wall_s)
     said = f"{outcome.outcome.label}. {outcome.detail}".strip()
-    return RunStatus(folder.name, "failed", said, cpu_s, 0.0)
+    return RunStatus(folder.name, "failed", said, cpu_s)
 
 
 def status_text(plan: Plan, results: Path, cores: int) -> str:
@@ -124,7 +123,9 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
     if any(statuses[fill.run].state != "done" for fill in fills):
         lines.append(f"{_count(fills, statuses)} of {len(fills)} fills that runs share")
     spent_s = sum(status.cpu_s for status in statuses.values())
-    lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
+    lines.append(
+        f"processor time so far: {duration_text(spent_s)}; {_left(plan, results, statuses, cores)}"
+    )
     if live is not None:
         lines += queue_lines(jobs_of(statuses, Path()))
     log = read_rounds(folder, plan.study.study)
@@ -162,33 +163,18 @@ def _orphans(plan: Plan, results: Path) -> list[str]:
     return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
 
 
-def _left(plan: Plan, statuses: dict[str, RunStatus], cores: int) -> str:
-    """Wall time of what is left, at the speed of the runs like it that are done."""
-    planning = plan.kind.planning
-    speeds: dict[SpeedClass, list[float]] = {}
-    runs = [run for run in (*plan.fills, *plan.runs) if run.run in statuses]
-    for run in runs:
-        wall_s = statuses[run.run].wall_s
-        if math.isfinite(wall_s):
-            core_s = wall_s * planning.threads(run.scenario)
-            each = core_s / own_work(run)
-            speeds.setdefault(planning.speed_class(run.scenario), []).append(each)
-    left_s, unknown = 0.0, 0
-    for run in runs:
-        status = statuses[run.run]
-        if status.state == "running" and math.isfinite(status.left_s):
-            left_s += status.left_s
-        elif status.state in ("running", "stopped", "waiting"):
-            costs = speeds.get(planning.speed_class(run.scenario))
-            if costs is None:
-                unknown += 1
-            else:
-                typical = sorted(costs)[len(costs) // 2]
-                left_s += own_work(run) * typical
-    if unknown:
-        return f"time left unknown: no run like {unknown} of them is done"
+def _left(plan: Plan, results: Path, statuses: Mapping[str, RunStatus], cores: int) -> str:
+    """Wall time until the report is written."""
+    time_left = TimeLeft((*plan.fills, *plan.runs), stored_speeds(plan, results))
+    for status in statuses.values():
+        time_left.learn(status.run, status.wall_s)
+    begun = {s.run: s.share for s in statuses.values() if s.state in ("running", "stopped")}
+    waiting = [s.run for s in statuses.values() if s.state == "waiting"]
+    left_s = time_left.seconds(begun, waiting, cores)
+    if not left_s:
+        return "nothing left"
+    left = [run for run in (*plan.fills, *plan.runs) if run.run in {*begun, *waiting}]
     return (
-        f"time left: about {duration_text(left_s / cores)} on {cores} cores"
-        if left_s
-        else ("nothing left")
+        f"time left with its report: about {duration_text(left_s)} on {cores} cores, "
+        f"{time_left.prices.basis(left)}"
     )

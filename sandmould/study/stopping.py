@@ -7,9 +7,10 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from types import FrameType
+from typing import IO
 
 from sandmould.runs.parent import end_with_parent
 
@@ -72,7 +73,12 @@ def _stopping() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def run_snakemake(command: Sequence[str]) -> int:
+def run_snakemake(
+    command: Sequence[str],
+    log: IO[str] | None = None,
+    environment: Mapping[str, str] | None = None,
+    look: Callable[[], float] | None = None,
+) -> int:
     """Run Snakemake in a group of processes of its own, which ends as a whole.
 
     A signal of the terminal would reach every job by itself, and each would say so. Jobs on this
@@ -82,6 +88,11 @@ def run_snakemake(command: Sequence[str]) -> int:
     Parameters
     ----------
     command : sequence of str
+    log : file, optional
+        Takes all that it and its jobs print; the terminal unless given.
+    environment : mapping of str to str, optional
+    look : callable, optional
+        Called while it runs; gives the seconds until the next call.
 
     Returns
     -------
@@ -96,10 +107,16 @@ def run_snakemake(command: Sequence[str]) -> int:
     process = subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
+        stdout=log,
+        stderr=log,
+        env=environment,
         process_group=0,
         preexec_fn=partial(end_with_parent, signal.SIGKILL),
     )
     try:
+        while look is not None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                return process.wait(look())
         return process.wait()
     except Stopped:
         if any(option.split("=")[0] in _ELSEWHERE for option in command):

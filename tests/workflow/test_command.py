@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -28,11 +29,17 @@ def test_a_study_from_an_empty_folder(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.chdir(tmp_path)
     Path("coarse.yaml").write_text(COARSE)
     command = [sys.executable, "-m", "sandmould.cli", "run", "coarse.yaml", "--cores", "2"]
-    options = ["--", "--quiet", "rules", "host"]
-    ran = subprocess.run([*command, *options], capture_output=True, text=True, timeout=120)
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert ran.returncode == 0, ran.stderr
-    assert ran.stdout == "The report: results/coarse/report.html\n"
     results = Path("results", "coarse")
+    said = (results / "verdict.txt").read_text().strip()
+    assert said
+    assert ran.stdout == f"{said} The report: results/coarse/report.html\n"
+    *_, first, second, last = ran.stderr.splitlines()
+    assert first.startswith("[1/2] ")
+    assert second.startswith("[2/2] ")
+    assert last.startswith("coarse: 2 of 2 runs done after ")
+    assert not re.search("rule|jobid|Select jobs", ran.stderr)
     # The shipped profile lets two short runs share a job.
     assert len(list((results / "batches").glob("*.done"))) == 1
     summary = pd.read_csv(results / "summary.tsv", sep="\t")

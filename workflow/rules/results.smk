@@ -72,6 +72,7 @@ rule report:
             category="Study",
             labels={"table": "findings, pictures, verdict"},
         ),
+        verdict=f"{FOLDER}/verdict.txt",
         figures=directory(f"{FOLDER}/figures"),
     log:
         f"{FOLDER}/logs/report.log",

@@ -6,6 +6,7 @@ import sys
 
 from sandmould import ROOT
 from sandmould.runs.columns import SWEEP
+from sandmould.runs.words import say
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.collect import CHECKS as CHECK_TABLES
 from sandmould.study.cluster.settings import goes_to_slurm
@@ -47,20 +48,21 @@ try:
             atexit.register(turn.close)
         PLAN, taken = take_up(PLAN, RESULTS)
         if taken:
-            print(taken, file=sys.stderr)
+            say(taken)
     BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
     STATED = workflow.resource_settings.default_resources or {}
     SUBMISSION = open_submission(PLAN, sys.argv, STATED)
     if workflow.is_main_process and starts_jobs(sys.argv) and goes_to_slurm(sys.argv):
         SUBMISSION.ask(BATCHED)
     if workflow.is_main_process and "--lint" not in sys.argv:
-        print(announce(PLAN, RESULTS, CORES), file=sys.stderr)
+        say(announce(PLAN, RESULTS, CORES))
         if said := prepare(PLAN, RESULTS, BATCHED):
-            print(f"{said}\n", file=sys.stderr)
+            say(f"{said}\n")
         for said in SUBMISSION.said:
-            print(said, file=sys.stderr)
+            say(said)
 except BadInputError as error:
-    sys.exit(str(error))
+    say(str(error))
+    sys.exit(1)
 
 STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"

@@ -33,6 +33,11 @@ class Note(NamedTuple):
     """One sentence or two, with figures."""
 
 
+def nothing_beside(scenario: Any) -> float:
+    """No time beside the work."""
+    return 0.0
+
+
 def no_notes(scenario: Any) -> Sequence[Note]:
     """Nothing to tell."""
     return ()
@@ -118,6 +123,8 @@ class Planning(Generic[ScenarioT]):
     """The part that comes first, as a scene of its own: runs with equal ones share it."""
     state_bytes: Callable[[ScenarioT], int] = no_state
     """Disk that the state at the end of a scene takes."""
+    beside_s: Callable[[ScenarioT], float] = nothing_beside
+    """Wall time of a run that does not grow with its work."""
     notes: Callable[[ScenarioT], Sequence[Note]] = no_notes
     """What a user should know of a run before it starts, though it can be run."""
     speed: MachineSpeed[ScenarioT] | None = None

@@ -26,6 +26,8 @@ from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import plan_table, write_plan, write_study
+from sandmould.study.plan.price import Prices
+from sandmould.study.plan.trust import may_run
 from sandmould.study.rounds.round_log import read_rounds
 
 RESULTS = Path("results")
@@ -214,7 +216,7 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
         When the results cannot be written.
     """
     folder = results / plan.study.name
-    with _writing(folder):
+    with writing(folder):
         write_owner(plan.study.path, folder)
         write_plan([*plan.fills, *plan.runs], folder)
         write_study(plan.study.study, folder)
@@ -238,7 +240,7 @@ def prepare(plan: Plan, results: Path, batches: Sequence[Batch] = ()) -> str:
         When the results cannot be written.
     """
     folder = results / plan.study.name
-    with _writing(folder):
+    with writing(folder):
         found = plan.lacks(results)
         said = note_lacks([*plan.fills, *plan.runs], found, folder)
         mark_done(batches, found, folder)
@@ -246,7 +248,7 @@ def prepare(plan: Plan, results: Path, batches: Sequence[Batch] = ()) -> str:
 
 
 @contextlib.contextmanager
-def _writing(folder: Path) -> Iterator[None]:
+def writing(folder: Path) -> Iterator[None]:
     """Say in one sentence that results cannot be written."""
     try:
         yield
@@ -257,7 +259,7 @@ def _writing(folder: Path) -> Iterator[None]:
 
 def price(plan: Plan, results: Path, cores: int) -> str:
     """Say what the runs will take, as far as the machine's speed is known at what was measured."""
-    return plan_table([*plan.fills, *plan.runs], stored_speeds(plan, results), cores)
+    return plan_table([*plan.fills, *plan.runs], Prices(stored_speeds(plan, results)), cores)
 
 
 def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
@@ -272,13 +274,15 @@ def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
 def measure_speeds(plan: Plan, results: Path) -> bool:
     """Measure and store how fast this machine is where that is not known: seconds an engine.
 
+    A program that the user has not allowed to run is not started for that either.
+
     Returns
     -------
     bool
         Whether anything was measured, so that the plan has another price.
     """
     speed = plan.kind.planning.speed
-    if speed is None:
+    if speed is None or not may_run(plan.study, plan.runs):
         return False
     before = stored_speeds(plan, results)
     missing = [scenario for each, scenario in plan.classes.items() if each not in before]

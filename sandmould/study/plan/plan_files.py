@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,15 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, read_planned, validated
 from sandmould.study.definition.run import FILL, Part, Run
 from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
-from sandmould.study.plan.fills import own_work, predicted_s
+from sandmould.study.plan.fills import own_work
+from sandmould.study.plan.price import Prices, study_s
 
 STUDY_FILE = "study.yaml"
 """The study as planned, with all that it rests on."""
+REPORT_FILE = "report.html"
+VERDICT_FILE = "verdict.txt"
+"""The first sentence of the report, for the terminal and for programs."""
 FIGURES = "figures"
 """Folder of a study that its report's main figures lie in."""
 LISTED_POINTS = 20
@@ -157,15 +160,13 @@ def _kind_of_older(tree: Tree) -> str:
     return next(fits, DEFAULT_KIND.name)
 
 
-def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], cores: int) -> str:
+def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     """What the runs of a study will take, as text.
 
     Parameters
     ----------
     runs : sequence of Run
-    rate_per_s : mapping of SpeedClass to float
-        Work a second of one core, as measured on this machine; where it is missing the wall time
-        is an estimate at a speed that is the same everywhere.
+    prices : Prices
     cores : int
         Cores that share the runs.
     """
@@ -179,17 +180,11 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
     planning = kind_of(runs[0].scenario).planning
     heads = [*planning.plan_cells(runs[0].scenario), planning.work_unit]
     rows = [["point", "runs", *heads, "wall time a run"]]
-    work = core_s = longest_s = 0.0
-    measured = True
+    work = 0.0
     for alike in points.values():
         scenario = alike[0].scenario
-        work_a_run, threads = own_work(alike[0]), planning.threads(scenario)
-        rate = rate_per_s.get(planning.speed_class(scenario))
-        wall_s = work_a_run / rate / threads if rate else predicted_s(alike[0])
-        measured = measured and rate is not None
+        work_a_run = own_work(alike[0])
         work += work_a_run * len(alike)
-        core_s += wall_s * threads * len(alike)
-        longest_s = max(longest_s, wall_s)
         for note in planning.notes(scenario):
             notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note.text))
         if len(rows) <= LISTED_POINTS:
@@ -199,22 +194,20 @@ def plan_table(runs: Sequence[Run], rate_per_s: Mapping[SpeedClass, float], core
                     str(len(alike)),
                     *planning.plan_cells(scenario).values(),
                     f"{work_a_run:.3g}",
-                    duration_text(wall_s),
+                    duration_text(prices.engine_s(alike[0])),
                 ]
             )
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows]
     if len(points) > LISTED_POINTS:
         lines.append(f"... and {len(points) - LISTED_POINTS} more points")
-    # No schedule is shorter than its longest run.
-    whole = duration_text(max(core_s / cores, longest_s))
-    basis = "at the speed measured on this machine" if measured else "an estimate"
     fills = [run for run in runs if run.part == FILL]
     if fills:
         lines.append(_fills_line(runs, fills))
+    whole = duration_text(study_s([prices.piece(run) for run in runs], cores))
     lines.append(
-        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}, "
-        f"wall time on {cores} cores: {whole}, {basis}"
+        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} "
+        f"cores with report: {whole}, {prices.basis(runs)}"
     )
     lines += [_note_line(told, len(points)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"

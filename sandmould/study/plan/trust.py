@@ -45,6 +45,11 @@ def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
     ]
 
 
+def may_run(study: OpenStudy, runs: Sequence[Run]) -> bool:
+    """Whether the user has allowed what the runs would execute, or all of it is shipped."""
+    return study.study.trusts_program or not _foreign(study, runs)
+
+
 def check_trust(study: OpenStudy, runs: Sequence[Run]) -> None:
     """See that the user has allowed what the runs would execute.
 
@@ -52,8 +57,8 @@ def check_trust(study: OpenStudy, runs: Sequence[Run]) -> None:
     ------
     BadInputError
     """
-    foreign = _foreign(study, runs)
-    if foreign and not study.study.trusts_program:
+    if not may_run(study, runs):
+        foreign = _foreign(study, runs)
         valid = (
             "true, once you have read the deck: one that is not shipped is a program that can read "
             f"and change your files ({listed(foreign)}); to run it write trust_deck: true in "

@@ -20,6 +20,7 @@ from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
+from sandmould.study.plan.price import Prices
 
 FREQUENCY = "vibration.0.frequency_hz"
 MARGINS = {"margins": {"tube_fill_fraction": 0.03}}
@@ -117,12 +118,13 @@ def test_part_of_a_run_is_in_the_plan_on_disk(planned: Planned, tmp_path: Path) 
 
 def test_price_is_that_of_each_engine(planned: Planned) -> None:
     rates = {("reference", 2): 2e7, ("lammps", 2): 2e6}
-    rows = plan_table(planned(**CHECKED).runs, rates, 1).splitlines()[1:]
+    rows = plan_table(planned(**CHECKED).runs, Prices(rates), 1).splitlines()[1:]
     assert [row.split()[:2] for row in rows[:3]] == [
         ["frequency_25", "3"], ["frequency_50", "3"], ["engine_lammps_frequency_50", "2"],
     ]  # fmt: skip
     assert "an estimate" not in "".join(rows)
-    assert plan_table(planned(**CHECKED).runs, {("lammps", 2): 2e6}, 1).endswith("an estimate\n")
+    half = Prices({("lammps", 2): 2e6})
+    assert plan_table(planned(**CHECKED).runs, half, 1).endswith("an estimate\n")
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.plan.price import Prices
 from sandmould.study.simulate import measure_run, render_run, simulate
 
 TANK = {"kind": "tank", "particle_m": 0.004, "width_m": 0.016, "depth_m": 0.032}
@@ -111,7 +112,7 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     top = {"sweep": {"design": "list", "points": points}}
     study = open_study(opened(tmp_path, top, duration_s=0.2))
     runs, folder = expand(study), tmp_path / "results"
-    assert "particle-solves" in plan_table(runs, {}, 1)
+    assert "particle-solves" in plan_table(runs, Prices(), 1)
     write_plan(runs, folder)
     write_study(study.study, folder)
     for run in runs:

@@ -13,6 +13,7 @@ from sandmould.runs.formatting import setting_text
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
+from sandmould.study.plan.price import Prices
 from tests.unit.study.test_solidification_study import opened
 
 
@@ -33,7 +34,7 @@ def test_points_of_one_study_have_labels_of_their_own(tmp_path: Path) -> None:
         runs = expand(open_study(opened(tmp_path, sweep, shapes=[polygon])))
         labels = {run.run.rsplit("_r", 1)[0] for run in runs}
         assert len(labels) == 2
-        rows = plan_table(runs, {}, 1).splitlines()[1:3]
+        rows = plan_table(runs, Prices(), 1).splitlines()[1:3]
         assert {row.split()[0] for row in rows} == labels
         assert all(re.fullmatch("[a-z0-9_]+", label) for label in labels)
 

@@ -20,6 +20,7 @@ from sandmould.study.kinds.deck import planning as deck
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.plan.price import Prices
 
 TEMPLATE = """\
 variable a equal {{ angle_deg }}
@@ -181,8 +182,9 @@ def test_the_plan_is_read_back_and_priced(tmp_path: Path) -> None:
     back = read_run(tmp_path / "results" / "runs" / runs[0].run / "scenario.yaml")
     assert back == runs[0]
     assert isinstance(back.scenario, OwnDeck)
-    text = plan_table(runs, {("lammps", 0): 1.0}, 2)
-    assert "4 runs, 120 core-seconds, wall time on 2 cores: 60 s" in text
+    lines = plan_table(runs, Prices({("lammps", 0): 3.0}), 2).splitlines()
+    assert lines[1].endswith(" 10 s")
+    assert lines[-1].startswith("4 runs, 120 core-seconds, wall time on 2 cores with report: ")
 
 
 def test_a_log_is_read_past_warnings(tmp_path: Path) -> None:

@@ -23,10 +23,12 @@ from sandmould.scenario.vibration import STOP_PERIODS
 from sandmould.study.definition.run import RUN_NAME, Run
 from sandmould.study.kinds.sand import speed
 from sandmould.study.kinds.sand.planning import planned_steps, planned_work, predicted_s
+from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.build_plan import announce, measure_speeds, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
+from sandmould.study.plan.price import BEGIN_S, END_S, Prices
 
 LAMMPS = ("lammps", 2)
 MEASURED = "at the speed measured on this machine"
@@ -177,26 +179,29 @@ def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
 
 
 def test_price_of_an_unknown_machine_is_an_estimate(demo: list[Run]) -> None:
-    *_, last = plan_table(demo, {}, 1).splitlines()
-    seconds = sum(predicted_s(r.scenario) for r in demo)
+    *_, last = plan_table(demo, Prices(), 1).splitlines()
+    seconds = BEGIN_S + END_S + sum(START_S + predicted_s(r.scenario) for r in demo)
     assert last.startswith("9 runs")
-    assert last.endswith(f"wall time on 1 cores: {duration_text(seconds)}, an estimate")
+    assert last.endswith(f"wall time on 1 cores with report: {duration_text(seconds)}, an estimate")
 
 
 def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
     total = sum(planned_work(r.scenario) for r in demo)
     # times well inside the range of their unit: the sums above carry round-off
-    lines = plan_table(demo, {LAMMPS: total / 9000}, 1).splitlines()
+    lines = plan_table(demo, Prices({LAMMPS: total / 9000}), 1).splitlines()
     grains = sum(plan_counts(demo[0].scenario))
     assert lines[1].split()[:3] == ["frequency_25", "3", f"{grains:,}"]
     assert lines[-1].startswith("9 runs, ")
-    assert lines[-1].endswith(f"wall time on 1 cores: 2.5 h, {MEASURED}")
-    halved = plan_table(demo, {LAMMPS: total / 9000}, 2)
-    assert halved.endswith(f"on 2 cores: 75.0 min, {MEASURED}\n")
+    assert lines[-1].endswith(f"wall time on 1 cores with report: 2.5 h, {MEASURED}")
+    # Nine runs on two cores: five after each other.
+    longer = duration_text(BEGIN_S + END_S + 5 * (START_S + 1000))
+    halved = plan_table(demo, Prices({LAMMPS: total / 9000}), 2)
+    assert halved.endswith(f"on 2 cores with report: {longer}, {MEASURED}\n")
     # On more cores than runs the longest run decides.
     longest = max(planned_work(r.scenario) for r in demo)
-    shortest = plan_table(demo, {LAMMPS: longest / 30}, 99)
-    assert shortest.endswith(f"on 99 cores: 30 s, {MEASURED}\n")
+    alone = duration_text(BEGIN_S + END_S + START_S + 300)
+    shortest = plan_table(demo, Prices({LAMMPS: longest / 300}), 99)
+    assert shortest.endswith(f"on 99 cores with report: {alone}, {MEASURED}\n")
 
 
 def test_long_table_is_cut(tmp_path: Path) -> None:
@@ -206,7 +211,7 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
         "{low: 15, high: 100, number: 30}}}",
         encoding="utf-8",
     )
-    lines = plan_table(expand(open_study(path)), {LAMMPS: 1e6}, 2).splitlines()
+    lines = plan_table(expand(open_study(path)), Prices({LAMMPS: 1e6}), 2).splitlines()
     assert len(lines) == 23
     assert lines[-2] == "... and 10 more points"
 

@@ -20,6 +20,7 @@ from sandmould.scenario.wall_thickness import thinnest_wall
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
+from sandmould.study.plan.price import Prices
 from tests.scenes import TUBE_SCENE
 from tests.unit.scenario.test_mesh_union import CUBE, box, file_of
 from tests.unit.study.test_solidification_study import opened
@@ -39,7 +40,7 @@ def around(side: float, sand: float) -> dict[str, Any]:
 
 
 def plan_of(folder: Path, top: dict[str, Any] | None = None, /, **scenario: Any) -> str:
-    return plan_table(expand(open_study(opened(folder, top, **scenario))), {}, 1)
+    return plan_table(expand(open_study(opened(folder, top, **scenario))), Prices(), 1)
 
 
 def notes_of(folder: Path, **scenario: Any) -> list[str]:
@@ -235,7 +236,7 @@ def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
         study["scenario"]["collision_distance"] = distance
         path = tmp_path / "pour.yaml"
         path.write_text(yaml.safe_dump(study))
-        told[distance] = plan_table(expand(open_study(path)), {}, 1)
+        told[distance] = plan_table(expand(open_study(path)), Prices(), 1)
     assert "Note: Metal is poured with collision_distance 0." in told[0.0]
     assert "Note:" not in told[0.8]
 
@@ -250,7 +251,7 @@ def test_obstacles_thinner_than_a_grain_are_told(tmp_path: Path) -> None:
         path.write_text(
             yaml.safe_dump({"scenario": scene, "objective": {"measure": "solid_fraction"}})
         )
-        return plan_table(expand(open_study(path)), {}, 1)
+        return plan_table(expand(open_study(path)), Prices(), 1)
 
     told = [line for line in table(0.0005).splitlines() if line.startswith("Note: ")]
     assert len(told) == 1

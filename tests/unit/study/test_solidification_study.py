@@ -26,6 +26,7 @@ from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.plan.price import Prices
 from sandmould.study.simulate import measure_run, render_run, simulate
 
 SMALL: dict[str, Any] = {
@@ -123,7 +124,7 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
         opened(tmp_path, {"sweep": {"design": "list", "points": points}, "reference": points[1]})
     )
     runs, folder = expand(study), tmp_path / "results"
-    assert "element-steps" in plan_table(runs, {}, 1)
+    assert "element-steps" in plan_table(runs, Prices(), 1)
     write_plan(runs, folder)
     write_study(study.study, folder)
     for run in runs:

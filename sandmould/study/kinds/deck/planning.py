@@ -12,8 +12,9 @@ from sandmould.engines.own_deck import deck as own_deck
 from sandmould.engines.registry import engine_module
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
+from sandmould.study.kinds.deck import speed
 from sandmould.study.kinds.deck.measures import MEASURES
-from sandmould.study.kinds.kind import Planning, SpeedClass, UserProgram
+from sandmould.study.kinds.kind import MachineSpeed, Planning, SpeedClass, UserProgram
 
 SHIPPED = ROOT / "config" / "decks"
 """Decks that come with us."""
@@ -144,5 +145,6 @@ PLANNING = Planning[OwnDeck](
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
+    speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
     program=UserProgram[OwnDeck](shipped=SHIPPED, files=files, foreign=foreign, to_read=to_read),
 )

@@ -36,6 +36,8 @@ in a snapshot: measured at 282 discs and 2 000 spheres."""
 PASSES = 4.0
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
+PASS_S = 2e-3
+"""Processor time of a pass of a window beside its grain-steps: loads, solution, new surface."""
 
 
 def resolved(scenario: Scenario) -> Scenario:
@@ -139,6 +141,14 @@ def predicted_s(scenario: Scenario) -> float:
     return planned_work(scenario) / (of_core * scenario.engine.ranks * in_3d)
 
 
+def beside_s(scenario: Scenario) -> float:
+    """Time for the pattern, which does not grow with the grains: so much a pass of a window."""
+    if scenario.pattern is None or not scenario.pattern.loop.has_windows:
+        return 0.0
+    loop = scenario.pattern.loop
+    return min(loop.most_passes, PASSES) * planned_s(scenario) / loop.window_s * PASS_S
+
+
 def planned_s(scenario: Scenario) -> float:
     """Fill, estimated, discharge, vibration and rest."""
     return build_program(scenario).expected_s
@@ -207,6 +217,7 @@ PLANNING = Planning[Scenario](
     plan_cells=plan_cells,
     fill=fill,
     state_bytes=state_bytes,
+    beside_s=beside_s,
     notes=notes,
     speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
 )

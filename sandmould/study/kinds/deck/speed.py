@@ -1,0 +1,136 @@
+"""How long a deck of the user's own takes here: a pilot of some seconds, stored."""
+
+from __future__ import annotations
+
+import json
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from sandmould.digest import SHORT, digest
+from sandmould.engines.own_deck import computation
+from sandmould.engines.own_deck import deck as own_deck
+from sandmould.engines.registry import engine_module
+from sandmould.runs.files import write_text
+from sandmould.runs.parent import end_with_parent
+from sandmould.scenario.own_deck import OwnDeck
+
+STORED = "pilots.json"
+PILOT_S = 12.0
+"""A shorter run is computed whole; of a longer one its steps are counted."""
+_LEAST_SHARE = 0.002
+_LOOK_EVERY_S = 0.2
+
+
+def stored_rate(scenario: OwnDeck, results: Path) -> float | None:
+    """Expected core-seconds that a second of a core computes, as a pilot found; starts nothing.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+    results : Path
+        Folder of all results.
+    """
+    core_s = _pilots(results).get(_key(scenario))
+    return None if core_s is None else scenario.expected_core_s / core_s
+
+
+def measured_rate(scenario: OwnDeck, results: Path) -> float | None:
+    """The same, by a pilot where there was none yet; parameters as in ``stored_rate``.
+
+    Returns
+    -------
+    float or None
+        None where the deck states no ``steps`` and did not end in time, or could not run.
+    """
+    if (rate := stored_rate(scenario, results)) is not None:
+        return rate
+    core_s = pilot(scenario)
+    if core_s is None:
+        return None
+    results.mkdir(parents=True, exist_ok=True)
+    write_text(results / STORED, json.dumps({**_pilots(results), _key(scenario): core_s}, indent=1))
+    return scenario.expected_core_s / core_s
+
+
+def pilot(scenario: OwnDeck, pilot_s: float = PILOT_S) -> float | None:
+    """Compute the deck for some seconds in a folder of its own; processor time of a whole run.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+        One of several ranks has no pilot.
+    pilot_s : float, s
+
+    Returns
+    -------
+    float or None
+    """
+    if scenario.engine.ranks > 1:
+        return None
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "runs" / "pilot"
+        folder.mkdir(parents=True)
+        write_text(folder / "scenario.json", scenario.model_dump_json())
+        with (folder / "log").open("w") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-m", __name__, str(folder)],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=end_with_parent,
+            )  # fmt: skip
+        try:
+            return _watched(process, folder, pilot_s)
+        finally:
+            process.kill()
+            process.wait()
+
+
+def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> float | None:
+    """What a whole run takes, once the pilot has ended or has gone on for long enough."""
+    whole, progress = folder / "whole.json", folder / "work" / "progress.json"
+    begun_s = None
+    while process.poll() is None:
+        if begun_s is None and (folder / "begun").exists():
+            begun_s = time.monotonic()
+        if begun_s is not None and time.monotonic() - begun_s > pilot_s:
+            break
+        time.sleep(_LOOK_EVERY_S)
+    if whole.exists():
+        return max(float(json.loads(whole.read_text())), 1e-3)
+    if not progress.exists() or begun_s is None:
+        return None
+    now = json.loads(progress.read_text())
+    if now["percent"] < 100 * _LEAST_SHARE or not now["work_per_s"]:
+        return None
+    return float(now["left_s"]) + (progress.stat().st_mtime - (folder / "begun").stat().st_mtime)
+
+
+def _pilots(results: Path) -> dict[str, float]:
+    """All pilots; none where the file is damaged."""
+    try:
+        return {key: float(s) for key, s in json.loads((results / STORED).read_text()).items()}
+    except (OSError, ValueError, AttributeError):
+        return {}
+
+
+def _key(scenario: OwnDeck) -> str:
+    """Machine, engine and deck: a deck with other values is one of another price."""
+    version = engine_module(scenario.engine.name).installed_version()
+    deck = digest(own_deck.render(scenario.model_copy(update={"seed": 1}), "pilot", "pilot"))
+    return f"{platform.node()} {scenario.engine.name} {version} {deck[:SHORT]}"
+
+
+def main(name: str) -> None:
+    """Compute the pilot of a folder, in a process that may be killed."""
+    folder = Path(name)
+    scenario = OwnDeck.model_validate_json((folder / "scenario.json").read_text())
+    write_text(folder / "begun", "")
+    computed = computation.compute(scenario, folder, "pilot", "pilot")
+    if computed.outcome.outcome == 0:
+        write_text(folder / "whole.json", json.dumps(computed.cost.wall_s))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,104 @@
+"""What runs and whole studies will take: the one place where time is foretold."""
+
+from __future__ import annotations
+
+import heapq
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from sandmould.study.definition.run import Run
+from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.registry import kind_of
+from sandmould.study.plan.batches import START_S
+from sandmould.study.plan.fills import own_work, predicted_s
+
+BEGIN_S = 5.0
+"""What Snakemake takes to read its rules, and the study to be planned."""
+END_S = 8.0
+"""What tables, report and check take once all runs have ended: three jobs."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Something to compute that keeps some cores busy for a while."""
+
+    wall_s: float
+    threads: int = 1
+
+
+@dataclass(frozen=True)
+class Prices:
+    """What runs take: by finished ones like them, else by this machine's speed, else fixed."""
+
+    rate_per_s: Mapping[SpeedClass, float] = field(default_factory=dict)
+    """Work a second of one core, as measured on this machine."""
+    ratios: Mapping[SpeedClass, float] = field(default_factory=dict)
+    """Finished runs of a class over what is foretold of them without these."""
+
+    def engine_s(self, run: Run) -> float:
+        """Wall time of a run's computation alone."""
+        return self.ratios.get(_class_of(run), 1.0) * foretold_s(run, self.rate_per_s)
+
+    def piece(self, run: Run) -> Piece:
+        """A run with its process, its deck and its measures."""
+        return Piece(
+            START_S + self.engine_s(run), kind_of(run.scenario).planning.threads(run.scenario)
+        )
+
+    def basis(self, runs: Iterable[Run]) -> str:
+        """What the price of some runs rests on."""
+        classes = {_class_of(run) for run in runs}
+        if classes <= set(self.ratios):
+            return "by finished runs"
+        known = {*self.ratios, *self.rate_per_s}
+        return "at the speed measured on this machine" if classes <= known else "an estimate"
+
+
+def foretold_s(run: Run, rate_per_s: Mapping[SpeedClass, float]) -> float:
+    """Wall time of a run's computation by the machine's speed, or by one fixed everywhere."""
+    planning, scenario = kind_of(run.scenario).planning, run.scenario
+    rate = rate_per_s.get(planning.speed_class(scenario))
+    if rate is None:
+        return predicted_s(run) + planning.beside_s(scenario)
+    in_steps_s = own_work(run) / rate / planning.threads(scenario)
+    return in_steps_s + planning.beside_s(scenario)
+
+
+def ratios_of(
+    finished: Iterable[tuple[Run, float]], rate_per_s: Mapping[SpeedClass, float]
+) -> dict[SpeedClass, float]:
+    """How much longer finished runs took than was foretold of them, by class: the median.
+
+    Parameters
+    ----------
+    finished : iterable of (Run, float)
+        Runs with the wall time of their computation in s.
+    rate_per_s : mapping of SpeedClass to float
+    """
+    found: dict[SpeedClass, list[float]] = {}
+    for run, wall_s in finished:
+        found.setdefault(_class_of(run), []).append(wall_s / foretold_s(run, rate_per_s))
+    return {each: statistics.median(ratios) for each, ratios in found.items()}
+
+
+def spread_s(pieces: Sequence[Piece], cores: int) -> float:
+    """Wall time of pieces that share cores: each begins, in order, once enough cores are free."""
+    free_at = [0.0] * max(cores, 1)
+    last_s = 0.0
+    for piece in pieces:
+        taken = [heapq.heappop(free_at) for _ in range(min(piece.threads, len(free_at)))]
+        end_s = max(taken) + piece.wall_s
+        for _ in taken:
+            heapq.heappush(free_at, end_s)
+        last_s = max(last_s, end_s)
+    return last_s
+
+
+def study_s(pieces: Sequence[Piece], cores: int) -> float:
+    """Wall time of a whole study: its beginning, its runs, its tables and its report."""
+    return BEGIN_S + spread_s(pieces, cores) + END_S
+
+
+def _class_of(run: Run) -> SpeedClass:
+    return kind_of(run.scenario).planning.speed_class(run.scenario)
