@@ -29,7 +29,7 @@ PARTS_OF_A_RUN = {"fill": "settle_", "shaking": "vibrate_"}
 
 
 @dataclass(frozen=True)
-class Extent:
+class DeckExtent:
     """How much is measured."""
 
     turns: int
@@ -48,10 +48,10 @@ _DISCS = _LAMMPS | {
 }
 _SPHERES = _LAMMPS | {"fill": {"layers": [{"count": 2000}], "settling": {"longest_s": 0.3}}}
 _FEW = {"fill": {"layers": [{"count": 60}]}, "rest": {"load_tolerance": 0.5}}
-WHOLE = Extent(
+WHOLE = DeckExtent(
     turns=3, scenes={"discs": ("tube_demo", _DISCS), "spheres": ("tube_3d_small", _SPHERES)}
 )
-LITTLE = Extent(
+LITTLE = DeckExtent(
     turns=1,
     scenes={
         "discs": ("tube_demo", _DISCS | _FEW),
@@ -91,7 +91,7 @@ def _spread(values: list[float]) -> dict[str, float]:
 
 def measure(name: str, run: BenchmarkRun) -> dict[str, Any]:
     """All variants in turns: times a grain-step, and within a turn the ratio of before to each."""
-    extent: Extent = run.extent
+    extent: DeckExtent = run.extent
     scenario = scene(*extent.scenes[name])
     turns = []
     with TemporaryDirectory() as folder:

@@ -134,6 +134,7 @@ class Driver:
 
     def _begin_clocks(self) -> None:
         self._earlier = (self.cost.wall_s, self.cost.cpu_s)
+        self._progress.earlier_cpu_s = self.cost.cpu_s
         self._begun, self._cpu_begun = time.monotonic(), cpu_time_s()
 
     def _read_clocks(self) -> None:

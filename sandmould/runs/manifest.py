@@ -15,6 +15,8 @@ from sandmould.runs.files import write_text
 
 MANIFEST_FILE = "products.json"
 DECK_FILE = "deck.in"
+LEFT_OUT = "left_out"
+"""Step of files that a pack of the run did without: they are not missed, but cannot be measured."""
 OLDER_ORIGIN, OLDER_COST = "provenance.json", "cost.tsv"
 """What runs of older times have beside it."""
 Manifest = dict[str, dict[str, Any]]

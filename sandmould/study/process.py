@@ -10,14 +10,15 @@ import contextlib
 import fcntl
 import os
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import IO, Protocol, TextIO
 
+from sandmould.runs.claim import Claim, owner_of
 from sandmould.runs.parent import end_with_parent
 
 RESTARTABLE_EXIT = 75
@@ -136,70 +137,89 @@ def _under_mpi(command: list[str], ranks: int, mpi: str) -> list[str]:
 
 @contextlib.contextmanager
 def _folder_lock(folder: Path) -> Iterator[TextIO]:
-    """Wait for any other process that computes in a run's folder.
+    """Wait for any other process that computes in a run's folder, of this machine or another.
 
-    One can outlive a killed snakemake; the next snakemake then finds what it finished. The file
-    names this machine, since a lock may not be seen from another.
+    One can outlive a killed snakemake; the next snakemake then finds what it finished.
     """
-    with _locked(folder / "lock", f"{folder}: waiting for the process that computes it") as file:
-        if not (folder / "outcome.json").exists():
-            (folder / "work").mkdir(exist_ok=True)
-            file.truncate(0)
-            file.write(f"{socket.gethostname()}\n")
-            file.flush()
-        yield file
+    waiting = f"{folder}: waiting for the process that computes it"
+    with _locked(folder / "lock", waiting) as (file, alone):
+        claim = Claim(folder, alone, partial(_lost, folder))
+        try:
+            if not (folder / "outcome.json").exists():
+                (folder / "work").mkdir(exist_ok=True)
+            yield file
+        finally:
+            claim.let_go()
         if (folder / "outcome.json").exists():
             (folder / "lock").unlink(missing_ok=True)  # nothing is left to be guarded
 
 
-def _locked(path: Path, waiting: str) -> TextIO:
-    """Open a file and hold its lock, that of a file which still has its name."""
+@contextlib.contextmanager
+def _locked(path: Path, waiting: str) -> Iterator[tuple[TextIO, bool]]:
+    """Open a file and hold its lock, that of a file which still has its name.
+
+    Beside the file stands False where the file system has no locks, even for one machine.
+    """
     while True:
-        file = path.open("a")
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            print(f"{waiting} already", file=sys.stderr)
-            fcntl.flock(file, fcntl.LOCK_EX)
-        with contextlib.suppress(FileNotFoundError):
-            if path.stat().st_ino == os.fstat(file.fileno()).st_ino:
-                return file
-        file.close()  # who held it has finished, and removed it
+        with path.open("a") as file:
+            alone = _flock(file, waiting)
+            with contextlib.suppress(FileNotFoundError):
+                if path.stat().st_ino == os.fstat(file.fileno()).st_ino:
+                    yield file, alone
+                    return
+        # who held it has finished, and removed it
 
 
-def take_turn(study_folder: Path) -> TextIO | None:
-    """Wait for any other Snakemake that computes a study; ends with the file that it gives.
+def _flock(file: TextIO, waiting: str) -> bool:
+    """Hold a file's lock; False where the file system has none, even for one machine."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        print(f"{waiting} already", file=sys.stderr)
+        fcntl.flock(file, fcntl.LOCK_EX)
+    except OSError:
+        return False
+    return True
+
+
+def _lost(folder: Path) -> None:
+    """End what computes in a folder that another process has taken over."""
+    print(f"{folder}: another process has taken over, since this one stood still", file=sys.stderr)
+    for children in Path("/proc/self/task").glob("*/children"):
+        for pid in children.read_text(encoding="ascii").split():
+            os.kill(int(pid), signal.SIGKILL)
+
+
+def take_turn(study_folder: Path) -> contextlib.ExitStack | None:
+    """Wait for any other Snakemake that computes a study; ends with what it gives.
 
     Two would remove and compute again what the other has just finished. None where the folder
     takes no file: the plan says so then.
     """
-    try:
-        study_folder.mkdir(parents=True, exist_ok=True)
-        return _locked(
-            study_folder / "lock", f"{study_folder}: waiting for the command that computes it"
-        )
-    except OSError:
-        return None
+    with contextlib.ExitStack() as turn:
+        try:
+            study_folder.mkdir(parents=True, exist_ok=True)
+            waiting = f"{study_folder}: waiting for the command that computes it"
+            _, alone = turn.enter_context(_locked(study_folder / "lock", waiting))
+            claim = Claim(study_folder, alone)
+        except OSError:
+            return None
+        turn.callback(claim.let_go)
+        return turn.pop_all()
 
 
 def is_locked(folder: Path) -> bool:
-    """Whether a process of this machine computes in a run's folder."""
+    """Whether a process computes in a run's folder, on this machine or on another."""
     try:
         with (folder / "lock").open() as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False
-    except OSError:
+    except BlockingIOError:
         return True
-    return False
-
-
-def computed_elsewhere(folder: Path) -> bool:
-    """Whether another machine computed in a run's folder last."""
-    with contextlib.suppress(OSError, ValueError):
-        host = (folder / "lock").read_text(encoding="utf-8").strip()
-        return host not in ("", socket.gethostname())
-    return False
+    except OSError:
+        return owner_of(folder, here=True) is not None
+    return owner_of(folder) is not None
 
 
 @contextlib.contextmanager

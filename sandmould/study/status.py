@@ -5,22 +5,23 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from sandmould.runs.claim import owner_of
 from sandmould.runs.formatting import size_text
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
+from sandmould.study.cluster.queue import jobs_of, live_jobs, queue_lines
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.fills import own_work
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
-from sandmould.study.process import computed_elsewhere, is_locked
+from sandmould.study.process import is_locked
 from sandmould.study.rounds.round_log import read_rounds
 from sandmould.study.run_tables import read_costs
 from sandmould.study.tidy import freed_bytes, orphans
@@ -28,8 +29,6 @@ from sandmould.study.tidy import freed_bytes, orphans
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
 LISTED_RUNS = 12
-FRESH_S = 60.0
-"""A run of another machine, whose lock may not be seen here, has written its progress since."""
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
 """What reading a file may raise that was cut short or overwritten."""
 
@@ -49,7 +48,7 @@ class RunStatus:
     """Of a run that is done."""
 
 
-def run_status(folder: Path, lack: Lack) -> RunStatus:
+def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) -> RunStatus:
     """See where a run stands from what it has written.
 
     Parameters
@@ -58,23 +57,31 @@ def run_status(folder: Path, lack: Lack) -> RunStatus:
         ``results/<study>/runs/<run>``.
     lack : Lack
         What a start would do for it.
+    live : collection of str, optional
+        Numbers of the jobs of the cluster that have not ended, where that is known.
     """
     name = folder.name
     if lack.need is Need.NOTHING:
         return _ended(folder)
     path = folder / "work" / "progress.json"
-    said, left_s, fresh = "", math.nan, False
+    said, left_s, cpu_s = "", math.nan, 0.0
     with contextlib.suppress(*_DAMAGED):
         now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        fresh = time.time() - path.stat().st_mtime < FRESH_S
         left_s = float(now["left_s"])
         said = f"{now['percent']:.0f} %, {now['stage']}, {now['time_s']:.3g} s simulated"
-    running = is_locked(folder) or (fresh and computed_elsewhere(folder))
+        cpu_s = float(now["cpu_s"])
+    owner = owner_of(folder)
+    ended = owner is not None and owner.job and live is not None and owner.job not in live
+    running = is_locked(folder) and not ended
     if not said:
         return RunStatus(name, "running" if running else "waiting", "" if running else lack.why)
     if running:
-        return RunStatus(name, "running", said, left_s=left_s)
-    return RunStatus(name, "stopped", said)
+        where = f", {owner.text()}" if owner else ""
+        return RunStatus(name, "running", f"{said}{where}", cpu_s, left_s)
+    with contextlib.suppress(*_DAMAGED):
+        stopped = RunOutcome.read(folder / "work" / "outcome.json").outcome
+        said = f"{said}; {stopped.label}"
+    return RunStatus(name, "stopped", said, cpu_s)
 
 
 def _ended(folder: Path) -> RunStatus:
@@ -102,7 +109,7 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
         That share what is left.
     """
     folder = results / plan.study.name
-    lacks = plan.lacks(results)
+    lacks, live = plan.lacks(results), live_jobs()
     # A fill that no run waits for any more counts where it was computed.
     fills = [
         fill
@@ -110,7 +117,7 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
         if fill.run in lacks or (folder / fill.place / "outcome.json").exists()
     ]
     statuses = {
-        run.run: run_status(folder / run.place, lacks.get(run.run, WHOLE))
+        run.run: run_status(folder / run.place, lacks.get(run.run, WHOLE), live)
         for run in (*fills, *plan.runs)
     }
     lines = [f"{plan.study.name}: {_count(plan.runs, statuses)} of {len(plan.runs)} runs"]
@@ -118,6 +125,8 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
         lines.append(f"{_count(fills, statuses)} of {len(fills)} fills that runs share")
     spent_s = sum(status.cpu_s for status in statuses.values())
     lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
+    if live is not None:
+        lines += queue_lines(jobs_of(statuses, Path()))
     log = read_rounds(folder, plan.study.study)
     if plan.study.study.refine.rounds:
         ended = log.ended or f"of at most {plan.study.study.refine.rounds}"

@@ -15,6 +15,7 @@ rule render:
         "../envs/sandmould.yaml"
     threads: 1
     resources:
+        **SUBMITTED,
         mem_mb=1000,
         runtime=10,
     message:
@@ -69,6 +70,7 @@ rule simulate:
         "../envs/sandmould.yaml"
     threads: threads_of
     resources:
+        **SUBMITTED,
         tasks=ranks_of,
         cpus_per_task=cpus_per_task_of,
         mpi=mpi_of,
@@ -106,6 +108,7 @@ rule measure:
         "../envs/sandmould.yaml"
     threads: 1
     resources:
+        **SUBMITTED,
         mem_mb=2000,
         runtime=30,
     message:
@@ -129,6 +132,7 @@ rule batch:
         "../envs/sandmould.yaml"
     threads: batch_threads_of
     resources:
+        **SUBMITTED,
         tasks=batch_ranks_of,
         cpus_per_task=batch_cpus_per_task_of,
         mpi=batch_mpi_of,

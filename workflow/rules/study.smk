@@ -1,5 +1,6 @@
 # The study is validated and expanded before Snakemake builds its graph: bad input ends here, in
 # one sentence a problem.
+import atexit
 import os
 import sys
 
@@ -7,6 +8,9 @@ from sandmould import ROOT
 from sandmould.runs.columns import SWEEP
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.collect import CHECKS as CHECK_TABLES
+from sandmould.study.cluster.settings import goes_to_slurm
+from sandmould.study.cluster.submission import open_submission
+from sandmould.study.packs.recorded import take_up
 from sandmould.study.plan.batches import alone
 from sandmould.study.plan.build_plan import (
     RESULTS,
@@ -37,13 +41,24 @@ try:
     check_places(PLAN.study)
     check_letters(PLAN.runs)
     check_trust(PLAN.study, PLAN.runs)
-    BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
-    if workflow.is_main_process and "--lint" not in sys.argv:
+    if workflow.is_main_process and starts_jobs(sys.argv):
         # Held until this process ends.
-        turn = starts_jobs(sys.argv) and take_turn(RESULTS / PLAN.study.name)
+        if turn := take_turn(RESULTS / PLAN.study.name):
+            atexit.register(turn.close)
+        PLAN, taken = take_up(PLAN, RESULTS)
+        if taken:
+            print(taken, file=sys.stderr)
+    BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
+    STATED = workflow.resource_settings.default_resources or {}
+    SUBMISSION = open_submission(PLAN, sys.argv, STATED)
+    if workflow.is_main_process and starts_jobs(sys.argv) and goes_to_slurm(sys.argv):
+        SUBMISSION.ask(BATCHED)
+    if workflow.is_main_process and "--lint" not in sys.argv:
         print(announce(PLAN, RESULTS, CORES), file=sys.stderr)
-        if said := prepare(PLAN, RESULTS):
+        if said := prepare(PLAN, RESULTS, BATCHED):
             print(f"{said}\n", file=sys.stderr)
+        for said in SUBMISSION.said:
+            print(said, file=sys.stderr)
 except BadInputError as error:
     sys.exit(str(error))
 
@@ -57,6 +72,8 @@ CHECKS = [
     for name in CHECK_TABLES
     if any(run.part != SWEEP for run in PLAN.runs)
 ]
+# What a cluster wants of every job.
+SUBMITTED = SUBMISSION.resources()
 RUNS = {run.run: run for run in (*PLAN.fills, *PLAN.runs)}
 BATCHES = {batch.name: [run.run for run in batch.runs] for batch in BATCHED}
 SIDE_BY_SIDE = {batch.name: batch.side_by_side for batch in BATCHED}
@@ -135,8 +152,8 @@ def memory_mb_of(wildcards):
     return PLAN.memory_mb(named(wildcards))
 
 
-def runtime_min_of(wildcards, attempt):
-    return attempt * PLAN.runtime_min(named(wildcards))
+def runtime_min_of(wildcards):
+    return SUBMISSION.runtime_min(PLAN.runtime_min(named(wildcards)))
 
 
 def labels_of(wildcards):
@@ -179,10 +196,10 @@ def batch_memory_mb_of(wildcards):
     return most * SIDE_BY_SIDE[wildcards.batch]
 
 
-def batch_runtime_min_of(wildcards, attempt):
+def batch_runtime_min_of(wildcards):
     beside = SIDE_BY_SIDE[wildcards.batch]
     runs = BATCHES[wildcards.batch]
-    return attempt * PLAN.runtime_min(*runs, side_by_side=beside)
+    return SUBMISSION.runtime_min(PLAN.runtime_min(*runs, side_by_side=beside))
 
 
 # Not the names themselves: Snakemake tries a pattern on every file of every run, and ten thousand

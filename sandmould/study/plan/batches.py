@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from sandmould.study.definition.run import FILLS, LAST_MEASURED, Run
+from sandmould.study.definition.run import FILL, FILLS, LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.fills import predicted_s
 
@@ -80,6 +80,26 @@ def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Bat
     for alike in list(waiting):
         close(alike)
     return batches
+
+
+def mark_done(batches: Iterable[Batch], lacking: Container[str], folder: Path) -> None:
+    """Mark batches whose runs lack nothing, such as unpacked ones, so that no job looks at them.
+
+    Parameters
+    ----------
+    batches : iterable of Batch
+    lacking : container of str
+        Names of runs that lack something.
+    folder : Path
+        ``results/<study>``.
+    """
+    for batch in batches:
+        if batch.runs[0].part == FILL:
+            continue  # one that no run waits for is not there
+        mark = folder / "batches" / f"{batch.name}.done"
+        if not mark.exists() and not any(run.run in lacking for run in batch.runs):
+            mark.parent.mkdir(exist_ok=True)
+            mark.touch()
 
 
 def alone(runs: Sequence[Run], batches: Sequence[Batch]) -> list[str]:

@@ -18,7 +18,7 @@ from sandmould.study.definition.comparing import ENGINE
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import AnyScenario, Kind, SpeedClass
 from sandmould.study.kinds.registry import kind_named
-from sandmould.study.plan.batches import Batch, plan_batches
+from sandmould.study.plan.batches import Batch, mark_done, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
@@ -224,8 +224,8 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
     return f"\n{title}\n{price(plan, results, cores)}"
 
 
-def prepare(plan: Plan, results: Path) -> str:
-    """Note for Snakemake what each run lacks.
+def prepare(plan: Plan, results: Path, batches: Sequence[Batch] = ()) -> str:
+    """Note for Snakemake what each run lacks, and which batches lack nothing.
 
     Returns
     -------
@@ -239,7 +239,10 @@ def prepare(plan: Plan, results: Path) -> str:
     """
     folder = results / plan.study.name
     with _writing(folder):
-        return note_lacks([*plan.fills, *plan.runs], plan.lacks(results), folder)
+        found = plan.lacks(results)
+        said = note_lacks([*plan.fills, *plan.runs], found, folder)
+        mark_done(batches, found, folder)
+        return said
 
 
 @contextlib.contextmanager

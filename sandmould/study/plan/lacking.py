@@ -11,6 +11,7 @@ from pathlib import Path
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import (
+    LEFT_OUT,
     MANIFEST_FILE,
     OLDER_COST,
     Manifest,
@@ -102,6 +103,8 @@ def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
         why = "it is not measured"
     else:
         why = damage(folder, manifest["measured"])
+    if why and manifest and LEFT_OUT in manifest:
+        return Lack(Need.COMPUTE, f"{why}, and its snapshots were left out of a pack")
     return Lack(Need.MEASURE, why) if why else WHOLE
 
 
@@ -127,6 +130,13 @@ def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
     folder : Path
         ``results/<study>``.
     """
+    template_hash = template_hashes()
+    found = {run.run: lack_of(run, folder / run.place, template_hash) for run in runs}
+    return {run: lack for run, lack in found.items() if lack.need}
+
+
+def template_hashes() -> Callable[[Run], str]:
+    """Hash of what turns a run into its deck, for many runs."""
     hashes: dict[tuple[Path, ...], str] = {}
 
     def template_hash(run: Run) -> str:
@@ -136,8 +146,7 @@ def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
             hashes[sources] = _template_hash(run)
         return hashes[sources]
 
-    found = {run.run: lack_of(run, folder / run.place, template_hash) for run in runs}
-    return {run: lack for run, lack in found.items() if lack.need}
+    return template_hash
 
 
 def note_lacks(runs: Iterable[Run], found: dict[str, Lack], folder: Path) -> str:
