@@ -31,7 +31,7 @@ BEFORE = "274675f"
 
 
 @dataclass(frozen=True)
-class LoopBeds:
+class LoopExtent:
     """How much is measured."""
 
     turns: int = 7
@@ -44,7 +44,7 @@ class LoopBeds:
     """Simulated time of a bed at rest, and how many discs it has."""
 
 
-QUICK = LoopBeds(2, 0.05, (300,), 300, 600, 100, 0.05)
+QUICK = LoopExtent(2, 0.05, (300,), 300, 600, 100, 0.05)
 
 
 def tree_of(commit: str) -> Path:
@@ -89,7 +89,7 @@ def turn(process: Any, steps: int) -> dict[str, Any]:
     return answer
 
 
-def compare(bed: Bed, motion: str, extent: LoopBeds) -> dict[str, Any]:
+def compare(bed: Bed, motion: str, extent: LoopExtent) -> dict[str, Any]:
     """Cost per grain-step before and now in turns, and whether all digits are the same."""
     with started({"before": tree_of(BEFORE), "now": ROOT}, bed, motion) as both:
         for process in both.values():
@@ -120,7 +120,7 @@ def compare(bed: Bed, motion: str, extent: LoopBeds) -> dict[str, Any]:
 
 def measure_beds(run: BenchmarkRun) -> list[dict[str, Any]]:
     """All beds, at rest and shaken."""
-    extent: LoopBeds = run.extent
+    extent: LoopExtent = run.extent
     beds = [settled(2, n) for n in extent.discs] + [settled(3, extent.spheres)]
     beds.append(tiled(beds[-1], extent.tiled_spheres))
     return [compare(bed, motion, extent) for bed in beds for motion in ("rest", "shaken")]
@@ -128,7 +128,7 @@ def measure_beds(run: BenchmarkRun) -> list[dict[str, Any]]:
 
 def measure_rest(run: BenchmarkRun) -> dict[str, Any]:
     """Drift of a small bed at rest over a long time, before and now."""
-    extent: LoopBeds = run.extent
+    extent: LoopExtent = run.extent
     bed = settled(2, extent.rest_discs)
     with started({"before": tree_of(BEFORE), "now": ROOT}, bed, "rest") as both:
         step_s = {name: turn(process, 4)["step_s"] for name, process in both.items()}["now"]
@@ -157,7 +157,7 @@ BENCHMARK = Benchmark(
     __doc__,
     parts={"beds": measure_beds, "rest": measure_rest},
     pages={"core_loop.md": page},
-    extent=LoopBeds(),
+    extent=LoopExtent(),
     quick=QUICK,
     arrange=lambda measured, run: {**measured, "origin": run.origin, "turns": run.extent.turns},
 )
