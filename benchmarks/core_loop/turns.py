@@ -7,6 +7,7 @@ checksum of all places, the greatest speed, m/s, and the farthest way since the 
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import json
 import sys
@@ -26,7 +27,7 @@ def _solver(tree: Path, bed_file: Path) -> tuple[Any, float]:
     beds = importlib.import_module("benchmarks.engines.beds")
     if Path(str(beds.__file__)).parents[2] != tree:
         raise SystemExit(f"{beds.__file__} does not lie in {tree}")
-    with np.load(bed_file) as arrays:
+    with np.load(bed_file, allow_pickle=False) as arrays:
         bed = beds.Bed(**{name: a[()] if a.ndim == 0 else a for name, a in arrays.items()})
     return beds.solver_on(bed), float(beds.PERIOD_S)
 
@@ -61,4 +62,8 @@ def main(tree: Path, bed_file: Path, motion: str) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tree", type=Path)
+    parser.add_argument("bed", type=Path)
+    parser.add_argument("motion", choices=("rest", "shaken"))
+    main(*vars(parser.parse_args()).values())

@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
-import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -79,5 +79,9 @@ def timed(scenario: Scenario, variant: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    scene = Scenario.model_validate_json(Path(sys.argv[1]).read_text(encoding="utf-8"))
-    print(json.dumps(timed(scene, sys.argv[2])))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("variant")
+    options = parser.parse_args()
+    scene = Scenario.model_validate_json(options.scene.read_text(encoding="utf-8"))
+    print(json.dumps(timed(scene, options.variant)))

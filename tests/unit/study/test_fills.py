@@ -20,6 +20,7 @@ from sandmould.study.plan.fills import own_work, predicted_s, share_fills
 from sandmould.study.plan.lacking import Need
 from sandmould.study.plan.load_study import STUDIES, open_study
 from sandmould.study.plan.plan_files import plan_table, read_run
+from sandmould.study.plan.price import Prices
 from sandmould.study.status import status_text
 from sandmould.study.tidy import orphans
 
@@ -109,7 +110,7 @@ def test_work_of_a_fill_is_counted_once(tmp_path: Path) -> None:
         alone = replace(run, fill="")
         assert own_work(run) + own_work(fill) == pytest.approx(own_work(alone))
         assert predicted_s(run) + predicted_s(fill) == pytest.approx(predicted_s(alone))
-    text = plan_table([*plan.fills, *plan.runs], {}, 1)
+    text = plan_table([*plan.fills, *plan.runs], Prices(), 1)
     assert text.splitlines()[1].startswith("fill ")
     assert "4 runs, " in text
     assert "4 runs share 2 fills, each computed and counted once" in text

@@ -194,8 +194,8 @@ def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
     assert lines[-1].startswith("9 runs, ")
     assert lines[-1].endswith(f"wall time on 1 cores with report: 2.5 h, {MEASURED}")
     # Nine runs on two cores: five after each other.
-    longer = duration_text(BEGIN_S + END_S + 5 * (START_S + 1000))
-    halved = plan_table(demo, Prices({LAMMPS: total / 9000}), 2)
+    longer = duration_text(BEGIN_S + END_S + 5 * (START_S + 10_000))
+    halved = plan_table(demo, Prices({LAMMPS: total / 90_000}), 2)
     assert halved.endswith(f"on 2 cores with report: {longer}, {MEASURED}\n")
     # On more cores than runs the longest run decides.
     longest = max(planned_work(r.scenario) for r in demo)

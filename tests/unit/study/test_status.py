@@ -72,10 +72,12 @@ def claimed(folder: Path) -> None:
     (folder / CLAIM_FILE).write_text(json.dumps(owner))
 
 
-def test_nothing_begun_has_no_time_left_that_is_known(plan: Plan) -> None:
+def test_time_left_of_nothing_begun_is_an_estimate(plan: Plan) -> None:
     said = status_text(plan, Path("results"), 2)
-    assert said.startswith("trial: 6 waiting of 6 runs\nprocessor time so far: 0 s; ")
-    assert "time left unknown: no run like 6 of them is done" in said
+    assert said.startswith(
+        "trial: 6 waiting of 6 runs\nprocessor time so far: 0 s; time left with its report: about "
+    )
+    assert said.endswith(" on 2 cores, an estimate")
 
 
 def test_every_state_is_told(plan: Plan) -> None:
@@ -92,8 +94,10 @@ def test_every_state_is_told(plan: Plan) -> None:
     first, second, *lines = said.splitlines()
     assert first == "trial: 1 done, 1 failed, 2 running, 1 stopped, 1 waiting of 6 runs"
     # 15 min of those that ended, three times 20 s of those that did not.
-    # Twice 90 s of those that run, and one stopped and one waiting of 600 s or 300 s, on two cores.
-    assert second.startswith("processor time so far: 16.0 min; time left: about ")
+    # 360 s are left of three, 600 s of the one that waits: on two cores 360 s, then 600 s, then
+    # the report.
+    left = "time left with its report: about 16.1 min on 2 cores, by finished runs"
+    assert second == f"processor time so far: 16.0 min; {left}"
     assert lines == [
         f"  running: {running.name}  40 %, settle_1, 0.5 s simulated",
         f"  running: {elsewhere.name}  40 %, settle_1, 0.5 s simulated, job 7 on node7",
