@@ -85,7 +85,7 @@ def render_deck(
         "scene": scenario.scene,
         "laws": {"grain": contact.grain_grain, "wall": contact.grain_wall},
         "dashpots": Dashpots(contact, context["classes"], contact.lag_s(context["step_s"])),
-        "slip_of_half_step": contact.lead_s(scenario.dimension, context["step_s"]) > 0.0,
+        "slip_of_half_step": scenario.dimension == 3 and contact.slip_normal == "half_step",
         "simulation_box": simulation_box(scenario, program),
         "half_slab": HALF_SLAB_M,
         "blocks": [_solid(b) for b in scenario.scene.blocks],
