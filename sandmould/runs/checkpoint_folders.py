@@ -15,6 +15,10 @@ END_CHECKPOINT = "end_checkpoint"
 """Folder of the state at the end of a fill, from which runs go on."""
 
 
+LAYOUT = 2
+"""Of the files of checkpoints: raised when those of earlier versions cannot be read any more."""
+
+
 @dataclass(frozen=True)
 class CheckpointMark:
     """Where a run stood when a checkpoint was written."""
@@ -31,6 +35,8 @@ class CheckpointMark:
     """The cost row so far."""
     shared_stages: int = 0
     """Stages at the beginning that another run has computed and pays for."""
+    layout: int = 1
+    """``LAYOUT`` of the version that wrote it."""
 
 
 def _digests(folder: Path) -> dict[str, str]:
@@ -43,7 +49,8 @@ def _digests(folder: Path) -> dict[str, str]:
 
 def seal(folder: Path, mark: CheckpointMark) -> None:
     """Close a checkpoint folder: the mark with the files' hashes comes last."""
-    text = json.dumps({"mark": asdict(mark), "sha256": _digests(folder)})
+    tree = {"mark": asdict(mark) | {"layout": LAYOUT}, "sha256": _digests(folder)}
+    text = json.dumps(tree)
     write_text(folder / "mark.json", text)
 
 
@@ -53,13 +60,16 @@ def read_mark(folder: Path) -> CheckpointMark:
     Raises
     ------
     ValueError
-        When the checkpoint is missing or damaged.
+        When the checkpoint is missing or damaged, or of a version with other files.
     """
     try:
         sealed = json.loads((folder / "mark.json").read_text(encoding="utf-8"))
         if sealed["sha256"] != _digests(folder):
             raise ValueError("its files do not match their hashes")
-        return CheckpointMark(**sealed["mark"])
+        mark = CheckpointMark(**sealed["mark"])
+        if mark.layout != LAYOUT:
+            raise ValueError("another version of Sandmould wrote it")
+        return mark
     except (OSError, KeyError, TypeError, RecursionError) as error:
         raise ValueError(str(error)) from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import shutil
 import threading
 from pathlib import Path
@@ -33,7 +34,13 @@ from sandmould.study.status import status_text
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.patterns import _one_thread  # noqa: F401
 from tests.scenes import TUBE_SCENE, tube_scene
-from tests.workflow.runs import SOON, computed, kill_after_a_checkpoint, last_snapshot
+from tests.workflow.runs import (
+    SOON,
+    computed,
+    kill_after_a_checkpoint,
+    last_snapshot,
+    run_folder,
+)
 from tests.workflow.test_records_change_nothing import PLANK
 
 REFERENCE: dict[str, Any] = {"engine": {"name": "reference"}, "rest": SOON}
@@ -159,6 +166,18 @@ def test_a_fill_that_cannot_be_used_is_told_and_the_run_fills_by_itself(
     assert f"the fill {fill.name} cannot be used" in capsys.readouterr().err
     assert_same(shorter, straight)
     assert "fill" not in read_costs([shorter]).rows
+
+
+def test_a_checkpoint_of_another_version_is_told_and_left(tmp_path: Path) -> None:
+    folder = run_folder(tube_scene(**REFERENCE, record={"checkpoint_every_s": 0.02}), tmp_path)
+    kill_after_a_checkpoint(folder)
+    for path in folder.glob("work/checkpoint_*/mark.json"):
+        sealed = json.loads(path.read_text())
+        del sealed["mark"]["layout"]
+        path.write_text(json.dumps(sealed))
+    assert compute(folder) is Outcome.FINISHED
+    detail = RunOutcome.read(folder / "outcome.json").detail
+    assert "cannot be used: another version of Sandmould wrote it" in detail
 
 
 def test_runs_end_as_the_fill_that_failed(tmp_path: Path) -> None:
