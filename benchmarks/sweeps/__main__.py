@@ -78,9 +78,9 @@ def _certified(scale: float, duration_s: float, replicates: int) -> dict[str, An
 
 WHOLE: dict[str, Any] = {
     "turns": 2,
-    "sweep": _sweep(6, 2.0, 4),
-    "certified": _certified(8, 1.0, 4),
-    "short_runs": _stand_in(200),
+    "sweep": _sweep(6, 2.0, 2),
+    "certified": _certified(8, 1.0, 3),
+    "short_runs": _stand_in(100),
 }
 LITTLE: dict[str, Any] = {
     "turns": 1,

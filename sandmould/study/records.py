@@ -43,7 +43,8 @@ DEFAULTS = 3
 """Which set of defaults records are computed with; a record without the number has the first. The
 second: rest is decided by checks of its own, sand rests after vibration before it is measured, and
 castings have the drawing's volume and area. The third: dashpots make up for the half step by
-which they see the velocity late."""
+which they see the velocity late, and in 3D the reference engine takes the slip of two grains in the
+plane of the normal of half a step ago."""
 OLD_DEFAULTS = "old defaults"
 USAGE = "python -m sandmould.study.records check | record STUDY.yaml | part STUDY.yaml"
 SAME = {
