@@ -13,7 +13,7 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
 .PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
-.PHONY: twins verification stability at-rest reliability fuzz benchmarks peers scaling solidification flow
+.PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow
 
 help:
 	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
@@ -89,6 +89,18 @@ verification: $(INSTALLED)
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
 
+## what LAMMPS decks cost with near grains and sorting: docs/lammps_speed.md
+lammps-decks: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.lammps_decks $(QUICK)
+
+## impacts on all engines and beds with both dashpots: docs/rebound.md
+rebound: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.rebound $(QUICK)
+
+## small grains between large ones: docs/size_ratio.md
+size-ratio: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.size_ratio $(QUICK)
+
 ## packing measured at speed and at rest: docs/measured_at_rest.md
 at-rest: $(INSTALLED)
 	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.at_rest $(QUICK)
@@ -104,6 +116,10 @@ fuzz: $(INSTALLED)
 ## how fast the engines are: docs/speed.md
 benchmarks: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.engines $(QUICK)
+
+## the solver's step loop beside an earlier commit: docs/core_loop.md
+core-loop: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.core_loop $(QUICK)
 
 # The peers need an older numpy, so they have an environment of their own.
 ## calibration beside other tools: docs/calibration_peers.md

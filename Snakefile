@@ -35,8 +35,10 @@ onstart:
 
 onerror:
     # After Ctrl-C too; "sandmould run" says it by itself.
-    if workflow.is_main_process and (left := len(PLAN.lacks(RESULTS))):
-        say(f"{left} of {len(PLAN.runs)} runs are left: the same command goes on with them.")
+    left = PLAN.lacks(RESULTS).keys() & {run.run for run in PLAN.runs}
+    if workflow.is_main_process and left:
+        runs = f"{len(left)} of {len(PLAN.runs)} runs are left"
+        say(f"{runs}: the same command goes on with them.")
 
 
 rule all:

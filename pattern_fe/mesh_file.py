@@ -92,6 +92,9 @@ def _parsed(path: Path) -> meshio.Mesh:
     # meshio tries Ansys's format first on this ending, and never ends at some damaged files
     known = "gmsh" if path.suffix.lower() == ".msh" else None
     try:
+        # a device has no end
+        if path.exists() and not path.is_file():
+            raise OSError("it is a folder or a device")
         # meshio prints and ends the process at a file that it cannot read; of a text file it takes
         # some bytes for a number of triangles, which may overflow
         hushed = contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed)

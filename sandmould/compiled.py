@@ -10,6 +10,8 @@ write to; without such a folder nothing is kept.
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import re
 import stat
@@ -20,7 +22,9 @@ from typing import Any, TypeVar
 
 import llvmlite
 import numba
+import numpy as np
 from llvmlite import binding
+from numba import types
 
 from sandmould.digest import SHORT, digest
 
@@ -141,10 +145,67 @@ numba.config.CACHE_DIR = str(_FOLDER)  # type: ignore[attr-defined]
 binding.set_option("sandmould", "-align-all-functions=6")
 
 
+_DISPATCHERS: dict[str, Any] = {}
+"""Functions that this process may call on one thread, by module and name."""
+
+
 def njit(**options: Any) -> Callable[[_Function], _Function]:
     """Compile a function for compiled code and for Python; options are those of ``numba.njit``."""
-    compiled: Callable[[_Function], _Function] = numba.njit(cache=KEEPS, **options)
+
+    def compiled(function: _Function) -> _Function:
+        dispatcher: Any = numba.njit(cache=KEEPS, **options)(function)
+        if not options.get("parallel"):  # loading one of these may start threads
+            _DISPATCHERS[f"{function.__module__}.{function.__qualname__}"] = dispatcher
+        return dispatcher
+
     return compiled
+
+
+def loaded_kernels() -> set[str]:
+    """Functions that Python has called in this process, each with the types of its arguments.
+
+    Each is a line of JSON. Those with types of other sorts than the house's own are left out.
+    """
+    kernels = set()
+    for name, dispatcher in _DISPATCHERS.items():
+        for signature in dispatcher.signatures:
+            with contextlib.suppress(TypeError):
+                kernels.add(json.dumps([name, [_described(each) for each in signature]]))
+    return kernels
+
+
+def load_kernels(kernels: Iterable[str]) -> None:
+    """Load functions before they are called, as another process had them; none is called."""
+    for kernel in kernels:
+        name, described = json.loads(kernel)
+        if name in _DISPATCHERS:
+            _DISPATCHERS[name].compile(tuple(_type_of(each) for each in described))
+
+
+def _described(kind: Any) -> Any:
+    """A type of numba's as JSON; a TypeError for one of a sort that no kernel of ours has."""
+    if isinstance(kind, types.Array):
+        return ["array", str(kind.dtype), kind.ndim, kind.layout, kind.mutable]
+    if isinstance(kind, types.Tuple | types.UniTuple | types.NamedTuple | types.NamedUniTuple):
+        of = getattr(kind, "instance_class", tuple)
+        return ["tuple", of.__module__, of.__qualname__, [_described(each) for each in kind.types]]
+    if type(kind) in (types.Integer, types.Float, types.Boolean):
+        return str(kind)
+    raise TypeError(kind)
+
+
+def _type_of(described: Any) -> Any:
+    """The type that ``_described`` gave; classes are those of modules that are loaded already."""
+    if isinstance(described, str):
+        return numba.from_dtype(np.dtype(described))
+    if described[0] == "array":
+        _, dtype, dimensions, layout, mutable = described
+        return types.Array(_type_of(dtype), dimensions, layout, readonly=not mutable)
+    _, module, name, parts = described
+    of = getattr(sys.modules[module], name)
+    return types.BaseTuple.from_types(
+        [_type_of(each) for each in parts], None if of is tuple else of
+    )
 
 
 def cfunc(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:

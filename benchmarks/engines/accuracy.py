@@ -16,11 +16,12 @@ from sandmould.scenario.scenario import Scenario
 _SPEED_M_S = 0.01
 _PHASES = 8
 """Pairs whose first touch falls at as many places within a time step."""
+DASHPOTS = ("corrected", "plain")
 EXACT = math.exp(-2)
 """Restitution at critical damping where no contact pulls (Schwager and Poeschel 2007)."""
 
 
-def _pairs_scene(engine: str, fraction: float) -> Scenario:
+def _pairs_scene(engine: str, fraction: float, dashpot: str) -> Scenario:
     """Pairs of the smallest discs of the bed, with its law, without gravity."""
     smallest = scene(2, 1, 0.3, 0.3).sand.classes(2)[0].diameter_m
     sieve = [
@@ -30,6 +31,7 @@ def _pairs_scene(engine: str, fraction: float) -> Scenario:
     return scene(
         2, 2 * _PHASES, 0.3, 0.3, engine,
         gravity_m_s2=0.0,
+        contact={"dashpot": dashpot},
         sand={"sieve": sieve, "size_scale": 1.0, "size_classes": 1},
         time_step={"fraction": fraction},
         # Beyond where the layer would be dropped from, LAMMPS and LIGGGHTS drop grains.
@@ -37,9 +39,9 @@ def _pairs_scene(engine: str, fraction: float) -> Scenario:
     )  # fmt: skip
 
 
-def restitution_error(engine: str, fraction: float) -> tuple[float, float]:
+def restitution_error(engine: str, fraction: float, dashpot: str) -> tuple[float, float]:
     """Time step (s), and root mean square of the relative error over the phases."""
-    scenario = _pairs_scene(engine, fraction)
+    scenario = _pairs_scene(engine, fraction, dashpot)
     step_s = scenario.step_s
     with opened(scenario) as session:
         radius = session.snapshot().radius_m[0]
@@ -69,17 +71,19 @@ def measure_accuracy(bed: dict[str, Any], extent: Extent) -> list[dict[str, Any]
     extent : Extent
     """
     rows = []
-    for name, row in bed["engines"].items():
-        if engine_problem(_pairs_scene(name, 0.5)) is not None:
-            continue
-        for fraction in extent.fractions:
-            step_s, error = restitution_error(name, fraction)
+    for dashpot in DASHPOTS:
+        for name, row in bed["engines"].items():
+            if engine_problem(_pairs_scene(name, 0.5, dashpot)) is not None:
+                continue
             rate = row["grain_steps_per_s"]["median"]
-            rows.append({
-                "engine": name,
-                "fraction": fraction,
-                "step_s": step_s,
-                "error": error,
-                "wall_s_per_s": bed["grains"] / step_s / rate,
-            })  # fmt: skip
+            for fraction in extent.fractions:
+                step_s, error = restitution_error(name, fraction, dashpot)
+                rows.append({
+                    "engine": name,
+                    "dashpot": dashpot,
+                    "fraction": fraction,
+                    "step_s": step_s,
+                    "error": error,
+                    "wall_s_per_s": bed["grains"] / step_s / rate,
+                })  # fmt: skip
     return rows

@@ -111,14 +111,17 @@ def _limits(ax: Axes, beds: list[dict[str, Any]]) -> None:
 
 def _accuracy(ax: Axes, rows: list[dict[str, Any]]) -> None:
     for name, (colour, marker) in ENGINES.items():
-        mine = [row for row in rows if row["engine"] == name]
-        if not mine:
-            continue
-        x, y = [row["wall_s_per_s"] for row in mine], [100 * row["error"] for row in mine]
-        ax.plot(x, y, color=colour, marker=marker, label=name)
-        for row, place in zip(mine, zip(x, y, strict=True), strict=True):
-            ax.annotate(f"{row['fraction']:g}", place, (4, 4), textcoords="offset points",
-                        fontsize=7, color=colour)  # fmt: skip
+        for dashpot, dash, filled in (("corrected", "-", colour), ("plain", ":", "none")):
+            mine = [row for row in rows if (row["engine"], row["dashpot"]) == (name, dashpot)]
+            if not mine:
+                continue
+            x, y = [row["wall_s_per_s"] for row in mine], [100 * row["error"] for row in mine]
+            ax.plot(x, y, color=colour, marker=marker, ls=dash, mfc=filled,
+                    label=f"{name}, {dashpot} dashpots")  # fmt: skip
+            for row, place in zip(mine, zip(x, y, strict=True), strict=True):
+                below = dashpot == "corrected"
+                ax.annotate(f"{row['fraction']:g}", place, (-4, -9) if below else (4, 4),
+                            textcoords="offset points", fontsize=7, color=colour)  # fmt: skip
     ax.set_xscale("log")
     ax.set_yscale("log")
     for axis, unit in ((ax.xaxis, ""), (ax.yaxis, " %")):
@@ -128,7 +131,7 @@ def _accuracy(ax: Axes, rows: list[dict[str, Any]]) -> None:
     ax.set_xlabel("wall time of one simulated second of the smaller bed of discs, s")
     ax.set_ylabel("relative error of the restitution")
     ax.set_title("Accuracy against cost; numbers: time step over the critical one")
-    ax.legend(frameon=False)
+    ax.legend(frameon=False, fontsize=8)
 
 
 def draw(results: dict[str, Any], path: Path) -> None:

@@ -10,7 +10,7 @@ from benchmarks.engines.roofline import (
     CHAINED_PER_CONTACT,
     FLOPS_PER_CONTACT,
     FLOPS_PER_GRAIN,
-    FLOPS_PER_LISTED,
+    FLOPS_PER_PAIR,
     QUOTIENTS_PER_GRAIN,
     ROOTS_PER_CONTACT,
 )
@@ -19,7 +19,7 @@ from benchmarks.frame import render
 
 STEP_PARTS = (
     ("within_pairs", "the loop over grains", "pairs: the loop over grains"),
-    ("within_pairs", "pairs apart", "pairs: listed pairs that do not touch"),
+    ("within_pairs", "pairs apart", "pairs: those looked at that do not touch"),
     ("within_pairs", "contacts", "pairs: contacts"),
     ("within_pairs", "guessing which", "pairs: guessing which touch"),
     ("parts", "surfaces", "walls"),
@@ -56,7 +56,7 @@ def page(results: dict[str, Any]) -> str:
         "gflop_s": {kind: _gflop_s(peaks[f"{kind}_ns_per_flop"]) for kind in ("scalar", "vector")},
         "step_parts": STEP_PARTS,
         "operations": (
-            ("listed pair", FLOPS_PER_LISTED),
+            ("pair looked at", FLOPS_PER_PAIR),
             ("contact", FLOPS_PER_CONTACT),
             ("grain", FLOPS_PER_GRAIN),
         ),

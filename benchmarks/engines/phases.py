@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from benchmarks.engines.timing import interleaved, seconds, spread
 from sandmould.compiled import njit
 from sandmould.dem.motion import drift, kick
-from sandmould.dem.neighbours import Pairs
 from sandmould.dem.pairs import gather_incoming, pair_forces
 from sandmould.dem.solver import Solver
 from sandmould.dem.steps import DemScene, Moving
@@ -32,8 +32,9 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
         for c in range(len(chunks.bound) - 1):
             first, last = chunks.bound[c], chunks.bound[c + 1]
             pair_forces(
-                dim, c, chunks, grains, moving.kinds, moving.pairs, scene.grain_law, scene.dt
-            )
+                dim, c, chunks, grains, moving.kinds, moving.pairs, moving.near,
+                scene.grain_law, scene.dt,
+            )  # fmt: skip
             if parts > 1:
                 surface_forces(
                     dim, walls.first_row[c], walls.first_row[c + 1], walls.candidates,
@@ -49,16 +50,21 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
                 drift(dim, first, last, grains, 0.0)
 
 
-def _some_pairs(pairs: Pairs, chosen: np.ndarray) -> Pairs:
-    """Some of the pairs, as a list of their own."""
-    first_slot = np.concatenate([[0], np.cumsum(chosen)])
-    fields = (pairs.other, pairs.touching, pairs.friction, pairs.rolling)
-    return Pairs(first_slot[pairs.start], *(array[chosen] for array in fields))
-
-
-def _with_pairs(moving: Moving, chosen: np.ndarray) -> Moving:
-    """Keep some of the pairs; there are slots enough between chunks for all of them."""
-    return moving._replace(pairs=_some_pairs(moving.pairs, chosen))
+def _with_near(moving: Moving, chosen: np.ndarray) -> Moving:
+    """Keep some of the near pairs of grains; those of a chunk move up to its front."""
+    near, bound = moving.near, moving.chunks.bound
+    rows = {
+        name: getattr(near, name).copy() for name in ("other", "touching", "friction", "rolling")
+    }
+    stop = near.stop.copy()
+    for begin, end in pairwise(bound):
+        first = moving.pairs.start[begin]
+        before = np.concatenate([[0], np.cumsum(chosen[first : near.stop[end - 1]])])
+        stop[begin:end] = first + before[near.stop[begin:end] - first]
+        kept = first + np.flatnonzero(chosen[first : near.stop[end - 1]])
+        for array in rows.values():
+            array[first : first + len(kept)] = array[kept]
+    return moving._replace(near=near._replace(stop=stop, **rows))
 
 
 def _block(solver: Solver, moving: Moving, parts: int, block_s: float) -> Callable[[], float]:
@@ -96,13 +102,14 @@ def measure_phases(
         Spreads in ns per grain-step.
     """
     moving = solver.moving  # what the step loop itself is given
-    touching = moving.pairs.touching.astype(bool)
+    moving.near.gap[0] = -1.0  # no look is due
+    touching = moving.near.touching.astype(bool)
     blocks = {
         name: _block(solver, moving, i + 1, block_s) for i, name in enumerate(PARTS)
     } | {
-        "touching": _block(solver, _with_pairs(moving, touching), 1, block_s),
-        "apart": _block(solver, _with_pairs(moving, ~touching), 1, block_s),
-        "no pairs": _block(solver, _with_pairs(moving, np.zeros_like(touching)), 1, block_s),
+        "touching": _block(solver, _with_near(moving, touching), 1, block_s),
+        "apart": _block(solver, _with_near(moving, ~touching), 1, block_s),
+        "no pairs": _block(solver, _with_near(moving, np.zeros_like(touching)), 1, block_s),
     }  # fmt: skip
     times = interleaved(blocks | {"step": step}, rounds)
     sums = np.array([times[name] for name in (*PARTS, "step")])

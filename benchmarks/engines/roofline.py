@@ -7,13 +7,13 @@ from typing import Any
 from benchmarks.engines.beds import Bed, settled, solver_on, tiled
 from benchmarks.engines.peaks import bandwidth, measure_peaks
 from benchmarks.engines.phases import measure_listing, measure_phases
-from benchmarks.engines.scale import advance, bytes_of, cost_of
+from benchmarks.engines.scale import advance, bytes_of, cost_of, near_of
 from benchmarks.engines.timing import Extent, one_core, spread, steps_lasting
 from sandmould.dem.solver import Solver
 
 # Operations counted by hand in pairs.py, contact_law.py and motion.py; a multiply-add is two,
 # comparisons, signs and what leaves the loop are none. First discs, then spheres.
-FLOPS_PER_LISTED = (
+FLOPS_PER_PAIR = (
     ("vector between the centres", 2, 3),
     ("its square", 3, 5),
     ("sum of the radii and its square", 2, 2),
@@ -42,8 +42,8 @@ CHAINED_PER_CONTACT = {2: 1, 3: 2}
 TRAFFIC = {
     "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains radius": 1,
     "kinds of_grain": 1, "grains mass": 1, "grains inertia": 1, "grains force": 2,
-    "grains moment": 2, "pairs start": 1, "pairs other": 1, "pairs touching": 2,
-    "pairs friction": 2, "pairs rolling": 2, "chunks grain": 1, "chunks incoming": 1,
+    "grains moment": 2, "near stop": 1, "near other": 1, "near touching": 2,
+    "near friction": 2, "near rolling": 2, "chunks grain": 1, "chunks incoming": 1,
     "chunks force": 2, "chunks moment": 2, "walls candidates rows": 1,
     "walls candidates start": 1, "walls candidates part": 1, "walls history used": 2,
     "walls history normal": 2, "walls history friction": 2, "walls history rolling": 2,
@@ -52,13 +52,13 @@ TRAFFIC = {
 stays in the core's cache from its first contact to its drift."""
 
 
-def flops(dimension: int, listed: float, contacts: float) -> float:
+def flops(dimension: int, near: float, contacts: float) -> float:
     """Operations of a grain-step, square roots and quotients apart."""
-    per_listed, per_contact, per_grain = (
+    per_pair, per_contact, per_grain = (
         sum(row[1:][dimension - 2] for row in counted)
-        for counted in (FLOPS_PER_LISTED, FLOPS_PER_CONTACT, FLOPS_PER_GRAIN)
+        for counted in (FLOPS_PER_PAIR, FLOPS_PER_CONTACT, FLOPS_PER_GRAIN)
     )
-    return listed * per_listed + contacts * per_contact + per_grain
+    return near * per_pair + contacts * per_contact + per_grain
 
 
 def traffic_bytes(solver: Solver) -> float:
@@ -68,10 +68,10 @@ def traffic_bytes(solver: Solver) -> float:
 
 
 def _bounds(
-    solver: Solver, contacts: float, listed: float, peaks: dict[str, Any], gb_s: float
+    solver: Solver, contacts: float, near: float, peaks: dict[str, Any], gb_s: float
 ) -> dict[str, float]:
     """Least time of a grain-step by each limit, ns."""
-    operations = flops(solver.dimension, listed, contacts)
+    operations = flops(solver.dimension, near, contacts)
     roots = contacts * ROOTS_PER_CONTACT[solver.dimension]
     return {
         "bandwidth": traffic_bytes(solver) / gb_s,
@@ -99,11 +99,12 @@ def _times(bed: Bed, extent: Extent, phases: bool) -> tuple[Solver, dict[str, An
 def _measure_bed(bed: Bed, peaks: dict[str, Any], extent: Extent, phases: bool) -> dict[str, Any]:
     """Time of a step against its limits."""
     solver, times = _times(bed, extent, phases)
-    step_ns, pairs = times["ns_per_grain_step"]["median"], solver.pairs
-    listed, contacts = len(pairs.other) / bed.grains, float(pairs.touching.sum()) / bed.grains
+    step_ns, pairs = times["ns_per_grain_step"]["median"], solver.moving.pairs
+    listed, contacts = len(pairs.other) / bed.grains, len(solver.contacts.first) / bed.grains
+    near = near_of(solver) / bed.grains
     held = sum(size for name, size in bytes_of(solver).items() if name in TRAFFIC)
     gb_s = bandwidth(held, extent.rounds)
-    bounds = _bounds(solver, contacts, listed, peaks, gb_s["median"])
+    bounds = _bounds(solver, contacts, near, peaks, gb_s["median"])
     chained_ns = peaks["ns_per_chained_root_and_quotient"]["median"]
     return {
         "bed": bed.name,
@@ -111,8 +112,9 @@ def _measure_bed(bed: Bed, peaks: dict[str, Any], extent: Extent, phases: bool) 
         "held_bytes": held,
         "gb_s": gb_s,
         "bytes_per_grain_step": traffic_bytes(solver),
-        "flops_per_grain_step": flops(bed.dimension, listed, contacts),
+        "flops_per_grain_step": flops(bed.dimension, near, contacts),
         "listed_per_grain": listed,
+        "near_per_grain": near,
         "contacts_per_grain": contacts,
         "bounds_ns": bounds,
         "fractions": {name: ns / step_ns for name, ns in bounds.items()},

@@ -85,6 +85,13 @@ def measure_threads(extent: Extent) -> dict[str, Any]:
     }
 
 
+def near_of(solver: Solver) -> int:
+    """Near pairs now."""
+    moving = solver.moving
+    last = moving.near.stop[moving.chunks.bound[1:] - 1]
+    return int((last - moving.pairs.start[moving.chunks.bound[:-1]]).sum())
+
+
 def bytes_of(solver: Solver) -> dict[str, int]:
     """Bytes of every array that the step loop is given."""
     moving = solver.moving
@@ -92,6 +99,7 @@ def bytes_of(solver: Solver) -> dict[str, int]:
         "grains": moving.grains,
         "kinds": moving.kinds,
         "pairs": moving.pairs,
+        "near": moving.near,
         "chunks": moving.chunks,
         "walls candidates": moving.walls.candidates,
         "walls history": moving.walls.history,
@@ -101,16 +109,20 @@ def bytes_of(solver: Solver) -> dict[str, int]:
         for part, arrays in parts.items()
         for field, array in arrays._asdict().items()
     }
+    # Near pairs fill the front of their places; what lies behind is never touched.
+    share = near_of(solver) / max(1, len(moving.pairs.other))
+    for field in ("other", "touching", "friction", "rolling"):
+        sizes[f"near {field}"] = round(share * sizes[f"near {field}"])
     return sizes | {"walls loads": moving.walls.loads.nbytes, "listed": moving.listed.nbytes}
 
 
 def _memory(solver: Solver) -> dict[str, Any]:
     """Bytes per grain array by array, and what they depend on."""
-    n, pairs = len(solver.grains.id), solver.pairs
+    n, pairs = len(solver.grains.id), solver.moving.pairs
     return {
         "grains": n,
         "listed_per_grain": len(pairs.other) / n,
-        "contacts_per_grain": float(pairs.touching.sum()) / n,
+        "contacts_per_grain": len(solver.contacts.first) / n,
         "bytes_per_grain": {name: size / n for name, size in bytes_of(solver).items()},
     }
 

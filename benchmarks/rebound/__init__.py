@@ -1,1 +1,1 @@
-"""Rebound by engine and step."""
+"""Rebound by engine, damping ratio and step, and what it does to a bed."""

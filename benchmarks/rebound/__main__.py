@@ -1,74 +1,97 @@
-"""How fast a grain leaves a wall or another grain, by engine and time step.
+"""Rebound over damping ratio and step on all engines, and beds with both kinds of dashpot.
 
-``python -m benchmarks.rebound`` prints a line for each damping ratio and step: the exact speed over
-that of the impact, then that from a wall and from another grain on each engine.
+``make rebound`` runs ``python -m benchmarks.rebound``, which writes docs/rebound.md.
 """
 
 from __future__ import annotations
 
-import math
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from sandmould.scenario.module_main import run_main
+from benchmarks.frame import Benchmark, BenchmarkRun, render
+from benchmarks.rebound.filled_bed import bed, compared
+from benchmarks.rebound.impacts import PHASES, Row, errors
+from sandmould.runs.formatting import number
+from sandmould.statistics.agreement import interval_text
 from tests.verification.cases import closed_forms
-from tests.verification.cases.bench import (
-    LARGE_M,
-    SMALL_M,
-    Bench,
-    law,
-    mass_kg,
-    scene,
-    stiffness,
-    vector,
+from tests.verification.cases.bench import LARGE_M, SMALL_M
+from tests.verification.cases.phases import rebounds
+
+ENGINES = ("reference", "lammps", "liggghts")
+DASHPOTS = ("plain", "corrected")
+
+
+class ReboundExtent(NamedTuple):
+    """How much is measured."""
+
+    damping_ratios: tuple[float, ...]
+    steps: tuple[float, ...]
+    """Over sqrt(m/k) of the contact."""
+    beds: int
+
+
+WHOLE = ReboundExtent((0.2, 0.5, 0.8, 1.0), (0.05, 0.1, 0.2), 80)
+LITTLE = ReboundExtent((1.0,), (0.2,), 2)
+
+
+def impacts(run: BenchmarkRun) -> list[Row]:
+    """Errors of impacts, two rows an engine, ratio, step and dashpot."""
+    return [
+        row
+        for engine in ENGINES
+        for ratio in run.extent.damping_ratios
+        for step in run.extent.steps
+        for dashpot in DASHPOTS
+        for row in run.parts.get(
+            f"{engine}, {ratio}, {step}, {dashpot}",
+            partial(errors, engine, ratio, step, dashpot),
+        )
+    ]
+
+
+def walls(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """Errors of the mean restitution at the floor, of grains of two sizes in one scene."""
+    rows = []
+    for engine in ENGINES:
+        for step in run.extent.steps[1:] or run.extent.steps:
+            row: dict[str, Any] = {"engine": engine, "step": step}
+            for size, radius in (("small", SMALL_M), ("large", LARGE_M)):
+                found = rebounds(engine, 2, 1.0, step, "corrected", radius)["floor"]
+                exact = closed_forms.restitution(1.0, "total")
+                row[size] = round(float(np.mean(found)) / exact - 1.0, 5)
+            rows.append(row)
+    return rows
+
+
+def beds(run: BenchmarkRun) -> list[dict[str, dict[str, float]]]:
+    """Measures of filled beds, a row a start."""
+    return [
+        run.parts.get(f"bed {seed}", partial(bed, seed)) for seed in range(1, run.extent.beds + 1)
+    ]
+
+
+def page(results: dict[str, Any]) -> str:
+    """The page of the results."""
+    return render(Path(__file__).with_name("page.md.j2"), {
+        **results,
+        "phases": PHASES,
+        "compared": compared(results["beds"]),
+        "number": number,
+        "interval_text": interval_text,
+    })  # fmt: skip
+
+
+BENCHMARK = Benchmark(
+    __file__,
+    __doc__,
+    parts={"impacts": impacts, "walls": walls, "beds": beds},
+    pages={"rebound.md": page},
+    extent=WHOLE,
+    quick=LITTLE,
 )
 
-ENGINES = ("lammps", "liggghts", "reference")
-STEPS = (0.176, 0.05, 0.01)
-"""Over sqrt(m/k) of the smaller grain; the first is 0.8 of the planned critical step."""
-DAMPING_RATIOS = (0.84, 0.95, 1.0)
-SPEED_M_S = 1e-5
-
-
-def rebounds(engine: str, damping_ratio: float, step: float) -> tuple[float, float]:
-    """Speed after over speed before: from a wall, and of two grains against each other.
-
-    Parameters
-    ----------
-    engine : str
-    damping_ratio : float
-    step : float
-        Over sqrt(m/k) of the smaller grain.
-    """
-    slowest_s, fastest_s = (
-        math.sqrt(mass_kg(2, radius) / stiffness(2)) for radius in (LARGE_M, SMALL_M)
-    )
-    same = law(2, damping_ratio)
-    given = scene(engine, 2, 4, (SMALL_M, LARGE_M), same, same, step * fastest_s)
-    with Bench(given) as bench:
-        (hits, falls), (apart, is_hit) = bench.by_size()
-        place, velocity = np.zeros((4, 2)), np.zeros((4, 2))
-        place[apart] = vector(2, 0.15, 0.15)
-        place[falls] = vector(2, 0.03, SMALL_M)
-        place[is_hit] = vector(2, 0.06, 0.06)
-        place[hits] = vector(2, 0.06, 0.06 + SMALL_M + LARGE_M)
-        velocity[[falls, hits]] = vector(2, 0.0, -SPEED_M_S)
-        bench.place(place, velocity)
-        after = bench.advance(60 * slowest_s).velocity_m_s[:, 1] / SPEED_M_S
-    return float(after[falls]), float(after[hits] - after[is_hit])
-
-
-def main() -> None:
-    """Print the table."""
-    for ratio in DAMPING_RATIOS:
-        exact = closed_forms.restitution(ratio, "total")
-        for step in STEPS:
-            speeds = "; ".join(
-                "{} {:.4f} {:.4f}".format(engine, *rebounds(engine, ratio, step))
-                for engine in ENGINES
-            )
-            print(f"zeta {ratio:g}, step {step:g}, exact {exact:.4f}: {speeds}", flush=True)
-
-
 if __name__ == "__main__":
-    run_main(main, "python -m benchmarks.rebound")
+    BENCHMARK.command()

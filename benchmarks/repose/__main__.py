@@ -26,7 +26,7 @@ def _heap(folder: Path) -> tuple[Scenario, Snapshot]:
     """Scenario and last snapshot of a run."""
     scenario = read_run(folder / "scenario.yaml").scenario
     try:
-        return scenario, Snapshot.load(list_moments(folder)[-1].path)
+        return scenario, list_moments(folder)[-1].load()
     except (LookupError, ValueError) as error:
         valid = f"a folder of finished runs whose snapshots can be read ({error})"
         raise BadInputError([Problem("FOLDER", str(folder), valid)]) from error

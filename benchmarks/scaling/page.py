@@ -12,9 +12,9 @@ from benchmarks.scaling.model import Assumed, WorkflowCosts, drain
 SWEEPS = ((1_000, 60), (10_000, 10), (10_000, 60), (10_000, 600))
 SETTINGS = (
     ("a job a run", 0.0, 1),
-    ("the profile as it comes", 300.0, 1),
-    ("jobs of whole nodes", 300.0, 32),
-    ("jobs of whole nodes, half an hour", 1800.0, 32),
+    ("jobs of one core", 300.0, 1),
+    ("the profile as it comes: whole nodes", 300.0, 32),
+    ("whole nodes, half an hour", 1800.0, 32),
 )
 WHEN_FAILING = {
     "sandmould": "the run's outcome says why; the others end; the report is written and the last "

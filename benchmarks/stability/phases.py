@@ -7,12 +7,11 @@ speed before: no engine, only the scheme that all engines share.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.verification.cases import closed_forms
+from benchmarks.frame.impact import Impacts, exact
 
 Array = NDArray[np.float64]
 
@@ -23,16 +22,6 @@ STEPS = (0.05, 0.1, 0.2, 0.4)
 """Time steps over sqrt(m/k)."""
 _LONGEST = 10.0
 """Over sqrt(m/k), three times the longest contact, that of no damping."""
-
-
-class Impacts(NamedTuple):
-    """What impacts come to, each (n,) float64; or the exact values."""
-
-    restitution: Array
-    peak_overlap: Array
-    """Over v sqrt(m/k)."""
-    contact_time: Array
-    """From the first touch to where the force, linear between steps, vanishes; over sqrt(m/k)."""
 
 
 def impacts(damping_ratio: float, step: float, corrected: bool) -> Impacts:
@@ -62,19 +51,6 @@ def impacts(damping_ratio: float, step: float, corrected: bool) -> Impacts:
         overlap, time, before = overlap + step * speed, time + step, force
         peak = np.maximum(peak, overlap)
     return Impacts(-speed, peak, ended)
-
-
-def exact(damping_ratio: float) -> Impacts:
-    """Solution of u'' + 2 zeta u' + u = 0 from u = 0 and u' = 1 to where its force vanishes."""
-    z = damping_ratio
-    w = math.sqrt(1.0 - z * z)
-    peak = math.exp(-z / w * math.atan2(w, z)) if w else math.exp(-1.0)
-    values = (
-        closed_forms.restitution(z, "total"),
-        peak,
-        closed_forms.contact_time_s(1.0, z, "total"),
-    )
-    return Impacts(*(np.array(x) for x in values))
 
 
 def errors() -> list[dict[str, float | list[tuple[float, float]]]]:

@@ -27,7 +27,7 @@ LIKE_FOAM = 0.9
 
 def can_couple(scheme: Scheme, engine: Capabilities) -> bool:
     """Whether an engine has what a scheme asks for; others need a mesh that bends, no more."""
-    if scheme == "measured":
+    if scheme in ("measured", "quasi_newton"):
         return engine.repeats_windows
     if scheme == "in_step":
         return engine.calls_movers
@@ -62,6 +62,12 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
         raise BadInputError([Problem("discharge.gate", scenario.discharge.gate, valid)])
     if loop.most_passes > 1 and not engine.repeats_windows:
         raise _bad("repeats", loop.repeats, f"0 on engine {name}, which cannot go back")
+    if scheme == "quasi_newton" and loop.repeats == 0:
+        valid = (
+            "at least 1 in the scheme quasi_newton, which learns the sand's stiffness from a "
+            "window that is computed again; another scheme for windows that are computed once"
+        )
+        raise _bad("repeats", loop.repeats, valid)
     if loop.exchange == "files" and not loop.has_windows:
         raise _bad(
             "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"

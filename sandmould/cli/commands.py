@@ -106,13 +106,20 @@ def run(
     ] = None,
     cores: Cores = None,
     adopt: Adopt = False,
+    cluster: Annotated[
+        bool,
+        typer.Option(
+            "--cluster", help="Submit the runs to Slurm; ./cluster.yaml says to which partition."
+        ),
+    ] = False,
 ) -> None:
     """Compute a study, or what is missing of it; write its report."""
     from sandmould.study.run_study import run_study
 
     if adopt:
         _adopt(study)
-    raise typer.Exit(run_study(study, [*_cores_option(cores), *(options or [])]))
+    profile = ["--workflow-profile", "slurm"] if cluster else []
+    raise typer.Exit(run_study(study, [*_cores_option(cores), *profile, *(options or [])]))
 
 
 @app.command()
@@ -153,8 +160,9 @@ def tidy(
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask first.")] = False,
 ) -> None:
     """Remove run folders that a study no longer lists."""
+    from sandmould.runs.formatting import size_text
     from sandmould.study.plan.build_plan import RESULTS, open_plan
-    from sandmould.study.tidy import leftovers, remove, size_text
+    from sandmould.study.tidy import leftovers, remove
 
     opened = open_plan(study)
     found = leftovers(opened, RESULTS)
@@ -169,6 +177,56 @@ def tidy(
     if yes or typer.confirm(f"Remove {number} run folders and free {size}?"):
         remove(opened, RESULTS, found.removable)
         typer.echo(f"{number} run folders removed, {size} freed")
+
+
+@app.command()
+def pack(
+    study: StudyFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", show_default="STUDY_runs.tar.xz",
+            help="File to write; a folder takes one more, of the runs that no pack in it holds.",
+        ),
+    ] = None,
+    last_state: Annotated[
+        bool,
+        typer.Option(
+            "--last-state", help="Leave out exports and all snapshots but the last: no films."
+        ),
+    ] = False,
+    checkpoints: Annotated[
+        bool, typer.Option("--checkpoints", help="Take along runs that were stopped.")
+    ] = False,
+) -> None:  # fmt: skip
+    """Pack the finished runs of a study into one file."""
+    from sandmould.study.packs.pack import pack as pack_study
+    from sandmould.study.plan.build_plan import RESULTS, open_plan
+
+    packed = pack_study(
+        open_plan(study), RESULTS, output, last_state=last_state, checkpoints=checkpoints
+    )
+    typer.echo(packed.text())
+
+
+@app.command()
+def unpack(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="What sandmould pack wrote.")
+    ],
+    checkpoints: Annotated[
+        bool,
+        typer.Option(
+            "--checkpoints", help="Take stopped runs too; engines read their files unchecked."
+        ),
+    ] = False,
+) -> None:
+    """Take packed runs into ./results."""
+    from sandmould.study.packs.unpack import unpack as unpack_runs
+    from sandmould.study.plan.build_plan import RESULTS
+
+    for file in files:
+        typer.echo(unpack_runs(file, RESULTS, checkpoints).text())
 
 
 @app.command()

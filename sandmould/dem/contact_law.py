@@ -20,6 +20,7 @@ from sandmould.dem.vectors import (
     tangent_after,
     tangent_moment,
     times,
+    turned_spin,
 )
 
 
@@ -44,6 +45,8 @@ class Law(NamedTuple):
     """Whether rolling resistance also resists spin about the normal in 3D, as (31) reads."""
     lag_s: float = 0.0
     """Time step, s, whose lag the dashpot makes up for, or 0: see ``pair_coefficients``."""
+    lead_s: float = 0.0
+    """Half a step, s, by which normals are ahead of velocities, or 0: see ``contact``."""
 
     @property
     def springs_n_m(self) -> tuple[float, float, float]:
@@ -103,6 +106,7 @@ def contact(
     w_2: Any,
     arm_1: float,
     arm_2: float,
+    turn: float,
     sizes: PairCoefficients,
     law: Law,
     dt: float,
@@ -124,6 +128,9 @@ def contact(
         Spins, one component in 2D.
     arm_1, arm_2 : float, m
         Distances of the centres from the contact point; 0 for a surface.
+    turn : float, s/m
+        Time by which the normal is ahead of the velocities over the distance of the centres; 0
+        where the slip is that of the normal as it is, such as at a face, whose normal stays.
     sizes : PairCoefficients
         Of this law.
     law : Law
@@ -141,13 +148,22 @@ def contact(
         To be kept for the next step.
     normal : float, N
         Normal force, positive in compression.
+
+    Notes
+    -----
+    Velocities are those of half a step ago, when the normal was n - turn v_t to first order. The
+    slip in that plane is v_t (1 + turn v_n) - (w + turn w_n v) x n with w = arm_1 w_1 + arm_2 w_2.
+    Taken in the plane of n instead, a grain that rolls and twists, as in the groove between two
+    others, slips a little in every step, always the same way (docs/size_ratio.md).
     """
-    normal = law.k_n * overlap - sizes.damping * dot(v, n)
+    approach = dot(v, n)
+    normal = law.k_n * overlap - sizes.damping * approach
     least = 0.0 if law.clip_total else -math.inf
     normal = normal if normal > least else least
     # Slip of body 2 over body 1 drags body 1 along: the sign that (25) needs under (14).
-    spun = spin_slip(n, plus(times(w_1, arm_1), arm_2, w_2))
-    friction = plus(tangent_after(n, friction, law.k_t * dt, v), -law.k_t * dt, spun)
+    spun = spin_slip(n, turned_spin(n, plus(times(w_1, arm_1), arm_2, w_2), turn, v))
+    moved = law.k_t * dt * (1.0 + turn * approach)
+    friction = plus(tangent_after(n, friction, moved, v), -law.k_t * dt, spun)
     friction = limited(friction, law.friction * abs(normal))
     force = plus(in_space(n, friction), -normal, n)
     turning = tangent_moment(n, friction)

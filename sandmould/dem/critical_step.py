@@ -89,10 +89,8 @@ class _Ends(NamedTuple):
 
 def _pair_ends(solver: Solver) -> _Ends:
     """Contacts between grains."""
-    grains, pairs = solver.grains, solver.pairs
-    owner = np.repeat(np.arange(len(grains.id)), np.diff(pairs.start))
-    touching = pairs.touching.astype(bool)
-    i, j = owner[touching], pairs.other[touching].astype(np.int64)
+    grains, contacts = solver.grains, solver.contacts
+    i, j = contacts.first, contacts.second
     apart = grains.position[j] - grains.position[i]
     distance = np.sqrt((apart**2).sum(axis=1))
     r_i, r_j, m_i, m_j = grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j]

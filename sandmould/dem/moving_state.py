@@ -11,19 +11,22 @@ from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.kinds import find_kinds
+from sandmould.dem.near_pairs import Contacts, contacts_of, new_near_pairs
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.pairs import split
 from sandmould.dem.steps import Moving, new_walls
 from sandmould.dem.surfaces import SurfaceArrays
+from sandmould.dem.vectors import dim_of
 from sandmould.dem.wall_history import WallHistory
 
 
 def to_arrays(moving: Moving) -> dict[str, np.ndarray]:
     """Arrays from which ``from_arrays`` goes on bit for bit; loads are left out."""
-    walls = moving.walls
+    walls, dim = moving.walls, dim_of(moving.grains.position.shape[1])
     parts: dict[str, Any] = {
         "grains": moving.grains,
         "pairs": moving.pairs,
+        "contacts": contacts_of(dim, moving.chunks.bound, moving.pairs, moving.near),
         "candidates": walls.candidates,
         "history": walls.history,
         "surfaces": walls.arrays,
@@ -49,6 +52,8 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
 
     grains, pairs = part(Grains, "grains"), part(Pairs, "pairs")
     chunks = split(grains, pairs)
+    dim = dim_of(grains.position.shape[1])
+    near = new_near_pairs(dim, pairs, len(chunks.grain), part(Contacts, "contacts"))
     walls = new_walls(
         part(SurfaceArrays, "surfaces"),
         chunks.bound,
@@ -59,6 +64,7 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
         grains,
         find_kinds(grains, grain_law),
         pairs,
+        near,
         chunks,
         walls._replace(listed=arrays["listed_vertices"]),
         arrays["orientation"],

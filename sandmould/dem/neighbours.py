@@ -1,8 +1,8 @@
-"""Contact search in two stages, section 3.6: a grid sorts the grains, a list keeps near pairs.
+"""First stage of the contact search, section 3.6: a grid sorts the grains, near pairs are listed.
 
-The grid is the first stage, in place of the paper's quadtree: sizes differ by less than a decade,
-and a counting sort is the cheapest there is. Grains are stored in the order of its cells, so that
-neighbours are near in memory. The second stage runs over the list of pairs at every step.
+The grid stands in place of the paper's quadtree: sizes differ by less than a decade, and a
+counting sort is the cheapest there is. Grains are stored in the order of its cells, so that
+neighbours are near in memory. ``near_pairs`` is the second stage.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains, Ints
-from sandmould.dem.vectors import OPTIONS, dim_of, dot, load, load_spin, plus, store, times
+from sandmould.dem.vectors import OPTIONS, dim_of, dot, load, plus
 
 
 class Pairs(NamedTuple):
@@ -24,19 +24,11 @@ class Pairs(NamedTuple):
     """(n + 1,) int64: pairs of grain i are start[i] to start[i + 1]."""
     other: NDArray[np.uint32]
     """(p,) uint32: the second grain."""
-    touching: NDArray[np.uint8]
-    """(p,) uint8: whether the pair touched at the last step."""
-    friction: Floats
-    """(p, s) float64, N: friction on the first grain, as a tangent."""
-    rolling: Floats
-    """(p, s) float64, N m: rolling moment on the first grain."""
 
     @classmethod
-    def none(cls, dimension: int) -> Pairs:
+    def none(cls) -> Pairs:
         """No pair yet."""
-        history = np.zeros((0, 1 if dimension == 2 else 3))
-        start = np.zeros(1, dtype=np.int64)
-        return cls(start, np.zeros(0, np.uint32), np.zeros(0, np.uint8), history, history.copy())
+        return cls(np.zeros(1, dtype=np.int64), np.zeros(0, np.uint32))
 
 
 class Grid(NamedTuple):
@@ -170,43 +162,7 @@ def find_pairs(
     return first, other[:p].copy()
 
 
-@njit(**OPTIONS)
-def carry_history(dim: Any, old: Pairs, place: Ints, new: Pairs) -> None:
-    """Copy friction and rolling of touching pairs from an old list of pairs into a new one.
-
-    Parameters
-    ----------
-    dim : tuple
-        ``PLANE`` or ``SPACE``.
-    old : Pairs
-    place : (n,) int64
-        Where each grain of the old order is stored now.
-    new : Pairs
-        Written to.
-    """
-    for i in range(len(old.start) - 1):
-        for k in range(old.start[i], old.start[i + 1]):
-            if old.touching[k]:
-                a, b = place[i], place[old.other[k]]
-                swapped = a > b
-                if swapped:
-                    a, b = b, a
-                for q in range(new.start[a], new.start[a + 1]):
-                    if new.other[q] == b:
-                        new.touching[q] = 1
-                        friction = load_spin(dim, old.friction, k)
-                        rolling = load_spin(dim, old.rolling, k)
-                        # what acts on the other grain is opposite; so is the tangent of 2D
-                        turned_round = swapped and len(dim) == 3
-                        store(times(friction, -1.0 if turned_round else 1.0), new.friction, q)
-                        store(times(rolling, -1.0 if swapped else 1.0), new.rolling, q)
-                        break
-
-
 def list_pairs(grains: Grains, start: Ints, grid: Grid, skin: float) -> Pairs:
-    """List near pairs of sorted grains, without history."""
-    d = grains.position.shape[1]
-    first, other = find_pairs(dim_of(d), grains.position, grains.radius, skin, start, grid)
-    history = np.zeros((len(other), grains.spin.shape[1]))
-    touching = np.zeros(len(other), dtype=np.uint8)
-    return Pairs(first, other, touching, history, history.copy())
+    """List near pairs of sorted grains."""
+    dim = dim_of(grains.position.shape[1])
+    return Pairs(*find_pairs(dim, grains.position, grains.radius, skin, start, grid))

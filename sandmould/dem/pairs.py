@@ -16,6 +16,7 @@ from sandmould.compiled import njit
 from sandmould.dem.contact_law import Law, contact
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.kinds import Kinds, pair_coefficients_of
+from sandmould.dem.near_pairs import NearPairs
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.vectors import (
     OPTIONS,
@@ -100,6 +101,7 @@ def pair_forces(
     grains: Grains,
     kinds: Kinds,
     pairs: Pairs,
+    near: NearPairs,
     law: Law,
     dt: float,
 ) -> None:
@@ -116,6 +118,8 @@ def pair_forces(
     kinds : Kinds
         Of the grains, for this law.
     pairs : Pairs
+    near : NearPairs
+        Of these.
     law : Law
     dt : float, s
     """
@@ -123,16 +127,17 @@ def pair_forces(
     position, velocity, spin = grains.position, grains.velocity, grains.spin
     radius, force, moment = grains.radius, grains.force, grains.moment
     kind, coefficients = kinds.of_grain, kinds.coefficients
-    start, other, touching = pairs.start, pairs.other, pairs.touching
-    friction, rolling = pairs.friction, pairs.rolling
+    stop, other, touching, slots = near.stop, near.other, near.touching, near.slot
+    friction, rolling = near.friction, near.rolling
     slot_force, slot_moment = chunks.force, chunks.moment
     begin, end = chunks.bound[c], index(chunks.bound[c + 1])
-    slot = chunks.first_slot[c]
+    crossing = chunks.first_slot[c]
+    first = pairs.start[begin]
     for i in range(begin, chunks.bound[c + 1]):
         x, v, w = load(dim, position, i), load(dim, velocity, i), load_spin(dim, spin, i)
         r, kind_i = radius[i], index(kind[i])
         force_i, moment_i = no_vector(dim), no_spin(dim)
-        for k in range(index(start[i]), index(start[i + 1])):
+        for k in range(index(first), index(stop[i])):
             j = index(other[k])
             r_j = radius[j]
             apart = plus(load(dim, position, j), -1.0, x)
@@ -140,15 +145,16 @@ def pair_forces(
             reach = r + r_j
             if distance2 < reach * reach:
                 distance = math.sqrt(distance2)
-                overlap = reach - distance
+                overlap, closeness = reach - distance, 1.0 / distance
                 press, turn_i, turn_j, slide, roll, _ = contact(
-                    times(apart, 1.0 / distance),
+                    times(apart, closeness),
                     overlap,
                     plus(load(dim, velocity, j), -1.0, v),
                     w,
                     load_spin(dim, spin, j),
                     r - 0.5 * overlap,
                     r_j - 0.5 * overlap,
+                    law.lead_s * closeness,
                     pair_coefficients_of(coefficients, kind_i, index(kind[j])),
                     law,
                     dt,
@@ -164,17 +170,18 @@ def pair_forces(
                     add_to(press, -1.0, force, j)
                     add_to(turn_j, 1.0, moment, j)
                 else:
-                    store(times(press, -1.0), slot_force, slot)
-                    store(turn_j, slot_moment, slot)
+                    store(times(press, -1.0), slot_force, slots[crossing])
+                    store(turn_j, slot_moment, slots[crossing])
             elif touching[k]:
                 touching[k] = 0
                 store(no_spin(dim), friction, k)
                 store(no_spin(dim), rolling, k)
                 if j >= end:
-                    store(no_vector(dim), slot_force, slot)
-                    store(no_spin(dim), slot_moment, slot)
+                    store(no_vector(dim), slot_force, slots[crossing])
+                    store(no_spin(dim), slot_moment, slots[crossing])
             if j >= end:
-                slot += 1
+                crossing += 1
+        first = stop[i]
         add_to(force_i, 1.0, force, i)
         add_to(moment_i, 1.0, moment, i)
 

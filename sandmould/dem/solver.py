@@ -13,13 +13,8 @@ from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.kinds import find_kinds
 from sandmould.dem.motion import kick
 from sandmould.dem.moving_state import from_arrays, to_arrays
-from sandmould.dem.neighbours import (
-    Pairs,
-    carry_history,
-    list_pairs,
-    make_grid,
-    sort_into_cells,
-)
+from sandmould.dem.near_pairs import Contacts, contacts_of, moved_contacts, new_near_pairs
+from sandmould.dem.neighbours import Pairs, list_pairs, make_grid, sort_into_cells
 from sandmould.dem.pairs import split
 from sandmould.dem.steps import (
     LIST_IS_OLD,
@@ -86,15 +81,16 @@ class Solver:
 
     def _empty(self) -> Moving:
         d = self.dimension
-        grains, pairs = Grains.none(d), Pairs.none(d)
+        grains, pairs = Grains.none(d), Pairs.none()
         none = np.zeros(0, dtype=np.int64)
         candidates = Candidates(none, np.zeros(1, dtype=np.int64), none.copy())
         chunks = split(grains, pairs)
         history = new_history(self._dim, 0)
+        near = new_near_pairs(self._dim, pairs, 0, Contacts.none(d))
         walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
         kinds = find_kinds(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
-        return Moving(grains, kinds, pairs, chunks, walls, upright, listed, np.zeros(1))
+        return Moving(grains, kinds, pairs, near, chunks, walls, upright, listed, np.zeros(1))
 
     def _upright(self, n: int) -> Floats:
         """Orientations of grains not turned yet."""
@@ -108,9 +104,10 @@ class Solver:
         return self.moving.grains
 
     @property
-    def pairs(self) -> Pairs:
-        """Near pairs of grains and their contact history."""
-        return self.moving.pairs
+    def contacts(self) -> Contacts:
+        """Touching pairs of grains and their history, a copy."""
+        moving = self.moving
+        return contacts_of(self._dim, moving.chunks.bound, moving.pairs, moving.near)
 
     @property
     def orientation(self) -> Floats:
@@ -123,10 +120,8 @@ class Solver:
         scene = self.scene
         kick(self._dim, 0, n, grains, scene.gravity, scene.damping, -0.5 * scene.dt)
         moving = self.moving
-        start = np.concatenate([moving.pairs.start, np.full(n, moving.pairs.start[-1])])
         self.moving = moving._replace(
             grains=moving.grains.joined(grains),
-            pairs=moving.pairs._replace(start=start),
             orientation=np.concatenate([moving.orientation, self._upright(n)]),
         )
         self._list(np.zeros(self.dimension))
@@ -145,8 +140,6 @@ class Solver:
             moment=np.zeros_like(spin_rad_s),
         )
         self.moving = self._empty()._replace(grains=same, orientation=self._upright(len(order)))
-        start = np.zeros(len(order) + 1, dtype=np.int64)
-        self.moving = self.moving._replace(pairs=self.pairs._replace(start=start))
         self._list(np.zeros(self.dimension))
         find_forces(self._dim, self.scene, self.moving)
         self.moving.walls.loads[:] = 0.0
@@ -181,8 +174,9 @@ class Solver:
         place[order] = np.arange(n)
         grains = old.grains.ordered(order)
         pairs = list_pairs(grains, start, grid, self._skin)
-        carry_history(self._dim, old.pairs, place, pairs)
         chunks = split(grains, pairs)
+        contacts = moved_contacts(self._dim, self.contacts, place)
+        near = new_near_pairs(self._dim, pairs, len(chunks.grain), contacts)
         candidates = find_candidates(
             self._dim,
             grains.position,
@@ -204,6 +198,7 @@ class Solver:
             grains,
             find_kinds(grains, self.scene.grain_law),
             pairs,
+            near,
             chunks,
             walls,
             orientation,

@@ -14,6 +14,7 @@ from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.kinds import Kinds
 from sandmould.dem.motion import Damping, drift, kick, turn
+from sandmould.dem.near_pairs import NearPairs, look, watch
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.pairs import Chunks, gather_incoming, pair_forces
 from sandmould.dem.surface_contacts import surface_forces
@@ -70,6 +71,7 @@ class Moving(NamedTuple):
     grains: Grains
     kinds: Kinds
     pairs: Pairs
+    near: NearPairs
     chunks: Chunks
     walls: Walls
     orientation: Floats
@@ -107,8 +109,14 @@ def _add_forces(
     dim: Any, c: int, scene: DemScene, moving: Moving, shift: Any, speed: Any, dt: float
 ) -> None:
     """Add all forces on the grains of a chunk but those of earlier chunks."""
-    grains, walls = moving.grains, moving.walls
-    pair_forces(dim, c, moving.chunks, grains, moving.kinds, moving.pairs, scene.grain_law, dt)
+    grains, walls, chunks = moving.grains, moving.walls, moving.chunks
+    pairs, near = moving.pairs, moving.near
+    if near.gap[0] >= 0.0:
+        look(
+            dim, c, chunks.bound, chunks.first_slot, grains, pairs, near,
+            chunks.force, chunks.moment,
+        )  # fmt: skip
+    pair_forces(dim, c, chunks, grains, moving.kinds, pairs, near, scene.grain_law, dt)
     surface_forces(
         dim,
         walls.first_row[c],
@@ -192,6 +200,8 @@ def _state(
         return NOT_A_NUMBER
     arrays, state = moving.walls.arrays, DONE
     shift, speed = box
+    way = math.sqrt(fastest2) * scene.dt
+    watch(moving.near, way, 2.0 * half_skin)
     # A bound on the way relative to the box; the true way is only looked at beyond it.
     moving.reach[0] -= (math.sqrt(fastest2) + math.sqrt(dot(speed, speed))) * scene.dt
     if moving.reach[0] < 0.0:

@@ -203,7 +203,7 @@ def surface_forces(
                     old += 1
                 taken += 1
             on_grain, moment_1, _, friction, rolling, _ = contact(
-                n, r - distance, v, w, no_spin(dim), max(distance, 0.0), 0.0,
+                n, r - distance, v, w, no_spin(dim), max(distance, 0.0), 0.0, 0.0,
                 pair_coefficients(law, mass[i], r, r), law, lapse, friction, rolling,
             )  # fmt: skip
             total = plus(total, 1.0, on_grain)

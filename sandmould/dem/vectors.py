@@ -166,6 +166,13 @@ spin_slip = _by_length(
         w[0] * n[1] - w[1] * n[0],
     ),
 )
+turned_spin = _by_length(
+    "turned_spin",
+    "w and s v times the part of w along n in 3D: turned_spin(n, w, s, v).\n\n"
+    "With the slip w x n it makes w x (n - s v), but for what lies along n.",
+    two=lambda n, w, s, v: w,
+    three=lambda n, w, s, v: plus(w, s * dot(w, n), v),
+)
 tangent_moment = _by_length(
     "tangent_moment",
     "Moment n x t of a tangent force at the end of a unit arm along n: tangent_moment(n, t).",

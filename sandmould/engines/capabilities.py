@@ -1,4 +1,4 @@
-"""What an engine's sessions can do with a surface that bends, known before one is opened."""
+"""What an engine's sessions can do, known before one is opened."""
 
 from __future__ import annotations
 
@@ -25,3 +25,5 @@ class Capabilities:
     loads_of_every_step: bool
     """Whether ``vertex_loads`` are means over all steps, not over samples some steps apart, so
     that a window may be as short as one step."""
+    checkpoints_at_setups: bool
+    """Whether a checkpoint forces a setup of the engine, so that it has to come with one."""

@@ -21,7 +21,7 @@ TEMPLATES = ROOT / "templates"
 _LONGEST_REMARK = 200
 """Characters; LIGGGHTS reads lines of 2048."""
 _BLOCK = re.compile(r"^#--- block: (\w+) ---.*?\n(.*?)^#--- end: \1 ---$", re.M | re.S)
-_RUN = re.compile(r"^run (\d+)\b[^\n]*$", re.M)
+_RUNS = re.compile(r'(?:^(?:run|if [^\n]* then "run) (?!0\b)[^\n]*\n)+', re.M)
 
 
 def exact(number: float) -> str:
@@ -76,20 +76,12 @@ class DeckBlock:
     name: str
     text: str
 
-    @property
-    def run_steps(self) -> int | None:
-        """Steps of the block's one long run, or None where it has none."""
-        steps = [int(m.group(1)) for m in _RUN.finditer(self.text) if int(m.group(1)) > 0]
-        if len(steps) > 1:
-            raise ValueError(f"block {self.name} has {len(steps)} run commands, at most one fits")
-        return steps[0] if steps else None
-
     def around_run(self) -> tuple[str, str]:
-        """Commands before and after the block's one long run."""
-        if self.run_steps is None:
-            return self.text, ""
-        before, after = re.split(rf"^run {self.run_steps}\b[^\n]*$", self.text, flags=re.M)
-        return before, after
+        """Commands before and after the block's long run, which may be two commands in a row."""
+        parts = _RUNS.split(self.text)
+        if len(parts) > 2:
+            raise ValueError(f"block {self.name} has {len(parts) - 1} long runs, at most one fits")
+        return parts[0], "".join(parts[1:])
 
 
 @dataclass(frozen=True)

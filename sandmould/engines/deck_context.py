@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from sandmould.engines.deck import remark
@@ -13,8 +14,26 @@ from sandmould.engines.deck_lines import (
     skin_m,
     vibration_key,
 )
-from sandmould.engines.program import Program
+from sandmould.engines.program import Program, Stage
 from sandmould.engines.step_counts import StepCounts
+
+
+def _checks(program: Program) -> dict[str, tuple[int, int]]:
+    """Of each stage, the steps to its first check and its largest number of checks."""
+    counts = StepCounts.of(program.scenario)
+    into_check, checks = 0, {}
+    for stage in program.stages:
+        first = counts.check - into_check
+        if stage.settling is None:
+            assert stage.vibration is not None
+            longest = counts.vibration(stage.vibration)
+            into_check = (into_check + longest) % counts.check
+        else:
+            # A bed comes to rest at a check.
+            longest = counts.steps(stage.settling.longest_s)
+            into_check = 0
+        checks[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.check)))
+    return checks
 
 
 def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[str, Any]:
@@ -32,6 +51,14 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
     counts = StepCounts.of(scenario)
     classes = size_classes(scenario)
     critical = scenario.critical_step
+    checks = _checks(program)
+
+    def first_check(stage: Stage) -> int:
+        return checks[stage.name][0]
+
+    def most_checks(stage: Stage) -> int:
+        return checks[stage.name][1]
+
     return {
         "run": remark(run),
         "study": remark(study),
@@ -49,6 +76,9 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
         "obstacle_top": scenario.pouring_top_m,
         "down": "0 -1 0" if scenario.dimension == 2 else "0 0 -1",
         "check_steps": counts.check,
+        "setup_steps": counts.setup,
+        "first_check": first_check,
+        "most_checks": most_checks,
         "load_steps": counts.load,
         "rest_loads": scenario.rest.load_tolerance is not None and scenario.gravity_m_s2 > 0.0,
         "snapshot_steps": counts.records(scenario.record.snapshot_every_s),

@@ -57,9 +57,10 @@ class DeckSession(StagedSession):
         self._setup_due = True
 
     def _compute_to(self, target: int) -> None:
-        # Setup computes forces with whole-step velocities; only without it do parts add up to
-        # the deck's own uncut run, bit for bit.
-        self.send(f"run {target - self.steps} pre {'yes' if self._setup_due else 'no'} post no")
+        # Setup computes forces with whole-step velocities, and a checkpoint forces one. So it comes
+        # at fixed steps, as in the deck, whether a file is written there or not.
+        due = self._setup_due or self.steps % self._counts.setup == 0
+        self.send(f"run {target - self.steps} pre {'yes' if due else 'no'} post no")
         self._setup_due = False
 
     def end_stage(self) -> None:

@@ -41,6 +41,7 @@ class Driver:
         name: str,
         scenario_hash: str,
         open_session: Opening | None = None,
+        keeps_end: bool = False,
     ) -> None:
         """Prepare a run.
 
@@ -55,6 +56,8 @@ class Driver:
             Tells this scenario's checkpoints from those of another.
         open_session : Opening, optional
             Opens something that acts as a session; by default the scenario's engine.
+        keeps_end : bool
+            Whether a checkpoint of the end is a product, from which other runs go on.
         """
         self._open_session = open_session or engine_of(program.scenario).open_session
         self._program = program
@@ -64,11 +67,15 @@ class Driver:
         self._work.mkdir(parents=True, exist_ok=True)
         self._hash = scenario_hash
         self._guard = Guard(program.scenario)
-        self._progress = Progress(name, self._work, program.expected_grain_steps)
+        self._name, self._keeps_end = name, keeps_end
+        self._shared_stages = 0
         counts, record = StepCounts.of(program.scenario), program.scenario.record
         self._record_steps = counts.record
         self._snapshot_steps = counts.records(record.snapshot_every_s)
-        self._checkpoint_steps = counts.records(record.checkpoint_every_s)
+        self._checkpoint_steps = counts.checkpoints(
+            record.checkpoint_every_s,
+            at_setups=engine_of(program.scenario).CAPABILITIES.checkpoints_at_setups,
+        )
         self._stop_requested = False
         self._recorder: Recorder | None = None
         self.is_root = True
@@ -91,6 +98,9 @@ class Driver:
         mark = newest[1] if newest else None
         if mark is not None:
             self.cost = Cost(**mark.cost)
+            self._shared_stages = mark.shared_stages
+        expected = self._program.expected_grain_steps(self._shared_stages)
+        self._progress = Progress(self._name, self._work, expected)
         session: Session | None = None
         outcome, detail = Outcome.FINISHED, ""
         self._begin_clocks()
@@ -124,6 +134,7 @@ class Driver:
 
     def _begin_clocks(self) -> None:
         self._earlier = (self.cost.wall_s, self.cost.cpu_s)
+        self._progress.earlier_cpu_s = self.cost.cpu_s
         self._begun, self._cpu_begun = time.monotonic(), cpu_time_s()
 
     def _read_clocks(self) -> None:
@@ -150,6 +161,8 @@ class Driver:
             while not session.stage_over:
                 self._window(session)
             self._check_rest(session, stage)
+            if self._keeps_end and stage is self._program.stages[-1]:
+                self._write_end(session)
             session.end_stage()
         if session.is_root:
             self._show(session, last=True)
@@ -218,25 +231,36 @@ class Driver:
             return
         # All ranks write into the one folder that the first has emptied.
         folder = checkpoints.next_folder(self._work) if session.is_root else self._work
-        folder = session.share(folder)
-        session.write_checkpoint(folder)
-        if self._recorder is not None:
-            self._read_clocks()
-            series_bytes, loads_bytes = self._recorder.sizes()
-            checkpoints.seal(
-                folder,
-                CheckpointMark(
-                    self._hash,
-                    session.stage.name,
-                    session.steps,
-                    self._recorder.snapshots,
-                    series_bytes,
-                    loads_bytes,
-                    self.cost.row(),
-                ),
-            )
+        self._write_checkpoint(session, session.share(folder))
         if stop:
             why = "the system asked" if self._stop_requested else "guard.wall_limit_s came"
             raise EngineStop(
                 Outcome.OUT_OF_WALL_TIME, f"stopped at {session.time_s:.4g} s because {why}"
             )
+
+    def _write_end(self, session: Session) -> None:
+        """Write the checkpoint that other runs go on from."""
+        folder = self._work / checkpoints.END_CHECKPOINT
+        if session.is_root:
+            checkpoints.empty(folder)
+        self._write_checkpoint(session, session.share(folder))
+
+    def _write_checkpoint(self, session: Session, folder: Path) -> None:
+        session.write_checkpoint(folder)
+        if self._recorder is None:
+            return
+        self._read_clocks()
+        series_bytes, loads_bytes = self._recorder.sizes()
+        checkpoints.seal(
+            folder,
+            CheckpointMark(
+                self._hash,
+                session.stage.name,
+                session.steps,
+                self._recorder.snapshots,
+                series_bytes,
+                loads_bytes,
+                self.cost.row(),
+                self._shared_stages,
+            ),
+        )

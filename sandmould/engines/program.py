@@ -112,12 +112,18 @@ class Program:
         return sum(stage.expected_s for stage in self.stages)
 
     @property
-    def expected_grain_steps(self) -> float:
-        """Sum over stages of grains present times steps."""
+    def fill_stages(self) -> int:
+        """Stages before the first vibration; all where the box never vibrates."""
+        shaken = (n for n, stage in enumerate(self.stages) if stage.counts_as_vibration)
+        return next(shaken, len(self.stages))
+
+    def expected_grain_steps(self, first_stage: int = 0) -> float:
+        """Sum over stages of grains present times steps, from a stage on."""
         total, grains = 0.0, 0
-        for stage in self.stages:
+        for number, stage in enumerate(self.stages):
             grains += self.counts[stage.layer - 1] if stage.layer else 0
-            total += grains * stage.expected_s / self.scenario.step_s
+            if number >= first_stage:
+                total += grains * stage.expected_s / self.scenario.step_s
         return total
 
 

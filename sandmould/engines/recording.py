@@ -9,6 +9,7 @@ from typing import TextIO
 from sandmould.engines.guard import Health
 from sandmould.engines.session import Array
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot_file import SnapshotFile
 from sandmould.runs.checkpoint_folders import CheckpointMark
 
 _SERIES = ("time_s", "vibration_time_s", "stage", "grains", "kinetic_energy_j", "rms_speed_m_s",
@@ -28,12 +29,8 @@ class Recorder:
         mark : CheckpointMark, optional
             The checkpoint that the run continues from.
         """
-        self.snapshots = mark.snapshots if mark else 0
         create_tables(work, dimension)
-        self._folder = work / "snapshots"
-        for path in self._folder.iterdir():
-            if not path.stem.isdigit() or int(path.stem) >= self.snapshots:
-                path.unlink()
+        self._snapshots = SnapshotFile(work, mark.snapshots if mark else 0)
         self._load_sums: dict[str, Array] = {}
         self._checks = 0
         headers = _headers(dimension)
@@ -42,6 +39,11 @@ class Recorder:
             _open(work / name, len("\t".join(columns)) + 1, sizes.get(name))
             for name, columns in headers.items()
         )
+
+    @property
+    def snapshots(self) -> int:
+        """Snapshots written so far."""
+        return self._snapshots.count
 
     def add_loads(self, loads: Mapping[str, Array] | None) -> None:
         """Take in the mean loads of a check that has ended; None where none has."""
@@ -65,8 +67,7 @@ class Recorder:
 
     def save(self, snapshot: Snapshot) -> None:
         """Write the next snapshot."""
-        snapshot.save(self._folder / f"{self.snapshots:06d}.npz")
-        self.snapshots += 1
+        self._snapshots.append(snapshot)
 
     def sizes(self) -> tuple[int, int]:
         """Flush the tables and give their sizes in bytes."""
@@ -75,7 +76,8 @@ class Recorder:
         return self._series.tell(), self._loads.tell()
 
     def close(self) -> None:
-        """Close the tables."""
+        """Close the files."""
+        self._snapshots.close()
         self._series.close()
         self._loads.close()
 
@@ -89,8 +91,7 @@ def _headers(dimension: int) -> dict[str, tuple[str, ...]]:
 
 
 def create_tables(work: Path, dimension: int) -> None:
-    """Make the tables and the snapshot folder of a run where they are missing."""
-    (work / "snapshots").mkdir(parents=True, exist_ok=True)
+    """Make the tables of a run where they are missing."""
     for name, columns in _headers(dimension).items():
         if not (work / name).exists():
             (work / name).write_text("\t".join(columns) + "\n", encoding="utf-8")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +48,20 @@ class Snapshot:
     def save(self, path: Path) -> None:
         """Write to an ``.npz`` file; where it is, it is whole."""
         with replaced(path) as partial, partial.open("wb") as file:
-            values = {f.name: getattr(self, f.name) for f in fields(self)}
-            np.savez(file, **{name: v for name, v in values.items() if v is not None})
+            np.savez(file, **self.arrays())
+
+    def arrays(self) -> dict[str, Any]:
+        """Values by name, as files hold them."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: value for name, value in values.items() if value is not None}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, Any]) -> Snapshot:
+        """The snapshot that such values are of; a KeyError or TypeError where some are missing."""
+        values = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays}
+        for scalar, kind in (("time_s", float), ("vibration_time_s", float), ("stage", str)):
+            values[scalar] = kind(values[scalar])
+        return cls(**values)
 
     @classmethod
     def load(cls, path: Path) -> Snapshot:
@@ -60,10 +74,7 @@ class Snapshot:
         """
         try:
             with np.load(path, allow_pickle=False) as data:
-                values = {f.name: data[f.name] for f in fields(cls) if f.name in data}
-            for scalar, kind in (("time_s", float), ("vibration_time_s", float), ("stage", str)):
-                values[scalar] = kind(values[scalar])
-            return cls(**values)
+                return cls.of_arrays(data)
         except Exception as error:
             raise ValueError(f"{path}: not a readable snapshot ({error})") from error
 

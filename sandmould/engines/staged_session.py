@@ -300,6 +300,8 @@ class StagedSession(ABC):
                 "vibration_start": self._vibration_start,
                 "checks_at_rest": [self._watch.in_row, self._watch.all_in_row],
                 "held": self._watch.held,
+                "stage_over": self.stage_over,
+                "at_rest": self.at_rest,
             }
             (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
 
@@ -320,4 +322,6 @@ class StagedSession(ABC):
         self._vibration_start = state["vibration_start"]
         self._watch.in_row, self._watch.all_in_row = state["checks_at_rest"]
         self._watch.held = state["held"]
+        # Checkpoints of earlier versions were all written within a stage.
+        self.stage_over, self.at_rest = state.get("stage_over", False), state.get("at_rest", False)
         self._ended_check = True

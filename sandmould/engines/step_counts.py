@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
 
+SETUP_CHECKS = 20
+"""Checks after which LAMMPS and LIGGGHTS are set up anew, so that a checkpoint may be written."""
+
 
 @dataclass(frozen=True)
 class StepCounts:
@@ -37,6 +40,16 @@ class StepCounts:
     def records(self, interval_s: float) -> int:
         """Steps of an interval, rounded to whole records, at least one."""
         return self.record * max(1, round(interval_s / self.step_s / self.record))
+
+    @property
+    def setup(self) -> int:
+        """Steps from one setup of LAMMPS or LIGGGHTS to the next, whatever is recorded."""
+        return self.check * SETUP_CHECKS
+
+    def checkpoints(self, interval_s: float, *, at_setups: bool) -> int:
+        """Steps of an interval, rounded to whole records and, if need be, to whole setups."""
+        whole = math.lcm(self.record, self.setup) if at_setups else self.record
+        return whole * max(1, round(interval_s / self.step_s / whole))
 
     def vibration(self, stage: VibrationStage) -> int:
         """Steps of a vibration stage, with one at rest at either end."""

@@ -84,7 +84,7 @@ def make_film(
     moments = list_moments(run_folder)
     if not moments:
         return None
-    last = Snapshot.load(moments[-1].path)
+    last = moments[-1].load()
     # positions deflate to a fifth or less, so more raw bytes than this are not worth a try
     raw_frame = max(1, 2 * last.position_m.size)
     count = min(len(moments), _MOST_FRAMES, max(2, 8 * budget_bytes // raw_frame))
@@ -107,7 +107,7 @@ def _pack(
     label: str,
     reading: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
 ) -> Film:
-    frames = [Snapshot.load(m.path) for m in moments]
+    frames = [m.load() for m in moments]
     ids = np.unique(np.concatenate([f.id for f in frames]))
     dimension = frames[0].position_m.shape[1]
     every = np.concatenate([f.position_m for f in frames])

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from sandmould.engines.snapshot import Snapshot
 from sandmould.report.figures import png
 from sandmould.scenario.geometry import Array, Solid
 from sandmould.scenario.mesh import TriangleMesh
@@ -40,7 +39,7 @@ def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
     assert pattern is not None
     drawn = next(s for s in scenario.scene.solids if s.name == pattern.name)
     moments = shape_moments(list_moments(run_folder))
-    shapes = {name: Snapshot.load(m.path).pattern_m for name, m in moments.items()}
+    shapes = {name: m.load().pattern_m for name, m in moments.items()}
     outlines_m = {name: shape for name, shape in shapes.items() if shape is not None}
     if not outlines_m:
         return "", ""

@@ -15,7 +15,7 @@ from sandmould.report.heaps import Heap
 from sandmould.report.kinds.registry import heaps_of
 from sandmould.report.repose_figures import draw_map, draw_posterior, plotted
 from sandmould.report.tables import Cell, Column, Table
-from sandmould.runs.columns import CPU_S, RUN
+from sandmould.runs.columns import CPU_S, RUN, total_s
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
@@ -232,6 +232,5 @@ def _worth_table(calibrated: Calibrated) -> Table:
 
 
 def _cost(summary: pd.DataFrame) -> str:
-    total_s = float(summary[CPU_S].sum()) if CPU_S in summary else math.nan
     runs = "The run" if len(summary) == 1 else f"All {len(summary)} runs"
-    return f"{runs} took {seconds(total_s)} of processor time."
+    return f"{runs} took {seconds(total_s(summary, CPU_S))} of processor time."

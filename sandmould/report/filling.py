@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.report.chart import Chart, Line, tints
@@ -205,5 +205,5 @@ def _limbs(table: _AtTimes, key: str, measure: str) -> str:
 
 def _exponent(limb: Limb) -> str:
     """An exponent with its 95 % interval, two degrees of freedom less than points."""
-    reach = float(student.ppf(0.5 + CONFIDENCE / 2, limb.points - 2)) * limb.se
+    reach = float(stdtrit(limb.points - 2, 0.5 + CONFIDENCE / 2)) * limb.se
     return f"{with_margin(limb.exponent, reach)} ({limb.points} settings)"

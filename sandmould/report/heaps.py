@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sandmould.engines.snapshot import Snapshot
 from sandmould.report.repose_figures import draw_heap
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import number
@@ -53,7 +52,7 @@ def steepest_heaps(
         moments = list_moments(study_folder / "runs" / run)
         if not moments:
             continue
-        sand = Snapshot.load(moments[-1].path)
+        sand = moments[-1].load()
         heading = f"{number(values[index])}°: {run}"
         picture = draw_heap(sand, scenario, 1.02 * scenario.scene.top_m)
         heaps.append(Heap(heading, picture, f"Heap and hopper of run {run} with fitted lines"))

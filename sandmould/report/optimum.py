@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.curves import reported_lines
 from sandmould.report.robustness import RobustnessPages, opening_sentences
-from sandmould.runs.columns import CPU_S
+from sandmould.runs.columns import CPU_S, total_s
 from sandmould.runs.formatting import (
     display_scale,
     listed,
@@ -34,7 +34,7 @@ WRONG = {"frequency_hz": 10.0}
 """By how much a key may be set wrong in a foundry; others by a tenth of their range."""
 SHARE_LOST = 0.05
 """Of the best value, what counts as no worse where the study sets no margin."""
-_TWO_SIDED = float(norm.ppf(0.5 + CONFIDENCE / 2))
+_TWO_SIDED = float(ndtri(0.5 + CONFIDENCE / 2))
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _beside(optimum: Optimum, study: Study) -> list[str]:
 def _effort(log: RoundLog, study: Study, summary: pd.DataFrame) -> str:
     added, swept = len(log.runs), study.sweep.number_of_points * study.replicates
     rounds = len(log.rounds)
-    spent_h = float(summary[CPU_S].sum()) / 3600 if CPU_S in summary else math.nan
+    spent_h = total_s(summary, CPU_S) / 3600
     rounds_text = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
     return (
         f"{rounds_text} added {added or 'any'} runs to the {swept} of the sweep, "

@@ -98,7 +98,7 @@ def sand_pages(
     run = next(iter(roles.values()), "")
     moments = list_moments(study_folder / "runs" / run) if run else ()
     chosen = _chosen(moments, scenario)
-    snapshots = [Snapshot.load(m.path) for _, m in chosen]
+    snapshots = [m.load() for _, m in chosen]
     height_m = _picture_height_m(snapshots, scenario)
     layers = figures.draw_layers(snapshots, scenario, height_m)
     densities, scale, median_kg_m3 = figures.draw_densities(snapshots, scenario, height_m)
@@ -180,14 +180,14 @@ def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Mo
         return []
     if not duration_s:
         return [("at its end", moments[-1])]
-    chosen: dict[Path, tuple[str, Moment]] = {}
+    chosen: dict[Moment, str] = {}
     for heading, share in MOMENTS.items():
         moment = nearest(moments, share * duration_s)
         if abs(moment.vibration_time_s - share * duration_s) <= 0.1 * duration_s:
             rests = share == 1.0 and scenario.ends_at_rest
-            shown = "at rest after its end" if rests else heading
-            chosen.setdefault(moment.path, (shown, moment))
-    return list(chosen.values()) or [("at its last snapshot", moments[-1])]
+            chosen.setdefault(moment, "at rest after its end" if rests else heading)
+    shown = [(heading, moment) for moment, heading in chosen.items()]
+    return shown or [("at its last snapshot", moments[-1])]
 
 
 def _picture_height_m(snapshots: Sequence[Snapshot], scenario: Scenario) -> float:

@@ -15,6 +15,8 @@ from sandmould.report.thinning import listed_note, listed_runs, listed_settings
 from sandmould.runs.columns import (
     CPU_S,
     DETAIL,
+    FILL,
+    FILL_CPU_S,
     GRAIN_STEPS_PER_S,
     GRAINS,
     LARGEST_OVERLAP_FRACTION,
@@ -30,6 +32,7 @@ from sandmould.runs.columns import (
     TIME_STEP_FRACTION,
     WALL_S,
     finished,
+    total_s,
 )
 from sandmould.runs.formatting import name_of, number, seconds, size, titled, with_margin
 from sandmould.runs.outcome import Outcome
@@ -108,10 +111,12 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
         if count is not None:
             count_text = f"{count:,.0f}".replace(",", "\u202f")
             numbers.append(KeyNumber(count_text, f"{what} in a run"))
-    wall_s, cpu_s = _total(summary, WALL_S, "sum"), _total(summary, CPU_S, "sum")
-    if wall_s is not None:
-        note = "" if cpu_s is None else f"{seconds(cpu_s)} of processor time"
-        numbers.append(KeyNumber(seconds(wall_s), "computing, all runs added up", note))
+    wall_s, cpu_s = total_s(summary, WALL_S), total_s(summary, CPU_S)
+    if wall_s > 0.0:
+        fills = summary[FILL].nunique() if FILL in summary else 0
+        added_up = f"all runs and {fills} shared fills added up" if fills else "all runs added up"
+        note = f"{seconds(cpu_s)} of processor time" if cpu_s > 0.0 else ""
+        numbers.append(KeyNumber(seconds(wall_s), f"computing, {added_up}", note))
     speed = _total(typical, GRAIN_STEPS_PER_S, "median")
     if speed is not None:
         numbers.append(KeyNumber(f"{number(speed / 1e6)} M", "grain-steps a second, median run"))
@@ -206,6 +211,7 @@ _COST = (
     (SIMULATED_S, "simulated", seconds),
     (WALL_S, "wall time", seconds),
     (CPU_S, "processor time", seconds),
+    (FILL_CPU_S, "share of its fill", seconds),
     (GRAIN_STEPS_PER_S, "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("element_steps_per_s", "element-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("particle_solves_per_s", "particle-solves/s", lambda v: f"{number(v / 1e6)} M"),
@@ -314,7 +320,7 @@ _FILES = (
     (FIGURES, "main figures as files: charts as SVG, sand as PNG"),
     ("agreement.tsv", "one row a pair of settings and measure that the study compares"),
     ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "
-     "snapshots; exports/ holds some of them for ParaView (.vtu) and OVITO (.dump)"),
+     "snapshots; exports.zip holds some of them for ParaView (.vtu) and OVITO (.dump)"),
 )  # fmt: skip
 
 

@@ -11,6 +11,13 @@ from typing import Any
 from sandmould.digest import file_digest
 from sandmould.runs.files import write_text
 
+END_CHECKPOINT = "end_checkpoint"
+"""Folder of the state at the end of a fill, from which runs go on."""
+
+
+LAYOUT = 2
+"""Of the files of checkpoints: raised when those of earlier versions cannot be read any more."""
+
 
 @dataclass(frozen=True)
 class CheckpointMark:
@@ -26,6 +33,10 @@ class CheckpointMark:
     """Sizes of the tables: what came after is written again."""
     cost: dict[str, Any]
     """The cost row so far."""
+    shared_stages: int = 0
+    """Stages at the beginning that another run has computed and pays for."""
+    layout: int = 1
+    """``LAYOUT`` of the version that wrote it."""
 
 
 def _digests(folder: Path) -> dict[str, str]:
@@ -38,15 +49,40 @@ def _digests(folder: Path) -> dict[str, str]:
 
 def seal(folder: Path, mark: CheckpointMark) -> None:
     """Close a checkpoint folder: the mark with the files' hashes comes last."""
-    text = json.dumps({"mark": asdict(mark), "sha256": _digests(folder)})
+    tree = {"mark": asdict(mark) | {"layout": LAYOUT}, "sha256": _digests(folder)}
+    text = json.dumps(tree)
     write_text(folder / "mark.json", text)
+
+
+def read_mark(folder: Path) -> CheckpointMark:
+    """Read the mark of a checkpoint whose files are all as they were sealed.
+
+    Raises
+    ------
+    ValueError
+        When the checkpoint is missing or damaged, or of a version with other files.
+    """
+    try:
+        sealed = json.loads((folder / "mark.json").read_text(encoding="utf-8"))
+        if sealed["sha256"] != _digests(folder):
+            raise ValueError("its files do not match their hashes")
+        mark = CheckpointMark(**sealed["mark"])
+        if mark.layout != LAYOUT:
+            raise ValueError("another version of Sandmould wrote it")
+        return mark
+    except (OSError, KeyError, TypeError, RecursionError) as error:
+        raise ValueError(str(error)) from error
 
 
 def next_folder(work: Path) -> Path:
     """Give an empty folder for the next checkpoint, keeping the newest sealed one."""
     newest = newest_checkpoint(work)[0]
     other = "b" if newest is not None and newest[0].name == "checkpoint_a" else "a"
-    folder = work / f"checkpoint_{other}"
+    return empty(work / f"checkpoint_{other}")
+
+
+def empty(folder: Path) -> Path:
+    """Make a folder, or empty the one that is there."""
     if folder.exists():
         shutil.rmtree(folder)
     folder.mkdir(parents=True)
@@ -78,10 +114,7 @@ def newest_checkpoint(work: Path) -> tuple[tuple[Path, CheckpointMark] | None, l
         if not folder.is_dir():
             continue
         try:
-            sealed = json.loads((folder / "mark.json").read_text(encoding="utf-8"))
-            if sealed["sha256"] != _digests(folder):
-                raise ValueError("its files do not match their hashes")
-            whole.append((folder, CheckpointMark(**sealed["mark"])))
-        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+            whole.append((folder, read_mark(folder)))
+        except ValueError as error:
             damaged.append(f"checkpoint {folder.name} cannot be used: {error}")
     return max(whole, key=lambda item: item[1].steps, default=None), damaged

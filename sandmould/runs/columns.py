@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 from sandmould.runs.outcome import Outcome
@@ -39,6 +40,11 @@ VERSION: Final = "version"
 RANKS: Final = "ranks"
 WALL_S: Final = "wall_s"
 CPU_S: Final = "cpu_s"
+FILL: Final = "fill"
+"""Fill that a run shares; only studies that have such runs."""
+FILL_WALL_S: Final = "fill_wall_s"
+FILL_CPU_S: Final = "fill_cpu_s"
+"""What the fill took, over the runs that share it: their sum counts each fill once."""
 GRAIN_STEPS_PER_S: Final = "grain_steps_per_s"
 PEAK_MEMORY_BYTES: Final = "peak_memory_bytes"
 TIME_STEP_S: Final = "time_step_s"
@@ -78,3 +84,18 @@ def during_vibration(curves: pd.DataFrame) -> pd.DataFrame:
 def finished(summary: pd.DataFrame) -> pd.Series[bool]:
     """Which runs of a summary reached their end, by row."""
     return summary[OUTCOME_CODE] == int(Outcome.FINISHED)
+
+
+def total_s(summary: pd.DataFrame, column: str) -> float:
+    """Time of all runs and of the fills that they share; NaN where no run says it.
+
+    Parameters
+    ----------
+    summary : DataFrame
+    column : str
+        ``WALL_S`` or ``CPU_S``.
+    """
+    of_fills = {WALL_S: FILL_WALL_S, CPU_S: FILL_CPU_S}[column]
+    if column not in summary:
+        return math.nan
+    return sum(float(summary[name].sum()) for name in (column, of_fills) if name in summary)

@@ -214,3 +214,11 @@ def listed(items: list[str], most: int = 4) -> str:
         return "".join(items)
     comma = "; " if any("," in item for item in items) else ", "
     return f"{comma.join(items[:-1])} and {items[-1]}"
+
+
+def size_text(size_bytes: int) -> str:
+    """Write a size as a person would say it."""
+    for unit, length in (("GB", 1e9), ("MB", 1e6)):
+        if size_bytes >= length:
+            return f"{size_bytes / length:.1f} {unit}"
+    return f"{size_bytes / 1e3:.0f} kB"

@@ -1,4 +1,7 @@
-"""What a run left behind, file by file with its size: what is lost or cut short later is seen."""
+"""What a run left behind: where it comes from, what it cost, and each file with its size.
+
+What is lost or cut short later is seen by the sizes.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,10 @@ from sandmould.runs.files import write_text
 
 MANIFEST_FILE = "products.json"
 DECK_FILE = "deck.in"
+LEFT_OUT = "left_out"
+"""Step of files that a pack of the run did without: they are not missed, but cannot be measured."""
+OLDER_ORIGIN, OLDER_COST = "provenance.json", "cost.tsv"
+"""What runs of older times have beside it."""
 Manifest = dict[str, dict[str, Any]]
 Step = Literal["computed", "measured"]
 
@@ -40,14 +47,33 @@ def _files(place: Path) -> Iterator[Path]:
         yield place
 
 
-def write_manifest(folder: Path, step: Step, sizes: Mapping[str, int]) -> None:
+def write_manifest(
+    folder: Path,
+    step: Step,
+    sizes: Mapping[str, int],
+    origin: Mapping[str, Any] | None = None,
+    cost: Mapping[str, Any] | None = None,
+) -> None:
     """Write down what a step of a run left.
 
     ``computed`` begins anew, with the hash of the deck that was computed; ``measured`` adds to it.
+
+    Parameters
+    ----------
+    folder : Path
+    step : str
+    sizes : mapping of str to int
+        Bytes of each file.
+    origin : mapping, optional
+        Provenance of what was computed.
+    cost : mapping, optional
+        Its cost row.
     """
     if step == "computed":
         deck = folder / DECK_FILE
         tree: Manifest = {"deck": {DECK_FILE: file_digest(deck)}} if deck.is_file() else {}
+        stated = {"origin": origin, "cost": cost}
+        tree |= {name: dict(values) for name, values in stated.items() if values is not None}
     else:
         tree = read_manifest(folder) or {}
     write_text(folder / MANIFEST_FILE, json.dumps({**tree, step: sizes}, indent=1) + "\n")
@@ -68,6 +94,34 @@ def read_manifest(folder: Path) -> Manifest | None:
     if not (isinstance(tree, dict) and all(isinstance(files, dict) for files in tree.values())):
         raise ValueError("no list of files by step")
     return tree
+
+
+def read_origin(folder: Path) -> dict[str, Any]:
+    """Provenance of a run; older ones have a file for it alone.
+
+    Raises
+    ------
+    OSError, ValueError
+        When it cannot be read.
+    """
+    manifest = read_manifest(folder)
+    if manifest is not None and "origin" in manifest:
+        return manifest["origin"]
+    if manifest is None and not (folder / OLDER_ORIGIN).exists():
+        raise FileNotFoundError(f"{MANIFEST_FILE} is missing")
+    origin: dict[str, Any] = json.loads((folder / OLDER_ORIGIN).read_text(encoding="utf-8"))
+    return origin
+
+
+def read_cost(folder: Path) -> dict[str, Any]:
+    """Cost row of a run; empty for one that has none, or has it in a table of its own.
+
+    Raises
+    ------
+    OSError, ValueError
+        When it cannot be read.
+    """
+    return (read_manifest(folder) or {}).get("cost", {})
 
 
 def deck_damage(folder: Path, manifest: Manifest) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
 import os
 import resource
 import shutil
@@ -12,7 +10,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from sandmould.runs.manifest import files_below, write_manifest
+from sandmould.runs.checkpoint_folders import END_CHECKPOINT
+from sandmould.runs.manifest import OLDER_COST, OLDER_ORIGIN, files_below, write_manifest
 from sandmould.runs.outcome import RunOutcome
 
 
@@ -35,15 +34,20 @@ class Cost:
     peak_memory_bytes: int = 0
     """Of the first rank."""
     largest_overlap_fraction: float = 0.0
+    fill: str = ""
+    """Fill that it shares, whose own cost counts apart."""
 
     def row(self) -> dict[str, Any]:
         """Values by name, as a continued run takes them up."""
         return asdict(self)
 
     def columns(self) -> dict[str, Any]:
-        """Columns of ``cost.tsv`` and their values."""
+        """Columns of the cost row in ``products.json`` and their values."""
         rate = self.grain_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
-        return {**self.row(), "grain_steps_per_s": rate}
+        columns = {**self.row(), "grain_steps_per_s": rate}
+        if not self.fill:
+            del columns["fill"]
+        return columns
 
 
 @dataclass(frozen=True)
@@ -69,15 +73,9 @@ def peak_memory_bytes() -> int:
 
 LAST_WORK = "last_work"
 """Folder of what a failed run leaves besides its products, its last checkpoint above all."""
-SAND_PRODUCTS = (
-    "series.tsv",
-    "loads.tsv",
-    "snapshots",
-    "engine.log",
-    "pattern.log",
-    "pattern.tsv",
-    "pattern_shapes.f8",
-)
+SAND_TABLES = ("series.tsv", "loads.tsv", "snapshots.npz", "pattern.tsv", "pattern_shapes.f8")
+"""What a run of sand writes on and on; a run that begins with a shared fill takes up the fill's."""
+SAND_PRODUCTS = (*SAND_TABLES, "engine.log", "pattern.log", END_CHECKPOINT)
 
 
 def finish(
@@ -90,8 +88,8 @@ def finish(
     """Move a run's products from its work folder into place.
 
     A finished run's work folder is removed, a failed one's renamed: asked for again, that run
-    begins anew, since its tables are no longer beside its checkpoint. The sizes of all products
-    are written down, so that what is lost or cut short later is seen.
+    begins anew, since its tables are no longer beside its checkpoint. Where it comes from, its cost
+    and the sizes of all products are written down in ``products.json``.
 
     Parameters
     ----------
@@ -110,15 +108,10 @@ def finish(
             shutil.rmtree(target)
         if (work / name).exists():
             os.replace(work / name, target)
-    row = cost.columns()
-    with (folder / "cost.tsv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(row), delimiter="\t", lineterminator="\n")
-        writer.writeheader()
-        writer.writerow(row)
-    text = json.dumps(provenance, indent=1) + "\n"
-    (folder / "provenance.json").write_text(text, encoding="utf-8")
-    left = (*products, "cost.tsv", "provenance.json")
-    write_manifest(folder, "computed", files_below(folder, left))
+    for older in (OLDER_ORIGIN, OLDER_COST):
+        (folder / older).unlink(missing_ok=True)
+    sizes = files_below(folder, tuple(products))
+    write_manifest(folder, "computed", sizes, provenance, cost.columns())
     shutil.rmtree(folder / LAST_WORK, ignore_errors=True)
     if outcome.outcome == 0:
         shutil.rmtree(work)

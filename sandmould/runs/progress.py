@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 import time
 from pathlib import Path
@@ -46,6 +47,8 @@ class Progress:
         self._expected = math.inf if expected is None else max(expected, 1.0)
         self._unit = unit
         self._last_line_s = self._last_state_s = -math.inf
+        self.earlier_cpu_s = 0.0
+        """Processor time of the processes that this run went on from."""
 
     def show(self, stage: str, time_s: float, done: float, rate: float, last: bool = False) -> None:
         """Show simulated time, percent, work per second and time left: a line now and then."""
@@ -62,6 +65,7 @@ class Progress:
             "percent": percent,
             "work_per_s": rate,
             "left_s": 0.0 if last else left,
+            "cpu_s": self.earlier_cpu_s + sum(os.times()[:4]),
         }
         write_text(self._path, json.dumps(state))
         if not last and now - self._last_line_s < LINE_EVERY_S:

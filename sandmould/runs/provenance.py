@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -35,8 +36,7 @@ def provenance_of(scenario: Section, seed: int, template_hash: str, command: str
         "template_sha256": template_hash,
         "seed": seed,
         "commit": commit(),
-        "versions": {name: metadata.version(name) for name in PACKAGES}
-        | {"python": platform.python_version()},
+        "versions": dict(versions()),
         "machine": {
             "system": f"{platform.system()} {platform.machine()}",
             "processor": processor(),
@@ -45,6 +45,14 @@ def provenance_of(scenario: Section, seed: int, template_hash: str, command: str
     }
 
 
+@cache
+def versions() -> tuple[tuple[str, str], ...]:
+    """Of the packages and of Python."""
+    packages = ((name, metadata.version(name)) for name in PACKAGES)
+    return (*packages, ("python", platform.python_version()))
+
+
+@cache
 def commit() -> str:
     """Commit of the checkout, marked where anything but its records differs from it."""
     name = _git("describe", "--always") or "not a git checkout"
@@ -57,6 +65,7 @@ def _git(*arguments: str) -> str:
     return ran.stdout.strip()
 
 
+@cache
 def processor() -> str:
     """Name of the processor, as Linux gives it."""
     try:

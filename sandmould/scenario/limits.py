@@ -108,6 +108,10 @@ FRAMES = Limit(
 PIXELS = Limit(
     25_000_000, "pixels", "a smaller picture and a larger pixel_m", "some 60 bytes a pixel"
 )
+DRAWING_BYTES = Limit(
+    2_000_000_000, "bytes of a drawing", "a coarser surface or a smaller picture",
+    "an ASCII STL file has 260 bytes a triangle",
+)  # fmt: skip
 TRIANGLES = Limit(
     5_000_000, "triangles", "a coarser surface",
     "0.5 kB a triangle to read it (301 MB at 720 000), more where shells touch",
@@ -115,5 +119,5 @@ TRIANGLES = Limit(
 
 LIMITS = (
     YAML_BYTES, YAML_DEPTH, YAML_ALIASES, YAML_VALUES, RUNS, REPLICATES, GRAINS, CELLS, PARTICLES,
-    PATTERN_ELEMENTS, RECORDS, FRAMES, PIXELS, TRIANGLES,
+    PATTERN_ELEMENTS, RECORDS, FRAMES, PIXELS, DRAWING_BYTES, TRIANGLES,
 )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from sandmould.digest import file_digest
-from sandmould.scenario.limits import TRIANGLES
+from sandmould.scenario.limits import DRAWING_BYTES, TRIANGLES
 from sandmould.scenario.mesh import signed_volumes_m3
 from sandmould.scenario.mesh_shells import (
     SAME,
@@ -36,9 +37,14 @@ def file_hash(path: Path) -> str:
     Raises
     ------
     MeshFileError
-        When it cannot be read.
+        When it cannot be read, or is a folder, a device or too large.
     """
     try:
+        what = path.stat()
+        if not stat.S_ISREG(what.st_mode):
+            raise MeshFileError("a file; here is a folder or a device")
+        if what.st_size > DRAWING_BYTES.most:
+            raise MeshFileError(f"a file {DRAWING_BYTES.sentence(what.st_size)}")
         return file_digest(path)
     except OSError as error:
         reason = error.strerror or "it cannot be read"

@@ -33,12 +33,22 @@ def run_main(main: Callable[..., Any], usage: str, counts: Container[int] = (0,)
     if len(given) not in counts:
         print(f"usage: {usage}", file=sys.stderr)
         raise SystemExit(2)
+    raise SystemExit(in_a_sentence(main, *given))
+
+
+def in_a_sentence(main: Callable[..., Any], *given: Any) -> Any:
+    """Call a function; after bad input or a file that cannot be read it ends with a sentence.
+
+    Raises
+    ------
+    SystemExit
+        With one sentence a problem.
+    """
     try:
-        status = main(*given)
+        return main(*given)
     except BadInputError as error:
         raise SystemExit(str(error)) from None
     except OSError as error:
         if error.filename is None:  # no file of the user's: a fault of ours or of the machine
             raise
         raise SystemExit(f"{error.filename}: {error.strerror}") from None
-    raise SystemExit(status)

@@ -103,10 +103,10 @@ class Loop(Section):
         "How far the surface is moved to where the last loads bend the pattern: not at all, a "
         "fixed share to where those at the end of the last layer or stage bend it, or to where "
         "the last window's do: a fixed share, one of the limit that a measured gain sets (not on "
-        "LIGGGHTS), Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS). Or no "
-        "windows: "
-        "in_step steps the pattern, condensed on its surface, inside every step of the engine; "
-        "monolithic steps all of it after every step of the grains, slow, what the others are "
+        "LIGGGHTS), Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS, with "
+        "repeats above 0 alone, so not on LIGGGHTS). Or no windows: in_step steps the pattern, "
+        "condensed on its surface, inside every step of the engine; monolithic "
+        "steps all of it after every step of the grains, slow, what the others are "
         "compared with, reference engine.",
         source=ARGUED,
     )

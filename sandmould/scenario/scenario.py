@@ -52,7 +52,8 @@ class Recording(Section):
     )
     checkpoint_every_s: float = quantity(
         0.1,
-        "Interval of checkpoints in simulated time, so that a run does not depend on the clock.",
+        "Interval of checkpoints in simulated time, so that a run does not depend on the clock; on "
+        "LAMMPS and LIGGGHTS rounded to whole times of 20 checks.",
         unit="s",
         source=ARGUED,
         gt=0,
@@ -149,6 +150,17 @@ class Scenario(Section):
         """Whether the last that happens is that the sand comes to rest after vibration."""
         rests = self.measure_at_rest or self.vibration[-1:] != self.vibrations[-1:]
         return bool(self.vibrations) and rests
+
+    @property
+    def before_vibration(self) -> Scenario:
+        """The same scene up to its first vibration: scenes with equal ones share that part."""
+        first = next(
+            (n for n, s in enumerate(self.vibration) if isinstance(s, VibrationStage)), None
+        )
+        rests_alone = type(self).model_fields["measure_at_rest"].default
+        return self.model_copy(
+            update={"vibration": self.vibration[:first], "measure_at_rest": rests_alone}
+        )
 
     @property
     def largest_diameter_m(self) -> float:

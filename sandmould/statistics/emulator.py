@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from threadpoolctl import threadpool_limits
 
 from sandmould.statistics.config import fewest_points
@@ -100,6 +97,10 @@ def fit_emulator(measure: str, points: Array, values: Array) -> Emulator:
     ------
     TooFewRunsError
     """
+    from sklearn.exceptions import ConvergenceWarning  # most reports have no emulator
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
     there = np.isfinite(values)
     points, values = points[there], values[there]
     distinct, place, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
@@ -138,5 +139,5 @@ def _scaled(points: Array, low: Array, high: Array) -> Array:
     return scaled
 
 
-def _white(process: GaussianProcessRegressor) -> float:
+def _white(process: Any) -> float:
     return math.sqrt(float(process.kernel_.k2.noise_level))

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy.special import stdtr, stdtrit
 
 from sandmould.statistics.settings import compare_means
 
@@ -86,7 +86,7 @@ def agree(
     verdict = classify_interval(ci, margin)
     if verdict != "not resolved":
         return Agreement(means, ci, margin, n, paired, verdict, "")
-    error = (ci[1] - ci[0]) / 2 / float(stats.t.ppf(0.5 + confidence / 2, result.df))
+    error = (ci[1] - ci[0]) / 2 / float(stdtrit(result.df, 0.5 + confidence / 2))
     more = _more(abs(difference), error * math.sqrt(n), margin, confidence, n, paired)
     note = (
         f"more than {MOST_REPLICATES} replicates would be needed: the difference lies about on "
@@ -136,10 +136,10 @@ def _more(
     replicates = np.arange(n + 1, MOST_REPLICATES + 1)
     freedom = (replicates - 1) * (1 if paired else 2)
     error = spread / np.sqrt(replicates)
-    need = stats.t.ppf(0.5 + confidence / 2, freedom)
-    chance = stats.t.cdf((size - margin) / error - need, freedom)
+    need = stdtrit(freedom, 0.5 + confidence / 2)
+    chance = stdtr(freedom, (size - margin) / error - need)
     if size < margin:
-        inside = stats.t.cdf((margin - size) / error - need, freedom)
-        chance = inside + stats.t.cdf((margin + size) / error - need, freedom) - 1
+        inside = stdtr(freedom, (margin - size) / error - need)
+        chance = inside + stdtr(freedom, (margin + size) / error - need) - 1
     enough = np.flatnonzero(chance >= POWER)
     return int(replicates[enough[0]]) - n if len(enough) else None

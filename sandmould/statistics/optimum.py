@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from sandmould.statistics.emulator import Array, Emulator, fit_emulator
 from sandmould.statistics.evidence import usable_values
@@ -144,6 +143,8 @@ def find_optimum(
 def _grid(low: Array, high: Array) -> Array:
     across = _ACROSS.get(len(low))
     if across is None:
+        from scipy.stats import qmc  # a third of a second
+
         unit = qmc.Sobol(len(low), rng=np.random.default_rng(0)).random(_SCATTERED)
         scattered: Array = low + (high - low) * unit
         return scattered

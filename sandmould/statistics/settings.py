@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtr, stdtrit
 
 from sandmould.runs.columns import REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
@@ -86,7 +85,7 @@ def setting_of(values: dict[str, Any], planned: int, measured: pd.Series[float])
     """Mean, spread and interval of one setting's finished values."""
     n = len(measured)
     sd = float(measured.std(ddof=1)) if n > 1 else math.nan
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * sd / math.sqrt(n) if n > 1 else sd
+    half = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) * sd / math.sqrt(n) if n > 1 else sd
     mean = float(measured.mean()) if n else math.nan
     return Setting(values, setting_text(values), planned, n, mean, sd, half)
 
@@ -138,14 +137,40 @@ def compare(
     return tuple(comparisons)
 
 
-def compare_means(first: pd.Series[float], second: pd.Series[float]) -> tuple[Any, bool] | None:
+@dataclass(frozen=True)
+class MeanTest:
+    """Student's t of a difference of two means, as ``scipy.stats`` has it.
+
+    That package takes half a second to load.
+    """
+
+    difference: float
+    error: float
+    """Standard error of it."""
+    df: float
+    """Degrees of freedom."""
+
+    @property
+    def pvalue(self) -> float:
+        """Of both sides."""
+        return 2.0 * float(stdtr(self.df, -abs(self.difference) / self.error))
+
+    def confidence_interval(self, level: float) -> tuple[float, float]:
+        """Interval of the difference."""
+        half = float(stdtrit(self.df, 0.5 + level / 2)) * self.error
+        return self.difference - half, self.difference + half
+
+
+def compare_means(
+    first: pd.Series[float], second: pd.Series[float]
+) -> tuple[MeanTest, bool] | None:
     """Test the difference of two means: in pairs where both have the same blocks, else by Welch.
 
     Returns
     -------
-    (TtestResult, bool) or None
-        Result of ``scipy.stats.ttest_rel`` or ``ttest_ind``, and whether it is paired. None where
-        a side has fewer than two values, or where no spread is left to test by.
+    (MeanTest, bool) or None
+        The test, and whether it is paired. None where a side has fewer than two values, or where
+        no spread is left to test by.
     """
     if len(first) < 2 or len(second) < 2:
         return None
@@ -154,11 +179,10 @@ def compare_means(first: pd.Series[float], second: pd.Series[float]) -> tuple[An
     x = np.asarray(first, dtype=np.float64)
     y = np.asarray(second.reindex(index) if paired else second, dtype=np.float64)
     samples = [x - y] if paired else [x, y]
-    error = math.hypot(*(v.std(ddof=1) / math.sqrt(len(v)) for v in samples))
+    variances = [float(v.var(ddof=1)) / len(v) for v in samples]
+    error = math.sqrt(sum(variances))
     if error <= 1e-12 * max(float(np.abs(x).max()), float(np.abs(y).max())):
         return None
-    with warnings.catch_warnings():
-        # One side may be constant where the other is not.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        result = stats.ttest_rel(x, y) if paired else stats.ttest_ind(x, y, equal_var=False)
-    return result, paired
+    # Satterthwaite's degrees of freedom; of pairs, one less than there are.
+    parts = [v**2 / (len(s) - 1) for v, s in zip(variances, samples, strict=True)]
+    return MeanTest(float(x.mean() - y.mean()), error, sum(variances) ** 2 / sum(parts)), paired

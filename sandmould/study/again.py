@@ -7,10 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sandmould.runs.manifest import MANIFEST_FILE
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.study.definition.run import FILLS
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.load_study import STUDIES
 from sandmould.study.plan.ownership import owner_path
+from sandmould.study.plan.plan_files import read_run
 from sandmould.study.process import is_locked
 
 
@@ -61,10 +64,21 @@ def forget(names: Sequence[str], results: Path) -> list[Path]:
     if problems:
         raise BadInputError(problems)
     for folder in folders:
-        # The outcome first: without it the run counts as not at its end.
-        for name in ("outcome.json", MANIFEST_FILE):
-            (folder / name).unlink(missing_ok=True)
+        for place in (folder, *_failed_fill(folder)):
+            # The outcome first: without it the run counts as not at its end.
+            for name in ("outcome.json", MANIFEST_FILE):
+                (place / name).unlink(missing_ok=True)
     return list(dict.fromkeys(studies.values()))
+
+
+def _failed_fill(folder: Path) -> list[Path]:
+    """The fill that a run goes on from, where that failed and so must be computed once more."""
+    fill = folder.parent.parent / FILLS / read_run(folder / "scenario.yaml").fill
+    try:
+        failed = RunOutcome.read(fill / "outcome.json").outcome is not Outcome.FINISHED
+    except (OSError, ValueError, KeyError):
+        return []
+    return [fill] if failed else []
 
 
 def _folders(name: str, results: Path) -> list[Path]:

@@ -18,19 +18,24 @@ from sandmould.study.plan.batches import is_done
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.process import launch
-from sandmould.study.simulate import measure, render
+from sandmould.study.simulate import render
+from sandmould.study.worker import compute_forked, load, measure_forked
 
 
 def compute_batch(
-    folders: Sequence[Path], logs: Path, ranks: int, mpi: str, side_by_side: int = 1
+    folders: Sequence[Path], log: Path, ranks: int, mpi: str, side_by_side: int = 1
 ) -> None:
     """Compute and measure runs, those left out that are there already.
+
+    Libraries are loaded once. Each run is then computed by a process that is forked for it, or by
+    one of its own where it has several ranks.
 
     Parameters
     ----------
     folders : sequence of Path
         Of the runs, each with its ``scenario.yaml``.
-    logs : Path
+    log : Path
+        Takes what all of them print.
     ranks : int
     mpi : str
     side_by_side : int
@@ -42,13 +47,15 @@ def compute_batch(
         At the end, when a run stopped or broke: the same job continues it and redoes none.
     """
     stop = _Stop()
+    log.touch()
+    load(folders, ahead=side_by_side > 1)
 
     def work(place_of_next: Callable[[], int]) -> None:
         """Take the next run until none is left or the job is asked to end."""
         while not stop.requested and (place := place_of_next()) < len(folders):
             folder = folders[place]
             try:
-                _compute(folder, logs / f"simulate_{folder.name}.log", ranks, mpi)
+                _compute(folder, log, ranks, mpi)
             except (Exception, SystemExit) as broken:  # one bad run must not stop the others
                 print(f"{folder.name}: {broken}", file=sys.stderr, flush=True)
 
@@ -107,8 +114,11 @@ def _compute(folder: Path, log: Path, ranks: int, mpi: str) -> None:
         for old in ("outcome.json", LAST_MEASURED):
             (folder / old).unlink(missing_ok=True)  # damaged, or of another scenario or deck
         render(run, folder)
-        launch(folder, log, ranks, mpi)
+        if ranks == 1:
+            compute_forked(run, folder, log)
+        else:
+            launch(folder, log, ranks, mpi)
     else:
         print(f"{folder.name}: computed already", file=sys.stderr)
     if lack_of(run, folder).need is not Need.NOTHING:
-        measure(run, folder)
+        measure_forked(run, folder, log)

@@ -8,7 +8,6 @@ of their own, ``summary_checks.tsv`` and ``curves_checks.tsv``.
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from sandmould.runs.columns import (
     CROSS_CHECK,
     DETAIL,
     ENGINE,
+    FILL,
     GRAINS,
     LARGEST_OVERLAP_FRACTION,
     OUTCOME,
@@ -38,6 +38,7 @@ from sandmould.runs.columns import (
     VIBRATION_TIME_S,
 )
 from sandmould.runs.files import replaced
+from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.agreement import (
@@ -48,9 +49,17 @@ from sandmould.statistics.agreement import (
     sweep_part,
 )
 from sandmould.study.definition.study import Study
+from sandmould.study.fill_costs import shares_of_fills
 from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
 from sandmould.study.plan.plan_files import STUDY_FILE
-from sandmould.study.run_tables import PLACE, UNREADABLE, RunTables, problem_text, read_tables
+from sandmould.study.run_tables import (
+    PLACE,
+    UNREADABLE,
+    RunTables,
+    problem_text,
+    read_costs,
+    read_tables,
+)
 
 NO_OUTCOME = "no outcome written"
 SUMMARY, CURVES = "summary.tsv", "curves.tsv"
@@ -237,7 +246,7 @@ def gather_runs(
     """The same of some of the runs: rows of ``read_runs``, numbered from 0."""
     folders = [study_folder / "runs" / str(run) for run in runs[RUN]]
     outcomes, problems = _read_outcomes(folders)
-    costs = read_tables([folder / "cost.tsv" for folder in folders])
+    costs = read_costs(folders)
     measures = _in_order(read_tables([folder / "measures.tsv" for folder in folders], _with_clock))
     bounds = measures.bounds(len(folders))
     details = []
@@ -258,6 +267,8 @@ def gather_runs(
         **_of_measures_and_costs(outcomes, measures, costs, at_vibration_s),
     }
     table = pd.DataFrame(summary).infer_objects()
+    if FILL in table:
+        table = table.assign(**shares_of_fills(table[FILL], study_folder))
     return Collected(table, _curves(table, swept_keys(runs), measures), swept_keys(runs))
 
 
@@ -392,7 +403,7 @@ def _with_clock(table: pd.DataFrame) -> pd.DataFrame:
 def read_provenance(folder: Path) -> dict[str, Any]:
     """Provenance of one run; empty where it was not written or cannot be read."""
     try:
-        values = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
+        values = read_origin(folder)
     except (OSError, ValueError):
         return {}
     return values if isinstance(values, dict) else {}

@@ -1,8 +1,9 @@
 """Committed results and whether they still stand for what the code would compute.
 
 ``python -m sandmould.study.records record STUDY.yaml`` copies a finished study's tables and
-figures with what was run; ``check`` lists the records that are stale and computes the smallest one
-of each kind again.
+figures with what was run; ``part STUDY.yaml`` packs the runs of an unfinished one that are at their
+end, which the next start of the study takes up. ``check`` lists the records that are stale and
+computes the smallest one of each kind again.
 """
 
 from __future__ import annotations
@@ -22,25 +23,30 @@ from sandmould.digest import digest
 from sandmould.runs.columns import ENGINE, OUTCOME, RUN, VERSION, finished
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.module_main import run_main
 from sandmould.study.collect import CHECKS, read_summary
 from sandmould.study.definition.run import Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import kind_of
+from sandmould.study.packs.pack import SUFFIX, packed_in
+from sandmould.study.packs.recorded import RECORDS, record_part
+from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.plan_files import FIGURES
 from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
 
-RECORDS = ROOT / "docs" / "results"
 COPIED = ("runs.tsv", "summary.tsv")
 DEFAULTS = 3
 """Which set of defaults records are computed with; a record without the number has the first. The
 second: rest is decided by checks of its own, sand rests after vibration before it is measured, and
 castings have the drawing's volume and area. The third: dashpots make up for the half step by
-which they see the velocity late."""
+which they see the velocity late, and in 3D the reference engine takes the slip of two grains in the
+plane of the normal of half a step ago."""
 OLD_DEFAULTS = "old defaults"
+USAGE = "python -m sandmould.study.records check | record STUDY.yaml | part STUDY.yaml"
 SAME = {
     "tube_fill_fraction": 0.05,
     "solid_fraction": 0.02,
@@ -87,7 +93,7 @@ def record(path: Path, results: Path) -> Path:
     failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
     names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
     names += [name for name in (ROUNDS_FILE, CHECKS[0]) if (folder / name).exists()]
-    provenance = json.loads((folder / "runs" / runs[0].run / "provenance.json").read_text())
+    provenance = read_origin(folder / "runs" / runs[0].run)
     record: dict[str, Any] = {
         "study": str(path),
         "study_sha256": study_hash(runs),
@@ -213,12 +219,17 @@ def main(arguments: list[str]) -> int:
     if arguments[:1] == ["record"] and len(arguments) == 2:
         print(record(Path(arguments[1]), Path("results")))
         return 0
+    if arguments[:1] == ["part"] and len(arguments) == 2:
+        print(record_part(open_plan(Path(arguments[1])), Path("results")).text())
+        return 0
     if arguments != ["check"]:
-        print("usage: python -m sandmould.study.records check | record STUDY.yaml")
+        print(f"usage: {USAGE}")
         return 2
     stale = stale_records()
     for name, why in stale:
         print(f"{name}: {_standing(why)}")
+    for folder in sorted({path.parent for path in RECORDS.glob(f"*/*{SUFFIX}")}):
+        print(f"{folder.name}: {len(packed_in(folder, folder.name))} runs packed")
     differences = recompute_smallest(Path("results"))
     for sentence in differences:
         print(sentence)
@@ -234,6 +245,6 @@ def _standing(why: str) -> str:
 if __name__ == "__main__":
     run_main(
         lambda *given: main([*given]),
-        "python -m sandmould.study.records check | record STUDY.yaml",
+        USAGE,
         (1, 2),
     )

@@ -11,6 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sandmould.runs.manifest import MANIFEST_FILE, OLDER_COST, read_cost
+
 PLACE = "place of the file"
 """Column of a joined table: the place of a row's file among those that were read."""
 
@@ -117,3 +119,23 @@ def _joined(parts: list[tuple[int, pd.DataFrame]], problems: dict[int, str]) -> 
         rows = pd.concat([table for _, table in parts], ignore_index=True)
     order = np.argsort(rows[PLACE].to_numpy(), kind="stable")
     return RunTables(rows.take(order).reset_index(drop=True), columns, problems)
+
+
+def read_costs(folders: Sequence[Path]) -> RunTables:
+    """Read the cost row of every run, wherever it is; folders without one have none."""
+    older = read_tables([folder / OLDER_COST for folder in folders])
+    rows, columns, problems = [], dict(older.columns), dict(older.problems)
+    for place, folder in enumerate(folders):
+        try:
+            cost = read_cost(folder)
+        except UNREADABLE as error:
+            problems[place] = problem_text(MANIFEST_FILE, error)
+            continue
+        if cost:
+            rows.append({**cost, PLACE: place})
+            columns[place] = tuple(cost)
+    tables = [table for table in (older.rows, pd.DataFrame(rows)) if len(table)]
+    if not tables:
+        return older
+    joined = pd.concat(tables, ignore_index=True).sort_values(PLACE, kind="stable")
+    return RunTables(joined.reset_index(drop=True), columns, problems)

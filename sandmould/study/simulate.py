@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import sandmould.runs.one_blas_thread  # noqa: F401
 from sandmould.runs.manifest import write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Cost, finish
@@ -50,9 +51,9 @@ def measure(run: Run, folder: Path) -> None:
     write_manifest(folder, "measured", written)
 
 
-def provenance(scenario: Any) -> dict[str, Any]:
-    """Versions, template hash, seed and machine of a run."""
-    command = " ".join(["python", "-m", "sandmould.study.simulate", *sys.argv[1:]])
+def provenance(scenario: Any, *arguments: str) -> dict[str, Any]:
+    """Versions, template hash, seed and machine of a run; arguments are those of its command."""
+    command = " ".join(["python", "-m", "sandmould.study.simulate", *arguments])
     template_hash = kind_of(scenario).planning.template_hash(scenario)
     return provenance_of(scenario, scenario.seed, template_hash, command)
 
@@ -91,7 +92,7 @@ def write_crash(folder: Path, detail: str) -> None:
 def _finish(folder: Path, scenario: Section, outcome: RunOutcome, cost: Cost) -> None:
     execution = kind_of(scenario).execution
     execution.complete(scenario, folder / "work")
-    finish(folder, execution.products, outcome, cost, provenance(scenario))
+    finish(folder, execution.products, outcome, cost, provenance(scenario, str(folder)))
 
 
 def main(folder: str, crash: str | None = None) -> int:

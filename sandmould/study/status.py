@@ -5,29 +5,29 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import pandas as pd
-
+from sandmould.runs.claim import owner_of
+from sandmould.runs.formatting import size_text
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
+from sandmould.study.cluster.queue import jobs_of, live_jobs, queue_lines
+from sandmould.study.definition.run import Run
 from sandmould.study.plan.build_plan import Plan, stored_speeds
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
-from sandmould.study.process import computed_elsewhere, is_locked
+from sandmould.study.process import is_locked
 from sandmould.study.rounds.round_log import read_rounds
-from sandmould.study.tidy import freed_bytes, orphans, size_text
+from sandmould.study.run_tables import read_costs
+from sandmould.study.tidy import freed_bytes, orphans
 from sandmould.study.time_left import TimeLeft
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
 LISTED_RUNS = 12
-FRESH_S = 60.0
-"""A run of another machine, whose lock may not be seen here, has written its progress since."""
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
 """What reading a file may raise that was cut short or overwritten."""
 
@@ -47,7 +47,7 @@ class RunStatus:
     """Of a run that is done."""
 
 
-def run_status(folder: Path, lack: Lack) -> RunStatus:
+def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) -> RunStatus:
     """See where a run stands from what it has written.
 
     Parameters
@@ -56,23 +56,31 @@ def run_status(folder: Path, lack: Lack) -> RunStatus:
         ``results/<study>/runs/<run>``.
     lack : Lack
         What a start would do for it.
+    live : collection of str, optional
+        Numbers of the jobs of the cluster that have not ended, where that is known.
     """
     name = folder.name
     if lack.need is Need.NOTHING:
         return _ended(folder)
     path = folder / "work" / "progress.json"
-    said, share, fresh = "", 0.0, False
+    said, share, cpu_s = "", 0.0, 0.0
     with contextlib.suppress(*_DAMAGED):
         now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        fresh = time.time() - path.stat().st_mtime < FRESH_S
         share = float(now["percent"]) / 100
         said = f"{now['percent']:.0f} %, {now['stage']}, {now['time_s']:.3g} s simulated"
-    running = is_locked(folder) or (fresh and computed_elsewhere(folder))
+        cpu_s = float(now["cpu_s"])
+    owner = owner_of(folder)
+    ended = owner is not None and owner.job and live is not None and owner.job not in live
+    running = is_locked(folder) and not ended
     if not said:
         return RunStatus(name, "running" if running else "waiting", "" if running else lack.why)
     if running:
-        return RunStatus(name, "running", said, share=share)
-    return RunStatus(name, "stopped", said, share=share)
+        where = f", {owner.text()}" if owner else ""
+        return RunStatus(name, "running", f"{said}{where}", cpu_s, share=share)
+    with contextlib.suppress(*_DAMAGED):
+        stopped = RunOutcome.read(folder / "work" / "outcome.json").outcome
+        said = f"{said}; {stopped.label}"
+    return RunStatus(name, "stopped", said, cpu_s, share=share)
 
 
 def _ended(folder: Path) -> RunStatus:
@@ -80,7 +88,7 @@ def _ended(folder: Path) -> RunStatus:
     outcome = RunOutcome.read(folder / "outcome.json")
     cpu_s = wall_s = math.nan
     with contextlib.suppress(*_DAMAGED):
-        cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[-1]
+        cost = read_costs([folder]).rows.iloc[-1]
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
     if outcome.outcome is Outcome.FINISHED:
@@ -100,18 +108,26 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
         That share what is left.
     """
     folder = results / plan.study.name
-    lacks = plan.lacks(results)
+    lacks, live = plan.lacks(results), live_jobs()
+    # A fill that no run waits for any more counts where it was computed.
+    fills = [
+        fill
+        for fill in plan.fills
+        if fill.run in lacks or (folder / fill.place / "outcome.json").exists()
+    ]
     statuses = {
-        run.run: run_status(folder / "runs" / run.run, lacks.get(run.run, WHOLE))
-        for run in plan.runs
+        run.run: run_status(folder / run.place, lacks.get(run.run, WHOLE), live)
+        for run in (*fills, *plan.runs)
     }
-    count = Counter(status.state for status in statuses.values())
-    parts = [f"{count[state]} {state}" for state in STATES if count[state]]
-    lines = [f"{plan.study.name}: {', '.join(parts)} of {len(plan.runs)} runs"]
+    lines = [f"{plan.study.name}: {_count(plan.runs, statuses)} of {len(plan.runs)} runs"]
+    if any(statuses[fill.run].state != "done" for fill in fills):
+        lines.append(f"{_count(fills, statuses)} of {len(fills)} fills that runs share")
     spent_s = sum(status.cpu_s for status in statuses.values())
     lines.append(
         f"processor time so far: {duration_text(spent_s)}; {_left(plan, results, statuses, cores)}"
     )
+    if live is not None:
+        lines += queue_lines(jobs_of(statuses, Path()))
     log = read_rounds(folder, plan.study.study)
     if plan.study.study.refine.rounds:
         ended = log.ended or f"of at most {plan.study.study.refine.rounds}"
@@ -124,9 +140,15 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
         lines += [f"  {state}: {s.run}  {s.said}".rstrip() for s in chosen[:LISTED_RUNS]]
         if len(chosen) > LISTED_RUNS:
             lines.append(f"  {state}: and {len(chosen) - LISTED_RUNS} more")
-    if count["failed"]:
+    if any(status.state == "failed" for status in statuses.values()):
         lines.append("a failed run is computed once more by: sandmould again RUN")
     return "\n".join([*lines, *_orphans(plan, results)])
+
+
+def _count(runs: Sequence[Run], statuses: dict[str, RunStatus]) -> str:
+    """How many of some runs are in which state."""
+    count = Counter(statuses[run.run].state for run in runs)
+    return ", ".join(f"{count[state]} {state}" for state in STATES if count[state])
 
 
 def _orphans(plan: Plan, results: Path) -> list[str]:
@@ -143,7 +165,7 @@ def _orphans(plan: Plan, results: Path) -> list[str]:
 
 def _left(plan: Plan, results: Path, statuses: Mapping[str, RunStatus], cores: int) -> str:
     """Wall time until the report is written."""
-    time_left = TimeLeft(plan.runs, stored_speeds(plan, results))
+    time_left = TimeLeft((*plan.fills, *plan.runs), stored_speeds(plan, results))
     for status in statuses.values():
         time_left.learn(status.run, status.wall_s)
     begun = {s.run: s.share for s in statuses.values() if s.state in ("running", "stopped")}
@@ -151,8 +173,8 @@ def _left(plan: Plan, results: Path, statuses: Mapping[str, RunStatus], cores: i
     left_s = time_left.seconds(begun, waiting, cores)
     if not left_s:
         return "nothing left"
-    left = [run for run in plan.runs if run.run in {*begun, *waiting}]
+    left = [run for run in (*plan.fills, *plan.runs) if run.run in {*begun, *waiting}]
     return (
-        f"time left: about {duration_text(left_s)} on {cores} cores with the report, "
+        f"time left with its report: about {duration_text(left_s)} on {cores} cores, "
         f"{time_left.prices.basis(left)}"
     )

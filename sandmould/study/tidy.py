@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from sandmould.study.definition.run import RUN_NAME
+from sandmould.study.definition.run import FILLS, RUN_NAME
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.ownership import owner_path
 from sandmould.study.plan.plan_files import STUDY_FILE
@@ -31,16 +31,18 @@ class Leftovers:
 
 
 def orphans(plan: Plan, results: Path) -> list[Path]:
-    """Run folders of a study that its file no longer leads to.
+    """Folders of runs and fills of a study that its file no longer leads to.
 
     Folders whose names are not those of runs are the user's own.
     """
-    wanted = {run.run for run in plan.runs}
-    runs = results / plan.study.name / "runs"
+    study = results / plan.study.name
+    wanted = {study / run.place for run in (*plan.runs, *plan.fills)}
+    places = (study / name for name in ("runs", FILLS))
     return [
         folder
-        for folder in sorted(runs.iterdir() if runs.is_dir() else ())
-        if folder.name not in wanted and re.fullmatch(RUN_NAME, folder.name) and folder.is_dir()
+        for place in places
+        for folder in sorted(place.iterdir() if place.is_dir() else ())
+        if folder not in wanted and re.fullmatch(RUN_NAME, folder.name) and folder.is_dir()
     ]
 
 
@@ -114,11 +116,3 @@ def remove(plan: Plan, results: Path, folders: Iterable[Path]) -> None:
         for log in (study / "logs").glob(f"*_{folder.name}.*"):
             log.unlink()
         (study / "batches" / f"{folder.name}.done").unlink(missing_ok=True)
-
-
-def size_text(size_bytes: int) -> str:
-    """Write a size as a person would say it."""
-    for unit, length in (("GB", 1e9), ("MB", 1e6)):
-        if size_bytes >= length:
-            return f"{size_bytes / length:.1f} {unit}"
-    return f"{size_bytes / 1e3:.0f} kB"

@@ -7,13 +7,12 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
-import pandas as pd
-
 from sandmould.runs.columns import WALL_S
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.plan.price import END_S, Piece, Prices, ratios_of, spread_s
+from sandmould.study.run_tables import read_costs
 
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
 
@@ -87,5 +86,5 @@ def computed_wall_s(folder: Path) -> float:
     """Wall time that a finished run's computation took; NaN where it failed or none is written."""
     with contextlib.suppress(*_DAMAGED):
         if RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED:
-            return float(pd.read_csv(folder / "cost.tsv", sep="\t")[WALL_S].iloc[-1])
+            return float(read_costs([folder]).rows[WALL_S].iloc[-1])
     return math.nan

@@ -109,8 +109,8 @@ def test_numbers_read_back_exactly() -> None:
 
 
 def test_a_block_with_two_runs_is_refused() -> None:
-    with pytest.raises(ValueError, match="2 run commands"):
-        _ = DeckBlock("twice", "run 10\nrun 20\n").run_steps
+    with pytest.raises(ValueError, match="2 long runs"):
+        DeckBlock("twice", "run 10\nfix one\nrun 20\n").around_run()
 
 
 def test_layer_file_holds_every_grain_with_its_diameter() -> None:

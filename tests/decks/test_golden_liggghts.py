@@ -74,10 +74,11 @@ def test_background_damping_comes_after_every_other_force(name: str) -> None:
 
 
 def test_blocks_are_named_as_in_the_dialect_of_lammps() -> None:
-    assert list(liggghts_deck("liggghts_tube_2d").blocks) == [
-        name for name in deck_of("plate_turned_no_rolling").blocks if not name.startswith("between")
-    ]
-    assert list(liggghts_deck(HOPPER).blocks) == list(deck_of("hopper").blocks)
+    # A vibration of LAMMPS runs in pieces, in a block of its own between two others.
+    pieces = re.compile("(run_of|after)_(vibrate|between)|between")
+    for ours, lammps in (("liggghts_tube_2d", "plate_turned_no_rolling"), (HOPPER, "hopper")):
+        names = [name for name in deck_of(lammps).blocks if not pieces.match(name)]
+        assert list(liggghts_deck(ours).blocks) == names
 
 
 def test_a_deck_without_rolling_names_no_rolling_model() -> None:

@@ -7,9 +7,11 @@ damage would get past the outermost check.
 from __future__ import annotations
 
 import io
+import lzma
 import random
 import re
 import struct
+import tarfile
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
@@ -44,6 +46,8 @@ def mutated(data: bytes, others: Sequence[bytes], chance: random.Random) -> byte
         return _archive(data, chance)
     if data[:8] == b"\x89PNG\r\n\x1a\n" and chance.random() < 0.7:
         return _picture(data, chance)
+    if data[:6] == b"\xfd7zXZ\0" and chance.random() < 0.8:
+        return _pack(data, chance)
     for _ in range(chance.choice((1, 1, 1, 2, 3, 6))):
         if chance.random() < 0.1:
             other = chance.choice(others)
@@ -172,3 +176,19 @@ def _picture(data: bytes, chance: random.Random) -> bytes:
         struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
         for name, body in chunks
     )
+
+
+def _pack(data: bytes, chance: random.Random) -> bytes:
+    """A pack of runs with its archive or its index damaged, the sizes around it right again."""
+    try:
+        inner = lzma.decompress(data)
+        head = tarfile.TarInfo.frombuf(inner[:512], "utf-8", "strict")
+    except (lzma.LZMAError, tarfile.HeaderError):
+        return chance.choice(_BINARY)(data, chance)
+    if chance.random() < 0.3:
+        return lzma.compress(chance.choice(_BINARY)(inner, chance), preset=0)
+    index, rest = inner[512 : 512 + head.size], inner[512 + head.size + (-head.size % 512) :]
+    index = chance.choice(_TEXT)(index, chance)
+    head.size = len(index)
+    padded = index + bytes(-len(index) % 512)
+    return lzma.compress(head.tobuf(tarfile.USTAR_FORMAT) + padded + rest, preset=0)

@@ -122,6 +122,12 @@ def _log(path: Path) -> object:
     return read_thermo([path])
 
 
+def _pack(path: Path) -> object:
+    from sandmould.study.packs.unpack import unpack
+
+    return unpack(path, path.parent / "results", checkpoints=True)
+
+
 def _tables(path: Path) -> object:
     from sandmould.study.collect import gather
 
@@ -146,6 +152,7 @@ READERS: dict[str, Reader] = {
     "grains": Reader(_grains, (ValueError,)),
     "stress": Reader(_stress, (ValueError,)),
     "log": Reader(_log),
+    "pack": Reader(_pack, (BadInputError,)),
     "tables": Reader(_tables, (OSError, ValueError)),
 }
 

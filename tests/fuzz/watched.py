@@ -111,5 +111,7 @@ def _watch(event: str, details: tuple[Any, ...], allowed: list[str]) -> None:
         place = os.fsdecode(details[0]) if details[2] & writes else ""
     elif event in _WRITES and isinstance(details[0], str | bytes | os.PathLike):
         place = os.fsdecode(details[0])
+        if event in ("os.remove", "os.rmdir") and details[1] >= 0:  # seen from an open folder
+            place = os.path.join(os.readlink(f"/proc/self/fd/{details[1]}"), place)
     if place and not os.path.realpath(place).startswith(tuple(map(os.path.realpath, allowed))):
         raise _Forbidden(f"{event} of {place}")

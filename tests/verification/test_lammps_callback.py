@@ -73,21 +73,24 @@ def test_isotropic_damping_takes_the_whole_vector(tmp_path: Path) -> None:
     g, dt = flight.gravity_m_s2, flight.step_s
     while session.time_s < 0.03:
         session.advance()
-    found, steps = session.snapshot(), session.steps
+    found, steps, setup = session.snapshot(), session.steps, session._counts.setup
     session.close()
     # Central differences of m a = m g - alpha m |g| v/|v|, eq. (38), by hand: half a step first.
+    # In a setup the force is computed once more, with the velocity of the whole step.
     x, v = np.array([0.01, 0.015]), np.array([0.4, 0.2])
 
     def acceleration(v: np.ndarray) -> np.ndarray:
         return np.array([0.0, -g]) - 0.1 * g * v / np.linalg.norm(v)
 
-    v = v + acceleration(v) * dt / 2
-    for _ in range(steps):
+    for step in range(steps):
+        if step % setup == 0:
+            a = acceleration(v)
+        v = v + a * dt / 2
         x = x + v * dt
         a = acceleration(v)
-        v = v + a * dt
+        v = v + a * dt / 2
     np.testing.assert_allclose(found.position_m[0], x, rtol=1e-10)
-    np.testing.assert_allclose(found.velocity_m_s[0], v - a * dt / 2, rtol=1e-9)
+    np.testing.assert_allclose(found.velocity_m_s[0], v, rtol=1e-9)
     # Component by component the horizontal velocity would not change: no force acts along it.
     assert found.velocity_m_s[0, 0] < 0.385
 

@@ -112,8 +112,9 @@ def test_one_grain_moves_alike_in_both_frames(
             measure_at_rest=False,
             contact=SOFT if dimension == 3 else {},
             time_step={"fraction": 0.4},
-            rest={"check_every_s": 1e-3, "load_every_steps": 1},
-            record={"series_every_s": 1e-3, "snapshot_every_s": 1e-3},
+            # no setup within the stage: LIGGGHTS forgets the velocity of moving walls there
+            rest={"check_every_s": 5e-3, "load_every_steps": 1},
+            record={"series_every_s": 5e-3, "snapshot_every_s": 5e-3},
         )
         folder = tmp_path / frame
         folder.mkdir()
@@ -123,7 +124,7 @@ def test_one_grain_moves_alike_in_both_frames(
         vibration = scene.vibration[0]
         track = []
         while not session.stage_over:
-            session.advance()
+            session.advance(1e-3)
             snapshot = session.snapshot()
             track.append([*snapshot.position_m[0], *snapshot.velocity_m_s[0]])
             floor = session.triangle_loads("floor").corners_m[..., dimension - 1].mean()

@@ -25,9 +25,10 @@ def put_grain(session: LammpsSession, height_m: float, speed_m_s: float) -> None
 def test_grain_outside_the_simulation_box_is_a_lost_grain(tmp_path: Path) -> None:
     session = open_lammps(one_grain_scene(), tmp_path)
     put_grain(session, 0.01, 0.0)
+    session.start_stage(session._program.stages[0])
     session.send("velocity all set 5000 0 0")
     with pytest.raises(EngineStop) as stop:
-        session.send("run 20000")
+        session.advance(1.0)
     assert stop.value.outcome is Outcome.LOST_GRAINS
     assert "LAMMPS says" in stop.value.detail
 

@@ -17,6 +17,7 @@ from sandmould.engines.driver import Driver
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import RunOutcome
 from sandmould.runs.products import finish
@@ -113,4 +114,4 @@ def drive(
 
 
 def last_snapshot(folder: Path) -> Snapshot:
-    return Snapshot.load(max((folder / "snapshots").glob("*.npz")))
+    return stored_snapshots(folder)[-1].load()

@@ -43,6 +43,7 @@ MinJobAge=3600
 KillWait=2
 NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} RealMemory={memory_mb} State=UNKNOWN
 PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
+PartitionName=short Nodes={host} MaxTime=5 State=UP
 """
 UP_S = 30.0
 
@@ -100,9 +101,18 @@ class SlurmNode:
         known = dict(line.split() for line in lines)
         return {job: state for job, state in known.items() if state in ("PENDING", "RUNNING")}
 
-    def cores(self, job: str) -> int:
-        """Cores that a job asks for."""
-        return int(self._run("squeue", "-h", "-j", job, "-o", "%C"))
+    def told(self, field: str) -> dict[str, str]:
+        """What squeue says of every job that has not ended, such as ``%l``, by its number."""
+        lines = self._run("squeue", "-h", "-o", f"%i {field}").splitlines()
+        return dict(line.split(maxsplit=1) for line in lines)
+
+    def submit(self, *options: str) -> str:
+        """Submit a job that does nothing; gives its number."""
+        return self._run("sbatch", "--parsable", *options, "--wrap=true").strip()
+
+    def requeue(self, job: str) -> None:
+        """End a job and put it into the queue again, as after the loss of its node."""
+        self._run("scontrol", "requeue", job)
 
     def cancel(self, job: str) -> None:
         """Cancel a job, as a user or an operator does."""

@@ -13,12 +13,12 @@ from pattern_fe.coupling.opening import open_coupled
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
-from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand import planning
 from tests.patterns import _one_thread  # noqa: F401
+from tests.workflow.runs import last_snapshot
 
 WIDTH_M = HEIGHT_M = 0.06
 YOUNG_PA, POISSON = 1e5, 0.35
@@ -81,7 +81,7 @@ def assert_sags_exactly(scene: Scenario, tmp_path: Path) -> None:
     engine_of(scene).write_deck(program, {}, tmp_path, "test", "test")
     outcome = Driver(program, tmp_path, "test", "hash", open_coupled).run()
     assert outcome.outcome is Outcome.FINISHED, outcome.detail
-    last = Snapshot.load(max((tmp_path / "work" / "snapshots").iterdir()))
+    last = last_snapshot(tmp_path / "work")
     weight_n = program.mass_kg(1) * scene.gravity_m_s2
     constrained_pa = YOUNG_PA * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
     area_m2 = WIDTH_M * scene.sand.disc_thickness_m
@@ -90,6 +90,27 @@ def assert_sags_exactly(scene: Scenario, tmp_path: Path) -> None:
     assert sag_m(scene, last.pattern_m) == pytest.approx(
         weight_n * HEIGHT_M / (constrained_pa * area_m2), rel=0.01
     )
+
+
+@pytest.mark.parametrize(
+    ("engine", "says"),
+    [
+        ("reference", r"pattern\.loop\.repeats = 0 .* at least 1 in the scheme quasi_newton"),
+        ("lammps", r"pattern\.loop\.repeats = 0 .* at least 1 in the scheme quasi_newton"),
+        ("liggghts", r"scheme = 'quasi_newton' .* one_way, per_layer, fixed, aitken on engine"),
+    ],
+)
+def test_secants_of_the_sands_noise_are_refused(engine: str, says: str) -> None:
+    """Windows that are computed once differ by what the sand does, not by the foam's answer."""
+    tree = column("aitken").model_dump(mode="json", exclude_unset=True)
+    del tree["obstacles"]
+    tree["pattern"]["loop"] |= {"scheme": "quasi_newton", "repeats": 0}
+    tree["engine"]["name"] = engine
+    if engine == "liggghts":
+        tree |= {"background_damping": {"form": "none"}}
+        tree["sand"]["disc_inertia"] = "sphere"
+    with pytest.raises(BadInputError, match=says):
+        planning.resolved(Scenario.model_validate(tree))
 
 
 def test_layers_are_refused_on_a_foam_too_soft_for_their_share() -> None:

@@ -17,6 +17,7 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import write_plan
+from sandmould.study.run_tables import read_costs
 from sandmould.study.simulate import measure_run, render_run, simulate
 
 FALLING = """\
@@ -138,7 +139,7 @@ def test_a_killed_run_goes_on_from_its_restart_file(tmp_path: Path) -> None:
     # Columns of six discs of 2 mm fall straight down and stand: their middle is at 6 mm, less what
     # the springs give.
     assert 0.00595 < series["height_m"].iloc[-1] < 0.006
-    cost = pd.read_csv(folder / "cost.tsv", sep="\t").iloc[0]
+    cost = read_costs([folder]).rows.iloc[0]
     assert cost["steps"] < 60000  # of the attempt that ended
     assert (folder / "output" / "grains.dump").is_file()
     assert not (folder / "work").exists()

@@ -13,6 +13,7 @@ from sandmould.engines.liggghts.render import write_deck
 from sandmould.engines.program import build_program
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.study.run_tables import read_costs
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.workflow.runs import (
     computed,
@@ -38,11 +39,11 @@ def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
     names = {p.name for p in straight.iterdir()}
-    assert {"outcome.json", "cost.tsv", "series.tsv", "loads.tsv", "provenance.json",
-            "snapshots", "engine.log", "deck.in", "layers"} <= names  # fmt: skip
+    assert {"outcome.json", "products.json", "series.tsv", "loads.tsv",
+            "snapshots.npz", "engine.log", "deck.in", "layers"} <= names  # fmt: skip
     assert not names & {"work", "log.liggghts"}
     assert RunOutcome.read(straight / "outcome.json").outcome is Outcome.FINISHED
-    cost = pd.read_csv(straight / "cost.tsv", sep="\t").iloc[0]
+    cost = read_costs([straight]).rows.iloc[0]
     assert cost.engine == "liggghts"
     assert str(cost.version).startswith("3.")
     assert cost.grains == 80
@@ -67,7 +68,7 @@ def test_killed_run_resumes_and_ends_as_if_never_stopped(straight: Path, tmp_pat
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     for table in ("series.tsv", "loads.tsv"):
         assert (folder / table).read_text() == (straight / table).read_text()
-    costs = [pd.read_csv(f / "cost.tsv", sep="\t").iloc[0] for f in (straight, folder)]
+    costs = [read_costs([f]).rows.iloc[0] for f in (straight, folder)]
     assert costs[0].grain_steps == costs[1].grain_steps
 
 

@@ -15,11 +15,12 @@ import pytest
 from sandmould.engines.guard import grain_masses_kg
 from sandmould.engines.program import build_program
 from sandmould.engines.session import RefusedError
-from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.engines.step_mover import StepMover
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.process import _folder_lock, launch
+from sandmould.study.run_tables import read_costs
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import computed, drive, last_snapshot, run_folder
 
@@ -32,12 +33,12 @@ def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
     names = {p.name for p in straight.iterdir()}
-    assert {"outcome.json", "cost.tsv", "series.tsv", "loads.tsv", "provenance.json",
-            "snapshots", "engine.log", "deck.in"} <= names  # fmt: skip
+    assert {"outcome.json", "products.json", "series.tsv", "loads.tsv",
+            "snapshots.npz", "engine.log", "deck.in"} <= names  # fmt: skip
     assert "work" not in names
     outcome = RunOutcome.read(straight / "outcome.json")
     assert outcome.outcome is Outcome.FINISHED
-    cost = pd.read_csv(straight / "cost.tsv", sep="\t").iloc[0]
+    cost = read_costs([straight]).rows.iloc[0]
     assert cost.grains == 120
     assert 60 * cost.steps < cost.grain_steps < 120 * cost.steps
     assert 0 < cost.engine_wall_s < cost.wall_s
@@ -62,7 +63,7 @@ def test_next_layer_enters_only_when_speed_and_loads_say_that_the_last_one_rests
 
 
 def test_vibration_has_snapshots_at_both_its_ends(straight: Path) -> None:
-    times = [Snapshot.load(p).vibration_time_s for p in sorted((straight / "snapshots").iterdir())]
+    times = [stored.load().vibration_time_s for stored in stored_snapshots(straight)]
     assert 0.0 in times
     assert times[-1] == pytest.approx(0.06, abs=5 * tube_scene().step_s)
 

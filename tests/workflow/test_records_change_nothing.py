@@ -17,13 +17,19 @@ from sandmould.engines.registry import engine_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
-from tests.liggghts_scenes import liggghts_scene
+from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.patterns import _one_thread  # noqa: F401
 from tests.scenes import tube_scene
+from tests.workflow.runs import last_snapshot
 
 RECORDS: tuple[dict[str, Any], ...] = (
     {"series_every_s": 0.005, "snapshot_every_s": 0.01, "checkpoint_every_s": 0.01},
     {"series_every_s": 0.02, "snapshot_every_s": 0.04, "checkpoint_every_s": 1.0},
+)
+ENGINES = pytest.mark.parametrize(
+    "scene",
+    [tube_scene, pytest.param(liggghts_scene, marks=needs_liggghts)],
+    ids=["lammps", "liggghts"],
 )
 PLANK: dict[str, Any] = {
     "box": {"width_m": 0.06, "height_m": 0.1},
@@ -51,7 +57,7 @@ def last_of(scene: Scenario, folder: Path) -> Snapshot:
     opening = open_coupled if scene.pattern is not None else None
     outcome = Driver(program, folder, "test", "hash", opening).run()
     assert outcome.outcome is Outcome.FINISHED, outcome.detail
-    return Snapshot.load(max((folder / "work" / "snapshots").iterdir()))
+    return last_snapshot(folder / "work")
 
 
 def assert_same(one: Snapshot, other: Snapshot) -> None:
@@ -92,9 +98,19 @@ def test_decks_are_cut_at_checks_never_at_records(scene: Any, tmp_path: Path) ->
     assert decks[0] == decks[1]
 
 
-def test_lammps_is_not_cut_where_records_are_written(tmp_path: Path) -> None:
-    short = {"fill": {"layers": [{"count": 30}]}, "vibration": []}
-    scenes = [
-        tube_scene(**short, record={**record, "checkpoint_every_s": 1.0}) for record in RECORDS
-    ]
-    assert_same(*(last_of(s, tmp_path / str(i)) for i, s in enumerate(scenes)))
+@pytest.mark.parametrize("frame", ["box", "laboratory"])
+@ENGINES
+def test_neither_records_nor_checkpoints_change_a_digit(
+    scene: Any, frame: str, tmp_path: Path
+) -> None:
+    short = {
+        "frame": frame,
+        "fill": {"layers": [{"count": 30}]},
+        "vibration": [{"acceleration_g": 1.0, "frequency_hz": 50.0, "duration_s": 0.02}],
+        "rest": {"rms_speed_m_s": 0.05},
+    }
+    folders = [tmp_path / str(i) for i, _ in enumerate(RECORDS)]
+    ended = [last_of(scene(**short, record=r), f) for r, f in zip(RECORDS, folders, strict=True)]
+    assert_same(*ended)
+    written = [any(folder.glob("work/checkpoint_*")) for folder in folders]
+    assert written == [True, False]

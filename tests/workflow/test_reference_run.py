@@ -17,6 +17,7 @@ from sandmould.engines.step_mover import StepMover
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.process import RESTARTABLE_EXIT
+from sandmould.study.run_tables import read_costs
 from tests.scenes import tube_scene
 from tests.workflow.runs import (
     SOON,
@@ -54,11 +55,11 @@ def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
     names = {p.name for p in straight.iterdir()}
-    assert {"outcome.json", "cost.tsv", "series.tsv", "loads.tsv", "provenance.json",
-            "snapshots", "engine.log", "deck.in", "layers"} <= names  # fmt: skip
+    assert {"outcome.json", "products.json", "series.tsv", "loads.tsv",
+            "snapshots.npz", "deck.in", "layers"} <= names  # fmt: skip
     assert "work" not in names
     assert RunOutcome.read(straight / "outcome.json").outcome is Outcome.FINISHED
-    assert pd.read_csv(straight / "cost.tsv", sep="\t").engine[0] == "reference"
+    assert read_costs([straight]).rows.engine[0] == "reference"
     loads = pd.read_csv(straight / "loads.tsv", sep="\t")
     assert {"floor", "left", "right", "tube_lower", "tube_upper"} == set(loads.surface)
 
@@ -83,7 +84,7 @@ def test_disk_that_takes_no_more_is_told_and_the_run_goes_on_with_room(
     straight: Path, tmp_path: Path
 ) -> None:
     folder = run_folder(scene(), tmp_path)
-    largest = max(p.stat().st_size for p in (straight / "snapshots").iterdir())
+    largest = (straight / "snapshots.npz").stat().st_size
     assert simulate(folder, largest_file_bytes=largest // 2) == RESTARTABLE_EXIT
     outcome = RunOutcome.read(folder / "work" / "outcome.json")
     assert outcome.outcome is Outcome.DISK_REFUSED

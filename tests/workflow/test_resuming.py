@@ -6,18 +6,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from sandmould import ROOT
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.runs.checkpoint_folders import newest_checkpoint
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.process import RESTARTABLE_EXIT
+from sandmould.study.run_tables import read_costs
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import (
     SOON,
@@ -49,10 +50,8 @@ def test_killed_run_resumes_and_ends_as_if_never_stopped(straight: Path, tmp_pat
         np.testing.assert_array_equal(values, _state(folder)[name])
     for table in ("series.tsv", "loads.tsv"):
         assert (folder / table).read_text() == (straight / table).read_text()
-    assert len(list((folder / "snapshots").iterdir())) == len(
-        list((straight / "snapshots").iterdir())
-    )
-    costs = [pd.read_csv(f / "cost.tsv", sep="\t").iloc[0] for f in (straight, folder)]
+    assert len(stored_snapshots(folder)) == len(stored_snapshots(straight))
+    costs = [read_costs([f]).rows.iloc[0] for f in (straight, folder)]
     assert costs[0].grain_steps == costs[1].grain_steps
 
 

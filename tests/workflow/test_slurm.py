@@ -14,6 +14,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sandmould.study.forked import PROCESS_NAME
+from sandmould.study.run_tables import read_costs
 from tests.workflow.slurm_node import SlurmNode, missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=f"needs Debian's slurmd: {missing()}")
@@ -59,46 +61,89 @@ def wait_for(what: Callable[[], bool], process: subprocess.Popen[bytes], log: Pa
 def simulating(folder: Path) -> list[int]:
     """Processes that compute a run below a folder."""
     found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
+    for path in Path("/proc").glob("[0-9]*/comm"):
         try:
-            words, where = path.read_bytes().split(b"\0"), path.with_name("cwd").readlink()
+            name, where = path.read_text().strip(), path.with_name("cwd").readlink()
         except OSError:
             continue
-        if b"sandmould.study.simulate" in words and where == folder:
+        if name == PROCESS_NAME and where == folder:
             found.append(int(path.parent.name))
     return found
 
 
 def study_folder(folder: Path, study: str) -> Path:
-    """A place to run a study in."""
+    """A place to run a study in, on a partition of jobs of five minutes."""
     folder.mkdir()
     (folder / "small.yaml").write_text(study)
+    (folder / "cluster.yaml").write_text("partition: short\n")
     return folder
 
 
 # Two or so runs share a job, and the queue of an empty node is asked more often.
+SANDMOULD = [sys.executable, "-m", "sandmould.cli"]
 COMMAND = [
-    sys.executable, "-m", "sandmould.cli", "run", "small.yaml", "--",
-    "--workflow-profile", "slurm", "--config", "batch_wall_s=8",
+    *SANDMOULD, "run", "small.yaml", "--cluster", "--", "--config", "batch_wall_s=8",
     "--slurm-init-seconds-before-status-checks", "1", "--latency-wait", "5",
     "--default-resources", "mem_mb=500", "runtime=5",
 ]  # fmt: skip
 
 
-@pytest.mark.slow
-def test_a_run_of_two_ranks_gets_two_cores(slurm: SlurmNode, tmp_path: Path) -> None:
-    folder = study_folder(tmp_path / "study", RANKS)
-    with (tmp_path / "log").open("wb") as file:
-        process = subprocess.Popen(
+def start(slurm: SlurmNode, folder: Path, log: Path) -> subprocess.Popen[bytes]:
+    with log.open("wb") as file:
+        return subprocess.Popen(
             COMMAND, cwd=folder, env=slurm.environment, stdout=file, stderr=file,
             start_new_session=True,
         )  # fmt: skip
-    wait_for(lambda: bool(slurm.jobs()), process, tmp_path / "log")
+
+
+def call(slurm: SlurmNode, folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command, cwd=folder, env=slurm.environment, capture_output=True, text=True, timeout=LIMIT_S
+    )
+
+
+@pytest.mark.slow
+def test_a_run_of_two_ranks_gets_two_cores_and_the_time_that_its_partition_allows(
+    slurm: SlurmNode, tmp_path: Path
+) -> None:
+    folder, log = study_folder(tmp_path / "study", RANKS), tmp_path / "log"
+    # What the cluster does not have is said once, before anything is submitted.
+    (folder / "cluster.yaml").write_text("partition: shrot\n")
+    said = call(slurm, folder, *COMMAND).stderr.splitlines()[1:]
+    assert said == [
+        "cluster.yaml: partition = 'shrot' cannot be used: valid is a partition of this cluster: "
+        "main, short."
+    ]
+    (folder / "cluster.yaml").write_text("partition: short\n")
+    process = start(slurm, folder, log)
+    wait_for(lambda: bool(slurm.jobs()), process, log)
     (job,) = slurm.jobs()
-    assert slurm.cores(job) == 2  # a rank has one core, not as many as the run has
-    assert process.wait(LIMIT_S) == 0, (tmp_path / "log").read_text()[-3000:]
-    (cost,) = (folder / "results" / "small" / "runs").glob("*/cost.tsv")
-    assert pd.read_csv(cost, sep="\t")["ranks"].tolist() == [2]
+    assert slurm.told("%C") == {job: "2"}  # a rank has one core, not as many as the run has
+    assert slurm.told("%l %P") == {job: "5:00 short"}
+    assert "A job asks at most 5.0 min, the limit of partition short; " in log.read_text()
+    # Ctrl-C takes the job away without a traceback.
+    process.send_signal(signal.SIGINT)
+    assert process.wait(LIMIT_S) == 130
+    assert "Traceback" not in log.read_text()
+    assert log.read_text().endswith("small was stopped: the same command goes on with it.\n")
+    assert slurm.jobs() == {}
+
+    # A job that can never begin, of an earlier start on another partition, is told and goes.
+    (run,) = (path.name for path in (folder / "results" / "small" / "runs").iterdir())
+    stuck = slurm.submit(
+        "--job-name=sandmould_1", f"--comment=rule_batch_wildcards_{run}", f"--chdir={folder}",
+        "--partition=short", "--time=60",
+    )  # fmt: skip
+    said = call(slurm, folder, *SANDMOULD, "status", "small.yaml").stdout.splitlines()
+    assert "jobs on the cluster: 1 pending (1 PartitionTimeLimit)" in said
+    assert (
+        f"  job {stuck} asks 1:00:00 and cannot begin as it is: PartitionTimeLimit  {run}" in said
+    )
+    ran = call(slurm, folder, *COMMAND)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert slurm.jobs() == {}
+    runs = list((folder / "results" / "small" / "runs").iterdir())
+    assert read_costs(runs).rows["ranks"].tolist() == [2]
 
 
 @pytest.mark.slow
@@ -112,26 +157,34 @@ def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished
     def done() -> dict[str, int]:
         return {p.parent.name: p.stat().st_mtime_ns for p in outcomes.glob("*/outcome.json")}
 
-    with log.open("wb") as file:
-        process = subprocess.Popen(
-            COMMAND, cwd=folder, env=slurm.environment, stdout=file, stderr=file,
-            start_new_session=True,
-        )  # fmt: skip
+    process = start(slurm, folder, log)
     wait_for(lambda: bool(simulating(folder)), process, log)
     running = [job for job, state in slurm.jobs().items() if state == "RUNNING"]
     slurm.cancel(running[0])
     wait_for(lambda: len(done()) >= 1 and bool(simulating(folder)), process, log)
     os.kill(simulating(folder)[0], signal.SIGKILL)
     wait_for(lambda: len(done()) >= 2 and bool(simulating(folder)), process, log)
+    going = [job for job, state in slurm.jobs().items() if state == "RUNNING"]
+    slurm.requeue(going[0])
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    finished = done()
+    left, finished = slurm.jobs(), done()
     assert len(finished) < 8
 
-    ran = subprocess.run(
-        COMMAND, cwd=folder, env=slurm.environment, capture_output=True, text=True, timeout=LIMIT_S
-    )
-    assert ran.returncode == 0, ran.stdout + ran.stderr
+    # Jobs of the first start go on; those of the second wait for them in the queue.
+    process = start(slurm, folder, tmp_path / "second.log")
+    at_once = []
+    while process.poll() is None:
+        state = slurm.told("%T %k")
+        at_once += [
+            list(state.values()).count(text) for text in state.values() if "RUNNING" in text
+        ]
+        time.sleep(0.5)
+    assert max(at_once) == 1
+    said = (tmp_path / "second.log").read_text()
+    assert process.returncode == 0, said
+    assert "Jobs of an earlier start go on: " in said
+    assert all(job in said.split("go on: ")[1].split(".")[0] for job in left)
     summary = pd.read_csv(folder / "results" / "small" / "summary.tsv", sep="\t")
     assert list(summary.outcome) == ["finished"] * 8
     assert summary.tube_fill_fraction.notna().all()

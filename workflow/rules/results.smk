@@ -5,9 +5,8 @@ rule collect:
     input:
         study=f"{FOLDER}/study.yaml",
         table=f"{FOLDER}/runs.tsv",
-        batches=expand(rules.batch.output.done, batch=BATCHES),
+        batches=expand(rules.batch.output.done, batch=COLLECTED),
         outcomes=expand(rules.simulate.output.outcome, run=ALONE),
-        costs=expand(rules.simulate.output.cost, run=ALONE),
         measures=expand(rules.measure.output.measures, run=ALONE),
     output:
         summary=report(

@@ -15,6 +15,7 @@ rule render:
         "../envs/sandmould.yaml"
     threads: 1
     resources:
+        **SUBMITTED,
         mem_mb=1000,
         runtime=10,
     message:
@@ -23,15 +24,43 @@ rule render:
         "../scripts/render.py"
 
 
+rule fill:
+    input:
+        # A list, as of a batch.
+        scenarios=[ancient(f"{FOLDER}/fills/{{fill}}/scenario.yaml")],
+        note=fill_note_of,
+    output:
+        outcome=f"{FOLDER}/fills/{{fill}}/outcome.json",
+    log:
+        f"{FOLDER}/logs/fill_{{fill}}.log",
+    benchmark:
+        f"{FOLDER}/logs/fill_{{fill}}.benchmark.tsv"
+    conda:
+        "../envs/sandmould.yaml"
+    threads: threads_of
+    resources:
+        tasks=ranks_of,
+        cpus_per_task=cpus_per_task_of,
+        mpi=mpi_of,
+        mem_mb=memory_mb_of,
+        runtime=runtime_min_of,
+    params:
+        side_by_side=1,
+    message:
+        "Compute {wildcards.fill}, which runs share"
+    script:
+        "../scripts/batch.py"
+
+
 rule simulate:
     input:
         scenario=rules.render.input.scenario,
         deck=rules.render.output.deck,
         note=compute_note_of,
+        fill=fill_of,
     output:
         outcome=f"{FOLDER}/runs/{{run}}/outcome.json",
-        provenance=f"{FOLDER}/runs/{{run}}/provenance.json",
-        cost=f"{FOLDER}/runs/{{run}}/cost.tsv",
+        products=f"{FOLDER}/runs/{{run}}/products.json",
         series=f"{FOLDER}/runs/{{run}}/series.tsv",
     log:
         f"{FOLDER}/logs/simulate_{{run}}.log",
@@ -41,6 +70,7 @@ rule simulate:
         "../envs/sandmould.yaml"
     threads: threads_of
     resources:
+        **SUBMITTED,
         tasks=ranks_of,
         cpus_per_task=cpus_per_task_of,
         mpi=mpi_of,
@@ -78,6 +108,7 @@ rule measure:
         "../envs/sandmould.yaml"
     threads: 1
     resources:
+        **SUBMITTED,
         mem_mb=2000,
         runtime=30,
     message:
@@ -90,6 +121,7 @@ rule batch:
     input:
         scenarios=ancient(scenarios_of),
         notes=batch_notes_of,
+        fills=batch_fills_of,
     output:
         done=touch(f"{FOLDER}/batches/{{batch}}.done"),
     log:
@@ -100,6 +132,7 @@ rule batch:
         "../envs/sandmould.yaml"
     threads: batch_threads_of
     resources:
+        **SUBMITTED,
         tasks=batch_ranks_of,
         cpus_per_task=batch_cpus_per_task_of,
         mpi=batch_mpi_of,

@@ -1,5 +1,6 @@
 # The study is validated and expanded before Snakemake builds its graph: bad input ends here, in
 # one sentence a problem.
+import atexit
 import os
 import sys
 
@@ -8,6 +9,9 @@ from sandmould.runs.columns import SWEEP
 from sandmould.runs.words import say
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.collect import CHECKS as CHECK_TABLES
+from sandmould.study.cluster.settings import goes_to_slurm
+from sandmould.study.cluster.submission import open_submission
+from sandmould.study.packs.recorded import take_up
 from sandmould.study.plan.batches import alone
 from sandmould.study.plan.build_plan import (
     RESULTS,
@@ -21,7 +25,7 @@ from sandmould.study.plan.build_plan import (
 )
 from sandmould.study.plan.lacking import Need, notes_of
 from sandmould.study.process import take_turn
-from sandmould.study.definition.run import RUN_NAME
+from sandmould.study.definition.run import FILL, RUN_NAME
 from sandmould.study.plan.trust import check_letters, check_places, check_trust
 
 OVERRIDES = dict(workflow.config_settings.config)
@@ -38,13 +42,24 @@ try:
     check_places(PLAN.study)
     check_letters(PLAN.runs)
     check_trust(PLAN.study, PLAN.runs)
-    BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
-    if workflow.is_main_process and "--lint" not in sys.argv:
+    if workflow.is_main_process and starts_jobs(sys.argv):
         # Held until this process ends.
-        turn = starts_jobs(sys.argv) and take_turn(RESULTS / PLAN.study.name)
+        if turn := take_turn(RESULTS / PLAN.study.name):
+            atexit.register(turn.close)
+        PLAN, taken = take_up(PLAN, RESULTS)
+        if taken:
+            say(taken)
+    BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
+    STATED = workflow.resource_settings.default_resources or {}
+    SUBMISSION = open_submission(PLAN, sys.argv, STATED)
+    if workflow.is_main_process and starts_jobs(sys.argv) and goes_to_slurm(sys.argv):
+        SUBMISSION.ask(BATCHED)
+    if workflow.is_main_process and "--lint" not in sys.argv:
         say(announce(PLAN, RESULTS, CORES))
-        if said := prepare(PLAN, RESULTS):
+        if said := prepare(PLAN, RESULTS, BATCHED):
             say(f"{said}\n")
+        for said in SUBMISSION.said:
+            say(said)
 except BadInputError as error:
     say(str(error))
     sys.exit(1)
@@ -59,9 +74,23 @@ CHECKS = [
     for name in CHECK_TABLES
     if any(run.part != SWEEP for run in PLAN.runs)
 ]
+# What a cluster wants of every job.
+SUBMITTED = SUBMISSION.resources()
+RUNS = {run.run: run for run in (*PLAN.fills, *PLAN.runs)}
 BATCHES = {batch.name: [run.run for run in batch.runs] for batch in BATCHED}
 SIDE_BY_SIDE = {batch.name: batch.side_by_side for batch in BATCHED}
+# Fills are computed for the runs that go on from them, not for the tables.
+COLLECTED = [batch.name for batch in BATCHED if batch.runs[0].part != FILL]
 ALONE = alone(PLAN.runs, BATCHED)
+# What tells that a fill is there: its outcome, or its batch's mark.
+FILL_MARKS = {
+    fill.run: f"{FOLDER}/{fill.place}/outcome.json" for fill in PLAN.fills
+} | {
+    fill: f"{FOLDER}/batches/{name}.done"
+    for name, fills in BATCHES.items()
+    for fill in fills
+    if fill in {fill.run for fill in PLAN.fills}
+}
 # As seen from here, wherever that is.
 TEMPLATES = ROOT / "templates" / "report"
 REPORT_TEMPLATES = sorted(os.path.relpath(path) for path in TEMPLATES.iterdir())
@@ -75,30 +104,58 @@ def measure_note_of(wildcards):
     return notes_of(f"{FOLDER}/runs/{wildcards.run}", Need.MEASURE)
 
 
+def fills_of(runs):
+    """Marks of the fills that some runs wait for; a run that is at its end waits for none."""
+    awaited = [
+        RUNS[run].fill
+        for run in runs
+        if notes_of(f"{FOLDER}/{RUNS[run].place}", Need.COMPUTE)
+        or not os.path.exists(f"{FOLDER}/{RUNS[run].place}/outcome.json")
+    ]
+    return sorted({FILL_MARKS[fill] for fill in awaited if fill})
+
+
+def fill_of(wildcards):
+    return fills_of([wildcards.run])
+
+
+def fill_note_of(wildcards):
+    return notes_of(f"{FOLDER}/fills/{wildcards.fill}", Need.COMPUTE)
+
+
+def batch_fills_of(wildcards):
+    return fills_of(BATCHES[wildcards.batch])
+
+
+def named(wildcards):
+    """Name of the run or of the fill that a job computes."""
+    return wildcards.get("run") or wildcards.fill
+
+
 def threads_of(wildcards):
-    return PLAN.threads(wildcards.run)
+    return PLAN.threads(named(wildcards))
 
 
 def ranks_of(wildcards):
-    return PLAN.ranks(wildcards.run)
+    return PLAN.ranks(named(wildcards))
 
 
 def cpus_per_task_of(wildcards):
     # Slurm would take threads for the cores of every rank.
-    return PLAN.threads(wildcards.run) // PLAN.ranks(wildcards.run)
+    return PLAN.threads(named(wildcards)) // PLAN.ranks(named(wildcards))
 
 
 def mpi_of(wildcards):
     # Slurm's jobs of one task must not be told of it.
-    return MPI if PLAN.ranks(wildcards.run) > 1 else ""
+    return MPI if PLAN.ranks(named(wildcards)) > 1 else ""
 
 
 def memory_mb_of(wildcards):
-    return PLAN.memory_mb(wildcards.run)
+    return PLAN.memory_mb(named(wildcards))
 
 
-def runtime_min_of(wildcards, attempt):
-    return attempt * PLAN.runtime_min(wildcards.run)
+def runtime_min_of(wildcards):
+    return SUBMISSION.runtime_min(PLAN.runtime_min(named(wildcards)))
 
 
 def labels_of(wildcards):
@@ -106,11 +163,13 @@ def labels_of(wildcards):
 
 
 def scenarios_of(wildcards):
-    return [f"{FOLDER}/runs/{run}/scenario.yaml" for run in BATCHES[wildcards.batch]]
+    return [
+        f"{FOLDER}/{RUNS[run].place}/scenario.yaml" for run in BATCHES[wildcards.batch]
+    ]
 
 
 def batch_notes_of(wildcards):
-    runs = [f"{FOLDER}/runs/{run}" for run in BATCHES[wildcards.batch]]
+    runs = [f"{FOLDER}/{RUNS[run].place}" for run in BATCHES[wildcards.batch]]
     return [note for run in runs for note in notes_of(run, Need.COMPUTE, Need.MEASURE)]
 
 
@@ -139,14 +198,15 @@ def batch_memory_mb_of(wildcards):
     return most * SIDE_BY_SIDE[wildcards.batch]
 
 
-def batch_runtime_min_of(wildcards, attempt):
+def batch_runtime_min_of(wildcards):
     beside = SIDE_BY_SIDE[wildcards.batch]
     runs = BATCHES[wildcards.batch]
-    return attempt * PLAN.runtime_min(*runs, side_by_side=beside)
+    return SUBMISSION.runtime_min(PLAN.runtime_min(*runs, side_by_side=beside))
 
 
 # Not the names themselves: Snakemake tries a pattern on every file of every run, and ten thousand
 # alternatives took it half of all its time.
 wildcard_constraints:
     run=RUN_NAME,
+    fill=RUN_NAME,
     batch=RUN_NAME,

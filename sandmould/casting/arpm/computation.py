@@ -45,7 +45,7 @@ class ElementCost(Cost):
     element_steps: int = 0
 
     def columns(self) -> dict[str, Any]:
-        """Columns of ``cost.tsv`` and their values."""
+        """Columns of the cost row in ``products.json`` and their values."""
         rate = self.element_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
         names = ("engine", "version", "ranks", "elements", "element_steps", "time_step_s",
                  "wall_s", "engine_wall_s", "cpu_s", "peak_memory_bytes")  # fmt: skip

@@ -41,7 +41,7 @@ class FlowCost(Cost):
     """Of the wall time of the steps, spent on the Poisson equation."""
 
     def columns(self) -> dict[str, Any]:
-        """Columns of ``cost.tsv`` and their values."""
+        """Columns of the cost row in ``products.json`` and their values."""
         rate = self.particle_solves / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
         names = ("engine", "version", "ranks", "particles", "steps", "particle_solves",
                  "poisson_iterations", "solver_fraction", "time_step_s", "wall_s", "engine_wall_s",

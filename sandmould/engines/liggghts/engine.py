@@ -24,6 +24,7 @@ CAPABILITIES = Capabilities(
     repeats_windows=False,
     calls_movers=False,
     loads_of_every_step=False,
+    checkpoints_at_setups=True,
 )
 
 

@@ -19,8 +19,7 @@ from sandmould.engines.liggghts.mesh_files import (
     surface_triangles,
     write_stl,
 )
-from sandmould.engines.program import Program, Stage
-from sandmould.engines.step_counts import StepCounts
+from sandmould.engines.program import Program
 from sandmould.scenario.geometry import Array
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
@@ -42,23 +41,6 @@ def surface_meshes(program: Program) -> dict[str, Array]:
     return surface_triangles(program.scenario, bounds_m(program))
 
 
-def _checks(program: Program) -> dict[str, tuple[int, int]]:
-    """Of each settling stage, the steps to its first check and its largest number of checks."""
-    counts = StepCounts.of(program.scenario)
-    into_check, checks = 0, {}
-    for stage in program.stages:
-        if stage.settling is None:
-            assert stage.vibration is not None
-            into_check = (into_check + counts.vibration(stage.vibration)) % counts.check
-        else:
-            # A bed comes to rest at a check.
-            longest = counts.steps(stage.settling.longest_s)
-            first = counts.check - into_check
-            checks[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.check)))
-            into_check = 0
-    return checks
-
-
 def render_deck(
     program: Program, sources: Mapping[str, str], run: str = "scene", study: str = "none"
 ) -> Deck:
@@ -74,14 +56,6 @@ def render_deck(
     """
     scenario = program.scenario
     lines = Lines(scenario, sources)
-    checks = _checks(program)
-
-    def first_check(stage: Stage) -> int:
-        return checks[stage.name][0]
-
-    def most_checks(stage: Stage) -> int:
-        return checks[stage.name][1]
-
     context = deck_context(program, lines, run, study)
     context |= {
         "tables": pair_tables(
@@ -95,8 +69,6 @@ def render_deck(
         "simulation_box": bounds_m(program),
         "surfaces": list(surface_meshes(program)),
         "wall_names": [wall.name for wall in scenario.scene.walls],
-        "first_check": first_check,
-        "most_checks": most_checks,
         "first_id": [1 + sum(program.counts[:i]) for i in range(len(program.counts))],
         "oldest_version": OLDEST_VERSION,
     }

@@ -35,8 +35,8 @@ class LiggghtsSession(DeckSession):
     """See ``sandmould.engines.session.Session``.
 
     A checkpoint keeps the history of all contacts, those with meshes included. In the laboratory
-    frame one force is lost: at the first step after a checkpoint, whether the run stopped there or
-    not, the dashpots of walls see a wall that stands still.
+    frame one force is lost wherever LIGGGHTS is set up, which is at fixed steps: there the dashpots
+    of walls see a wall that stands still.
     """
 
     steps = 0

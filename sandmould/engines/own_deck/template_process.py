@@ -111,4 +111,8 @@ def main(memory_bytes: int, most_characters: int, cpu_s: float) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]))
+    try:
+        limits = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
+    except (IndexError, ValueError):
+        sys.exit("usage: started by the renderer alone: MEMORY_BYTES MOST_CHARACTERS CPU_S")
+    main(*limits)

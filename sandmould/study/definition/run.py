@@ -6,9 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 Part = str
-"""``sweep``, ``cross_check``, or a case of the certificate's controls."""
+"""``sweep``, ``cross_check``, a case of the certificate's controls, or ``FILL``."""
 RUN_NAME = "[a-z0-9_]+_r[0-9]+_[0-9a-f]{6}"
 """Pattern of the name of any run."""
+FILL = "fill"
+"""Part of a run that is no result: a fill that runs of the study share."""
+FILLS = "fills"
+"""Folder of those, beside that of the runs."""
 LAST_MEASURED = "final.png"
 """File of a run's folder that is written after all else that is measured."""
 
@@ -30,6 +34,13 @@ class Run:
     """Where each leaf of the scenario came from, by key path."""
     part: Part = "sweep"
     """What it belongs to."""
+    fill: str = ""
+    """Name of the fill that it goes on from; empty of one that fills by itself."""
+
+    @property
+    def place(self) -> str:
+        """Where it lies in the folder of its study."""
+        return f"{FILLS if self.part == FILL else 'runs'}/{self.run}"
 
     @property
     def seed(self) -> int:

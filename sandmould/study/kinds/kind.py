@@ -43,6 +43,15 @@ def no_notes(scenario: Any) -> Sequence[Note]:
     return ()
 
 
+def no_state(scenario: Any) -> int:
+    """Nothing on the disk."""
+    return 0
+
+
+def no_fill(scenario: Any) -> None:
+    """Nothing that runs could share."""
+
+
 @dataclass(frozen=True)
 class MachineSpeed(Generic[ScenarioT]):
     """How fast a core of this machine is; of kinds whose engines differ from machine to machine.
@@ -110,6 +119,10 @@ class Planning(Generic[ScenarioT]):
     """Scenarios of one class are computed at one speed."""
     plan_cells: Callable[[ScenarioT], Mapping[str, str]]
     """What the plan says of a run, by heading."""
+    fill: Callable[[ScenarioT], ScenarioT | None] = no_fill
+    """The part that comes first, as a scene of its own: runs with equal ones share it."""
+    state_bytes: Callable[[ScenarioT], int] = no_state
+    """Disk that the state at the end of a scene takes."""
     beside_s: Callable[[ScenarioT], float] = nothing_beside
     """Wall time of a run that does not grow with its work."""
     notes: Callable[[ScenarioT], Sequence[Note]] = no_notes
@@ -136,6 +149,10 @@ class Execution(Generic[ScenarioT]):
     """Cost of a run that has not begun."""
     measure: Callable[[Run, Path], None]
     """Measure what a run left behind; the picture last."""
+    load_computing: Callable[[ScenarioT], None] = lambda scenario: None
+    load_measuring: Callable[[ScenarioT], None] = lambda scenario: None
+    """Import what computing or measuring needs, for a worker that forks for each run: what starts
+    threads, MPI or an engine must stay for the run's own process."""
 
 
 def _nothing() -> dict[str, Any]:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from sandmould.study.definition.run import LAST_MEASURED, Run
+from sandmould.study.definition.run import FILL, FILLS, LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
+from sandmould.study.plan.fills import predicted_s
 
-START_S = 2.0
+START_S = 0.3
 """What a run takes beside its steps: its process and its measures (docs/scaling.md)."""
 
 
-def is_done(run_folder: Path) -> bool:
-    """Whether a run is computed and measured; a failed one is, too."""
-    return all((run_folder / name).exists() for name in ("outcome.json", LAST_MEASURED))
+def is_done(folder: Path) -> bool:
+    """Whether a run is computed and measured; a failed one is, too. Fills are not measured."""
+    last = "outcome.json" if folder.parent.name == FILLS else LAST_MEASURED
+    return all((folder / name).exists() for name in ("outcome.json", last))
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class _Alike(NamedTuple):
 
 def planned_wall_s(run: Run) -> float:
     """Wall time that batches count on for a run, in a job that is there already."""
-    return START_S + kind_of(run.scenario).planning.predicted_s(run.scenario)
+    return START_S + predicted_s(run)
 
 
 def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Batch]:
@@ -78,6 +80,26 @@ def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Bat
     for alike in list(waiting):
         close(alike)
     return batches
+
+
+def mark_done(batches: Iterable[Batch], lacking: Container[str], folder: Path) -> None:
+    """Mark batches whose runs lack nothing, such as unpacked ones, so that no job looks at them.
+
+    Parameters
+    ----------
+    batches : iterable of Batch
+    lacking : container of str
+        Names of runs that lack something.
+    folder : Path
+        ``results/<study>``.
+    """
+    for batch in batches:
+        if batch.runs[0].part == FILL:
+            continue  # one that no run waits for is not there
+        mark = folder / "batches" / f"{batch.name}.done"
+        if not mark.exists() and not any(run.run in lacking for run in batch.runs):
+            mark.parent.mkdir(exist_ok=True)
+            mark.touch()
 
 
 def alone(runs: Sequence[Run], batches: Sequence[Batch]) -> list[str]:

@@ -18,9 +18,10 @@ from sandmould.study.definition.comparing import ENGINE
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import AnyScenario, Kind, SpeedClass
 from sandmould.study.kinds.registry import kind_named
-from sandmould.study.plan.batches import Batch, plan_batches
+from sandmould.study.plan.batches import Batch, mark_done, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
-from sandmould.study.plan.lacking import Lack, lacks, note_lacks
+from sandmould.study.plan.fills import share_fills
+from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
@@ -39,6 +40,8 @@ class Plan:
 
     study: OpenStudy
     runs: tuple[Run, ...]
+    fills: tuple[Run, ...] = ()
+    """Those that runs share."""
 
     @property
     def kind(self) -> Kind[Any]:
@@ -52,14 +55,17 @@ class Plan:
 
     @cached_property
     def _by_name(self) -> dict[str, Run]:
-        return {run.run: run for run in self.runs}
+        return {run.run: run for run in (*self.runs, *self.fills)}
 
     def batches(self, wall_s: float, least: int = 1, cores: int = 1) -> list[Batch]:
         """Runs that share a job of so many cores until it lasts so long; none for 0.
 
         Batches of fewer than ``least`` runs are left out: those runs have jobs of their own.
         """
-        batches = plan_batches(self.runs, wall_s, cores) if wall_s > 0 else []
+        if wall_s <= 0:
+            return []
+        apart = self.fills, self.runs
+        batches = (batch for runs in apart for batch in plan_batches(runs, wall_s, cores))
         return [batch for batch in batches if len(batch.runs) >= least]
 
     def threads(self, name: str) -> int:
@@ -82,14 +88,24 @@ class Plan:
         return 10 + math.ceil(seconds / 60)
 
     def lacks(self, results: Path) -> dict[str, Lack]:
-        """What a start would compute or measure: what each run lacks, whole ones left out."""
-        return lacks(self.runs, results / self.study.name)
+        """What a start would compute or measure: what each run lacks, whole ones left out.
+
+        With the fills that runs go on from that are computed.
+        """
+        folder = results / self.study.name
+        found = lacks(self.runs, folder)
+        awaited = {run.fill for run in self.runs if _computes(found.get(run.run))}
+        return found | lacks((fill for fill in self.fills if fill.run in awaited), folder)
 
     def labels(self, name: str) -> dict[str, str]:
         """Labels of a run in Snakemake's own report."""
         run = self._by_name[name]
         labels = {key: str(value) for key, value in run.parameters.items()}
         return labels | {"replicate": str(run.replicate)}
+
+
+def _computes(lack: Lack | None) -> bool:
+    return lack is not None and lack.need is Need.COMPUTE
 
 
 _LOOKS = (
@@ -165,7 +181,8 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         problems[str(found)] = found
     if problems:
         raise BadInputError(list(problems.values()))
-    return Plan(study, tuple(runs))
+    shared, fills = share_fills(runs, planning)
+    return Plan(study, tuple(shared), tuple(fills))
 
 
 def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:
@@ -201,7 +218,7 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
     folder = results / plan.study.name
     with writing(folder):
         write_owner(plan.study.path, folder)
-        write_plan(plan.runs, folder)
+        write_plan([*plan.fills, *plan.runs], folder)
         write_study(plan.study.study, folder)
     if measure:
         measure_speeds(plan, results)
@@ -209,8 +226,8 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
     return f"\n{title}\n{price(plan, results, cores)}"
 
 
-def prepare(plan: Plan, results: Path) -> str:
-    """Note for Snakemake what each run lacks.
+def prepare(plan: Plan, results: Path, batches: Sequence[Batch] = ()) -> str:
+    """Note for Snakemake what each run lacks, and which batches lack nothing.
 
     Returns
     -------
@@ -224,7 +241,10 @@ def prepare(plan: Plan, results: Path) -> str:
     """
     folder = results / plan.study.name
     with writing(folder):
-        return note_lacks([run.run for run in plan.runs], plan.lacks(results), folder)
+        found = plan.lacks(results)
+        said = note_lacks([*plan.fills, *plan.runs], found, folder)
+        mark_done(batches, found, folder)
+        return said
 
 
 @contextlib.contextmanager
@@ -239,7 +259,7 @@ def writing(folder: Path) -> Iterator[None]:
 
 def price(plan: Plan, results: Path, cores: int) -> str:
     """Say what the runs will take, as far as the machine's speed is known at what was measured."""
-    return plan_table(plan.runs, Prices(stored_speeds(plan, results)), cores)
+    return plan_table([*plan.fills, *plan.runs], Prices(stored_speeds(plan, results)), cores)
 
 
 def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:

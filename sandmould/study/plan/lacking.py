@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
 
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.manifest import MANIFEST_FILE, Manifest, damage, deck_damage, read_manifest
+from sandmould.runs.manifest import (
+    LEFT_OUT,
+    MANIFEST_FILE,
+    OLDER_COST,
+    Manifest,
+    damage,
+    deck_damage,
+    read_manifest,
+    read_origin,
+)
 from sandmould.runs.outcome import RunOutcome
-from sandmould.study.definition.run import LAST_MEASURED, Run
+from sandmould.study.definition.run import FILL, LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
 
 UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError)
 """What reading a broken file may raise."""
 LISTED = 12
-_OF_ANY_COMPUTED = ("cost.tsv", "series.tsv")
+_OF_ANY_COMPUTED = (OLDER_COST, "series.tsv")
 _OF_ANY_MEASURED = ("measures.tsv", LAST_MEASURED)
 
 
@@ -55,7 +62,7 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     ----------
     run : Run
     folder : Path
-        ``results/<study>/runs/<run>``.
+        Its own, see ``Run.place``.
     template_hash : callable, optional
         Hash of what turns a run into its deck, for a caller that keeps it; see ``Planning``.
     """
@@ -68,17 +75,18 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     except UNREADABLE:
         return Lack(Need.COMPUTE, "outcome.json cannot be read")
     try:
-        origin: dict[str, Any] = json.loads((folder / "provenance.json").read_text("utf-8"))
+        origin = read_origin(folder)
         if origin["scenario_sha256"] != scenario_hash(run.scenario):
             return Lack(Need.COMPUTE, "it is of another scenario")
         if origin["template_sha256"] != wanted(run):
             return Lack(Need.COMPUTE, "its deck or its solver has changed since")
         manifest = read_manifest(folder)
     except FileNotFoundError:
-        return Lack(Need.COMPUTE, "provenance.json is missing")
+        return Lack(Need.COMPUTE, f"{MANIFEST_FILE} is missing")
     except UNREADABLE:
-        return Lack(Need.COMPUTE, f"provenance.json or {MANIFEST_FILE} cannot be read")
-    return _lack_of_files(folder, manifest)
+        return Lack(Need.COMPUTE, f"{MANIFEST_FILE} cannot be read")
+    lack = _lack_of_files(folder, manifest)
+    return WHOLE if run.part == FILL and lack.need is Need.MEASURE else lack
 
 
 def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
@@ -95,6 +103,8 @@ def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
         why = "it is not measured"
     else:
         why = damage(folder, manifest["measured"])
+    if why and manifest and LEFT_OUT in manifest:
+        return Lack(Need.COMPUTE, f"{why}, and its snapshots were left out of a pack")
     return Lack(Need.MEASURE, why) if why else WHOLE
 
 
@@ -120,6 +130,13 @@ def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
     folder : Path
         ``results/<study>``.
     """
+    template_hash = template_hashes()
+    found = {run.run: lack_of(run, folder / run.place, template_hash) for run in runs}
+    return {run: lack for run, lack in found.items() if lack.need}
+
+
+def template_hashes() -> Callable[[Run], str]:
+    """Hash of what turns a run into its deck, for many runs."""
     hashes: dict[tuple[Path, ...], str] = {}
 
     def template_hash(run: Run) -> str:
@@ -129,11 +146,10 @@ def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
             hashes[sources] = _template_hash(run)
         return hashes[sources]
 
-    found = {run.run: lack_of(run, folder / "runs" / run.run, template_hash) for run in runs}
-    return {run: lack for run, lack in found.items() if lack.need}
+    return template_hash
 
 
-def note_lacks(runs: Iterable[str], found: dict[str, Lack], folder: Path) -> str:
+def note_lacks(runs: Iterable[Run], found: dict[str, Lack], folder: Path) -> str:
     """Write for Snakemake which runs of a study need what, where it would not see that by itself.
 
     What is missing before anything was collected it sees. Later it takes no notice of a missing
@@ -142,8 +158,8 @@ def note_lacks(runs: Iterable[str], found: dict[str, Lack], folder: Path) -> str
 
     Parameters
     ----------
-    runs : iterable of str
-        Names of all runs.
+    runs : iterable of Run
+        All runs.
     found : dict
         What those that are not whole lack, see ``lacks``.
     folder : Path
@@ -155,8 +171,8 @@ def note_lacks(runs: Iterable[str], found: dict[str, Lack], folder: Path) -> str
         Which runs are computed or measured again, and why; empty where none is.
     """
     begun = (folder / "summary.tsv").exists() or (folder / "batches").exists()
-    for name in runs:
-        run, lack = folder / "runs" / name, found.get(name, WHOLE)
+    for each in runs:
+        run, lack = folder / each.place, found.get(each.run, WHOLE)
         for need, note in _NOTE.items():
             if need is not lack.need:
                 (run / note).unlink(missing_ok=True)

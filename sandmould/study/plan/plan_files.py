@@ -12,12 +12,14 @@ import yaml
 from pydantic import create_model
 
 from sandmould.runs.files import write_text
+from sandmould.runs.formatting import size_text
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, read_planned, validated
-from sandmould.study.definition.run import Part, Run
+from sandmould.study.definition.run import FILL, Part, Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
+from sandmould.study.plan.fills import own_work
 from sandmould.study.plan.price import Prices, study_s
 
 STUDY_FILE = "study.yaml"
@@ -46,6 +48,7 @@ class _RunFile(Section):
     scenario: Any
     sources: dict[str, str]
     part: Part = "sweep"
+    fill: str = ""
 
 
 _OF_RUN = tuple(name for name in _RunFile.model_fields if name != "kind")
@@ -59,7 +62,7 @@ def _file_model(kind: str) -> type[_RunFile]:
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
-    """Write ``runs.tsv`` and ``runs/<run>/scenario.yaml``, files that would not change left alone.
+    """Write ``runs.tsv`` and each run's ``scenario.yaml``, files that would not change left alone.
 
     Rows keep the place they had in an earlier round; new ones are appended. Folders of runs that
     are no longer listed stay, since they may hold results.
@@ -67,18 +70,20 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
     Parameters
     ----------
     runs : sequence of Run
-        All runs of the study, those of earlier rounds included.
+        All runs of the study, those of earlier rounds included, and the fills that they share;
+        fills are no rows.
     folder : Path
         ``results/<study>``.
     """
     for run in runs:
         text, without_kind = _scenario_texts(run)
-        _write(folder / "runs" / run.run / "scenario.yaml", text, without_kind)
+        _write(folder / run.place / "scenario.yaml", text, without_kind)
     table = folder / "runs.tsv"
     text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
     earlier = text.splitlines()[1:]
     place = {line.split("\t", 1)[0]: n for n, line in enumerate(earlier)}
-    ordered = sorted(runs, key=lambda run: place.get(run.run, len(place)))
+    rows = (run for run in runs if run.part != FILL)
+    ordered = sorted(rows, key=lambda run: place.get(run.run, len(place)))
     _write(table, _table_text(ordered))
 
 
@@ -165,9 +170,12 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     cores : int
         Cores that share the runs.
     """
-    points: dict[str, list[Run]] = {}
+    points: dict[tuple[Any, ...], list[Run]] = {}
     for run in runs:
-        points.setdefault(f"{run.part} {json.dumps(run.parameters)}", []).append(run)
+        # Fills of one size are one point; runs of a point may share a fill or not.
+        size = kind_of(run.scenario).planning.planned_work(run.scenario) if run.part == FILL else ""
+        alike_in = run.part, json.dumps(run.parameters), bool(run.fill), size
+        points.setdefault(alike_in, []).append(run)
     notes: dict[str, list[tuple[str, str]]] = {}
     planning = kind_of(runs[0].scenario).planning
     heads = [*planning.plan_cells(runs[0].scenario), planning.work_unit]
@@ -175,7 +183,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     work = 0.0
     for alike in points.values():
         scenario = alike[0].scenario
-        work_a_run = planning.planned_work(scenario)
+        work_a_run = own_work(alike[0])
         work += work_a_run * len(alike)
         for note in planning.notes(scenario):
             notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note.text))
@@ -193,13 +201,27 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows]
     if len(points) > LISTED_POINTS:
         lines.append(f"... and {len(points) - LISTED_POINTS} more points")
+    fills = [run for run in runs if run.part == FILL]
+    if fills:
+        lines.append(_fills_line(runs, fills))
     whole = duration_text(study_s([prices.piece(run) for run in runs], cores))
     lines.append(
-        f"{len(runs)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} cores with "
-        f"report: {whole}, {prices.basis(runs)}"
+        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} "
+        f"cores with report: {whole}, {prices.basis(runs)}"
     )
     lines += [_note_line(told, len(points)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
+    """How many runs share how many fills, and what the fills take of the disk."""
+    sharing = sum(bool(run.fill) for run in runs)
+    state_bytes = sum(kind_of(fill.scenario).planning.state_bytes(fill.scenario) for fill in fills)
+    number = "1 fill" if len(fills) == 1 else f"{len(fills)} fills"
+    return (
+        f"{sharing} runs share {number}, each computed and counted once: "
+        f"about {size_text(state_bytes)} of the disk"
+    )
 
 
 def _note_line(told: Sequence[tuple[str, str]], points: int) -> str:

@@ -11,6 +11,7 @@ from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.batches import START_S
+from sandmould.study.plan.fills import own_work, predicted_s
 
 BEGIN_S = 5.0
 """What Snakemake takes to read its rules, and the study to be planned."""
@@ -59,8 +60,8 @@ def foretold_s(run: Run, rate_per_s: Mapping[SpeedClass, float]) -> float:
     planning, scenario = kind_of(run.scenario).planning, run.scenario
     rate = rate_per_s.get(planning.speed_class(scenario))
     if rate is None:
-        return planning.predicted_s(scenario) + planning.beside_s(scenario)
-    in_steps_s = planning.planned_work(scenario) / rate / planning.threads(scenario)
+        return predicted_s(run) + planning.beside_s(scenario)
+    in_steps_s = own_work(run) / rate / planning.threads(scenario)
     return in_steps_s + planning.beside_s(scenario)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from sandmould.runs.columns import CPU_S
+from sandmould.runs.columns import CPU_S, total_s
 from sandmould.runs.formatting import listed, name_of, number, unit_of
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
@@ -45,7 +45,7 @@ def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str
 def next_round(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> RoundLog:
     """Add a round, or the reason why there is none; parameters as in ``next_runs``."""
     refine, done = study.refine, len(log.rounds)
-    spent_h = float(summary[CPU_S].sum()) / 3600 if CPU_S in summary else 0.0
+    spent_h = total_s(summary, CPU_S) / 3600 if CPU_S in summary else 0.0
     try:
         optimum = find_optimum(
             summary, keys, study.objective.measure, study.objective.better, seed=done

@@ -68,17 +68,31 @@ def read_rounds(folder: Path, study: Study) -> RoundLog:
     if not (study.refine.rounds or study.certificate.controls) or not path.is_file():
         return RoundLog(basis)
     try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-        log = RoundLog(
-            tree["basis"],
-            tuple(_round(round_) for round_ in tree["rounds"]),
-            tree["ended"],
-            tuple(float(f) for f in tree["certified_hz"]),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
+        log = log_of(path.read_bytes())
+    except ValueError:
         valid = "a list of rounds as the study wrote it, or no such file: they then begin anew"
         raise BadInputError([Problem("rounds", "as it is", valid, str(path))]) from None
     return log if log.basis == basis else RoundLog(basis)
+
+
+def log_of(text: bytes) -> RoundLog:
+    """Rounds from a file's bytes.
+
+    Raises
+    ------
+    ValueError
+        When they are no list of rounds.
+    """
+    try:
+        tree = json.loads(text)
+        return RoundLog(
+            str(tree["basis"]),
+            tuple(_round(round_) for round_ in tree["rounds"]),
+            str(tree["ended"]),
+            tuple(float(f) for f in tree["certified_hz"]),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ValueError(f"no list of rounds: {error}") from None
 
 
 def _round(tree: dict[str, Any]) -> Round:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.definition.run import LAST_MEASURED
+from sandmould.study.definition.run import FILLS, LAST_MEASURED
 
 _DAMAGED = (OSError, ValueError, KeyError, TypeError)
 
@@ -46,16 +47,16 @@ class RunWatch:
     measured again has it before.
     """
 
-    folder: Path
-    """``results/<study>/runs``."""
+    folders: Mapping[str, Path]
+    """Of the runs, and of the fills that they share."""
     waiting: list[str]
-    """Runs that lack something, in the order of the plan."""
+    """Those that lack something, in the order of the plan."""
     since_s: float
     """Time of the file system when the watch began."""
     running: dict[str, Running] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._before = {run: _time_ns(self.folder / run / LAST_MEASURED) for run in self.waiting}
+        self._before = {run: _time_ns(self._last(run)) for run in self.waiting}
 
     def look(self) -> list[Ended]:
         """Look once; gives the runs that have ended since the last look."""
@@ -63,15 +64,20 @@ class RunWatch:
         gone = set(ended)
         self.waiting = [run for run in self.waiting if run not in gone]
         self.running = {r.run: r for run in self.waiting if (r := self._running(run)) is not None}
-        return [Ended(run, failure(self.folder / run)) for run in ended]
+        return [Ended(run, failure(self.folders[run])) for run in ended]
+
+    def _last(self, run: str) -> Path:
+        """File that is written last; nothing is measured of a fill."""
+        folder = self.folders[run]
+        return folder / ("outcome.json" if folder.parent.name == FILLS else LAST_MEASURED)
 
     def _has_ended(self, run: str) -> bool:
-        now = _time_ns(self.folder / run / LAST_MEASURED)
-        return now not in (0, self._before[run]) and (self.folder / run / "outcome.json").exists()
+        now = _time_ns(self._last(run))
+        return now not in (0, self._before[run]) and (self.folders[run] / "outcome.json").exists()
 
     def _running(self, run: str) -> Running | None:
         """Where a run is; None while it has not begun since the watch did."""
-        folder = self.folder / run
+        folder = self.folders[run]
         begun_s = _time_ns(folder / "lock") / 1e9
         if _time_ns(folder / "outcome.json") / 1e9 >= self.since_s:
             return Running(run, "measures", 100.0, begun_s=max(begun_s, self.since_s))

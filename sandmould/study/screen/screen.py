@@ -59,20 +59,18 @@ class Screen:
         self._console = Console(stderr=True, highlight=False, markup=False, emoji=False)
         self._table: Live | None = None
         lacks = plan.lacks(results)
-        names = [run.run for run in plan.runs]
-        runs = self._folder / "runs"
-        self._watch = RunWatch(
-            runs, [run for run in names if run in lacks], file_time_s(logs / "words.txt")
-        )
-        self.failures = [
-            Ended(run, said) for run in names if run not in lacks and (said := failure(runs / run))
-        ]
+        every = (*plan.fills, *plan.runs)
+        self._folders = {run.run: self._folder / run.place for run in every}
+        waiting = [run.run for run in every if run.run in lacks]
+        self._watch = RunWatch(self._folders, waiting, file_time_s(logs / "words.txt"))
+        self._fills = {fill.run for fill in plan.fills}
+        whole = [run.run for run in plan.runs if run.run not in lacks]
+        self.failures = [Ended(run, said) for run in whole if (said := failure(self._folders[run]))]
         """Runs that failed, in this start or before."""
         self._told: set[str] = set()
-        self._done = len(names) - len(lacks) - len(self.failures)
+        self._done = len(whole) - len(self.failures)
         self._ended: list[Ended] = []
         self._so_far = SoFar(plan.study.study, self._folder)
-        whole = [run for run in names if run not in lacks]
         self._so_far.add(whole)
         self._time_left: TimeLeft | None = None
         self._whole = whole
@@ -113,7 +111,11 @@ class Screen:
         begun = time.process_time()
         if words := self._words.new().strip("\n"):
             self._print(words)
-        ended = self._watch.look()
+        all_ended = self._watch.look()
+        for run in all_ended:
+            self._learn(run.run)
+        # Runs tell of a fill that failed.
+        ended = [run for run in all_ended if run.run not in self._fills]
         for run in ended:
             self._end(run)
         if self._table is not None:
@@ -140,8 +142,10 @@ class Screen:
         if self.failures:
             self._print("A failed run is computed once more by: sandmould again RUN")
 
+    def _learn(self, run: str) -> None:
+        self._time_left_known().learn(run, computed_wall_s(self._folders[run]))
+
     def _end(self, run: Ended) -> None:
-        self._time_left_known().learn(run.run, computed_wall_s(self._folder / "runs" / run.run))
         self._so_far.add([run.run])
         if run.said:
             self.failures.append(run)
@@ -152,9 +156,10 @@ class Screen:
     def _time_left_known(self) -> TimeLeft:
         """What foretells the time: made late, since a start measures the machine's speed first."""
         if self._time_left is None:
-            self._time_left = TimeLeft(self._plan.runs, stored_speeds(self._plan, self._results))
+            every = (*self._plan.fills, *self._plan.runs)
+            self._time_left = TimeLeft(every, stored_speeds(self._plan, self._results))
             for run in self._whole:
-                self._time_left.learn(run, computed_wall_s(self._folder / "runs" / run))
+                self._learn(run)
         return self._time_left
 
     def _view(self) -> StudyView:
@@ -175,7 +180,7 @@ class Screen:
             running=tuple(
                 RunView(at, time_left.seconds_of(run, shares[run])) for run, at in running.items()
             ),
-            waiting=len(waiting),
+            waiting=len([run for run in waiting if run not in self._fills]),
             passed_s=passed_s,
             left_s=left_s,
             share=passed_s / (passed_s + left_s) if passed_s + left_s else 0.0,

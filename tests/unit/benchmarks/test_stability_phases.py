@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.stability.phases import exact, impacts
+from benchmarks.frame.impact import exact
+from benchmarks.stability.phases import impacts
 
 
 def test_an_undamped_impact_is_of_second_order() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import runpy
 import shutil
@@ -119,6 +120,33 @@ def test_a_module_tells_how_it_is_called(
     assert capsys.readouterr().out.startswith("usage: python -m ")
     assert end_of(path, ["one", "two", "three"], monkeypatch) == 2
     assert "usage: python -m " in capsys.readouterr().err
+
+
+def test_the_process_that_renders_templates_says_that_it_is_started_by_us(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = ROOT / "sandmould" / "engines" / "own_deck" / "template_process.py"
+    for arguments in ([], ["--help"], ["one", "two", "three"]):
+        assert str(end_of(path, arguments, monkeypatch)).startswith("usage: ")
+
+
+@pytest.mark.parametrize(
+    ("based_on", "scene"),
+    [
+        ("bracket_small", "obstacles: [{kind: mesh, name: a, file: FILE}]"),
+        ("plates_small", "shapes: [{kind: image, file: FILE, pixel_m: 0.001}]"),
+        ("tube_demo", "pattern: {shape: {kind: file, file: FILE}}"),
+    ],
+)
+def test_a_drawing_that_is_a_device_or_a_pipe(based_on: str, scene: str, elsewhere: Path) -> None:
+    """One has no end, the other waits for a writer: neither is opened."""
+    os.mkfifo("pipe")
+    for file in ("/dev/zero", str(elsewhere / "pipe"), "."):
+        text = f"based_on: {based_on}\nscenario: {{{scene.replace('FILE', file)}}}\n"
+        Path("drawn.yaml").write_text(text)
+        status, lines = said("plan", "drawn.yaml")
+        assert status == 1
+        assert any("folder or a device" in line for line in lines), lines
 
 
 @pytest.mark.parametrize("module", ["simulate", "from_files", "records"])

@@ -9,6 +9,7 @@ from sandmould.dem import pairs as pairs_module
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import ISOTROPIC, NONE, Damping
+from sandmould.dem.near_pairs import new_near_pairs
 from sandmould.dem.neighbours import list_pairs, make_grid, sort_into_cells
 from sandmould.dem.solver import NotANumberError, Solver
 from sandmould.dem.steps import DemScene
@@ -106,11 +107,34 @@ def test_listing_again_changes_nothing(dimension: int) -> None:
         often._list(np.zeros(dimension))
         seldom.advance(np.zeros(52))
     assert often.lists > seldom.lists + 20
-    assert often.pairs.touching.sum() > 3
+    assert len(often.contacts.first) > 3
     one, two = (s.grains.ordered(np.argsort(s.grains.id)) for s in (often, seldom))
     # The order of sums differs, and round-off grows a thousandfold in a few collisions.
     np.testing.assert_allclose(one.position, two.position, atol=1e-11)
     np.testing.assert_allclose(one.spin, two.spin, atol=1e-5)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_looks_for_near_pairs_change_no_bit(dimension: int) -> None:
+    seldom, always, never = (solver(dimension, 200) for _ in range(3))
+    fewer = 0
+    for _ in range(1000):
+        always.moving.near.left[:] = -1.0
+        moving = never.moving
+        slots = len(moving.chunks.grain)
+        whole = new_near_pairs(never._dim, moving.pairs, slots, never.contacts)
+        whole.left[:] = np.inf
+        never.moving = moving._replace(near=whole)
+        for s in (seldom, always, never):
+            s.advance(np.zeros(5))
+        near, listed = seldom.moving.near, seldom.moving.pairs.start
+        fewer += int(near.stop[-1] < listed[-1] == never.moving.near.stop[-1])
+        np.testing.assert_array_equal(seldom.grains.position, never.grains.position)
+    assert fewer > 500  # some pairs were passed over, and looked at in every step by the other
+    assert len(never.contacts.first) > 3
+    for s in (seldom, always):
+        np.testing.assert_array_equal(s.grains.position, never.grains.position)
+        np.testing.assert_array_equal(s.contacts.friction, never.contacts.friction)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -121,7 +145,7 @@ def test_threads_change_no_bit(dimension: int, monkeypatch: pytest.MonkeyPatch) 
     for s in (one, two):
         s.advance(np.zeros(3002))
     assert len(two.moving.chunks.bound) == 11
-    assert one.pairs.touching.sum() > 10
+    assert len(one.contacts.first) > 10
     np.testing.assert_array_equal(one.grains.position, two.grains.position)
     np.testing.assert_array_equal(one.grains.spin, two.grains.spin)
 
@@ -164,9 +188,9 @@ def test_grains_fall_freely_once_the_gate_is_gone(dimension: int) -> None:
     s.add(grains)
     s.advance(np.zeros(20002))
     assert s.mean_loads(20000)["gate"][-1] < 0
-    bonds = s.pairs.touching.sum()
+    bonds = len(s.contacts.first)
     s.remove_surface("gate")
-    assert s.pairs.touching.sum() == bonds > 0  # contacts of grains are kept
+    assert len(s.contacts.first) == bonds > 0  # contacts of grains are kept
     s.advance(np.zeros(3))  # the first step still has the gate's last force
 
     def middle(values: np.ndarray) -> float:
@@ -213,7 +237,7 @@ def test_momentum_and_angular_momentum_are_kept_without_walls(dimension: int) ->
     met = 0
     for _ in range(20):
         s.advance(np.zeros(102))
-        met += int(s.pairs.touching.sum())
+        met += len(s.contacts.first)
     after = momenta()
     assert met > 50
     scale = float((s.grains.mass * np.linalg.norm(s.grains.velocity, axis=1)).sum())

@@ -245,7 +245,7 @@ def test_loop_of_checks_is_left_to_the_session() -> None:
     assert "label settling_settle_2" in deck.blocks["rest_of_settle_2"].text
     before, after = deck.blocks["vibrate_1"].around_run()
     assert "run" not in after
-    assert before.splitlines()[-1].startswith("variable shake_next")
+    assert before.splitlines()[-1].startswith("variable until_setup")
 
 
 def test_first_run_after_a_vibration_ends_at_a_check() -> None:
@@ -253,7 +253,7 @@ def test_first_run_after_a_vibration_ends_at_a_check() -> None:
     scene = liggghts_scene(fill={"vibration_between_layers": between})
     program = build_program(scene)
     text = render_deck(program, {}).text
-    first, whole = re.findall(r'then "run (\d+) post no" else "run (\d+) ', text)[1]
+    first, whole = re.findall(r'then "run (\d+) post no" elif .* "run (\d+) ', text)[1]
     steps = next(s for s in program.stages if s.vibration)
     assert steps.vibration is not None
     moved = math.ceil(steps.vibration.whole_duration_s / scene.step_s) + 2

@@ -68,7 +68,7 @@ def test_a_plan_pays_for_the_rest() -> None:
     rest = with_rest.stages[-1]
     assert rest.expected_s > rest.stop_s
     assert with_rest.expected_s == pytest.approx(without.expected_s + rest.expected_s)
-    assert with_rest.expected_grain_steps > without.expected_grain_steps
+    assert with_rest.expected_grain_steps() > without.expected_grain_steps()
 
 
 def course_of(stages: list[Stage], step_s: float, counts: StepCounts) -> np.ndarray:

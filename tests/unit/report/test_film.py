@@ -53,7 +53,7 @@ def test_film_holds_the_snapshots(tmp_path: Path, dimension: int) -> None:
     assert film is not None
     metres, radius, layer = unpack(film)
     for number, moment in enumerate(list_moments(folder)):
-        snapshot = Snapshot.load(moment.path)
+        snapshot = moment.load()
         here = snapshot.id - 1
         apart = metres[:, number, here].T - snapshot.position_m
         assert np.abs(apart).max() <= 0.5 * film.quantum_m * (1 + 1e-9)

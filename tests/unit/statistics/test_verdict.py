@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ import pytest
 from scipy import stats
 
 from sandmould.scenario.vibration import VibrationStage
+from sandmould.statistics.settings import compare_means
 from sandmould.statistics.verdict import NOT_TESTED, compare_settings, rank_runs, sand_notes
 
 KEY = "vibration.0.frequency_hz"
@@ -265,3 +267,17 @@ def test_one_constant_side_is_compared_with_the_other() -> None:
     reach = stats.t.ppf(0.975, 2) * error
     apart = (0.6 + 0.63 + 0.62) / 3 - 0.3
     assert comparison.ci == pytest.approx((apart - reach, apart + reach), rel=1e-9)
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_means_are_tested_as_scipy_tests_them(paired: bool) -> None:
+    drawn = np.random.default_rng(0)
+    first = pd.Series(drawn.normal(size=5))
+    second = pd.Series(drawn.normal(1.0, 2.0, 5 if paired else 7))
+    second.index += 0 if paired else 10
+    test, is_paired = compare_means(first, second) or pytest.fail("not tested")
+    known = stats.ttest_rel if paired else partial(stats.ttest_ind, equal_var=False)
+    result = known(first, second)
+    assert is_paired is paired
+    assert (test.pvalue, test.df) == pytest.approx((result.pvalue, result.df))
+    assert test.confidence_interval(0.9) == pytest.approx(result.confidence_interval(0.9))

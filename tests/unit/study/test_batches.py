@@ -97,24 +97,24 @@ class Jobs:
         self.measured: list[str] = []
         self.stops = stops
         monkeypatch.setattr(batch_job, "render", self.render)
-        monkeypatch.setattr(batch_job, "launch", self.launch)
-        monkeypatch.setattr(batch_job, "measure", self.measure)
+        monkeypatch.setattr(batch_job, "load", lambda folders, ahead: None)
+        monkeypatch.setattr(batch_job, "compute_forked", self.compute)
+        monkeypatch.setattr(batch_job, "measure_forked", self.measure)
 
     def render(self, run: Run, folder: Path) -> None:
         (folder / "deck.in").write_text("run 1\n")
 
-    def launch(self, folder: Path, log: Path, ranks: int, mpi: str) -> None:
+    def compute(self, run: Run, folder: Path, log: Path) -> None:
         if folder.name == self.stops:
             raise SystemExit(f"{folder} stopped early: the same command continues it.")
         self.computed.append(folder.name)
-        run = batch_job.read_run(folder / "scenario.yaml")
         origin = {"scenario_sha256": scenario_hash(run.scenario),
                   "template_sha256": deck_hash(run.scenario)}  # fmt: skip
         (folder / "provenance.json").write_text(json.dumps(origin))
         write_manifest(folder, "computed", {})
         RunOutcome(Outcome.FINISHED, "", 1.0, 1.0).write(folder / "outcome.json")
 
-    def measure(self, run: Run, folder: Path) -> None:
+    def measure(self, run: Run, folder: Path, log: Path) -> None:
         self.measured.append(folder.name)
         (folder / LAST_MEASURED).touch()
         write_manifest(folder, "measured", {LAST_MEASURED: 0})
@@ -133,16 +133,16 @@ def test_a_batch_goes_on_past_a_run_that_stopped_and_redoes_none(
     names = [folder.name for folder in folders]
     first = Jobs(monkeypatch, stops=names[1])
     with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {names[1]}"):
-        compute_batch(folders, tmp_path, 1, "mpiexec")
+        compute_batch(folders, tmp_path / "log", 1, "mpiexec")
     assert "stopped early" in capfd.readouterr().err
     assert first.computed == first.measured == [names[0], names[2]]
     again = Jobs(monkeypatch)
-    compute_batch(folders, tmp_path, 1, "mpiexec")
+    compute_batch(folders, tmp_path / "log", 1, "mpiexec")
     assert again.computed == again.measured == [names[1]]
     # What was computed and not measured is measured alone.
     (folders[0] / LAST_MEASURED).unlink()
     last = Jobs(monkeypatch)
-    compute_batch(folders, tmp_path, 1, "mpiexec")
+    compute_batch(folders, tmp_path / "log", 1, "mpiexec")
     assert (last.computed, last.measured) == ([], [names[0]])
 
 
@@ -152,14 +152,14 @@ def test_a_run_that_breaks_does_not_stop_the_others(
     folders = planned(tmp_path)
     jobs = Jobs(monkeypatch)
 
-    def measure(run: Run, folder: Path) -> None:
+    def measure(run: Run, folder: Path, log: Path) -> None:
         if folder == folders[0]:
             raise OSError("no space left")
-        jobs.measure(run, folder)
+        jobs.measure(run, folder, log)
 
-    monkeypatch.setattr(batch_job, "measure", measure)
+    monkeypatch.setattr(batch_job, "measure_forked", measure)
     with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {folders[0].name}"):
-        compute_batch(folders, tmp_path, 1, "mpiexec")
+        compute_batch(folders, tmp_path / "log", 1, "mpiexec")
     assert f"{folders[0].name}: no space left" in capfd.readouterr().err
     assert jobs.measured == [folder.name for folder in folders[1:]]
 
@@ -170,14 +170,14 @@ def test_a_job_that_is_asked_to_end_begins_no_other_run(
     folders = planned(tmp_path)
     jobs = Jobs(monkeypatch)
 
-    def measure(run: Run, folder: Path) -> None:
+    def measure(run: Run, folder: Path, log: Path) -> None:
         os.kill(os.getpid(), signal.SIGTERM)
-        jobs.measure(run, folder)
+        jobs.measure(run, folder, log)
 
-    monkeypatch.setattr(batch_job, "measure", measure)
+    monkeypatch.setattr(batch_job, "measure_forked", measure)
     before = signal.getsignal(signal.SIGTERM)
     with pytest.raises(SystemExit, match="2 of 3 stopped or broke"):
-        compute_batch(folders, tmp_path, 1, "mpiexec")
+        compute_batch(folders, tmp_path / "log", 1, "mpiexec")
     assert jobs.measured == [folders[0].name]
     assert signal.getsignal(signal.SIGTERM) == before
 
@@ -188,10 +188,10 @@ def test_runs_side_by_side_are_computed_once_each(
     folders = planned(tmp_path)
     Jobs(monkeypatch, stops=folders[1].name)
     with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {folders[1].name}"):
-        compute_batch(folders, tmp_path, 1, "mpiexec", side_by_side=2)
+        compute_batch(folders, tmp_path / "log", 1, "mpiexec", side_by_side=2)
     assert [is_done(folder) for folder in folders] == [True, False, True]
     Jobs(monkeypatch)
-    compute_batch(folders, tmp_path, 1, "mpiexec", side_by_side=2)
+    compute_batch(folders, tmp_path / "log", 1, "mpiexec", side_by_side=2)
     assert all(is_done(folder) for folder in folders)
 
 
@@ -202,11 +202,11 @@ def test_a_changed_scenario_or_solver_is_computed_again(
     run = batch_job.read_run(folder / "scenario.yaml")
     assert lack_of(run, folder) == Lack(Need.COMPUTE)
     jobs = Jobs(monkeypatch)
-    compute_batch([folder], tmp_path, 1, "mpiexec")
+    compute_batch([folder], tmp_path / "log", 1, "mpiexec")
     assert lack_of(run, folder) == WHOLE
     origin = json.loads((folder / "provenance.json").read_text())
     for key in ("scenario_sha256", "template_sha256"):
         (folder / "provenance.json").write_text(json.dumps(origin | {key: "another"}))
         assert lack_of(run, folder).need is Need.COMPUTE
-    compute_batch([folder], tmp_path, 1, "mpiexec")
+    compute_batch([folder], tmp_path / "log", 1, "mpiexec")
     assert jobs.computed == jobs.measured == [folder.name] * 2

@@ -8,12 +8,14 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
-from sandmould.runs.manifest import MANIFEST_FILE
+from sandmould.runs.manifest import MANIFEST_FILE, OLDER_COST, OLDER_ORIGIN
 from sandmould.study.batch_job import compute_batch
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of, notes_of
+from sandmould.study.run_tables import read_costs
 from sandmould.study.simulate import measure_run
 from sandmould.study.status import run_status, status_text
 from tests.finished_study import finished_study, study_text
@@ -81,13 +83,11 @@ def appended(name: str) -> Callable[[Path], None]:
         (removed("outcome.json"), Need.COMPUTE, "outcome.json is missing"),
         (emptied("outcome.json"), Need.COMPUTE, "outcome.json cannot be read"),
         (cut("outcome.json"), Need.COMPUTE, "outcome.json cannot be read"),
-        (removed("provenance.json"), Need.COMPUTE, "provenance.json is missing"),
-        (cut("provenance.json"), Need.COMPUTE, "cannot be read"),
-        (cut(MANIFEST_FILE), Need.COMPUTE, "cannot be read"),
+        (removed(MANIFEST_FILE), Need.COMPUTE, "products.json is missing"),
+        (cut(MANIFEST_FILE), Need.COMPUTE, "products.json cannot be read"),
         (removed("fields.npz"), Need.COMPUTE, "fields.npz is missing"),
         (cut("fields.npz"), Need.COMPUTE, "fields.npz has "),
         (emptied("series.tsv"), Need.COMPUTE, "series.tsv has 0 of "),
-        (removed("cost.tsv"), Need.COMPUTE, "cost.tsv is missing"),
         (removed("deck.in"), Need.COMPUTE, "deck.in is missing"),
         (appended("deck.in"), Need.COMPUTE, "deck.in was changed by hand"),
         (removed("measures.tsv"), Need.MEASURE, "measures.tsv is missing"),
@@ -126,8 +126,12 @@ def test_what_is_no_damage_computes_nothing(harmless: Callable[[Path], None], pl
 
 def test_a_run_of_older_times_needs_its_files_to_be_there(plan: Plan) -> None:
     folder = folder_of(plan)
+    tree = json.loads((folder / MANIFEST_FILE).read_text())
+    (folder / OLDER_ORIGIN).write_text(json.dumps(tree["origin"]))
+    pd.DataFrame([tree["cost"]]).to_csv(folder / OLDER_COST, sep="\t", index=False)
     (folder / MANIFEST_FILE).unlink()
     assert lack(plan) == WHOLE
+    assert read_costs([folder]).rows["engine"][0] == tree["cost"]["engine"]
     (folder / "final.png").write_bytes(b"")
     assert lack(plan) == Lack(Need.MEASURE, "final.png is missing or empty")
     (folder / "series.tsv").unlink()
@@ -169,10 +173,10 @@ def test_a_batch_mends_what_is_damaged(plan: Plan) -> None:
     folder = folder_of(plan)
     before = {name: (folder / name).read_text() for name in ("series.tsv", "measures.tsv")}
     cut("outcome.json")(folder)
-    compute_batch([folder], folder, 1, "mpiexec")
+    compute_batch([folder], folder / "log", 1, "mpiexec")
     assert lack(plan) == WHOLE
     removed("fields.vtu")(folder)
-    compute_batch([folder], folder, 1, "mpiexec")
+    compute_batch([folder], folder / "log", 1, "mpiexec")
     assert lack(plan) == WHOLE
     assert before == {name: (folder / name).read_text() for name in before}
     assert run_status(folder, lack(plan)).state == "done"

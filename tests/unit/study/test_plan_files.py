@@ -28,7 +28,7 @@ from sandmould.study.plan.build_plan import announce, measure_speeds, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
-from sandmould.study.plan.price import BEGIN_S, END_S, Piece, Prices, spread_s
+from sandmould.study.plan.price import BEGIN_S, END_S, Prices
 
 LAMMPS = ("lammps", 2)
 MEASURED = "at the speed measured on this machine"
@@ -194,9 +194,8 @@ def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
     assert lines[-1].startswith("9 runs, ")
     assert lines[-1].endswith(f"wall time on 1 cores with report: 2.5 h, {MEASURED}")
     # Nine runs on two cores: five after each other.
-    engines = [Piece(planned_work(r.scenario) * 9000 / total) for r in demo]
-    longer = duration_text(BEGIN_S + END_S + 5 * START_S + spread_s(engines, 2))
-    halved = plan_table(demo, Prices({LAMMPS: total / 9000}), 2)
+    longer = duration_text(BEGIN_S + END_S + 5 * (START_S + 10_000))
+    halved = plan_table(demo, Prices({LAMMPS: total / 90_000}), 2)
     assert halved.endswith(f"on 2 cores with report: {longer}, {MEASURED}\n")
     # On more cores than runs the longest run decides.
     longest = max(planned_work(r.scenario) for r in demo)

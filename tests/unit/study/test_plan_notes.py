@@ -105,6 +105,17 @@ def test_walls_of_a_picture(tmp_path: Path) -> None:
     assert "the thinnest measures 3" in walls
 
 
+def test_large_elements_in_a_metal_that_melts_at_one_temperature_are_told(tmp_path: Path) -> None:
+    scene_ = around(0.08, 0.04) | {"element_m": 0.004}
+    pure = {"casting": {"solidus_k": 1750.0, "liquidus_k": 1750.0}}
+    (front,) = notes_of(tmp_path, **scene_, **pure, layers=[2])
+    assert front.startswith("The metal melts at one temperature, and layers put elements of 8 mm")
+    assert notes_of(tmp_path, **scene_, **pure) == []
+    assert notes_of(tmp_path, **scene_, layers=[2]) == []
+    # too thin for a larger one
+    assert notes_of(tmp_path, **around(0.012, 0.04), element_m=0.004, **pure, layers=[2]) == []
+
+
 def test_elements_that_hold_another_volume_than_drawn_are_told(tmp_path: Path) -> None:
     off = around(0.043, 0.04)
     off["box"]["high_m"] = [0.124, 0.124]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 
 import meshio
@@ -58,10 +59,12 @@ def test_measures_have_a_row_a_snapshot_and_gaps_for_broken_ones(folder: Path) -
 
 def test_exports_are_read_back_by_meshio_and_hold_the_moments(folder: Path) -> None:
     write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
-    names = sorted(p.name for p in (folder / "exports").iterdir())
+    with zipfile.ZipFile(folder / "exports.zip") as archive:
+        names = sorted(archive.namelist())
+        archive.extractall(folder / "unpacked")
     assert names == ["000000.dump", "000000.vtu", "000001.dump", "000001.vtu", "000002.dump",
                      "000002.vtu", "solids.vtu"]  # fmt: skip
-    mesh = meshio.read(folder / "exports" / "000002.vtu")
+    mesh = meshio.read(folder / "unpacked" / "000002.vtu")
     assert mesh.points[0] == pytest.approx([0.06, 0.02, 0.0])
 
 

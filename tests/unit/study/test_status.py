@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from sandmould.engines.registry import deck_hash
+from sandmould.runs.claim import CLAIM_FILE
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.kinds.sand.planning import planned_work
@@ -20,7 +21,8 @@ from sandmould.study.plan.lacking import Lack, Need
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.status import run_status, status_text
 
-FREQUENCY = "vibration.0.frequency_hz"
+RECORDS = "record.series_every_s"
+"""Runs of other records share no fill: test_fills.py has those that do."""
 
 
 @pytest.fixture
@@ -29,7 +31,7 @@ def plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Plan:
     monkeypatch.chdir(tmp_path)
     tree = {
         "based_on": "tube", "scenario": {"engine": {"name": "reference"}},
-        "sweep": {"keys": {FREQUENCY: [25, 50, 100]}}, "replicates": 2,
+        "sweep": {"keys": {RECORDS: [0.01, 0.02, 0.04]}}, "replicates": 2,
     }  # fmt: skip
     Path("trial.yaml").write_text(yaml.safe_dump(tree), encoding="utf-8")
     plan = open_plan(Path("trial.yaml"))
@@ -55,7 +57,7 @@ def begun(plan: Plan, place: int, ago_s: float) -> Path:
     """Let a run have written its progress a while ago."""
     folder = Path("results/trial/runs") / plan.runs[place].run
     (folder / "work").mkdir()
-    progress = {"stage": "settle_1", "time_s": 0.5, "percent": 40.0, "left_s": 90.0}
+    progress = {"stage": "settle_1", "time_s": 0.5, "percent": 40.0, "left_s": 90.0, "cpu_s": 20.0}
     path = folder / "work" / "progress.json"
     path.write_text(json.dumps(progress))
     now = path.stat().st_mtime
@@ -63,11 +65,19 @@ def begun(plan: Plan, place: int, ago_s: float) -> Path:
     return folder
 
 
-def test_nothing_begun_has_no_time_left_that_is_known(plan: Plan) -> None:
+def claimed(folder: Path) -> None:
+    """Let a job on another machine compute a run."""
+    (folder / "lock").touch()
+    owner = {"host": "node7", "boot": "another", "pid": 1, "job": "7", "token": "t"}
+    (folder / CLAIM_FILE).write_text(json.dumps(owner))
+
+
+def test_time_left_of_nothing_begun_is_an_estimate(plan: Plan) -> None:
     said = status_text(plan, Path("results"), 2)
-    assert said.startswith("trial: 6 waiting of 6 runs\nprocessor time so far: 0 s; ")
-    assert "; time left: about " in said
-    assert said.splitlines()[1].endswith(" on 2 cores with the report, an estimate")
+    assert said.startswith(
+        "trial: 6 waiting of 6 runs\nprocessor time so far: 0 s; time left with its report: about "
+    )
+    assert said.endswith(" on 2 cores, an estimate")
 
 
 def test_every_state_is_told(plan: Plan) -> None:
@@ -77,17 +87,20 @@ def test_every_state_is_told(plan: Plan) -> None:
     running, stopped = begun(plan, 2, ago_s=500.0), begun(plan, 3, ago_s=1.0)
     (stopped / "lock").write_text(f"{socket.gethostname()}\n")
     elsewhere = begun(plan, 4, ago_s=1.0)
-    (elsewhere / "lock").write_text("another machine\n")
+    claimed(elsewhere)
     with (running / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         said = status_text(plan, Path("results"), 2)
     first, second, *lines = said.splitlines()
     assert first == "trial: 1 done, 1 failed, 2 running, 1 stopped, 1 waiting of 6 runs"
-    # Twice 90 s of those that run, and one stopped and one waiting of 600 s or 300 s, on two cores.
-    assert second.startswith("processor time so far: 15.0 min; time left: about ")
+    # 15 min of those that ended, three times 20 s of those that did not.
+    # 360 s are left of three, 600 s of the one that waits: on two cores 360 s, then 600 s, then
+    # the report.
+    left = "time left with its report: about 16.1 min on 2 cores, by finished runs"
+    assert second == f"processor time so far: 16.0 min; {left}"
     assert lines == [
         f"  running: {running.name}  40 %, settle_1, 0.5 s simulated",
-        f"  running: {elsewhere.name}  40 %, settle_1, 0.5 s simulated",
+        f"  running: {elsewhere.name}  40 %, settle_1, 0.5 s simulated, job 7 on node7",
         f"  stopped: {stopped.name}  40 %, settle_1, 0.5 s simulated",
         f"  failed: {plan.runs[1].run}  overlap too large. why it is so",
         "a failed run is computed once more by: sandmould again RUN",
@@ -96,8 +109,15 @@ def test_every_state_is_told(plan: Plan) -> None:
 
 def test_progress_alone_is_no_run_that_goes_on(plan: Plan) -> None:
     folder = begun(plan, 0, ago_s=500.0)
-    (folder / "lock").write_text("another machine\n")
+    (folder / "lock").touch()
     assert run_status(folder, Lack(Need.COMPUTE)).state == "stopped"
+    claimed(folder)
+    assert run_status(folder, Lack(Need.COMPUTE), {"7"}).state == "running"
+    # Its job has ended, as the cluster says, though its claim is fresh; or it ran out of time.
+    RunOutcome(Outcome.OUT_OF_WALL_TIME, "", 0.5, 1.0).write(folder / "work" / "outcome.json")
+    ended = run_status(folder, Lack(Need.COMPUTE), {"8"})
+    assert (ended.state, ended.said[-18:]) == ("stopped", "; out of wall time")
+    (folder / CLAIM_FILE).unlink()
     (folder / "lock").unlink()
     assert run_status(begun(plan, 1, ago_s=0.0), Lack(Need.COMPUTE)).state == "stopped"
 

@@ -32,7 +32,8 @@ def _shaken(
         frame=frame,
         vibration=[stage],
         measure_at_rest=False,
-        rest={"load_every_steps": 50, "check_every_s": 1e-3},
+        # no setup within the case: engines forget the velocity of moving walls there
+        rest={"load_every_steps": 50, "check_every_s": 5e-3},
         **changes,
     )
     return Bench(given), given.vibration[0]

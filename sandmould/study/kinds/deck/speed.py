@@ -16,6 +16,7 @@ from sandmould.engines.own_deck import deck as own_deck
 from sandmould.engines.registry import engine_module
 from sandmould.runs.files import write_text
 from sandmould.runs.parent import end_with_parent
+from sandmould.scenario.module_main import run_main
 from sandmould.scenario.own_deck import OwnDeck
 
 STORED = "pilots.json"
@@ -122,7 +123,7 @@ def _key(scenario: OwnDeck) -> str:
     return f"{platform.node()} {scenario.engine.name} {version} {deck[:SHORT]}"
 
 
-def main(name: str) -> None:
+def main(name: str) -> int:
     """Compute the pilot of a folder, in a process that may be killed."""
     folder = Path(name)
     scenario = OwnDeck.model_validate_json((folder / "scenario.json").read_text())
@@ -130,7 +131,8 @@ def main(name: str) -> None:
     computed = computation.compute(scenario, folder, "pilot", "pilot")
     if computed.outcome.outcome == 0:
         write_text(folder / "whole.json", json.dumps(computed.cost.wall_s))
+    return 0
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    run_main(main, "python -m sandmould.study.kinds.deck.speed FOLDER-OF-A-PILOT", (1,))

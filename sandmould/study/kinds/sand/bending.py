@@ -22,6 +22,7 @@ from pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.run_tables import read_costs
 
 Row = dict[str, Any]
 
@@ -171,7 +172,7 @@ def _filled_m(table: pd.DataFrame) -> float:
 
 def _outside_fraction(log: pd.DataFrame, folder: Path) -> float:
     """Share of the wall time that went into the pattern's own part."""
-    path = folder / "cost.tsv"
-    if "solve_s" not in log or not path.is_file():
+    costs = read_costs([folder]).rows
+    if "solve_s" not in log or "wall_s" not in costs:
         return np.nan
-    return float(log["solve_s"].sum() / pd.read_csv(path, sep="\t")["wall_s"].iloc[-1])
+    return float(log["solve_s"].sum() / costs["wall_s"].iloc[-1])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from pattern_fe.export import write_stl, write_surface
-from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand.bending import BentPattern
 from sandmould.study.kinds.sand.moments import Moment, list_moments
@@ -31,7 +30,7 @@ def write_bent(scenario: Scenario, run_folder: Path, out: Path) -> None:
     """
     bent = BentPattern(scenario)
     for name, moment in shape_moments(list_moments(run_folder)).items():
-        snapshot = Snapshot.load(moment.path)
+        snapshot = moment.load()
         if snapshot.pattern_m is None:
             continue
         moved_m = snapshot.pattern_m - bent.drawn.vertices_m

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
 from sandmould.engines import recording, registry
 from sandmould.engines.cost import cost_before
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.program import build_program
+from sandmould.engines.snapshot_file import close_torn
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.products import SAND_PRODUCTS, Computed
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.definition.run import Run
+from sandmould.study.definition.run import FILL, Run
 from sandmould.study.kinds.kind import Execution
+from sandmould.study.kinds.sand.shared_fill import lay_fill
 
 
 def render(run: Run, folder: Path) -> None:
@@ -23,21 +26,26 @@ def render(run: Run, folder: Path) -> None:
 
 
 def compute(run: Run, folder: Path) -> Computed:
-    """Take the scenario through its program."""
+    """Take the scenario through its program, or through what its shared fill leaves of it."""
     program = build_program(run.scenario)
+    failed = lay_fill(run, folder, program)
+    if failed is not None:
+        return failed
     opening: Opening = registry.engine_of(run.scenario).open_session
     if run.scenario.pattern is not None:
         from pattern_fe.coupling.opening import open_coupled
 
         opening = open_coupled
-    driver = Driver(program, folder, run.run, scenario_hash(run.scenario), opening)
+    run_hash, is_fill = scenario_hash(run.scenario), run.part == FILL
+    driver = Driver(program, folder, run.run, run_hash, opening, keeps_end=is_fill)
     outcome = driver.run()
     return Computed(outcome, driver.cost, driver.is_root)
 
 
 def complete(scenario: Scenario, work: Path) -> None:
-    """Make empty tables, so that collection finds them."""
+    """Make empty tables, so that collection finds them, and end the file of snapshots."""
     recording.create_tables(work, scenario.dimension)
+    close_torn(work)
 
 
 def measure(run: Run, folder: Path) -> None:
@@ -47,6 +55,20 @@ def measure(run: Run, folder: Path) -> None:
     measure_sand(run.scenario, folder)
 
 
+def load_computing(scenario: Scenario) -> None:
+    """Import the engine's side of the house, and the pattern's where there is one."""
+    registry.engine_of(scenario)
+    if scenario.pattern is not None:
+        importlib.import_module("pattern_fe.coupling.opening")
+
+
+def load_measuring(scenario: Scenario) -> None:
+    """Import what measures and draws."""
+    importlib.import_module("sandmould.study.kinds.sand.measure")
+    if scenario.pattern is not None:
+        importlib.import_module("sandmould.study.kinds.sand.bent_files")
+
+
 EXECUTION = Execution[Scenario](
     products=SAND_PRODUCTS,
     render=render,
@@ -54,4 +76,6 @@ EXECUTION = Execution[Scenario](
     complete=complete,
     no_cost=cost_before,
     measure=measure,
+    load_computing=load_computing,
+    load_measuring=load_measuring,
 )

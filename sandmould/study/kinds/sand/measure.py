@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
+import zipfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +25,11 @@ from analysis.solid_fraction import (
 )
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot, scene_at
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.runs.files import replaced
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import LAST_MEASURED
-from sandmould.study.kinds.sand.moments import MOMENTS, list_moments, nearest
+from sandmould.study.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.study.kinds.sand.outflow import add_outflow, measure_outflow
 
 
@@ -79,10 +83,10 @@ def measure_sand(scenario: Scenario, folder: Path) -> None:
 
 def write_picture(scenario: Scenario, folder: Path, out: Path) -> None:
     """Draw the last snapshot of a run by layer; the empty scene where there is none."""
-    figure = Figure(figsize=(6, 4.5), dpi=150, layout="constrained")
-    ax = figure.add_subplot()
+    figure = Figure(figsize=(6, 4.5), dpi=150)
+    ax = figure.add_axes((0.12, 0.12, 0.84, 0.8))  # a layout of its own would draw all twice
     moments = list_moments(folder)
-    last = Snapshot.load(moments[-1].path) if moments else None
+    last = moments[-1].load() if moments else None
     scene = scenario.scene if last is None else scene_at(scenario, last)
     draw_scene(scene, ax, scenario.box.height_m)
     if last is not None:
@@ -93,29 +97,41 @@ def write_picture(scenario: Scenario, folder: Path, out: Path) -> None:
 def write_exports(scenario: Scenario, folder: Path, out: Path) -> None:
     """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks.
 
-    A pattern's bent surface is always written: it is what the run was made for.
+    They go into one archive beside the folder, ``exports.zip``: a folder of them would be most of
+    the files of a sweep. A pattern's bent surface is always written, into the folder: it is what
+    the run was made for.
     """
     wanted = scenario.record.export
-    out.mkdir(exist_ok=True)
     moments = list_moments(folder)
     if scenario.pattern is not None:
         from sandmould.study.kinds.sand.bent_files import (
             write_bent,  # scikit-fem: few studies need it
         )
 
+        out.mkdir(exist_ok=True)
         write_bent(scenario, folder, out)
     if wanted == "none" or not moments:
         return
-    if scenario.scene.solids:
-        solids_to_vtk(scenario.scene, out / "solids.vtu")
     last_s = moments[-1].vibration_time_s
     chosen = (
         moments if wanted == "all" else {nearest(moments, f * last_s) for f in MOMENTS.values()}
     )
-    for moment in chosen:
-        snapshot = Snapshot.load(moment.path)
-        to_vtk(snapshot, out / f"{moment.path.stem}.vtu")
-        to_ovito(snapshot, out / f"{moment.path.stem}.dump")
+    with tempfile.TemporaryDirectory() as name, replaced(out.with_suffix(".zip")) as partial:
+        written = Path(name)
+        if scenario.scene.solids:
+            solids_to_vtk(scenario.scene, written / "solids.vtu")
+        _write_moments(chosen, written)
+        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
+            for path in sorted(written.iterdir()):
+                archive.write(path, path.name)
+
+
+def _write_moments(moments: Iterable[Moment], out: Path) -> None:
+    """Write some snapshots for ParaView and OVITO into a folder."""
+    for moment in moments:
+        snapshot = moment.load()
+        to_vtk(snapshot, out / f"{moment.stored.name}.vtu")
+        to_ovito(snapshot, out / f"{moment.stored.name}.dump")
 
 
 def write_profile(scenario: Scenario, folder: Path, out: Path) -> None:
@@ -129,7 +145,7 @@ def write_profile(scenario: Scenario, folder: Path, out: Path) -> None:
     rows = []
     for heading, share in MOMENTS.items() if moments else ():
         moment = nearest(moments, share * moments[-1].vibration_time_s)
-        snapshot = Snapshot.load(moment.path)
+        snapshot = moment.load()
         profile = solid_fraction_profile(
             snapshot.position_m, snapshot.radius_m, scene_at(scenario, snapshot), edges_m
         )
@@ -154,9 +170,9 @@ def write_measures(scenario: Scenario, folder: Path, out: Path) -> None:
 
         bent = BentPattern(scenario)
     rows = []
-    for path in sorted((folder / "snapshots").glob("*.npz")):
+    for stored in stored_snapshots(folder):
         try:
-            snapshot = Snapshot.load(path)
+            snapshot = stored.load()
             row = measure_snapshot(scenario, snapshot)
             rows.append(row if bent is None else row | bent.row(snapshot))
         except ValueError as error:

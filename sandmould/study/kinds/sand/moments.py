@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
+from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot_file import StoredSnapshot, stored_snapshots
 
 MOMENTS = {"at its start": 0.0, "after 1/8": 0.125, "after 1/2": 0.5, "at its end": 1.0}
 """Shares of the vibration that are shown, by their heading."""
@@ -14,26 +16,26 @@ MOMENTS = {"at its start": 0.0, "after 1/8": 0.125, "after 1/2": 0.5, "at its en
 
 @dataclass(frozen=True)
 class Moment:
-    """A snapshot's file and time; its grains are not read yet."""
+    """A snapshot by its time; its grains are not read yet."""
 
-    path: Path
+    stored: StoredSnapshot
     time_s: float
     vibration_time_s: float
+
+    def load(self) -> Snapshot:
+        """Read its grains; a ValueError where they are damaged."""
+        return self.stored.load()
 
 
 def list_moments(run_folder: Path) -> tuple[Moment, ...]:
     """Readable snapshots of a run in order of time.
 
-    A file cut short by a killed run is passed over.
+    One cut short by a killed run is passed over.
     """
     moments = []
-    for path in sorted((run_folder / "snapshots").glob("*.npz")):
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                times = float(data["time_s"]), float(data["vibration_time_s"])
-        except Exception:  # numpy and zipfile raise a dozen kinds on a broken file
-            continue
-        moments.append(Moment(path, *times))
+    for stored in stored_snapshots(run_folder):
+        with contextlib.suppress(Exception):  # numpy and zipfile raise a dozen on a broken file
+            moments.append(Moment(stored, *stored.times_s()))
     return tuple(sorted(moments, key=lambda m: m.time_s))
 
 

@@ -30,6 +30,9 @@ SLOW_RATE = 1e6
 """Grain-steps per second of a slow core; benchmarks/ has those measured."""
 IN_3D = 0.4
 """Share in 3D of an engine's speed in 2D."""
+STATE_BYTES, SNAPSHOT_BYTES = {2: 230, 3: 560}, {2: 75, 3: 97}
+"""Disk that a grain at rest takes in a checkpoint of the reference engine, with its contacts, and
+in a snapshot: measured at 282 discs and 2 000 spheres."""
 PASSES = 4.0
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
@@ -75,6 +78,23 @@ def template_hash(scenario: Scenario) -> str:
     return registry.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
 
 
+def fill(scenario: Scenario) -> Scenario | None:
+    """The scene up to its first vibration; None where there is none.
+
+    Another program that bends a pattern answers every run for itself.
+    """
+    pattern = scenario.pattern
+    if not scenario.vibrations or (pattern is not None and pattern.loop.exchange == "files"):
+        return None
+    return scenario.before_vibration
+
+
+def state_bytes(scenario: Scenario) -> int:
+    """Disk for the end of a scene and for the snapshots up to there."""
+    snapshots, d = planned_s(scenario) / scenario.record.snapshot_every_s, scenario.dimension
+    return round(sum(plan_counts(scenario)) * (STATE_BYTES[d] + snapshots * SNAPSHOT_BYTES[d]))
+
+
 def computed_hash(scenario: Scenario) -> str:
     """Hash of what the engine is told to compute, and of the pattern beside it."""
     of_engine = registry.computed_hash(scenario)
@@ -111,7 +131,7 @@ def allowed_s(scenario: Scenario) -> float:
 def planned_work(scenario: Scenario) -> float:
     """Steps times grains in the box at the time, and again where windows are repeated."""
     most = 1 if scenario.pattern is None else scenario.pattern.loop.most_passes
-    return min(most, PASSES) * build_program(scenario).expected_grain_steps
+    return min(most, PASSES) * build_program(scenario).expected_grain_steps()
 
 
 def predicted_s(scenario: Scenario) -> float:
@@ -195,6 +215,8 @@ PLANNING = Planning[Scenario](
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
+    fill=fill,
+    state_bytes=state_bytes,
     beside_s=beside_s,
     notes=notes,
     speed=MachineSpeed(speed.stored_rate, speed.measured_rate),

@@ -32,7 +32,7 @@ def notes(scenario: Solidification) -> Sequence[Note]:
     """Notes of one scenario that has no problems."""
     it = scene.cooled_of(scenario)
     return [*_sand(scenario, it), *_symmetry(scenario), *_walls(scenario), *_volume(scenario),
-            *_filled(scenario)]  # fmt: skip
+            *_filled(scenario), *_front(scenario)]  # fmt: skip
 
 
 def _sand(scenario: Solidification, it: Cooled) -> Iterator[Note]:
@@ -116,3 +116,18 @@ def _filled(scenario: Solidification) -> Iterator[Note]:
     for n, shape in enumerate(scenario.shapes):
         if isinstance(shape, SolidMesh) and (text := filled_note(shape, f"shapes.{n}")):
             yield Note(f"filled {n}", text)
+
+
+def _front(scenario: Solidification) -> Iterator[Note]:
+    metal = scenario.casting
+    if not scenario.layers or metal.solidus_k < metal.liquidus_k:
+        return
+    elements = scene.elements_of(scenario)
+    largest_m = float(elements.size_m[elements.material == scene.CASTING].max())
+    if largest_m > 1.5 * scenario.element_m:
+        yield Note(
+            "front",
+            f"The metal melts at one temperature, and layers put elements of "
+            f"{number(1e3 * largest_m)} mm into the casting: they freeze as a whole, in a strong "
+            f"chill some per cent of the casting's time too early; layers = [] leaves none.",
+        )

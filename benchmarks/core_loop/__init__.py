@@ -1,0 +1,1 @@
+"""The solver's step loop against that of an earlier commit."""

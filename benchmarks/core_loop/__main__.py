@@ -1,0 +1,166 @@
+"""The step loop of the solver beside that of an earlier commit, on the same beds in turns.
+
+``python -m benchmarks.core_loop`` unpacks that commit from the repository, settles the beds and
+writes docs/core_loop.md. Times are processor times of one thread, so that a busy machine does not
+spoil them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.core_loop import turns
+from benchmarks.engines.beds import Bed, settled, tiled
+from benchmarks.engines.timing import ratio, spread
+from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, render
+from sandmould import ROOT
+
+BEFORE = "274675f"
+"""The commit that is compared with."""
+
+
+@dataclass(frozen=True)
+class LoopExtent:
+    """How much is measured."""
+
+    turns: int = 7
+    turn_s: float = 0.5
+    discs: tuple[int, ...] = (3_000, 10_000)
+    spheres: int = 2_000
+    tiled_spheres: int = 20_000
+    rest_discs: int = 100
+    rest_s: float = 100.0
+    """Simulated time of a bed at rest, and how many discs it has."""
+
+
+QUICK = LoopExtent(2, 0.05, (300,), 300, 600, 100, 0.05)
+
+
+def tree_of(commit: str) -> Path:
+    """Source tree of a commit, unpacked once."""
+    tree = SCRATCH / "core_loop" / commit
+    if not tree.exists():
+        tree.mkdir(parents=True)
+        packed = subprocess.run(
+            ["git", "archive", commit], cwd=ROOT, check=True, capture_output=True
+        )
+        subprocess.run(["tar", "-x", "-C", tree], input=packed.stdout, check=True)
+    return tree
+
+
+@contextmanager
+def started(trees: dict[str, Path], bed: Bed, motion: str) -> Iterator[dict[str, Any]]:
+    """One process for each tree with the bed in it."""
+    environment = os.environ | {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    with tempfile.TemporaryDirectory() as name:
+        bed_file = Path(name) / "bed.npz"
+        np.savez(bed_file, **vars(bed))
+        processes = {
+            key: subprocess.Popen(
+                [sys.executable, turns.__file__, str(tree), str(bed_file), motion],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=tree, env=environment,
+            )
+            for key, tree in trees.items()
+        }  # fmt: skip
+        try:
+            yield processes
+        finally:
+            for process in processes.values():
+                process.stdin.close()  # type: ignore[union-attr]
+                process.wait()
+
+
+def turn(process: Any, steps: int) -> dict[str, Any]:
+    """One turn of one tree."""
+    process.stdin.write(f"{steps}\n")
+    process.stdin.flush()
+    answer: dict[str, Any] = json.loads(process.stdout.readline())
+    return answer
+
+
+def compare(bed: Bed, motion: str, extent: LoopExtent) -> dict[str, Any]:
+    """Cost per grain-step before and now in turns, and whether all digits are the same."""
+    with started({"before": tree_of(BEFORE), "now": ROOT}, bed, motion) as both:
+        for process in both.values():
+            turn(process, 4)
+        first = [turn(process, 40)["took_s"] for process in both.values()]
+        steps = max(20, round(40 * extent.turn_s / first[0]))
+        for process in both.values():
+            turn(process, steps)
+        costs: dict[str, list[float]] = {name: [] for name in both}
+        same = True
+        for _ in range(extent.turns):
+            answers = {name: turn(process, steps) for name, process in both.items()}
+            same = same and len({a["checksum"] for a in answers.values()}) == 1
+            for name, answer in answers.items():
+                costs[name].append(1e9 * answer["took_s"] / (steps * bed.grains))
+    row = {
+        "bed": bed.name,
+        "motion": motion,
+        "steps": steps,
+        "fastest_m_s": answers["now"]["fastest_m_s"],
+        "ns_per_grain_step": {name: spread(values) for name, values in costs.items()},
+        "speedup": ratio(costs["before"], costs["now"]),
+        "same_digits": same,
+    }
+    print(row, flush=True)
+    return row
+
+
+def measure_beds(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """All beds, at rest and shaken."""
+    extent: LoopExtent = run.extent
+    beds = [settled(2, n) for n in extent.discs] + [settled(3, extent.spheres)]
+    beds.append(tiled(beds[-1], extent.tiled_spheres))
+    return [compare(bed, motion, extent) for bed in beds for motion in ("rest", "shaken")]
+
+
+def measure_rest(run: BenchmarkRun) -> dict[str, Any]:
+    """Drift of a small bed at rest over a long time, before and now."""
+    extent: LoopExtent = run.extent
+    bed = settled(2, extent.rest_discs)
+    with started({"before": tree_of(BEFORE), "now": ROOT}, bed, "rest") as both:
+        step_s = {name: turn(process, 4)["step_s"] for name, process in both.items()}["now"]
+        tenth = max(1, round(0.1 * extent.rest_s / step_s))
+        marks = {name: [turn(p, tenth) for _ in range(10)] for name, p in both.items()}
+    return {
+        "bed": bed.name,
+        "simulated_s": 10 * tenth * step_s,
+        "mean_radius_m": float(bed.radius_m.mean()),
+        "farthest_m": {n: [m["farthest_m"] for m in rows] for n, rows in marks.items()},
+        "fastest_m_s": {n: rows[-1]["fastest_m_s"] for n, rows in marks.items()},
+        "same_digits": all(
+            a["checksum"] == b["checksum"]
+            for a, b in zip(marks["before"], marks["now"], strict=True)
+        ),
+    }
+
+
+def page(results: dict[str, Any]) -> str:
+    """The page of the results."""
+    return render(Path(__file__).with_name("page.md.j2"), {**results, "before": BEFORE})
+
+
+BENCHMARK = Benchmark(
+    __file__,
+    __doc__,
+    parts={"beds": measure_beds, "rest": measure_rest},
+    pages={"core_loop.md": page},
+    extent=LoopExtent(),
+    quick=QUICK,
+    arrange=lambda measured, run: {**measured, "origin": run.origin, "turns": run.extent.turns},
+)
+
+if __name__ == "__main__":
+    BENCHMARK.command()

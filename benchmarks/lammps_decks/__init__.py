@@ -1,0 +1,1 @@
+"""What grains near walls and sorted grains make of the speed of LAMMPS decks."""

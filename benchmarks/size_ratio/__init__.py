@@ -1,0 +1,1 @@
+"""Small grains between large ones: what the plane of the slip does."""

@@ -1,0 +1,1 @@
+"""What whole sweeps cost with an older version and with this one."""

@@ -1,0 +1,188 @@
+"""What whole sweeps cost with an older version and with this one, in turns on one machine.
+
+``python -m benchmarks.sweeps --old FOLDER`` writes docs/sweep_cost.md. FOLDER is a checkout of the
+older version with its own ``.venv``, such as one that ``git worktree add`` makes and
+``make quick`` sets up.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from argparse import ArgumentParser
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import yaml
+
+from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, render
+from sandmould import ROOT
+from sandmould.study.run_tables import read_costs
+
+CORES = 2
+STUDIES = ("sweep", "certified", "short_runs")
+FREQUENCY = "vibration.0.frequency_hz"
+_TUBE: dict[str, Any] = {"engine": {"name": "reference"}, "time_step": {"fraction": 0.8}}
+_SHAKE: dict[str, Any] = {"frequency_hz": 50, "acceleration_g": 1.5}
+
+
+def _study(scenario: Mapping[str, Any], hz: list[float], **top: Any) -> dict[str, Any]:
+    return {
+        "based_on": "tube", "scenario": {**_TUBE, **scenario},
+        "sweep": {"keys": {FREQUENCY: hz}}, **top,
+    }  # fmt: skip
+
+
+def _stand_in(runs: int) -> dict[str, Any]:
+    """Short runs: those of docs/scaling.md."""
+    scenario = {
+        "sand": {"size_scale": 12, "size_classes": 3},
+        "fill": {"layers": [{"count": 20}]},
+        "vibration": [{**_SHAKE, "duration_s": 0.06}],
+        "record": {"snapshot_every_s": 0.2},
+    }
+    return _study(scenario, [20.0 + 0.04 * n for n in range(runs // 5)], replicates=5)
+
+
+def _sweep(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
+    """A sweep like ``tube_frequency``: eight frequencies in equal ratios, 1.5 g held."""
+    scenario = {
+        "sand": {"size_scale": scale},
+        "vibration": [{**_SHAKE, "duration_s": duration_s}],
+    }
+    return _study(scenario, [15, 21, 29, 40, 55, 77, 107, 150], replicates=replicates)
+
+
+def _certified(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
+    """One like ``tube_certified``: a stroke held, a round, and controls of hold and stiffness."""
+    held = {**_SHAKE, "hold": "displacement", "reference_frequency_hz": 50}
+    scenario = {
+        "sand": {"size_scale": scale},
+        "vibration": [{**held, "duration_s": duration_s}],
+    }
+    del held["frequency_hz"]
+    return _study(
+        scenario, [25, 35, 50, 70, 100, 140], replicates=replicates,
+        equivalence={"margins": {"tube_fill_fraction": 0.03}},
+        refine={"rounds": 1, "runs": 6, "interval": {FREQUENCY: 20}},
+        certificate={"controls": ["hold", "stiffness"]},
+    )  # fmt: skip
+
+
+WHOLE: dict[str, Any] = {
+    "turns": 2,
+    "sweep": _sweep(6, 2.0, 2),
+    "certified": _certified(8, 1.0, 3),
+    "short_runs": _stand_in(100),
+}
+LITTLE: dict[str, Any] = {
+    "turns": 1,
+    "sweep": _sweep(12, 0.1, 1),
+    "certified": _certified(12, 0.1, 2),
+    "short_runs": _stand_in(10),
+}
+
+
+def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
+    """Run a study from nothing to its report with one version; what that took and left."""
+    shutil.rmtree(study.parent / "results", ignore_errors=True)
+    shutil.rmtree(study.parent / ".snakemake", ignore_errors=True)
+    before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    ran = subprocess.run(
+        [python, "-m", "sandmould.cli", "run", study.name, "--cores", str(CORES)],
+        cwd=study.parent, capture_output=True, text=True,
+        env=os.environ | {"PYTHONPATH": str(root)},
+    )  # fmt: skip
+    wall_s = time.perf_counter() - begun
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    folder = study.parent / "results" / study.stem
+    if ran.returncode and not (folder / "report.html").exists():
+        raise SystemExit(f"{study} failed with {root}:\n{ran.stdout[-2000:]}{ran.stderr[-2000:]}")
+    costs = read_costs([*folder.glob("runs/*"), *folder.glob("fills/*")]).rows
+    return {
+        "core_s": sum(
+            getattr(after, name) - getattr(before, name) for name in ("ru_utime", "ru_stime")
+        ),
+        "wall_s": wall_s,
+        "loop_s": float(costs["engine_wall_s"].sum()),
+        "runs": sum(1 for _ in folder.glob("runs/*")),
+        "grain_steps": float(costs["grain_steps"].sum()),
+        "files": sum(path.is_file() for path in folder.rglob("*")),
+        "bytes": sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()),
+    }
+
+
+def _in_turns(name: str, run: BenchmarkRun) -> dict[str, Any]:
+    """Rows of the old and the new version, turn by turn; kernels are compiled before."""
+    versions = {"old": Path(run.options.old).resolve(), "new": ROOT}
+    rows: dict[str, list[dict[str, float]]] = {version: [] for version in versions}
+    folder = SCRATCH / "sweeps"
+    for version, root in versions.items():
+        for turn, study in (("warm_up", LITTLE["short_runs"]), ("study", run.extent[name])):
+            place = folder / f"{name}_{version}_{turn}"
+            place.mkdir(parents=True, exist_ok=True)
+            (place / f"{name}.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
+        warm_up = folder / f"{name}_{version}_warm_up" / f"{name}.yaml"
+        _measured(_python(root), root, warm_up)
+    for number in range(run.extent["turns"]):
+        for version, root in versions.items():
+            study = folder / f"{name}_{version}_study" / f"{name}.yaml"
+            rows[version].append(_measured(_python(root), root, study))
+            print(name, number, version, rows[version][-1], flush=True)
+    return {"study": run.extent[name], "rows": rows, "commits": _commits(versions)}
+
+
+def _python(root: Path) -> Path:
+    own = root / ".venv" / "bin" / "python"
+    return own if own.exists() else Path(sys.executable)
+
+
+def _commits(versions: Mapping[str, Path]) -> dict[str, str]:
+    command = ["git", "describe", "--always", "--dirty"]
+    return {
+        version: subprocess.run(command, cwd=root, capture_output=True, text=True).stdout.strip()
+        for version, root in versions.items()
+    }
+
+
+def page(results: dict[str, Any]) -> str:
+    """The page of the results."""
+    studies = {}
+    for name in STUDIES:
+        rows = results[name]["rows"]
+        medians = {
+            version: {key: median(row[key] for row in rows[version]) for key in rows[version][0]}
+            for version in rows
+        }
+        studies[name] = {**medians, "turns": len(rows["new"]), "rows": rows}
+    values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
+    return render(Path(__file__).with_name("page.md.j2"), values)
+
+
+def _add_options(parser: ArgumentParser) -> None:
+    older = "checkout of the older version with its .venv; this one unless given"
+    parser.add_argument("--old", metavar="FOLDER", default=ROOT, help=older)
+
+
+BENCHMARK = Benchmark(
+    __file__,
+    __doc__,
+    parts={
+        **{name: partial(_in_turns, name) for name in STUDIES},
+        "origin": lambda run: run.origin,
+    },
+    pages={"sweep_cost.md": page},
+    extent=WHOLE,
+    quick=LITTLE,
+    add_options=_add_options,
+)  # fmt: skip
+
+if __name__ == "__main__":
+    BENCHMARK.command()

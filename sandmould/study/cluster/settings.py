@@ -1,0 +1,91 @@
+"""What a user says of a cluster: ``cluster.yaml`` in the working folder, which no study holds."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from pydantic import Field
+
+from sandmould.scenario.quantity import Section
+from sandmould.scenario.reading import Origin, read_yaml, validated
+
+CLUSTER_FILE = Path("cluster.yaml")
+_WORD = r"^[A-Za-z0-9_.,:@&|+*=\[\]()-]+$"
+"""Nothing that a shell takes for more than a word."""
+_CHOOSES = ("--workflow-profile", "--profile", "--executor", "-e")
+
+
+class Cluster(Section):
+    """A queue of a cluster, and how long its jobs may take."""
+
+    partition: str | None = Field(
+        None,
+        pattern=_WORD,
+        description="Partition, or several with commas; Slurm's own unless given.",
+    )
+    account: str | None = Field(None, pattern=_WORD, description="Who pays.")
+    qos: str | None = Field(None, pattern=_WORD, description="Quality of service.")
+    constraint: str | None = Field(None, pattern=_WORD, description="Kind of node.")
+    options: str | None = Field(
+        None,
+        pattern=r"^-[A-Za-z0-9_.,:@&|+*=\[\]()/ -]+$",
+        description="Other options of sbatch, such as --mail-type=END.",
+    )
+    longest_wall_h: float | None = Field(
+        None,
+        gt=0,
+        description="Most wall time that a job asks for; a longer run goes on in the next.",
+    )
+
+    def resources(self) -> dict[str, str]:
+        """What Snakemake submits each job with."""
+        names = {
+            "slurm_partition": self.partition,
+            "slurm_account": self.account,
+            "qos": self.qos,
+            "constraint": self.constraint,
+        }
+        return {name: value for name, value in names.items() if value is not None}
+
+    def sbatch(self) -> list[str]:
+        """The same as options of ``sbatch``."""
+        options = {
+            "--partition": self.partition,
+            "--account": self.account,
+            "--qos": self.qos,
+            "--constraint": self.constraint,
+        }
+        stated = [f"{name}={value}" for name, value in options.items() if value is not None]
+        return [*stated, *(self.options or "").split()]
+
+
+def read_cluster(path: Path = CLUSTER_FILE) -> Cluster:
+    """Read what the user says; nothing is said where the file is not there.
+
+    Raises
+    ------
+    BadInputError
+    """
+    if not path.exists():
+        return Cluster()
+    return validated(Cluster, read_yaml(path, str(path)), Origin({"": str(path)}))
+
+
+def goes_to_slurm(arguments: Sequence[str]) -> bool:
+    """Whether Snakemake called with these arguments submits jobs to Slurm, as its profile says.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        The command line.
+    """
+    words = [
+        word for argument in arguments for word in re.split("(?<=[a-z])=", argument, maxsplit=1)
+    ]
+    return any(
+        option in _CHOOSES and "slurm" in Path(value).name
+        for option, value in itertools.pairwise(words)
+    )

@@ -1,0 +1,94 @@
+"""A piece of work in a process that is forked from one with all libraries loaded."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from typing import NoReturn, TextIO
+
+from sandmould.runs.parent import call_process, end_with_parent
+
+Work = Callable[[], int | None]
+"""Gives the exit status; None for 0."""
+PROCESS_NAME = "sandmould-run"
+"""What lists of processes call it, where Linux takes a name of fifteen letters."""
+BROKEN = 1
+"""Exit status of work that raised."""
+
+
+class ForkedProcess:
+    """Acts as a ``subprocess.Popen`` whose output is read as lines.
+
+    What may not be forked once it has begun, such as MPI or threads, must begin in the work.
+    """
+
+    def __init__(self, work: Work) -> None:
+        """Begin.
+
+        Parameters
+        ----------
+        work : callable
+            Gives the exit status; None for 0.
+        """
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()  # what lies in a buffer would be written by both
+        read, write = os.pipe()
+        # A request to end waits until the child has let go of the handlers of its parent.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+        parent = os.getpid()
+        self.pid = os.fork()
+        if self.pid == 0:
+            os.close(read)
+            _work_on(work, write, parent)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+        os.close(write)
+        self.stdout: TextIO = os.fdopen(read, encoding="utf-8", errors="replace")
+        self._status: int | None = None
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        if self._status is None:
+            os.kill(self.pid, signal.SIGTERM)
+
+    def wait(self) -> int:
+        """Exit status, or the number of the signal that ended it, negative."""
+        if self._status is None:
+            _, ended = os.waitpid(self.pid, 0)
+            self._status = os.waitstatus_to_exitcode(ended)
+            self.stdout.close()
+        return self._status
+
+
+def _work_on(work: Work, write: int, parent: int) -> NoReturn:
+    """Do the work in the child; nothing of the parent's own end is done here."""
+    status = BROKEN
+    try:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+        end_with_parent()
+        call_process(PROCESS_NAME)
+        for number in (1, 2):
+            os.dup2(write, number)
+        os.close(write)
+        sys.stdout, sys.stderr = (os.fdopen(n, "w", 1, closefd=False) for n in (1, 2))
+        if os.getppid() == parent:
+            status = work() or 0
+    except SystemExit as end:
+        status = _status_of(end)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(status)
+
+
+def _status_of(end: SystemExit) -> int:
+    """Exit status as Python gives it; a text is printed."""
+    if isinstance(end.code, int) or end.code is None:
+        return end.code or 0
+    print(end.code, file=sys.stderr)
+    return BROKEN

@@ -1,0 +1,88 @@
+"""Runs of a shipped study that are committed as packs: the next start takes them up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sandmould import ROOT
+from sandmould.runs.hashing import scenario_hash
+from sandmould.study.packs.index import PackedRun
+from sandmould.study.packs.pack import SUFFIX, Packed, pack
+from sandmould.study.packs.unpack import Unpacked, open_pack, place_runs, take_rounds
+from sandmould.study.plan.build_plan import Plan, open_plan
+from sandmould.study.plan.lacking import Need, template_hashes
+from sandmould.study.process import is_locked
+
+RECORDS = ROOT / "docs" / "results"
+
+
+def record_part(plan: Plan, results: Path) -> Packed:
+    """Add a pack of the runs at their end to the record of a study.
+
+    Raises
+    ------
+    BadInputError
+        Where no run is at its end that is not in the record yet.
+    """
+    folder = RECORDS / plan.study.name
+    folder.mkdir(parents=True, exist_ok=True)
+    return pack(plan, results, folder, last_state=True)
+
+
+def take_up(plan: Plan, results: Path) -> tuple[Plan, str]:
+    """Take the runs of a study's record that it lacks and that fit it as it is now.
+
+    Call it while no other start computes the study.
+
+    Parameters
+    ----------
+    plan : Plan
+        Of a study of any place: those of users have no record.
+    results : Path
+
+    Returns
+    -------
+    plan : Plan
+        The same with the rounds of the record.
+    said : str
+        What was taken; empty where nothing was.
+
+    Raises
+    ------
+    BadInputError
+        Where a pack cannot be read.
+    """
+    shipped = plan.study.path.resolve().parent == (ROOT / "config" / "studies").resolve()
+    packs = sorted((RECORDS / plan.study.name).glob(f"*{SUFFIX}")) if shipped else []
+    taken = 0
+    folder = results / plan.study.name
+    for path in packs:
+        with open_pack(path) as archive:
+            if take_rounds(archive, folder):
+                plan = open_plan(plan.study.path, results)
+        with open_pack(path) as archive:
+            unpacked = Unpacked(plan.study.name)
+            place_runs(archive, folder, _Wanted(plan, results), unpacked)
+            taken += len(unpacked.taken)
+    return plan, f"{taken} runs taken from the record of {plan.study.name}" if taken else ""
+
+
+class _Wanted:
+    """Asks whether a run of a pack is one that its study lacks."""
+
+    def __init__(self, plan: Plan, results: Path) -> None:
+        self._runs = {run.run: run for run in plan.runs}
+        self._lacks = plan.lacks(results)
+        self._folder = results / plan.study.name / "runs"
+        self._template_hash = template_hashes()
+
+    def __call__(self, name: str, packed: PackedRun) -> bool:
+        lack = self._lacks.get(name)
+        if lack is None or lack.need is not Need.COMPUTE or not packed.at_end:
+            return False
+        run = self._runs[name]
+        return (
+            packed.scenario_sha256 == scenario_hash(run.scenario)
+            and packed.template_sha256 == self._template_hash(run)
+            and not is_locked(self._folder / name)
+        )
