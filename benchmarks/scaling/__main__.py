@@ -23,8 +23,6 @@ from benchmarks.scaling.run_parts import job_start, parts
 from benchmarks.scaling.study import Place
 
 BEFORE_JSON = Path(__file__).with_name("before.json")
-TURNS_JSON = Path(__file__).with_name("turns.json")
-"""From ``benchmarks.scaling.turns``, called in turns from two trees."""
 ALONE_UP_TO = 100
 """Runs up to which three jobs a run are executed too."""
 CORES = 2
@@ -86,8 +84,7 @@ def rounded(tree: Any) -> Any:
 def arrange(measured: dict[str, Any], run: BenchmarkRun) -> dict[str, Any]:
     """Results beside those of before, with where and how long they were measured."""
     results: dict[str, Any] = rounded({
-        "before": json.loads(BEFORE_JSON.read_text(encoding="utf-8")),
-        "turns": json.loads(TURNS_JSON.read_text(encoding="utf-8")), **measured,
+        "before": json.loads(BEFORE_JSON.read_text(encoding="utf-8")), **measured,
         "took_s": round(run.took_s), "load_before": run.load_before,
         "load_after": os.getloadavg()[0], "provenance": run.origin,
     })  # fmt: skip
