@@ -193,7 +193,7 @@ def test_a_watch_sees_runs_begin_go_on_and_end(plan: Plan) -> None:
     # A run measured again has its last product from before.
     (runs / names[3] / LAST_MEASURED).write_text("")
     os.utime(runs / names[3] / LAST_MEASURED, (since_s - 9, since_s - 9))
-    watch = RunWatch(runs, list(names), since_s)
+    watch = RunWatch({name: runs / name for name in names}, list(names), since_s)
     old = runs / names[2] / "work" / "progress.json"
     old.parent.mkdir()
     old.write_text("{}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import platform
 import subprocess
 import sys
@@ -22,7 +23,6 @@ from sandmould.scenario.own_deck import OwnDeck
 STORED = "pilots.json"
 PILOT_S = 12.0
 """A shorter run is computed whole; of a longer one its steps are counted."""
-_LEAST_SHARE = 0.002
 _LOOK_EVERY_S = 0.2
 
 
@@ -103,9 +103,9 @@ def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> 
     if not progress.exists() or begun_s is None:
         return None
     now = json.loads(progress.read_text())
-    if now["percent"] < 100 * _LEAST_SHARE or not now["work_per_s"]:
-        return None
-    return float(now["left_s"]) + (progress.stat().st_mtime - (folder / "begun").stat().st_mtime)
+    taken_s = progress.stat().st_mtime - (folder / "begun").stat().st_mtime
+    whole_s = float(now["left_s"]) + taken_s
+    return whole_s if math.isfinite(whole_s) else None
 
 
 def _pilots(results: Path) -> dict[str, float]:
