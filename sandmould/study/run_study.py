@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from sandmould import ROOT
+from sandmould.scenario.bad_input import BAD_INPUT_EXIT
 from sandmould.statistics.agreement import sweep_part
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.build_plan import RESULTS, open_plan, starts_jobs, writing
@@ -88,6 +89,8 @@ def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> in
     with log:
         with screen:
             status = run_snakemake(command, log, screen.environment(), screen.look)
+        if status == BAD_INPUT_EXIT:
+            return status
         screen.tell_failures()
         if status and not screen.is_explained and (found := trouble(screen.log)):
             for line in (*found, f"All that Snakemake said: {screen.log}"):

@@ -7,7 +7,7 @@ import sys
 from sandmould import ROOT
 from sandmould.runs.columns import SWEEP
 from sandmould.runs.words import say
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.bad_input import BAD_INPUT_EXIT, BadInputError
 from sandmould.study.collect import CHECKS as CHECK_TABLES
 from sandmould.study.cluster.settings import goes_to_slurm
 from sandmould.study.cluster.submission import open_submission
@@ -62,7 +62,7 @@ try:
             say(said)
 except BadInputError as error:
     say(str(error))
-    sys.exit(1)
+    sys.exit(BAD_INPUT_EXIT)
 
 STUDY = PLAN.study
 FOLDER = f"results/{STUDY.name}"

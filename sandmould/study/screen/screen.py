@@ -98,7 +98,8 @@ class Screen:
             if self._table is not None:
                 self._table.stop()
                 self._table = None
-        if error is None:
+        # Of a start that computed nothing, since its input is bad, there is nothing to count.
+        if error is None and (self._ended or self.failures or not self._watch.waiting):
             passed = duration_text(time.monotonic() - self._begun_s)
             self._print(f"{self._plan.study.name}: {counts_text(self._view())} after {passed}")
 
