@@ -9,9 +9,8 @@ from typing import Any
 
 from sandmould import ROOT
 
-
 BAD_INPUT_EXIT = 78
-"""Exit status of a workflow that has said what is wrong with its input (EX_CONFIG of sysexits.h)."""
+"""Exit status of a workflow that has said what is wrong with its input (EX_CONFIG, sysexits.h)."""
 
 
 @dataclass(frozen=True)
