@@ -111,7 +111,6 @@ def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
             getattr(after, name) - getattr(before, name) for name in ("ru_utime", "ru_stime")
         ),
         "wall_s": wall_s,
-        "loop_s": float(costs["engine_wall_s"].sum()),
         "runs": sum(1 for _ in folder.glob("runs/*")),
         "grain_steps": float(costs["grain_steps"].sum()),
         "files": sum(path.is_file() for path in folder.rglob("*")),
