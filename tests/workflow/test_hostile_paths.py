@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.bad_input import BAD_INPUT_EXIT, BadInputError
 from sandmould.study import run_study
 from sandmould.study.plan import trust
 from sandmould.study.plan.load_study import open_study
@@ -104,7 +104,7 @@ def test_slurm_is_handed_no_command(tmp_path: Path) -> None:
         cwd=tmp_path, env=os.environ | {"PATH": f"{fakes}:{os.environ['PATH']}"},
         capture_output=True, text=True, timeout=60,
     )  # fmt: skip
-    assert said.returncode == 1
+    assert said.returncode == BAD_INPUT_EXIT
     assert "valid is a path without quotes, $ ` \\ * % and line breaks" in said.stderr
     assert not (tmp_path / "HIT").exists()
 
@@ -153,6 +153,6 @@ def test_a_foreign_deck_is_refused_without_the_command_too(tmp_path: Path) -> No
         [*command, "--configfile", "probe.yaml", "--cores", "1"],
         cwd=tmp_path, capture_output=True, text=True, timeout=60,
     )  # fmt: skip
-    assert said.returncode == 1
+    assert said.returncode == BAD_INPUT_EXIT
     assert "write trust_deck: true in probe.yaml" in said.stderr
     assert not list(tmp_path.rglob("HIT"))
