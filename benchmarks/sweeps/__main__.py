@@ -162,6 +162,7 @@ def page(results: dict[str, Any]) -> str:
         }
         studies[name] = {**medians, "turns": len(rows["new"]), "rows": rows}
     values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
+    values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)
 
 
