@@ -48,7 +48,7 @@ def pattern_of(scenario: Scenario) -> Pattern:
     # what is shared by all runs of a study that differ in their sand or their loop
     body = config.model_copy(update={"loop": Loop()})
     size_m = (box.width_m, box.height_m) if d == 2 else (box.width_m, box.depth_m, box.height_m)
-    thickness_m = scenario.sand.disc_thickness_m if d == 2 else None
+    thickness_m = scenario.sand.thickness_m if d == 2 else None
     return _computed(body, size_m, thickness_m, _changed_ns(config))
 
 

@@ -45,6 +45,7 @@ HOPPER: dict[str, Any] = {
     "box": {"width_m": BOX_WIDTH_M, "height_m": 0.16},
     "obstacles": hopper_plates(),
     "sand": {
+        "disc_thickness_m": 0.1,
         "size_classes": 2,
         "disc_inertia": "sphere",
         "sieve": [

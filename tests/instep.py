@@ -35,7 +35,7 @@ def bed_scene(**changes: Any) -> Scenario:
     }
     scene: dict[str, Any] = {
         "box": {"width_m": 0.08, "height_m": 0.08},
-        "sand": {"size_scale": 8.0, "size_classes": 3},
+        "sand": {"size_scale": 8.0, "size_classes": 3, "disc_thickness_m": 0.1},
         "pattern": told,
         "fill": {"layers": [{"count": 60, "repeat": 2}]},
         "time_step": {"fraction": 0.4},

@@ -44,6 +44,7 @@ ONE_GRAIN: dict[str, Any] = {
             {"opening_m": 2 * RADIUS_M / 1.001, "passing_fraction": 0},
             {"opening_m": 2 * RADIUS_M * 1.001, "passing_fraction": 1},
         ],
+        "disc_thickness_m": 0.1,
     },
     "fill": {"layers": [{"count": 1}]},
     "time_step": {"fraction": 0.01},

@@ -25,12 +25,12 @@ TUBE_SCENE: dict[str, Any] = {
             "axis_height_m": 0.025,
         }
     ],
-    "sand": {"size_scale": 8.0, "size_classes": 3},
+    "sand": {"size_scale": 8.0, "size_classes": 3, "disc_thickness_m": 0.1},
     "fill": {"layers": [{"count": 60, "repeat": 2}]},
     "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.06}],
     "record": {"snapshot_every_s": 0.02},
 }
-"""About the smallest scene in which sand flows into a tube."""
+"""About the smallest scene in which sand flows into a tube; soft, for the length of its step."""
 
 
 def tube_scene(**changes: Any) -> Scenario:

@@ -86,7 +86,7 @@ def scene(
     base: dict[str, Any] = {
         "dimension": dimension,
         "box": {"width_m": width_m, "depth_m": depth_m, "height_m": 0.5},
-        "sand": {"disc_inertia": "sphere"},
+        "sand": {"disc_inertia": "sphere", "disc_thickness_m": 0.1},
         "contact": {"grain_wall": wall},
         "background_damping": {"form": "none"},
         "fill": {

@@ -43,7 +43,7 @@ _LAMMPS = {
     "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.04}],
 }
 _DISCS = _LAMMPS | {
-    "sand": {"size_scale": 3.5},
+    "sand": {"size_scale": 3.5, "disc_thickness_m": 0.1},
     "fill": {"layers": [{"count": 1000}], "settling": {"longest_s": 0.22}},
 }
 _SPHERES = _LAMMPS | {"fill": {"layers": [{"count": 2000}], "settling": {"longest_s": 0.3}}}

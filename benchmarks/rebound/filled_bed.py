@@ -17,7 +17,7 @@ from sandmould.study.plan.load_study import open_study
 
 STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
 CHANGES: dict[str, Any] = {
-    "sand": {"size_scale": 10},
+    "sand": {"size_scale": 10, "disc_thickness_m": 0.1},
     "vibration": [{"frequency_hz": 50, "acceleration_g": 1.5, "duration_s": 0.3}],
 }
 DASHPOTS = ("corrected", "plain")

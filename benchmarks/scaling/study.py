@@ -31,7 +31,7 @@ based_on: tube
 title: A sweep of short runs
 scenario:
   engine: {{name: reference}}
-  sand: {{size_scale: 12, size_classes: 3}}
+  sand: {{size_scale: 12, size_classes: 3, disc_thickness_m: 0.1}}
   fill: {{layers: [{{count: 20}}]}}
   time_step: {{fraction: 0.8}}
   vibration: [{{frequency_hz: 50, acceleration_g: 1.5, duration_s: 0.06}}]

@@ -90,7 +90,7 @@ def map_of(scene: str, engine: str, grid: MapGrid) -> list[dict[str, Any]]:
 def one_contact_s(damping_ratio: float) -> float:
     """The paper's step for the smallest grain of the bed with one contact, (42), (51) and (54)."""
     s = scenario_of("bed", "reference", damping_ratio)
-    law, smallest = s.contact.grain_grain, s.sand.classes(2)[0].diameter_m
+    law, smallest = s.laws.grain_grain, s.sand.classes(2)[0].diameter_m
     mass = s.sand.grain_mass_kg(smallest, 2)
     along = 2 * math.sqrt(mass / law.normal_stiffness_n_m)
     about = 2 * math.sqrt(s.sand.inertia_factor(2) * mass / law.tangential_stiffness_n_m)

@@ -117,7 +117,7 @@ def disturb(
     height = float(start.mass_kg @ start.position_m[:, 1])
     way = float(start.mass_kg @ (after - start.position_m)[:, 1])
     weight = scenario.gravity_m_s2 * float(start.mass_kg.min())
-    sag = weight / scenario.contact.grain_wall.normal_stiffness_n_m
+    sag = weight / scenario.laws.grain_wall.normal_stiffness_n_m
     sinks = abs(way) > SAGS * sag * start.mass_kg.sum()
     drifts = highest > GROWN or late > max(1.0, GROWTH * early) or sinks
     return DisturbanceResult(DRIFTS if drifts else STABLE, highest, way / height)

@@ -41,7 +41,7 @@ _ONE_SIZE = {
 _BASE: dict[str, Any] = {
     "box": {"width_m": 0.05, "height_m": 0.05},
     # A moment of inertia that LIGGGHTS has too, and no background damping, which it lacks.
-    "sand": {"disc_inertia": "sphere"},
+    "sand": {"disc_inertia": "sphere", "disc_thickness_m": 0.1},
     "background_damping": {"form": "none"},
     # Never at rest before the end; LAMMPS keeps grains up to where a layer would be dropped from.
     "fill": {"drop_height_m": 0.1, "settling": {"shortest_s": 99.0, "longest_s": 100.0}},
@@ -152,8 +152,8 @@ def start_of(scene: str) -> Start:
     scenario = scenario_of(scene, "reference", 0.5, **damped)
     if scene == "bed":
         return _settled(scenario, 1.2)
-    law = scenario.contact.grain_grain.normal_stiffness_n_m
-    wall = scenario.contact.grain_wall.normal_stiffness_n_m
+    law = scenario.laws.grain_grain.normal_stiffness_n_m
+    wall = scenario.laws.grain_wall.normal_stiffness_n_m
     n = COLUMN if scene == "column" else 1
     mass = scenario.sand.grain_mass_kg(scenario.sand.classes(2)[0].diameter_m, 2)
     radius = scenario.sand.classes(2)[0].diameter_m / 2

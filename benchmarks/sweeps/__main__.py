@@ -43,7 +43,7 @@ def _study(scenario: Mapping[str, Any], hz: list[float], **top: Any) -> dict[str
 def _stand_in(runs: int) -> dict[str, Any]:
     """Short runs: those of docs/scaling.md."""
     scenario = {
-        "sand": {"size_scale": 12, "size_classes": 3},
+        "sand": {"size_scale": 12, "size_classes": 3, "disc_thickness_m": 0.1},
         "fill": {"layers": [{"count": 20}]},
         "vibration": [{**_SHAKE, "duration_s": 0.06}],
         "record": {"snapshot_every_s": 0.2},
@@ -54,7 +54,7 @@ def _stand_in(runs: int) -> dict[str, Any]:
 def _sweep(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
     """A sweep like ``tube_frequency``: eight frequencies in equal ratios, 1.5 g held."""
     scenario = {
-        "sand": {"size_scale": scale},
+        "sand": {"size_scale": scale, "disc_thickness_m": 0.1},
         "vibration": [{**_SHAKE, "duration_s": duration_s}],
     }
     return _study(scenario, [15, 21, 29, 40, 55, 77, 107, 150], replicates=replicates)
@@ -64,7 +64,7 @@ def _certified(scale: float, duration_s: float, replicates: int) -> dict[str, An
     """One like ``tube_certified``: a stroke held, a round, and controls of hold and stiffness."""
     held = {**_SHAKE, "hold": "displacement", "reference_frequency_hz": 50}
     scenario = {
-        "sand": {"size_scale": scale},
+        "sand": {"size_scale": scale, "disc_thickness_m": 0.1},
         "vibration": [{**held, "duration_s": duration_s}],
     }
     del held["frequency_hz"]

@@ -28,9 +28,9 @@ class ContactBound:
     @classmethod
     def of_grain(cls, scenario: Scenario, diameter_m: float) -> ContactBound:
         """One contact of a grain, eq. (19)."""
-        law = scenario.contact.grain_wall
+        law = scenario.laws.grain_wall
         mass_kg = scenario.sand.grain_mass_kg(diameter_m, scenario.dimension)
-        dashpot = law.dashpot_n_s_m(mass_kg, scenario.contact.lag_s(scenario.step_s))
+        dashpot = law.dashpot_n_s_m(mass_kg, scenario.laws.lag_s(scenario.step_s))
         return cls(max(law.normal_stiffness_n_m, law.tangential_stiffness_n_m), dashpot)
 
     @classmethod

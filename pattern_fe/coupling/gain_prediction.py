@@ -80,7 +80,7 @@ def _grain_n_m(scenario: Scenario, window_s: float) -> float:
     contact = ContactBound.of_grain(scenario, diameter_m)
     contact_n_m = contact.stiffness_n_m + 2.0 * contact.damping_n_s_m / window_s
     mass_kg = scenario.sand.grain_mass_kg(diameter_m, scenario.dimension)
-    spring_n_m = scenario.contact.grain_grain.normal_stiffness_n_m
+    spring_n_m = scenario.laws.grain_grain.normal_stiffness_n_m
     box = scenario.box
     in_column = sum(plan_counts(scenario)) * diameter_m / box.width_m
     if scenario.dimension == 3:

@@ -39,17 +39,40 @@ class Lines:
         return f"variable {name} index {exact(value)}  # {unit}, {meaning}; {source}"
 
     def value(self, name: str, key: str) -> str:
-        """One key of the scenario as a variable of the deck."""
+        """One key of the scenario, as it is computed with, as a variable of the deck."""
         *path, last = key.split(".")
-        section: BaseModel = self.scenario
-        for part in path:
-            section = getattr(section, part)
+        section = self._section(path)
         extra = type(section).model_fields[last].json_schema_extra
         unit = str(extra["unit"]) if isinstance(extra, dict) else "1"
         meaning = (type(section).model_fields[last].description or "").rstrip(".")
+        value, how = self.in_use(key)
         return self.number(
-            name, getattr(section, last), "-" if unit == "1" else unit, meaning, self.source(key)
+            name, value, "-" if unit == "1" else unit, f"{meaning}{how}", self.source(key)
         )
+
+    def _section(self, path: list[str]) -> BaseModel:
+        section: BaseModel = self.scenario
+        for part in path:
+            section = getattr(section, part)
+        return section
+
+    def in_use(self, key: str) -> tuple[Any, str]:
+        """The number that is computed with for a key, and how it follows from the given one."""
+        *path, last = key.split(".")
+        given = getattr(self._section(path), last)
+        sand, contact = self.scenario.sand, self.scenario.contact
+        if key == "sand.disc_thickness_m" and given == "grain":
+            return sand.thickness_m, ", the mass-median diameter"
+        if not key.endswith("_stiffness_n_m"):
+            return given, ""
+        _, law, spring = key.split(".")
+        value = getattr(getattr(self.scenario.laws, law), spring)
+        if value == given:
+            return value, ""
+        if contact.wave_speed_m_s is not None:
+            return value, f", {given:g} multiplied for a wave speed of {contact.wave_speed_m_s:g} m/s"
+        scale = contact.springs_at_size_scale
+        return value, f", {given:g} at size_scale {scale:g}, times {sand.size_scale:g}/{scale:g}"
 
 
 def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, float]]:

@@ -59,7 +59,7 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
     -------
     tuple of Row
     """
-    sand, contact = scenario.sand, scenario.contact
+    sand, contact = scenario.sand, scenario.laws
     sizes = sand.classes(scenario.dimension)
     low, high = (1e3 * sizes[i].diameter_m for i in (0, -1))
     return (
@@ -126,7 +126,7 @@ def _model(scenario: Scenario) -> str:
     if scenario.dimension == 3:
         return f"distinct elements in 3D: spheres; {gravity}"
     return (
-        f"distinct elements in 2D: discs {1e3 * scenario.sand.disc_thickness_m:g} mm long across "
+        f"distinct elements in 2D: discs {number(1e3 * scenario.sand.thickness_m)} mm long across "
         "the plane, a length the paper leaves open (only stiffness over thickness matters); "
         f"{gravity}"
     )

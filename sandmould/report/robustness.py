@@ -165,7 +165,7 @@ def _column(scenario: Scenario, summary: pd.DataFrame, responses: Sequence[Respo
     mass_kg = scenario.sand.grain_mass_kg(mean_m, scenario.dimension)
     height_m = float(pd.to_numeric(summary[BED_HEIGHT_M], errors="coerce").median())
     estimate_hz = column_frequency_hz(
-        mean_m, mass_kg, scenario.contact.grain_grain.normal_stiffness_n_m, height_m
+        mean_m, mass_kg, scenario.laws.grain_grain.normal_stiffness_n_m, height_m
     )
     said = (
         f"A column of the model's springs, {number(1e3 * height_m)} mm high, would resonate at "

@@ -16,6 +16,8 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
 from sandmould.scenario.vibration import VibrationStage
 
+SHORTEST_STEP_S = 1e-9
+"""A second of shorter steps takes more than ten hours for a thousand grains."""
 KINDS = {2: ("plate", "tube", "polygon"), 3: ("plate", "tube", "cylinder", "mesh", "triangles")}
 """Kinds of obstacles that a dimension has."""
 
@@ -36,6 +38,7 @@ def problems(scenario: Scenario) -> list[Problem]:
         *_discharge(scenario),
         *_grains(scenario),
         *_pouring(scenario),
+        *_springs(scenario),
         *_time(scenario),
         *_vibration(scenario),
     ]
@@ -191,6 +194,20 @@ def _grains(s: Scenario) -> Iterator[Problem]:
     if largest * 3 > narrowest:
         key = "box.width_m" if narrowest == s.box.width_m else "box.depth_m"
         yield Problem(key, narrowest, f"at least three of the largest grains, {3 * largest:.6g} m")
+
+
+def _springs(s: Scenario) -> Iterator[Problem]:
+    speed_m_s = s.contact.wave_speed_m_s
+    if speed_m_s is not None and s.dimension == 2 and s.sand.disc_thickness_m != "grain":
+        valid = "null with sand.disc_thickness_m in m: discs are as hard as springs over thickness"
+        yield Problem("contact.wave_speed_m_s", speed_m_s, valid)
+    elif s.critical_step.step_s < SHORTEST_STEP_S:
+        key, value = "contact.wave_speed_m_s", speed_m_s
+        if speed_m_s is None:
+            key = "contact.grain_grain.normal_stiffness_n_m"
+            value = s.contact.grain_grain.normal_stiffness_n_m
+        valid = f"springs whose critical time step is {SHORTEST_STEP_S:g} s or longer"
+        yield Problem(key, value, f"{valid}, not {s.critical_step.step_s:.2g} s")
 
 
 def _time(s: Scenario) -> Iterator[Problem]:

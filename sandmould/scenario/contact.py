@@ -46,6 +46,11 @@ class ContactLaw(Section):
         le=1e12,
     )
 
+    def stiffer(self, factor: float) -> ContactLaw:
+        """The law with all of its springs multiplied."""
+        springs = (key for key in type(self).model_fields if key.endswith("_stiffness_n_m"))
+        return self.model_copy(update={key: factor * getattr(self, key) for key in springs})
+
     def dashpot_ratio(self, mass_kg: float, lag_s: float) -> float:
         """Damping ratio that a dashpot is given, c'/C_cr with c' = c/(1 + c lag/(4 m)).
 
@@ -97,6 +102,24 @@ class Contact(Section):
 
     grain_grain: ContactLaw = Field(ContactLaw(), description="Law between two grains.")
     grain_wall: ContactLaw = Field(WALL_LAW, description="Law between a grain and a rigid wall.")
+    springs_at_size_scale: float | None = quantity(
+        4.0,
+        "sand.size_scale that the springs belong to. At another one all springs are multiplied by "
+        "size_scale over it, in 3D and with discs as thick as a grain, so that sand stays as hard "
+        "when grains are coarsened. null: springs are used as they are given.",
+        source=PAPER,
+        gt=0,
+        le=100,
+    )
+    wave_speed_m_s: float | None = quantity(
+        None,
+        "Speed of a compression wave along a row of mass-median grains in contact; given, all "
+        "springs are multiplied alike so that it comes out.",
+        unit="m/s",
+        source="user",
+        gt=0,
+        le=1e4,
+    )
     no_tension: Literal["total", "elastic"] = quantity(
         "total",
         "What eq. (18) keeps from pulling: the total normal force, or its elastic part alone.",
@@ -124,6 +147,17 @@ class Contact(Section):
         "the other costs 1.16 times as much. LIGGGHTS has full_step alone.",
         source=ARGUED,
     )
+
+    def stiffer(self, factor: float) -> Contact:
+        """Both laws with all of their springs multiplied; a given wave speed goes as the root."""
+        speed_m_s = self.wave_speed_m_s
+        return self.model_copy(
+            update={
+                "grain_grain": self.grain_grain.stiffer(factor),
+                "grain_wall": self.grain_wall.stiffer(factor),
+                "wave_speed_m_s": speed_m_s and math.sqrt(factor) * speed_m_s,
+            }
+        )
 
     def lead_s(self, dimension: int, step_s: float) -> float:
         """Half the time step where the slip of two grains is that of half a step ago, else 0."""

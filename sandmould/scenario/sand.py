@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -67,8 +67,12 @@ class Sand(Section):
     size_classes: int = quantity(
         5, "Number of diameters that stand for the sieve curve.", source=ARGUED, ge=1, le=20
     )
-    disc_thickness_m: float = quantity(
-        0.1, "Length of a disc across the plane, 2D only.", unit="m", source=ARGUED, ge=1e-6, le=10
+    disc_thickness_m: Annotated[float, Field(ge=1e-6, le=10)] | Literal["grain"] = quantity(
+        "grain",
+        "Length of a disc across the plane, 2D only; grain is the mass-median diameter, which makes "
+        "discs as hard under their load as spheres are.",
+        unit="m",
+        source=ARGUED,
     )
     disc_inertia: Literal["disc", "sphere"] = quantity(
         "disc", "Whose moment of inertia a disc has, 1/2 m r^2 or 2/5 m r^2, 2D only.",
@@ -105,6 +109,22 @@ class Sand(Section):
             for i, (d, m, c) in enumerate(zip(diameter, mass, count, strict=True))
         )
 
+    @property
+    def mass_median_diameter_m(self) -> float:
+        """Diameter that half of the modelled sand's mass is finer than.
+
+        Read off the sieve curve, which is taken as straight between openings.
+        """
+        passing = [p.passing_fraction for p in self.sieve]
+        opening_m = [p.opening_m for p in self.sieve]
+        return float(np.interp(0.5, passing, opening_m)) * self.size_scale
+
+    @property
+    def thickness_m(self) -> float:
+        """Length of a disc across the plane as a number."""
+        given = self.disc_thickness_m
+        return self.mass_median_diameter_m if given == "grain" else given
+
     def grain_measure(self, diameter_m: float, dimension: int) -> float:
         """Area (m2) of a disc or volume (m3) of a sphere."""
         return math.pi / 4 * diameter_m**2 if dimension == 2 else math.pi / 6 * diameter_m**3
@@ -115,5 +135,5 @@ class Sand(Section):
 
     def grain_mass_kg(self, diameter_m: float, dimension: int) -> float:
         """Mass of a grain: rho pi r^2 b for a disc, rho 4/3 pi r^3 for a sphere."""
-        thickness = self.disc_thickness_m if dimension == 2 else 1.0
+        thickness = self.thickness_m if dimension == 2 else 1.0
         return self.density_kg_m3 * thickness * self.grain_measure(diameter_m, dimension)

@@ -20,6 +20,7 @@ from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.rest import Rest
 from sandmould.scenario.sand import ARGUED, Sand
+from sandmould.scenario.springs import springs_in_use
 from sandmould.scenario.stages import is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
 from sandmould.scenario.vibration import BoxStage, VibrationStage
@@ -182,9 +183,14 @@ class Scenario(Section):
         return copied
 
     @property
+    def laws(self) -> Contact:
+        """Contact laws with the springs that the scene is computed with."""
+        return springs_in_use(self.sand, self.contact, self.dimension)
+
+    @property
     def critical_step(self) -> CriticalStep:
         """Critical time step, eqs. (40)-(54)."""
-        return critical_step(self.sand, self.contact, self.time_step, self.dimension)
+        return critical_step(self.sand, self.laws, self.time_step, self.dimension)
 
     @property
     def step_s(self) -> float:

@@ -35,6 +35,7 @@ def one_grain_scene(**changes: object) -> Scenario:
                 {"opening_m": 2 * RADIUS_M / 1.001, "passing_fraction": 0},
                 {"opening_m": 2 * RADIUS_M * 1.001, "passing_fraction": 1},
             ],
+            "disc_thickness_m": 0.1,
         },
         "fill": {"layers": [{"count": 1}]},
         "background_damping": {"form": "none"},

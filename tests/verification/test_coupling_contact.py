@@ -31,7 +31,7 @@ HASTY = {"check_every_s": 0.008, "checks": 1, "rms_speed_m_s": 10.0, "load_toler
 """A stage ends at its shortest time: contact is looked at in all records, at rest or not."""
 SCENE: dict[str, Any] = {
     "box": {"width_m": 0.06, "height_m": 0.08},
-    "sand": {"size_scale": 8.0, "size_classes": 2},
+    "sand": {"size_scale": 8.0, "size_classes": 2, "disc_thickness_m": 0.1},
     "fill": {
         "layers": [{"count": 40}],
         "drop_height_m": 0.0005,

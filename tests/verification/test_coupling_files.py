@@ -29,7 +29,7 @@ from tests.workflow.runs import drive
 
 SCENE: dict[str, Any] = {
     "box": {"width_m": 0.06, "height_m": 0.06},
-    "sand": {"size_scale": 8.0, "size_classes": 2},
+    "sand": {"size_scale": 8.0, "size_classes": 2, "disc_thickness_m": 0.1},
     # Sand falls for 10 ms, and rests by the rule at the first check after it: eight windows.
     "fill": {
         "layers": [{"count": 30, "repeat": 2}],

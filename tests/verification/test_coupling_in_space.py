@@ -141,7 +141,7 @@ def plank_scene(**changes: Any) -> Scenario:
     scene: dict[str, Any] = {
         "dimension": 3,
         "box": {"width_m": 0.06, "depth_m": 0.03, "height_m": 0.08},
-        "sand": {"size_scale": 8.0, "size_classes": 2},
+        "sand": {"size_scale": 8.0, "size_classes": 2, "disc_thickness_m": 0.1},
         "contact": {"grain_grain": SOFT, "grain_wall": SOFT},
         "pattern": {
             "shape": {"kind": "bar", "width_m": 0.06, "height_m": 0.006},

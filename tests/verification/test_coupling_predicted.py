@@ -30,7 +30,7 @@ def plank_scene(window_s: float, factor: float, **changes: Any) -> Scenario:
     """Sand over a plank held at both ends, as config/scenarios/plank.yaml."""
     scene: dict[str, Any] = {
         "box": {"width_m": 0.08, "height_m": 0.09},
-        "sand": {"size_scale": 8.0, "size_classes": 3},
+        "sand": {"size_scale": 8.0, "size_classes": 3, "disc_thickness_m": 0.1},
         "pattern": {
             "shape": {"kind": "bar", "width_m": 0.08, "height_m": 0.01},
             "position_m": [0.0, 0.015],
@@ -126,7 +126,7 @@ def test_a_long_window_lets_the_column_go() -> None:
 
 
 def test_one_grain_on_a_pillar_in_space_by_hand() -> None:
-    sand = {"size_scale": 8.0, "size_classes": 1}
+    sand = {"size_scale": 8.0, "size_classes": 1, "disc_thickness_m": 0.1}
     scene: dict[str, Any] = {
         "dimension": 3,
         "box": {"width_m": 0.08, "depth_m": 0.08, "height_m": 0.09},

@@ -107,7 +107,7 @@ def hill(**changes: Any) -> Scenario:
                                [0.03, 0.018], [0.02, 0.01]],
             }
         ],
-        "sand": {"size_scale": 8.0, "size_classes": 3},
+        "sand": {"size_scale": 8.0, "size_classes": 3, "disc_thickness_m": 0.1},
         "fill": {"layers": [{"count": 40, "repeat": 2}]},
         "rest": {"rms_speed_m_s": 1e-3},
         "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.06}],

@@ -44,7 +44,7 @@ def column(scheme: str, engine: str = "reference") -> Scenario:
             },
             # walls that carry nothing
             "contact": {"grain_wall": {"friction": 0.0}},
-            "sand": {"size_scale": 8.0, "size_classes": 3},
+            "sand": {"size_scale": 8.0, "size_classes": 3, "disc_thickness_m": 0.1},
             "fill": {"layers": [{"count": 60}]},
             "engine": {"name": engine},
         }
@@ -84,7 +84,7 @@ def assert_sags_exactly(scene: Scenario, tmp_path: Path) -> None:
     last = last_snapshot(tmp_path / "work")
     weight_n = program.mass_kg(1) * scene.gravity_m_s2
     constrained_pa = YOUNG_PA * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
-    area_m2 = WIDTH_M * scene.sand.disc_thickness_m
+    area_m2 = WIDTH_M * scene.sand.thickness_m
     assert last.pattern_m is not None
     # The tolerance of rest, 1 % of the weight.
     assert sag_m(scene, last.pattern_m) == pytest.approx(

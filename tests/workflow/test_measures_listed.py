@@ -38,7 +38,7 @@ DAM = {
     "obstacles": [
         {"kind": "plate", "name": "gate", "centre_m": [0.06, 0.06], "size_m": [0.004, 0.12]}
     ],
-    "sand": {"size_scale": 4.0, "size_classes": 3},
+    "sand": {"size_scale": 4.0, "size_classes": 3, "disc_thickness_m": 0.1},
     "discharge": {"gate": "gate", "settling": {"shortest_s": 0.01}},
 }
 STEEL = {

@@ -23,7 +23,7 @@ STUDY = """\
 based_on: tube
 scenario:
   engine: {name: reference}
-  sand: {size_scale: 9, size_classes: 3}
+  sand: {size_scale: 9, size_classes: 3, disc_thickness_m: 0.1}
   time_step: {fraction: 0.8}
   vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 1.5}]
   record: {snapshot_every_s: 0.1}
@@ -34,7 +34,7 @@ RANKS = """\
 based_on: tube
 scenario:
   engine: {name: lammps, ranks: 2}
-  sand: {size_scale: 12, size_classes: 3}
+  sand: {size_scale: 12, size_classes: 3, disc_thickness_m: 0.1}
   fill: {layers: [{count: 40}]}
   time_step: {fraction: 0.8}
   vibration: []

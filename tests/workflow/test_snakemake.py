@@ -25,7 +25,7 @@ STUDIES = sorted((ROOT / "config" / "studies").glob("*.yaml"))
 TINY = """\
 based_on: tube
 scenario:
-  sand: {size_scale: 12, size_classes: 3}
+  sand: {size_scale: 12, size_classes: 3, disc_thickness_m: 0.1}
   time_step: {fraction: 0.8}
   vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 0.06}]
   record: {snapshot_every_s: 0.02}

@@ -79,7 +79,7 @@ def render_deck(
         Names for the deck's first line.
     """
     scenario = program.scenario
-    contact = scenario.contact
+    contact = scenario.laws
     context = deck_context(program, Lines(scenario, sources), run, study)
     context |= {
         "scene": scenario.scene,

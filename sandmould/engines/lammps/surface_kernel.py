@@ -68,7 +68,7 @@ class SurfaceKernel:
         memory = new_history(dim_of(d), n)
         # The names must live as long as LAMMPS is asked by their addresses.
         self._names = [ctypes.create_string_buffer(name) for name in GRAIN_ARRAYS]
-        contact, damping = scenario.contact, scenario.background_damping
+        contact, damping = scenario.laws, scenario.background_damping
         law = Law(**contact.parameters(contact.grain_wall, d, self._counts.step_s))
         constants = Constants(
             damping.nonviscous_translation,

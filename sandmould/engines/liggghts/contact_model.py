@@ -92,7 +92,8 @@ def pair_tables(
         rows = [[of_pair(i, j) for j in classes] + flat * [of_wall(i)] for i in classes]
         # Walls never meet walls; LIGGGHTS wants a number all the same.
         rows += flat * [[of_wall(j) for j in classes] + flat * [of_wall(classes[0])]]
-        sources = [lines.source(f"contact.{law}.{key}") for law in ("grain_grain", "grain_wall")]
+        keys = [f"contact.{law}.{key}" for law in ("grain_grain", "grain_wall")]
+        sources = [lines.source(k) + lines.in_use(k)[1] for k in keys]
         source = " and ".join(dict.fromkeys(sources))
         return PairTable(name, liggghts, unit, meaning, source, rows)
 

@@ -59,13 +59,13 @@ def render_deck(
     context = deck_context(program, lines, run, study)
     context |= {
         "tables": pair_tables(
-            scenario.contact,
+            scenario.laws,
             context["classes"],
             lines,
             context["step_s"],
             scenario.discharge is not None,
         ),
-        "rolling_model": rolling_model(scenario.contact),
+        "rolling_model": rolling_model(scenario.laws),
         "simulation_box": bounds_m(program),
         "surfaces": list(surface_meshes(program)),
         "wall_names": [wall.name for wall in scenario.scene.walls],

@@ -67,7 +67,7 @@ def render_deck(program: Program, sources: Mapping[str, str], run: str, study: s
     context |= {
         "kernels": source_hash(),
         "keys": keys,
-        "inertia_factor": inertia_factor(scenario.sand, scenario.contact, scenario.time_step, d),
+        "inertia_factor": inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d),
         "surfaces": surfaces_of(scenario).names,
     }
     return Deck.render("reference", context)

@@ -23,7 +23,7 @@ than twice as long at 0.15, one busy machine, two runs each."""
 
 
 def _law(scenario: Scenario, law: ContactLaw, step_s: float) -> Law:
-    return Law(**scenario.contact.parameters(law, scenario.dimension, step_s))
+    return Law(**scenario.laws.parameters(law, scenario.dimension, step_s))
 
 
 def _damping(scenario: Scenario) -> Damping:
@@ -42,8 +42,8 @@ def scene_of(scenario: Scenario, stage: Stage, step_s: float) -> DemScene:
     up = (0.0,) * (d - 1) + (1.0,)
     direction = up if stage.vibration is None else stage.vibration.unit_direction(d)
     return DemScene(
-        _law(scenario, scenario.contact.grain_grain, step_s),
-        _law(scenario, scenario.contact.grain_wall, step_s),
+        _law(scenario, scenario.laws.grain_grain, step_s),
+        _law(scenario, scenario.laws.grain_wall, step_s),
         _damping(scenario),
         (0.0,) * (d - 1) + (-scenario.gravity_m_s2,),
         direction,
@@ -84,7 +84,7 @@ def grains_of(scenario: Scenario, layer: PlannedLayer, base_m: float, first_id: 
     position = layer.position_m.copy()
     position[:, -1] += base_m
     mass = scenario.sand.grain_mass_kg(1.0, d) * (2 * radius) ** d
-    factor = inertia_factor(scenario.sand, scenario.contact, scenario.time_step, d)
+    factor = inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d)
     return Grains(
         first_id + np.arange(n),
         position,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from sandmould.scenario.box import Tube
-from sandmould.scenario.contact import Contact
 from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.control_case import ControlCase
@@ -90,15 +89,11 @@ def _stiffer(factor: float) -> Change:
     """
 
     def change(scenario: Scenario) -> Scenario:
-        tree = scenario.contact.model_dump()
-        for pair in tree.values():
-            for key, value in pair.items() if isinstance(pair, dict) else ():
-                if key.endswith("_stiffness_n_m") and value is not None:
-                    pair[key] = factor * value
         allowed = scenario.guard.largest_overlap_fraction * max(1.0, factor**-0.5)
         overlap = {"largest_overlap_fraction": min(allowed, FULL_OVERLAP)}
         guard = scenario.guard.model_copy(update=overlap)
-        return scenario.model_copy(update={"contact": Contact(**tree), "guard": guard})
+        contact = scenario.contact.stiffer(factor)
+        return scenario.model_copy(update={"contact": contact, "guard": guard})
 
     return change
 

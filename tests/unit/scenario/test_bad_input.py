@@ -121,7 +121,7 @@ CASES: dict[str, tuple[str, str]] = {
     "time step above critical": (
         "based_on: tube\nscenario: {time_step: {step_s: 1e-3}}",
         "trial.yaml: scenario.time_step.step_s = 0.001 cannot be used: valid is at most the "
-        "critical step 1.516e-05 s, set by normal grain-grain contact.",
+        "critical step 2.289e-06 s, set by normal grain-grain contact.",
     ),
     "frequency 0": (
         "based_on: tube\nscenario: {vibration: [{frequency_hz: 0, acceleration_g: 1.5}]}",

@@ -42,7 +42,7 @@ def test_classes_keep_the_mass_of_the_sieve_curve() -> None:
 def test_one_class_stands_at_the_geometric_mean() -> None:
     (only,) = EQUAL.classes(2)
     assert only.diameter_m == pytest.approx(1.1e-3)
-    assert EQUAL.grain_mass_kg(2e-3, 2) == pytest.approx(2400 * math.pi * 1e-6 * 0.1)
+    assert EQUAL.grain_mass_kg(2e-3, 2) == pytest.approx(2400 * math.pi * 1e-6 * 1.1e-3)
     assert EQUAL.grain_mass_kg(2e-3, 3) == pytest.approx(2400 * math.pi / 6 * 8e-9)
 
 
@@ -132,7 +132,7 @@ def test_tube_in_3d_has_the_bore_of_the_circle(facets: int) -> None:
 
 def test_layer_amounts_turn_into_grains() -> None:
     area = math.pi / 4 * 1.1e-3**2
-    layers = [{"count": 7}, {"mass_kg": 2400 * 0.1 * area * 50}, {"height_m": 0.01, "repeat": 2}]
+    layers = [{"count": 7}, {"mass_kg": 2400 * 1.1e-3 * area * 50}, {"height_m": 0.01, "repeat": 2}]
     scene = Scenario.model_validate({"sand": EQUAL, "fill": {"layers": layers}})
     by_height = round(0.01 * 0.1 * 0.8 / area)
     assert plan_counts(scene) == [7, 50, by_height, by_height]

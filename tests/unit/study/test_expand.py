@@ -146,7 +146,7 @@ def test_swept_section_merges_and_swept_list_replaces(runs_of: Runs) -> None:
     assert first.scenario.contact.grain_wall.normal_stiffness_n_m == 2e4
     assert second.sources["contact.grain_wall.friction"] == "sweep of trial.yaml"
     assert second.sources["contact.grain_wall.damping_ratio"] == "Rojek 2004, section 4.1"
-    layers = [[{"count": 500}, {"mass_kg": 0.5}], [{"height_m": 0.05}]]
+    layers = [[{"count": 500}, {"mass_kg": 0.02}], [{"height_m": 0.05}]]
     first, second = runs_of(sweep=swept(fill__layers=layers))
     assert [layer.count for layer in first.scenario.fill.layers] == [500, None]
     assert second.scenario.fill.layers[0].height_m == 0.05

@@ -105,7 +105,7 @@ def test_the_bent_pattern_is_written_for_tools_that_measure_shapes(
         measured(folder).pattern_distance_largest_m.iloc[-1]
     )
     solid = meshio.read(folder / "exports" / "pattern_filled.stl")
-    thickness_m = scenario.sand.disc_thickness_m
+    thickness_m = scenario.sand.thickness_m
     assert np.ptp(solid.points[:, 2]) == pytest.approx(thickness_m, rel=1e-6)
     highest_m = (body.vertices_m + bent)[:, 1].max()
     assert solid.points[:, 1].max() == pytest.approx(highest_m, rel=1e-6)

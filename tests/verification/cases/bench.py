@@ -21,6 +21,8 @@ from tests.verification.cases.case import RefusedCase
 
 Array = NDArray[np.float64]
 RADIUS_M = 0.002
+THICKNESS_M = 0.1
+"""Of the discs."""
 SMALL_M, LARGE_M = 0.0016, 0.0024
 OMEGA_RAD_S = 2000.0
 """sqrt(k/m) of the stiffness that ``law`` gives unless told and the mass of a grain of RADIUS_M."""
@@ -42,13 +44,18 @@ def sieve(dimension: int, radii_m: tuple[float, ...]) -> dict[str, Any]:
     points = [
         {"opening_m": o, "passing_fraction": p} for o, p in zip(openings, passing, strict=True)
     ]
-    return {"size_scale": 1.0, "size_classes": len(radii_m), "sieve": points}
+    return {
+        "size_scale": 1.0,
+        "size_classes": len(radii_m),
+        "sieve": points,
+        "disc_thickness_m": THICKNESS_M,
+    }
 
 
 def mass_kg(dimension: int, radius_m: float = RADIUS_M) -> float:
-    """Mass of a grain of the bench: density 2400 kg/m3, discs 0.1 m thick."""
+    """Mass of a grain of the bench: density 2400 kg/m3, discs THICKNESS_M thick."""
     if dimension == 2:
-        return 2400.0 * 0.1 * math.pi * radius_m**2
+        return 2400.0 * THICKNESS_M * math.pi * radius_m**2
     return 2400.0 * 4 / 3 * math.pi * radius_m**3
 
 
@@ -104,7 +111,11 @@ def scene(
         "gravity_m_s2": 0.0,
         "box": {"width_m": 0.2, "depth_m": 0.2, "height_m": 0.2},
         "sand": sieve(dimension, radii_m),
-        "contact": {"grain_grain": pair or law(dimension), "grain_wall": wall or law(dimension)},
+        "contact": {
+            "grain_grain": pair or law(dimension),
+            "grain_wall": wall or law(dimension),
+            "springs_at_size_scale": None,
+        },
         "background_damping": {"form": "none"},
         # Never at rest before the end.
         "fill": {
