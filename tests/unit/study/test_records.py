@@ -96,11 +96,14 @@ def test_record_is_stale_when_its_study_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = "config/studies/tube_demo.yaml"
-    digest = records.study_hash(expand(open_study(ROOT / study)))
+    runs = expand(open_study(ROOT / study))
+    digest, scenarios = records.study_hash(runs), records.scenarios_hash(runs)
+    other = {"study": study, "study_sha256": "0" * 64, "defaults": records.DEFAULTS}
     for name, kept in (
         ("good", {"study": study, "study_sha256": digest}),
         ("old", {"study": study, "study_sha256": "0" * 64}),
-        ("new", {"study": study, "study_sha256": "0" * 64, "defaults": records.DEFAULTS}),
+        ("new", other),
+        ("older", other | {"scenarios_sha256": scenarios}),
         ("gone", {"study": "config/studies/no_such.yaml", "study_sha256": digest}),
     ):
         (tmp_path / name).mkdir()
@@ -110,6 +113,7 @@ def test_record_is_stale_when_its_study_changes(
     assert told["good"] == ""
     assert told["old"] == records.OLD_DEFAULTS
     assert "changed" in told["new"]
+    assert told["older"] == records.OLDER_SOLVER
     assert "gone" in told["gone"]
 
 
@@ -134,6 +138,26 @@ def test_record_of_a_study_with_rounds_rests_on_the_runs_they_added(
     assert records.stale_records() == [("tube_certified", "")]
     (folder / ROUNDS_FILE).unlink()
     assert "changed" in records.stale_records()[0][1]
+
+
+@pytest.mark.parametrize(
+    ("differences", "status", "said"),
+    [([], 0, "count: its results are the same"), (["a: mean b is 1, recorded 2"], 1, "do not")],
+)
+def test_records_of_an_older_solver_count_while_the_cheapest_study_gives_the_same(
+    differences: list[str],
+    status: int,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    kept = [("here", ""), ("there", records.OLDER_SOLVER), ("before", records.OLD_DEFAULTS)]
+    monkeypatch.setattr(records, "stale_records", lambda: kept)
+    monkeypatch.setattr(records, "recompute_smallest", lambda results: differences)
+    assert records.main(["check"]) == status
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert said in last
+    assert last.endswith(": there.")
 
 
 def test_unfinished_study_is_not_recorded(tmp_path: Path) -> None:
