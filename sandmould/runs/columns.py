@@ -23,9 +23,11 @@ PART: Final = "part"
 
 SWEEP: Final = "sweep"
 CROSS_CHECK: Final = "cross_check"
+CROSS_CHECK_OWN: Final = "cross_check, own engine"
 CONTROL: Final = "control: "
-"""Cells of ``part``: the sweep with its rounds, its points on another engine, and the beginning of
-the name of a control's case."""
+"""Cells of ``part``: the sweep with its rounds, its point on another engine, the same point on the
+study's own where the check vibrates for a time of its own, and the beginning of the name of a
+control's case."""
 
 OUTCOME_CODE: Final = "outcome_code"
 OUTCOME: Final = "outcome"

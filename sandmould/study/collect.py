@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from sandmould.runs.columns import (
     CLOCK,
     CROSS_CHECK,
+    CROSS_CHECK_OWN,
     DETAIL,
     ENGINE,
     FILL,
@@ -189,9 +190,11 @@ def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> t
     comparisons = compare_keys(swept, keys, equivalence)
     if study.cross_check is not None and PART in summary:
         checked = summary[summary[PART] == CROSS_CHECK]
-        alike = swept
-        for key, value in study.cross_check.at.items():
-            alike = alike[alike[key] == value]
+        alike = summary[summary[PART] == CROSS_CHECK_OWN]
+        if study.cross_check.vibration_s is None:
+            alike = swept
+            for key, value in study.cross_check.at.items():
+                alike = alike[alike[key] == value]
         engines = (study.scenario.engine.name, study.cross_check.engine)
         comparisons += compare_pair(
             "engine.name", engines, study.cross_check.at, (alike, checked), equivalence

@@ -46,6 +46,17 @@ def _cross_check(check: CrossCheck, study: Study) -> Iterator[Problem]:
     if check.replicates is not None and check.replicates > study.replicates:
         valid = f"at most {study.replicates}, the study's own: runs are compared in pairs"
         yield Problem("cross_check.replicates", check.replicates, valid)
+    if check.vibration_s is not None:
+        yield from _vibration(check.vibration_s, study)
     swept = points(study.sweep, study.scenario)
     if check.at not in swept:
         yield Problem("cross_check.at", check.at, f"a point of the sweep, such as {swept[0]}")
+
+
+def _vibration(vibration_s: float, study: Study) -> Iterator[Problem]:
+    stages = study.scenario.vibrations
+    if not stages:
+        yield Problem("cross_check.vibration_s", vibration_s, "null without a stage of vibration")
+    elif vibration_s > stages[-1].duration_s:
+        valid = f"at most {stages[-1].duration_s:g} s, that of the last vibration"
+        yield Problem("cross_check.vibration_s", vibration_s, valid)

@@ -32,6 +32,14 @@ class CrossCheck(Section):
         source=ARGUED,
         ge=1,
     )
+    vibration_s: float | None = quantity(
+        None,
+        "Duration of the last vibration in the runs of the check, for a shorter one; both engines "
+        "then compute runs of their own. That of the scenario unless given.",
+        unit="s",
+        source="user",
+        gt=0,
+    )
 
 
 def kind_key(name: str) -> Any:

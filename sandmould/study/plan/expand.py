@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.runs.columns import CROSS_CHECK, CROSS_CHECK_OWN
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import Section
@@ -211,11 +212,16 @@ class _AtPoint:
         check = self.study.study.cross_check
         if check is None or check.at != self.point:
             return
-        engine = self.scenario.engine.model_copy(update={"name": check.engine})
-        scenario = self.scenario.model_copy(update={"engine": engine})
+        own = self.scenario
+        if check.vibration_s is not None:
+            own = _vibrated_for(check.vibration_s, own)
+        engine = own.engine.model_copy(update={"name": check.engine})
+        other = own.model_copy(update={"engine": engine})
         number = check.replicates or self.study.study.replicates
         source = {ENGINE: f"cross_check of {self.study.file}"}
-        yield from self._replicates(scenario, range(1, number + 1), source, "cross_check")
+        yield from self._replicates(other, range(1, number + 1), source, CROSS_CHECK)
+        if own is not self.scenario:
+            yield from self._replicates(own, range(1, number + 1), source, CROSS_CHECK_OWN)
 
     def changed(self, case: Case) -> tuple[Scenario, list[Problem]]:
         """The scenario of a control at this point, and why it cannot be run."""
@@ -260,6 +266,14 @@ class _AtPoint:
                 {**sources, "seed": f"replicate {replicate} of seed {own} ({sources['seed']})"},
                 part,
             )
+
+
+def _vibrated_for(duration_s: float, scenario: Scenario) -> Scenario:
+    """A scene whose last vibration has another duration."""
+    last = scenario.vibrations[-1]
+    shorter = last.model_copy(update={"duration_s": duration_s})
+    stages = tuple(shorter if stage is last else stage for stage in scenario.vibration)
+    return scenario.model_copy(update={"vibration": stages})
 
 
 def swept_key(study: OpenStudy, point: Point, key: str) -> str:

@@ -101,6 +101,21 @@ def test_all_replicates_are_checked_unless_fewer_are_asked_for(planned: Planned)
     assert [r.replicate for r in runs if r.part == "cross_check"] == [1, 2, 3]
 
 
+def test_a_shorter_check_has_runs_of_both_engines(planned: Planned) -> None:
+    check = CHECKED["cross_check"] | {"vibration_s": 0.5}
+    runs = planned(**{**CHECKED, "cross_check": check}).runs
+    short = [run for run in runs if run.scenario.vibrations[-1].duration_s == 0.5]
+    assert [(run.part, run.scenario.engine.name, run.replicate) for run in short] == [
+        (part, engine, replicate)
+        for part, engine in (
+            ("cross_check", "lammps"), ("cross_check, own engine", "reference"),
+        )
+        for replicate in (1, 2)
+    ]  # fmt: skip
+    assert short[2].run.startswith("engine_reference_frequency_50_r1_")
+    assert len(runs) == 6 + 4
+
+
 def test_study_without_a_sweep_can_be_checked(planned: Planned) -> None:
     tree = {**CHECKED, "sweep": {}, "cross_check": {"engine": "lammps"}}
     assert [r.part for r in planned(**tree).runs] == ["sweep"] * 3 + ["cross_check"] * 3
@@ -130,6 +145,11 @@ def test_price_is_that_of_each_engine(planned: Planned) -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
+        (
+            {"cross_check": {"engine": "lammps", "at": {FREQUENCY: 50}, "vibration_s": 9.0}},
+            "trial.yaml: cross_check.vibration_s = 9.0 cannot be used: valid is at most 2 s, that "
+            "of the last vibration.",
+        ),
         (
             {"cross_check": {"engine": "lammps", "at": {FREQUENCY: 65}}},
             "trial.yaml: cross_check.at = {'vibration.0.frequency_hz': 65} cannot be used: valid "
