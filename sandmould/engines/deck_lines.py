@@ -70,7 +70,10 @@ class Lines:
         if value == given:
             return value, ""
         if contact.wave_speed_m_s is not None:
-            return value, f", {given:g} multiplied for a wave speed of {contact.wave_speed_m_s:g} m/s"
+            return (
+                value,
+                f", {given:g} multiplied for a wave speed of {contact.wave_speed_m_s:g} m/s",
+            )
         scale = contact.springs_at_size_scale
         return value, f", {given:g} at size_scale {scale:g}, times {sand.size_scale:g}/{scale:g}"
 

@@ -37,6 +37,7 @@ from sandmould.runs.columns import (
 from sandmould.runs.formatting import name_of, number, seconds, size, titled, with_margin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.evidence import NOT_FINISHED, left_out, reason_text
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import CHECKS, CURVES, SUMMARY
@@ -81,6 +82,21 @@ class Table:
     """What it leaves out."""
 
 
+def _of_what_fits(summary: pd.DataFrame, verdict: Verdict) -> list[KeyNumber]:
+    """How much of what the tube could hold is in it at the best setting."""
+    column = verdict.measure.removesuffix("_fill_fraction") + "_fill_of_bed_fraction"
+    if verdict.best is None or column not in summary:
+        return []
+    at_best = sweep_part(summary[finished(summary)])
+    for key, value in verdict.best.values.items():
+        at_best = at_best[at_best[key] == value]
+    share = at_best[column].mean()
+    if not math.isfinite(share):
+        return []
+    what = f"of what fits in, {verdict.best.label}: the tube as dense as the bed is 100 %"
+    return [KeyNumber(f"{100 * share:.0f} %", what)]
+
+
 def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...]:
     """Objective of the best setting, runs that finished, size, cost and health of the runs.
 
@@ -94,12 +110,13 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
     tuple of KeyNumber
         Without those whose data are missing.
     """
-    numbers = []
+    numbers: list[KeyNumber] = []
     if verdict.best is not None:
         best = verdict.best
         label = f"{name_of(verdict.measure)}, {best.label}"
         mean = f"mean of {best.n} runs" if best.n > 1 else "one run"
         numbers.append(KeyNumber(number(best.mean), label, mean))
+        numbers += _of_what_fits(summary, verdict)
     complete = summary[finished(summary)]
     checks = PART in summary and (summary[PART] != SWEEP).any()
     label = "runs finished, checks included" if checks else "runs finished"

@@ -53,6 +53,9 @@ _ONE_NUMBER = 1e-9
 """Numbers that differ by less, as a share, are one: round-off of a unit."""
 
 
+_OF_BED = "_fill_of_bed_fraction"
+
+
 def unit_of(key: str) -> str:
     """Unit that a key's suffix states; empty for a pure number."""
     return next((unit for suffix, unit in _UNITS if key.endswith(suffix)), "")
@@ -71,6 +74,8 @@ def name_of(key: str) -> str:
         return _NAMES.get(key) or _NAMES[last]
     if last.endswith("_fill_fraction"):
         return f"fill of the {last.removesuffix('_fill_fraction').replace('_', ' ')}"
+    if last.endswith(_OF_BED):
+        return f"fill of the {last.removesuffix(_OF_BED).replace('_', ' ')} over the bed's density"
     for ending, what in _OF_PROBE.items():
         if last.endswith(ending):
             return f"{what} at {last.removesuffix(ending).replace('_', ' ')}"

@@ -13,7 +13,8 @@ def wave_speed_m_s(sand: Sand, contact: Contact, dimension: int) -> float:
 
     c = d sqrt(k_n/m) of equal masses m between springs k_n, a distance d apart and far shorter
     than the wave: sqrt(4 k_n/(pi rho b)) of discs of thickness b, sqrt(6 k_n/(pi rho d)) of
-    spheres. A bed has more contacts a grain, in all directions, and its own speed (docs/hard_sand.md).
+    spheres. A bed has more contacts a grain, in all directions, and its own speed
+    (docs/hard_sand.md).
 
     Parameters
     ----------

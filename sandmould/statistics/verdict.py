@@ -12,6 +12,7 @@ import pandas as pd
 from sandmould.runs.columns import RUN, finished
 from sandmould.runs.formatting import listed, name_of, number, value_text, with_margin
 from sandmould.scenario.vibration import VibrationStage
+from sandmould.statistics.equivalence import MOST_REPLICATES
 from sandmould.statistics.evidence import one_way_caveat, reasons_sentence, usable_values
 from sandmould.statistics.settings import (
     Comparison,
@@ -277,6 +278,8 @@ def _sentences(
             _difference_sentence(first, best, len(comparisons)),
         )
     like = [c.other for c in comparisons if not c.separated]
+    worse = [c.other for c in comparisons if c.separated]
+    ruled_out = f" Ruled out: {listed(worse)}." if worse else ""
     again = (
         _difference_sentence(first, best, len(comparisons))
         if first.tested
@@ -286,8 +289,27 @@ def _sentences(
     return (
         f"Not resolved: no setting can be recommended for its {what}. The {most} mean, "
         f"{mean}, is that of {best.label}, but it cannot be told apart from "
-        f"{listed(like)} at 95 % confidence.",
-        again,
+        f"{listed(like)} at 95 % confidence.{ruled_out}",
+        again + _more_sentence(comparisons, best),
+    )
+
+
+def _more_sentence(comparisons: Sequence[Comparison], best: Setting) -> str:
+    """How many more replicates would tell the best from those that it cannot be told from.
+
+    An interval shrinks with the root of the number of replicates, so that it leaves zero out once
+    n (half width / difference)^2 of them are there.
+    """
+    open_ones = [c for c in comparisons if c.tested and not c.separated]
+    if not open_ones or any(c.difference == 0.0 for c in open_ones):
+        return ""
+    needed = max(best.n * ((c.ci[1] - c.ci[0]) / 2 / c.difference) ** 2 for c in open_ones)
+    more = math.ceil(needed) - best.n
+    if more > MOST_REPLICATES:
+        return f" More than {MOST_REPLICATES} further replicates would be needed to decide."
+    return (
+        f" If the differences are as large as they seem, about {more} more replicates of each "
+        "of these settings decide."
     )
 
 

@@ -26,7 +26,12 @@ from tests.workflow.runs import drive
 def plank_scene(engine: str) -> Scenario:
     scene: dict[str, Any] = {
         "box": {"width_m": 0.05, "height_m": 0.07},
-        "sand": {"size_scale": 8.0, "size_classes": 2, "disc_inertia": "sphere", "disc_thickness_m": 0.1},
+        "sand": {
+            "size_scale": 8.0,
+            "size_classes": 2,
+            "disc_inertia": "sphere",
+            "disc_thickness_m": 0.1,
+        },
         "background_damping": {"form": "none"},
         "pattern": {
             "shape": {"kind": "bar", "width_m": 0.05, "height_m": 0.006},

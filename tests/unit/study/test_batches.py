@@ -66,7 +66,9 @@ def test_runs_of_other_engines_or_more_cores_have_jobs_of_their_own(tmp_path: Pa
 
 
 def test_the_shortest_run_takes_its_start(tmp_path: Path) -> None:
-    runs = runs_of(tmp_path, scenario={"sand": {"disc_thickness_m": 0.1}, "fill": {"layers": [{"count": 1}]}})
+    runs = runs_of(
+        tmp_path, scenario={"sand": {"disc_thickness_m": 0.1}, "fill": {"layers": [{"count": 1}]}}
+    )
     assert START_S < planned_wall_s(runs[0]) < START_S + 0.5
 
 

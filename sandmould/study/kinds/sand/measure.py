@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import zipfile
 from collections.abc import Iterable
@@ -68,6 +69,9 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         "largest_overlap_fraction": touching.largest_overlap_fraction,
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
+    for bore in scenario.scene.bores:
+        filled, packed = row[f"{bore.name}_fill_fraction"], row["solid_fraction"]
+        row[f"{bore.name}_fill_of_bed_fraction"] = filled / packed if packed else math.nan
     if snapshot.pattern_m is not None and scenario.dimension == 2:
         row["pattern_under_fraction"] = fill_under(snapshot.pattern_m, position, radius)
     return row | measure_outflow(scenario, snapshot)

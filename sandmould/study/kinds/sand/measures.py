@@ -60,6 +60,10 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
                 "<tube>_fill_fraction",
                 "Sand in the tube <tube> over its space: a dense bed gives its solid fraction.",
             ),
+            Measure(
+                "<tube>_fill_of_bed_fraction",
+                "Sand in the tube <tube> over what it would hold as densely filled as the bed.",
+            ),
             Measure("<tube>_front_depth_m", "How far sand has come into the tube <tube>."),
             Measure("<tube>_grains", "Grains in the tube <tube>."),
         ),
