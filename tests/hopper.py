@@ -54,7 +54,8 @@ HOPPER: dict[str, Any] = {
         ],
     },
     "contact": {
-        name: dict.fromkeys(SPRINGS, 1e4) for name in ("grain_grain", "grain_wall")
+        "springs_at_size_scale": None,
+        **{name: dict.fromkeys(SPRINGS, 1e4) for name in ("grain_grain", "grain_wall")},
     },
     "background_damping": {"form": "none"},
     # The first layer leaves gaps: grains of the second stand on the gate too.

@@ -46,6 +46,7 @@ ONE_GRAIN: dict[str, Any] = {
         ],
         "disc_thickness_m": 0.1,
     },
+    "contact": {"springs_at_size_scale": None},
     "fill": {"layers": [{"count": 1}]},
     "time_step": {"fraction": 0.01},
     "rest": {"load_every_steps": 1, "check_every_s": 1e-4},

@@ -26,6 +26,7 @@ TUBE_SCENE: dict[str, Any] = {
         }
     ],
     "sand": {"size_scale": 8.0, "size_classes": 3, "disc_thickness_m": 0.1},
+    "contact": {"springs_at_size_scale": None},
     "fill": {"layers": [{"count": 60, "repeat": 2}]},
     "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.06}],
     "record": {"snapshot_every_s": 0.02},

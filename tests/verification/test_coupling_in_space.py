@@ -32,7 +32,11 @@ def cantilever_scene(**changes: Any) -> Scenario:
     scene: dict[str, Any] = {
         "dimension": 3,
         "box": {"width_m": 0.05, "depth_m": 0.02, "height_m": 0.05},
-        "contact": {"grain_grain": SOFT, "grain_wall": SOFT | {"friction": 0.35}},
+        "contact": {
+            "grain_grain": SOFT,
+            "grain_wall": SOFT | {"friction": 0.35},
+            "springs_at_size_scale": None,
+        },
         "background_damping": {"form": "nonviscous_componentwise", "nonviscous_rotation": 0.3},
         "pattern": {
             "shape": {"kind": "bar", "width_m": 0.03, "height_m": 0.005},
@@ -142,7 +146,7 @@ def plank_scene(**changes: Any) -> Scenario:
         "dimension": 3,
         "box": {"width_m": 0.06, "depth_m": 0.03, "height_m": 0.08},
         "sand": {"size_scale": 8.0, "size_classes": 2, "disc_thickness_m": 0.1},
-        "contact": {"grain_grain": SOFT, "grain_wall": SOFT},
+        "contact": {"grain_grain": SOFT, "grain_wall": SOFT, "springs_at_size_scale": None},
         "pattern": {
             "shape": {"kind": "bar", "width_m": 0.06, "height_m": 0.006},
             "position_m": [0.0, 0.0, 0.01],

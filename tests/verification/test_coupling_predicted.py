@@ -145,9 +145,9 @@ def test_one_grain_on_a_pillar_in_space_by_hand() -> None:
         "loop": {"scheme": "fixed"},
     }
     told = with_surface(Scenario.model_validate(scene))
-    window_s, beds = 1e-3, told.contact.grain_grain.normal_stiffness_n_m
+    window_s, beds = 1e-3, told.laws.grain_grain.normal_stiffness_n_m
     mass_kg = told.sand.density_kg_m3 * math.pi * size.diameter_m**3 / 6
-    law = told.contact.grain_wall
+    law = told.laws.grain_wall
     dashpot = 2 * law.damping_ratio * math.sqrt(mass_kg * law.normal_stiffness_n_m)
     stiffest = max(law.normal_stiffness_n_m, law.tangential_stiffness_n_m)
     contact_n_m = stiffest + 2 * dashpot / window_s

@@ -114,7 +114,11 @@ def test_solids_of_3d_equal_a_plate_of_lammps(kind: str, tmp_path: Path) -> None
         write_cuboid(path, np.array([0.005, 0.005, 0.005]), np.array([0.045, 0.045, TOP_M]))
         other = {"kind": "mesh", "name": "slab", "file": str(path)}
     soft = {"normal_stiffness_n_m": 500.0, "tangential_stiffness_n_m": 500.0}
-    contact = {"grain_grain": soft, "grain_wall": SMOOTH["grain_wall"] | soft}
+    contact = {
+        "grain_grain": soft,
+        "grain_wall": SMOOTH["grain_wall"] | soft,
+        "springs_at_size_scale": None,
+    }
     scenes = [
         slab_scene(obstacle, dimension=3, box=box, contact=contact)
         for obstacle in ({**plate, "size_m": [0.04, 0.04, 0.005]}, other)
