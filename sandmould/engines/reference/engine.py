@@ -69,6 +69,7 @@ def render_deck(program: Program, sources: Mapping[str, str], run: str, study: s
         "keys": keys,
         "inertia_factor": inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d),
         "surfaces": surfaces_of(scenario).names,
+        "planned_step_s": scenario.planned_step_s,
     }
     return Deck.render("reference", context)
 
