@@ -33,10 +33,11 @@ def with_bed_step(scenario: Scenario, limit_s: float) -> Scenario:
     """
     fraction = scenario.time_step.bed_fraction
     assert fraction is not None
-    step_s = fraction * limit_s if math.isfinite(limit_s) else scenario.step_s
     periods_s = (1.0 / stage.frequency_hz for stage in scenario.vibrations)
     longest_s = (period_s / LEAST_STEPS_A_PERIOD for period_s in periods_s)
-    step_s = _rounded_down(min(step_s, scenario.rest.check_every_s, *longest_s))
+    step_s = scenario.step_s
+    if math.isfinite(limit_s):
+        step_s = _rounded_down(min(fraction * limit_s, scenario.rest.check_every_s, *longest_s))
     time_step = scenario.time_step.model_copy(update={"step_s": step_s})
     return scenario.model_copy(update={"time_step": time_step})
 

@@ -49,7 +49,8 @@ def refuse(scenario: Scenario) -> None:
 def session_sources(scenario: Scenario) -> list[Path]:
     """The solver, and how it is given a scene."""
     here = Path(__file__).parent
-    session = [here / name for name in ("model.py", "moved_solver.py", "session.py")]
+    names = ("model.py", "moved_solver.py", "session.py", "exact_limit.py")
+    session = [here / name for name in names]
     return [*source_files(), *session, here.parent / "solid_surfaces.py"]
 
 
