@@ -14,7 +14,10 @@ import yaml
 from sandmould.engines.driver import Driver
 from sandmould.engines.session import Session
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
+from sandmould.study.plan.build_plan import open_plan
+from sandmould.study.plan.fills import own_work
+from sandmould.study.plan.plan_files import plan_table
+from sandmould.study.plan.price import Prices
 from sandmould.study.run_tables import read_costs
 from tests.scenes import TUBE_SCENE, tube_scene
 from tests.workflow.runs import SOON, drive, run_folder
@@ -48,9 +51,10 @@ def test_a_branch_is_bit_for_bit_the_run_alone_from_its_deck(
     assert [compute(folder) for folder in (fill, shorter, longer)] == [Outcome.FINISHED] * 3
     assert_same(shorter, straight)
     costs = {f: cost_of(f) for f in (straight, fill, shorter, longer)}
-    step_s = costs[straight].time_step_s
+    step_s = float(costs[straight].time_step_s)
     assert step_s == costs[shorter].time_step_s == costs[longer].time_step_s
-    assert 0.6999 * costs[fill].bed_limit_s < step_s <= 0.7 * costs[fill].bed_limit_s
+    # rounded down to four digits
+    assert 0.999 * 0.7 < step_s / costs[fill].bed_limit_s <= 0.7
     # the fill has the planned step, and with it the bed that gives the other one
     assert costs[fill].time_step_s == tube_scene(**OF_BED).planned_step_s
     assert costs[fill].grain_steps + costs[shorter].grain_steps == costs[straight].grain_steps
@@ -124,12 +128,11 @@ def test_a_step_above_the_limit_of_the_shaken_bed_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = Driver._limit_s
-    shrinks = lambda self, session: (
-        found(self, session)
-        * (  # noqa: E731
-            0.6 if session.stage.counts_as_vibration else 1.0
-        )
-    )
+
+    def shrinks(driver: Driver, session: Session) -> float:
+        share = 0.6 if session.stage.counts_as_vibration else 1.0
+        return share * found(driver, session)
+
     monkeypatch.setattr(Driver, "_limit_s", shrinks)
     folder = run_folder(tube_scene(**OF_BED), tmp_path)
     assert compute(folder) is Outcome.FINISHED
@@ -139,7 +142,7 @@ def test_a_step_above_the_limit_of_the_shaken_bed_is_told(
 
 
 def test_the_plan_counts_the_planned_step_and_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     tree = {"scenario": {**TUBE_SCENE, **OF_BED},
@@ -147,8 +150,11 @@ def test_the_plan_counts_the_planned_step_and_says_so(
     Path("small.yaml").write_text(yaml.safe_dump(tree))
     plan = open_plan(Path("small.yaml"))
     assert len(plan.fills) == 1
-    announce(plan, RESULTS, 1)
-    told = capsys.readouterr()
-    said = told.out + told.err
-    assert "1.68e-05 s planned" in said
-    assert "The price counts the planned time step." in said
+    said = plan_table([*plan.fills, *plan.runs], Prices(), 1)
+    assert "  1.68e-05 s planned  " in said
+    assert "Note: The price counts the planned time step. What follows the fill takes 0.7" in said
+    without = {**tree, "scenario": {**tree["scenario"], "time_step": {"fraction": 0.5}}}
+    Path("plain.yaml").write_text(yaml.safe_dump(without))
+    plain = open_plan(Path("plain.yaml"))
+    assert [own_work(run) for run in plain.runs] == [own_work(run) for run in plan.runs]
+    assert "planned" not in plan_table([*plain.fills, *plain.runs], Prices(), 1)

@@ -26,9 +26,9 @@ def exact_limit_s(program: Program, snapshot: Snapshot) -> float:
     """
     scenario = program.scenario
     solver = solver_of(scenario, program.stages[0], scenario.step_s)
-    if scenario.discharge is not None and not is_filling(snapshot.stage):
-        solver.surfaces.remove(scenario.discharge.gate)
     grains = grains_at(scenario, snapshot)
     solver.add(grains)
+    if scenario.discharge is not None and not is_filling(snapshot.stage):
+        solver.remove_surface(scenario.discharge.gate)
     solver.place(grains.position, grains.velocity, grains.spin)
     return whole_step(active_contacts(solver)).damped_s
