@@ -43,7 +43,8 @@ def grains_at(scene: Scenario, place: list[list[float]], stage: str = "vibrate_1
 
 def unit_rad_s(scene: Scenario) -> float:
     smallest = scene.sand.classes(2)[0].diameter_m
-    return math.sqrt(7e4 / scene.sand.grain_mass_kg(smallest, 2))
+    stiffness_n_m = scene.laws.grain_grain.normal_stiffness_n_m
+    return math.sqrt(stiffness_n_m / scene.sand.grain_mass_kg(smallest, 2))
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.4, 1.0])

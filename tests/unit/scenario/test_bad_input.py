@@ -124,7 +124,7 @@ CASES: dict[str, tuple[str, str]] = {
         "critical step 2.289e-06 s, set by normal grain-grain contact.",
     ),
     "step of the bed beside a step": (
-        "based_on: tube\nscenario: {time_step: {step_s: 1e-5, bed_fraction: 0.7}}",
+        "based_on: tube\nscenario: {time_step: {step_s: 1e-6, bed_fraction: 0.7}}",
         "trial.yaml: scenario.time_step.bed_fraction = 0.7 cannot be used: valid is absent where "
         "time_step.step_s gives the step of the whole run.",
     ),
