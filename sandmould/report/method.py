@@ -213,34 +213,30 @@ def _measured(scenario: Scenario) -> str:
 
 
 def _time_step(scenario: Scenario, summary: pd.DataFrame) -> str:
-    said, fraction = "", scenario.time_step.bed_fraction
-    if fraction is not None:
-        return _step_of_bed(scenario, fraction, summary)
+    said = ""
     if {TIME_STEP_S, TIME_STEP_FRACTION} <= set(summary.columns):
         steps, shares = summary[TIME_STEP_S].dropna(), summary[TIME_STEP_FRACTION].dropna()
         if len(steps) and len(shares):
             said = f"{_range(1e6 * steps)} µs, {_range(shares)} of the critical one; "
-    return f"{said}the critical step is set by the {scenario.critical_step.cause}"
+    said += f"the critical step is set by the {scenario.critical_step.cause}"
+    return said + _step_of_bed(summary)
 
 
-def _step_of_bed(scenario: Scenario, fraction: float, summary: pd.DataFrame) -> str:
-    critical = scenario.critical_step
-    said = (
-        f"fill: {number(1e6 * scenario.planned_step_s)} µs, {number(scenario.time_step.fraction)} "
-        f"of the critical one, which is set by the {critical.cause}; from then on "
-        f"{number(fraction)} of the exact limit of the filled bed"
+def _step_of_bed(summary: pd.DataFrame) -> str:
+    """What is known of runs that took their step from the filled bed."""
+    columns = [TIME_STEP_S, BED_LIMIT_S, LEAST_LIMIT_S, LIMIT_MOMENTS]
+    if not set(columns) <= set(summary.columns):
+        return ""
+    found = summary[columns].dropna()
+    if found.empty:
+        return ""
+    step_s, bed_s, least_s, moments = (found[column] for column in columns)
+    return (
+        f"; after the fill {len(found)} runs take {_range(step_s / bed_s)} of the exact limit of "
+        f"the filled bed, {_range(1e6 * bed_s)} µs; the least one of the shaken bed, over "
+        f"{_range(moments)} moments of a run, is {_range(1e6 * least_s)} µs, "
+        f"{_range(least_s / step_s)} times the step"
     )
-    if {TIME_STEP_S, BED_LIMIT_S, LEAST_LIMIT_S, LIMIT_MOMENTS} <= set(summary.columns):
-        found = summary.dropna(subset=[LEAST_LIMIT_S])
-        if len(found):
-            least_s = found[LEAST_LIMIT_S]
-            said += (
-                f", {_range(1e6 * found[BED_LIMIT_S])} µs: "
-                f"{_range(1e6 * found[TIME_STEP_S])} µs; exact limit of the shaken bed, least of "
-                f"{_range(found[LIMIT_MOMENTS])} moments of a run: {_range(1e6 * least_s)} µs, "
-                f"{_range(least_s / found[TIME_STEP_S])} times the step"
-            )
-    return said
 
 
 def _range(values: pd.Series[float]) -> str:

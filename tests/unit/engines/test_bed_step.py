@@ -33,27 +33,30 @@ def smooth_scene(damping_ratio: float, **changes: Any) -> Scenario:
 
 def grains_at(scene: Scenario, place: list[list[float]], stage: str = "vibrate_1") -> Snapshot:
     """Grains of the smallest class, places in radii from the middle of the floor."""
-    radius = 0.5 * scene.sand.classes(2)[0].diameter_m
+    d = scene.dimension
+    radius = 0.5 * scene.sand.classes(d)[0].diameter_m
     position = np.array(place, dtype=float) * radius * (1 - OVERLAP)
-    position[:, 0] += 0.04
+    position[:, :-1] += 0.04
     n = len(position)
     return Snapshot(1.0, 0.0, stage, np.arange(1, n + 1), np.ones(n, dtype=np.int64), position,
-                    np.zeros((n, 2)), np.zeros((n, 3)), np.full(n, radius))  # fmt: skip
+                    np.zeros((n, d)), np.zeros((n, 3)), np.full(n, radius))  # fmt: skip
 
 
 def unit_rad_s(scene: Scenario) -> float:
-    smallest = scene.sand.classes(2)[0].diameter_m
+    smallest = scene.sand.classes(scene.dimension)[0].diameter_m
     stiffness_n_m = scene.laws.grain_grain.normal_stiffness_n_m
-    return math.sqrt(stiffness_n_m / scene.sand.grain_mass_kg(smallest, 2))
+    return math.sqrt(stiffness_n_m / scene.sand.grain_mass_kg(smallest, scene.dimension))
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("zeta", [0.0, 0.4, 1.0])
-def test_a_grain_on_the_floor_has_the_limit_of_its_oscillator(zeta: float) -> None:
-    scene = smooth_scene(zeta)
+def test_a_grain_on_the_floor_has_the_limit_of_its_oscillator(zeta: float, dimension: int) -> None:
+    scene = smooth_scene(zeta, dimension=dimension, box={"depth_m": 0.08})
+    place = [[0] * (dimension - 1) + [1]]
     omega = unit_rad_s(scene)
     # c / (4 m) of a contact with a wall is zeta omega / 2; the corrected limit by Newton's way
     exact = damped_step(omega, zeta, 0.5 * zeta * omega)
-    assert exact_limit_s(build_program(scene), grains_at(scene, [[0, 1]])) == pytest.approx(exact)
+    assert exact_limit_s(build_program(scene), grains_at(scene, place)) == pytest.approx(exact)
 
 
 @pytest.mark.parametrize("columns", [1, 3])

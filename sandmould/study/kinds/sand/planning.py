@@ -182,7 +182,7 @@ def notes(scenario: Scenario) -> list[Note]:
     if scenario.time_step.bed_fraction is not None:
         text = (
             "The price counts the planned time step. What follows the fill takes "
-            f"{number(scenario.time_step.bed_fraction)} of the exact limit of the filled bed, "
+            f"{scenario.time_step.bed_fraction:g} of the exact limit of the filled bed, "
             "which nobody knows before; it is mostly longer."
         )
         told.append(Note("time step of the bed", text))
