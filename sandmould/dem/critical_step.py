@@ -30,9 +30,8 @@ from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Ints
 from sandmould.dem.solver import Solver
 
-_SETTLED = 1e-10
-"""Relative growth of the step of corrected dashpots below which it has been found; each round
-leaves about a tenth of the last."""
+_SETTLED = 1e-9
+"""Relative change of the step of corrected dashpots below which it has been found."""
 
 
 @dataclass(frozen=True)
@@ -189,15 +188,23 @@ def _stable(
     """Steps of a frequency and of the rate omega (sqrt(1 + xi^2) + xi) that (42) puts for it.
 
     The rate is that of dashpots, (c,) float64, s. Corrected ones are the weaker the longer the
-    step: from the limit of the plain ones up, each limit is that of the dashpots of the last one.
+    step: their limit is the step that is the limit of its own dashpots, found by secants from that
+    of the plain ones.
     """
     if not omega_rad_s > 0.0:
         return StableStep(0.0, math.inf, math.inf)
+
+    def missed_s(step_s: float) -> float:
+        dashpot = contacts.dashpot / (1.0 + contacts.correction * step_s)
+        return 2.0 / damped_rate_rad_s(dashpot) - step_s
+
     damped = 2.0 / damped_rate_rad_s(contacts.dashpot)
-    last = 0.0
-    while contacts.correction.any() and damped > last * (1.0 + _SETTLED):
-        last = damped
-        damped = 2.0 / damped_rate_rad_s(contacts.dashpot / (1.0 + contacts.correction * damped))
+    if contacts.correction.any():
+        last, missed = damped, missed_s(damped)
+        damped += missed
+        while abs(damped - last) > _SETTLED * damped:
+            before, missed = missed, missed_s(damped)
+            last, damped = damped, damped - missed * (damped - last) / (missed - before)
     return StableStep(float(omega_rad_s), 2.0 / omega_rad_s, damped)
 
 
@@ -256,7 +263,8 @@ def _largest(matrix: csr_array) -> float:
         return float(np.linalg.eigvalsh(matrix.toarray())[-1])
     # A start of no symmetry, always the same.
     start = np.random.default_rng(1).standard_normal(n)
-    largest = eigsh(matrix, k=1, which="LA", v0=start, ncv=40, tol=1e-10, return_eigenvectors=False)
+    # The error of the eigenvalue is the square of that of the vector, which the tolerance bounds.
+    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=1e-8, return_eigenvectors=False)
     return float(largest[0])
 
 

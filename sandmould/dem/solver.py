@@ -146,6 +146,24 @@ class Solver:
         scene = self.scene
         kick(self._dim, 0, len(order), self.grains, scene.gravity, scene.damping, -0.5 * scene.dt)
 
+    def change_step(self, earlier_s: float, steps: int) -> None:
+        """Go on with the step of the scene from a state that was computed with another one.
+
+        Velocities stood half of the other step before now, and now stand half of this one before
+        it. The box must stand.
+
+        Parameters
+        ----------
+        earlier_s : float
+            The other step.
+        steps : int
+            That count as done from now on.
+        """
+        scene, grains = self.scene, self.grains
+        lag_s = 0.5 * (earlier_s - scene.dt)
+        kick(self._dim, 0, len(grains.id), grains, scene.gravity, scene.damping, lag_s)
+        self.steps = steps
+
     def remove_surface(self, name: str) -> None:
         """Take a surface away at once, as a gate that opens, while the box is where it began.
 

@@ -9,10 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
+from sandmould.engines.bed_step import limit_moments, limit_warning, with_bed_step
 from sandmould.engines.blockage import what_blocks
 from sandmould.engines.cost import cost_before
 from sandmould.engines.guard import Guard
-from sandmould.engines.program import Program, Stage
+from sandmould.engines.program import Program, Stage, build_program
 from sandmould.engines.recording import Recorder
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import EngineStop, Session
@@ -42,6 +43,7 @@ class Driver:
         scenario_hash: str,
         open_session: Opening | None = None,
         keeps_end: bool = False,
+        write_deck: Callable[[Program], None] | None = None,
     ) -> None:
         """Prepare a run.
 
@@ -58,29 +60,52 @@ class Driver:
             Opens something that acts as a session; by default the scenario's engine.
         keeps_end : bool
             Whether a checkpoint of the end is a product, from which other runs go on.
+        write_deck : callable, optional
+            Writes the deck of a program again, once the filled bed has given its time step.
         """
         self._open_session = open_session or engine_of(program.scenario).open_session
-        self._program = program
-        self._scenario = program.scenario
+        self._planned = program
+        self._bed_limit_s: float | None = None
+        self._moments: list[int] = []
+        self._write_deck = write_deck
         self._folder = folder
         self._work = folder / "work"
         self._work.mkdir(parents=True, exist_ok=True)
         self._hash = scenario_hash
-        self._guard = Guard(program.scenario)
         self._name, self._keeps_end = name, keeps_end
         self._shared_stages = 0
-        counts, record = StepCounts.of(program.scenario), program.scenario.record
-        self._record_steps = counts.record
-        self._snapshot_steps = counts.records(record.snapshot_every_s)
-        self._checkpoint_steps = counts.checkpoints(
-            record.checkpoint_every_s,
-            at_setups=engine_of(program.scenario).CAPABILITIES.checkpoints_at_setups,
-        )
+        self._follow(program)
         self._stop_requested = False
         self._recorder: Recorder | None = None
         self.is_root = True
         """Whether this process writes the products; known once the engine has started."""
         self.cost = cost_before(program.scenario)
+        self._simulated_s = 0.0
+
+    def _follow(self, program: Program) -> None:
+        """Go by a program and its time step from now on."""
+        self._program = program
+        self._scenario = program.scenario
+        self._guard = Guard(program.scenario)
+        counts, record = StepCounts.of(program.scenario), program.scenario.record
+        self._check_steps, self._record_steps = counts.check, counts.record
+        self._snapshot_steps = counts.records(record.snapshot_every_s)
+        self._checkpoint_steps = counts.checkpoints(
+            record.checkpoint_every_s,
+            at_setups=engine_of(program.scenario).CAPABILITIES.checkpoints_at_setups,
+        )
+
+    def _take_step_of_bed(self, limit_s: float) -> None:
+        """Go on with the time step that the filled bed gives, and say so in cost and deck."""
+        self._bed_limit_s = limit_s
+        self._follow(build_program(with_bed_step(self._planned.scenario, limit_s)))
+        self._moments = limit_moments(self._program)
+        now = cost_before(self._scenario)
+        self.cost.time_step_s = now.time_step_s
+        self.cost.time_step_fraction = now.time_step_fraction
+        self.cost.bed_limit_s = limit_s
+        if self._write_deck is not None:
+            self._write_deck(self._program)
 
     def run(self) -> RunOutcome:
         """Compute to the end, to the wall-time limit or to what stops it.
@@ -99,25 +124,12 @@ class Driver:
         if mark is not None:
             self.cost = Cost(**mark.cost)
             self._shared_stages = mark.shared_stages
-        expected = self._program.expected_grain_steps(self._shared_stages)
-        self._progress = Progress(self._name, self._work, expected)
-        session: Session | None = None
+            self._simulated_s = self.cost.steps * self.cost.time_step_s
         outcome, detail = Outcome.FINISHED, ""
         self._begin_clocks()
         try:
-            try:
-                session = self._open_session(
-                    self._program,
-                    self._folder,
-                    self._work / "engine.log",
-                    newest[0] if newest else None,
-                )
-                self.is_root = session.is_root
-                if session.is_root:
-                    self._recorder = Recorder(self._work, self._scenario.dimension, mark)
-                self._go(session, mark)
-            finally:
-                self._end(session)
+            while not self._go_on(newest):
+                newest, _ = checkpoints.newest_checkpoint(self._work)
         except EngineStop as stop:
             outcome, detail = stop.outcome, stop.detail
         except OSError as error:
@@ -125,16 +137,50 @@ class Driver:
                 raise
             where = f": {error.filename}" if error.filename else ""
             outcome, detail = Outcome.DISK_REFUSED, f"{error.strerror}{where}"
-        simulated_s = self.cost.steps * self.cost.time_step_s
-        detail = "; ".join([detail, *notes] if detail else notes)
-        return RunOutcome(outcome, detail, simulated_s, self._program.expected_s)
+        warning = limit_warning(self.cost.time_step_s, self.cost.least_limit_s)
+        detail = "; ".join(said for said in (detail, warning, *notes) if said)
+        return RunOutcome(outcome, detail, self._simulated_s, self._program.expected_s)
+
+    def _go_on(self, newest: tuple[Path, CheckpointMark] | None) -> bool:
+        """Compute in a session from a checkpoint, or from the beginning.
+
+        Returns
+        -------
+        bool
+            Whether the run has reached its end: not where the filled bed has given another step,
+            with which the next session goes on.
+        """
+        mark = newest[1] if newest else None
+        if mark is not None and mark.bed_limit_s is not None:
+            self._take_step_of_bed(mark.bed_limit_s)
+        self._progress = Progress(self._name, self._work, self._expected_grain_steps())
+        self._progress.earlier_cpu_s = self._earlier[1]
+        session: Session | None = None
+        try:
+            session = self._open_session(
+                self._program,
+                self._folder,
+                self._work / "engine.log",
+                newest[0] if newest else None,
+            )
+            self.is_root = session.is_root
+            if session.is_root:
+                self._recorder = Recorder(self._work, self._scenario.dimension, mark)
+            return self._go(session, mark)
+        finally:
+            self._end(session)
+
+    def _expected_grain_steps(self) -> float:
+        """Work of this run: the fill, where it does not share it, has the planned step."""
+        filled, fill = self._program.fill_stages, self._planned.expected_grain_steps
+        own_fill = fill(self._shared_stages) - fill(filled)
+        return own_fill + self._program.expected_grain_steps(max(filled, self._shared_stages))
 
     def _ask_to_stop(self, number: int, frame: FrameType | None) -> None:
         self._stop_requested = True
 
     def _begin_clocks(self) -> None:
         self._earlier = (self.cost.wall_s, self.cost.cpu_s)
-        self._progress.earlier_cpu_s = self.cost.cpu_s
         self._begun, self._cpu_begun = time.monotonic(), cpu_time_s()
 
     def _read_clocks(self) -> None:
@@ -151,7 +197,8 @@ class Driver:
         # Last, since the time of an engine of its own process counts once that has ended.
         self._read_clocks()
 
-    def _go(self, session: Session, mark: CheckpointMark | None) -> None:
+    def _go(self, session: Session, mark: CheckpointMark | None) -> bool:
+        self._simulated_s = session.time_s
         names = [stage.name for stage in self._program.stages]
         first = names.index(mark.stage) if mark else 0
         for number, stage in enumerate(self._program.stages[first:], start=first):
@@ -161,11 +208,30 @@ class Driver:
             while not session.stage_over:
                 self._window(session)
             self._check_rest(session, stage)
+            finds_limit = number + 1 == self._program.fill_stages and self._lacks_bed_limit
+            if finds_limit:
+                self.cost.bed_limit_s = self._bed_limit_s = self._limit_s(session)
             if self._keeps_end and stage is self._program.stages[-1]:
                 self._write_end(session)
+            elif finds_limit:
+                self._write_checkpoint(session, checkpoints.next_folder(self._work))
+                return False
             session.end_stage()
         if session.is_root:
             self._show(session, last=True)
+        return True
+
+    @property
+    def _lacks_bed_limit(self) -> bool:
+        """Whether the run takes its step from the filled bed and has not found its limit yet."""
+        return self._scenario.time_step.bed_fraction is not None and self._bed_limit_s is None
+
+    def _limit_s(self, session: Session) -> float:
+        """Exact critical step of the bed as it is now."""
+        # Compiled and slow to load: only runs that take their step from the bed wait for it.
+        from sandmould.engines.reference.exact_limit import exact_limit_s
+
+        return exact_limit_s(self._program, session.snapshot())
 
     def _check_rest(self, session: Session, stage: Stage) -> None:
         """Stop where the sand did not come to rest, or came to rest before it had flowed out."""
@@ -193,12 +259,14 @@ class Driver:
 
     def _window(self, session: Session) -> None:
         """Compute up to the next check, look at it, and record it where a record is due."""
-        before, began = session.steps, time.monotonic()
-        session.advance()
-        cost = self.cost
-        cost.engine_wall_s += time.monotonic() - began
+        before, cost = session.steps, self.cost
+        if session.stage.counts_as_vibration and cost.limit_moments < len(self._moments):
+            self._find_limits(session)
+        self._advance(session)
+        self._simulated_s = session.time_s
+        cost.grains = session.grains
         cost.grain_steps += session.grains * (session.steps - before)
-        cost.grains, cost.steps = session.grains, session.steps
+        cost.steps += session.steps - before
         snapshot = session.snapshot()
         health = self._guard.check(snapshot)
         cost.largest_overlap_fraction = max(
@@ -215,6 +283,26 @@ class Driver:
             self._show(session)
         if ended_record:
             self._checkpoint_if_due(session)
+
+    def _advance(self, session: Session, duration_s: float | None = None) -> None:
+        began = time.monotonic()
+        session.advance(duration_s)
+        self.cost.engine_wall_s += time.monotonic() - began
+
+    def _find_limits(self, session: Session) -> None:
+        """Find the exact limit at the moments that lie before the next check."""
+        cost, step_s = self.cost, session.step_s
+        now = round(session.snapshot().vibration_time_s / step_s)
+        check = now + self._check_steps - session.steps % self._check_steps
+        for moment in self._moments[cost.limit_moments :]:
+            if moment >= check or session.stage_over:
+                return
+            if moment > now:
+                self._advance(session, (moment - now) * step_s)
+                now = moment
+            limit_s, least_s = self._limit_s(session), cost.least_limit_s
+            cost.least_limit_s = limit_s if least_s is None else min(limit_s, least_s)
+            cost.limit_moments += 1
 
     def _show(self, session: Session, last: bool = False) -> None:
         rate = self.cost.grain_steps / max(self.cost.engine_wall_s, 1e-9)
@@ -262,5 +350,6 @@ class Driver:
                 loads_bytes,
                 self.cost.row(),
                 self._shared_stages,
+                self._bed_limit_s,
             ),
         )

@@ -22,7 +22,7 @@ from sandmould.scenario.scenario import Scenario
 _OF_EVERY_ENGINE = (
     "scenario/placement.py", "engines/program.py", "engines/step_counts.py",
     "engines/box_motion.py", "engines/staged_session.py", "engines/deck_session.py",
-    "engines/driver.py", "engines/guard.py",
+    "engines/driver.py", "engines/guard.py", "engines/bed_step.py",
 )  # fmt: skip
 """Where grains begin, how stages follow each other, when they end, what stops a run."""
 

@@ -58,6 +58,8 @@ class StagedSession(ABC):
         self._counts = StepCounts.of(program.scenario)
         self._layer_of_id = np.repeat(np.arange(1, len(program.counts) + 1), program.counts)
         self.step_s = self._counts.step_s
+        self._time_at_0_s = 0.0
+        """Simulated time at step 0, had the step always been this one."""
         self.stage = program.stages[0]
         self.stage_over = self.at_rest = False
         self._watch = self._new_watch()
@@ -117,7 +119,7 @@ class StagedSession(ABC):
     @property
     def time_s(self) -> float:
         """Simulated time."""
-        return self.steps * self.step_s
+        return self._time_at_0_s + self.steps * self.step_s
 
     @property
     def is_root(self) -> bool:
@@ -285,6 +287,29 @@ class StagedSession(ABC):
         """Refuse: this engine calls nobody in its steps."""
         raise RefusedError("surface", name, self._valid_surface)
 
+    def _take_step_over(self, earlier_s: float) -> None:
+        """Go on from the end of a stage with another step, at the next step that ends a check."""
+        time_s, lasted_s = (
+            self._time_at_0_s + self.steps * earlier_s,
+            (self.steps - self._stage_start) * earlier_s,
+        )
+        self._change_step(earlier_s, -(-self.steps // self._counts.check) * self._counts.check)
+        self._time_at_0_s = time_s - self.steps * self.step_s
+        self._stage_start = self.steps - self._counts.steps(lasted_s)
+
+    def _change_step(self, earlier_s: float, steps: int) -> None:
+        """Refuse: this engine computes with one step.
+
+        Parameters
+        ----------
+        earlier_s : float
+            Step of the state that was restored; that of the session follows.
+        steps : int
+            That count as done from now on.
+        """
+        valid = f"{earlier_s:g}, as before, on this engine"
+        raise RefusedError("time_step.step_s", self.step_s, valid)
+
     @property
     def can_checkpoint(self) -> bool:
         """Whether the last advance ended a check and the stage goes on."""
@@ -302,6 +327,8 @@ class StagedSession(ABC):
                 "held": self._watch.held,
                 "stage_over": self.stage_over,
                 "at_rest": self.at_rest,
+                "step_s": self.step_s,
+                "time_at_0_s": self._time_at_0_s,
             }
             (folder / "session.json").write_text(json.dumps(state), encoding="utf-8")
 
@@ -318,6 +345,11 @@ class StagedSession(ABC):
         self._restore(checkpoint)
         self._start(passed[-1])
         self._stage_start = state["stage_start"]
+        # Earlier versions had one step and one beginning.
+        self._time_at_0_s = state.get("time_at_0_s", 0.0)
+        earlier_s = state.get("step_s", self.step_s)
+        if earlier_s != self.step_s:
+            self._take_step_over(earlier_s)
         self._stage_end = self._stage_start + self._stage_steps()
         self._vibration_start = state["vibration_start"]
         self._watch.in_row, self._watch.all_in_row = state["checks_at_rest"]

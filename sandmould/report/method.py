@@ -9,7 +9,10 @@ from typing import Any
 import pandas as pd
 
 from sandmould.runs.columns import (
+    BED_LIMIT_S,
     ENGINE,
+    LEAST_LIMIT_S,
+    LIMIT_MOMENTS,
     RANKS,
     REPLICATE,
     SEED,
@@ -215,7 +218,25 @@ def _time_step(scenario: Scenario, summary: pd.DataFrame) -> str:
         steps, shares = summary[TIME_STEP_S].dropna(), summary[TIME_STEP_FRACTION].dropna()
         if len(steps) and len(shares):
             said = f"{_range(1e6 * steps)} µs, {_range(shares)} of the critical one; "
-    return f"{said}the critical step is set by the {scenario.critical_step.cause}"
+    said += f"the critical step is set by the {scenario.critical_step.cause}"
+    return said + _step_of_bed(summary)
+
+
+def _step_of_bed(summary: pd.DataFrame) -> str:
+    """What is known of runs that took their step from the filled bed."""
+    columns = [TIME_STEP_S, BED_LIMIT_S, LEAST_LIMIT_S, LIMIT_MOMENTS]
+    if not set(columns) <= set(summary.columns):
+        return ""
+    found = summary[columns].dropna()
+    if found.empty:
+        return ""
+    step_s, bed_s, least_s, moments = (found[column] for column in columns)
+    return (
+        f"; after the fill {len(found)} runs take {_range(step_s / bed_s)} of the exact limit of "
+        f"the filled bed, {_range(1e6 * bed_s)} µs; the least one of the shaken bed, over "
+        f"{_range(moments)} moments of a run, is {_range(1e6 * least_s)} µs, "
+        f"{_range(least_s / step_s)} times the step"
+    )
 
 
 def _range(values: pd.Series[float]) -> str:

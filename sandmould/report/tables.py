@@ -20,6 +20,7 @@ from sandmould.runs.columns import (
     GRAIN_STEPS_PER_S,
     GRAINS,
     LARGEST_OVERLAP_FRACTION,
+    LEAST_LIMIT_S,
     OUTCOME,
     OUTCOME_CODE,
     PART,
@@ -235,6 +236,7 @@ _COST = (
     ("solver_fraction", "time in the solver", lambda v: f"{100 * v:.0f} %"),
     (PEAK_MEMORY_BYTES, "memory", size),
     (TIME_STEP_FRACTION, "step / critical", number),
+    (LEAST_LIMIT_S, "least exact limit", lambda v: f"{number(1e6 * v)} µs"),
     (LARGEST_OVERLAP_FRACTION, "largest overlap", lambda v: f"{100 * v:.1f} %"),
 )
 

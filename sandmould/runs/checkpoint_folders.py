@@ -35,6 +35,8 @@ class CheckpointMark:
     """The cost row so far."""
     shared_stages: int = 0
     """Stages at the beginning that another run has computed and pays for."""
+    bed_limit_s: float | None = None
+    """Exact critical step of the filled bed, where the run takes its step from it."""
     layout: int = 1
     """``LAYOUT`` of the version that wrote it."""
 

@@ -52,6 +52,11 @@ PEAK_MEMORY_BYTES: Final = "peak_memory_bytes"
 TIME_STEP_S: Final = "time_step_s"
 TIME_STEP_FRACTION: Final = "time_step_fraction"
 """Of the critical one."""
+BED_LIMIT_S: Final = "bed_limit_s"
+LEAST_LIMIT_S: Final = "least_limit_s"
+LIMIT_MOMENTS: Final = "limit_moments"
+"""Exact critical step of the filled bed, the least one of the shaken bed, and at how many moments
+that was found; only runs that take their step from the bed have them."""
 LARGEST_OVERLAP_FRACTION: Final = "largest_overlap_fraction"
 """Of a radius; of the whole run in ``summary.tsv``, of one moment in the other tables."""
 

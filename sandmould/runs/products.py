@@ -34,6 +34,11 @@ class Cost:
     peak_memory_bytes: int = 0
     """Of the first rank."""
     largest_overlap_fraction: float = 0.0
+    bed_limit_s: float | None = None
+    """Exact critical step of the filled bed, where the run takes its step from it."""
+    least_limit_s: float | None = None
+    """Least one of the shaken bed, over the moments at which it was found."""
+    limit_moments: int = 0
     fill: str = ""
     """Fill that it shares, whose own cost counts apart."""
 
@@ -45,9 +50,8 @@ class Cost:
         """Columns of the cost row in ``products.json`` and their values."""
         rate = self.grain_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
         columns = {**self.row(), "grain_steps_per_s": rate}
-        if not self.fill:
-            del columns["fill"]
-        return columns
+        absent = {"bed_limit_s": None, "least_limit_s": None, "limit_moments": 0, "fill": ""}
+        return {k: v for k, v in columns.items() if k not in absent or v != absent[k]}
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
+from sandmould.scenario.time_step import LEAST_STEPS_A_PERIOD
 from sandmould.scenario.vibration import VibrationStage
 
 SHORTEST_STEP_S = 1e-9
@@ -213,6 +214,8 @@ def _springs(s: Scenario) -> Iterator[Problem]:
 def _time(s: Scenario) -> Iterator[Problem]:
     critical = s.critical_step
     own = s.time_step.step_s
+    if s.time_step.bed_fraction is not None:
+        yield from _bed_step(s, s.time_step.bed_fraction)
     if own is not None and own > critical.step_s:
         yield Problem(
             "time_step.step_s",
@@ -244,6 +247,19 @@ def _time(s: Scenario) -> Iterator[Problem]:
         )
 
 
+def _bed_step(s: Scenario, fraction: float) -> Iterator[Problem]:
+    """What keeps a step from being taken from the filled bed."""
+    reasons = {
+        "absent where time_step.step_s gives the step of the whole run": s.time_step.step_s,
+        "absent with a pattern, whose own limit is that of the planned step": s.pattern,
+        "absent without vibration, for the step serves what follows the fill": not s.vibrations,
+    }
+    for valid, reason in reasons.items():
+        if reason:
+            yield Problem("time_step.bed_fraction", fraction, valid)
+            return
+
+
 def _vibration(s: Scenario) -> Iterator[Problem]:
     stages = []
     for i, stage in enumerate(s.vibration):
@@ -263,11 +279,12 @@ def _vibration(s: Scenario) -> Iterator[Problem]:
                 f"vertical, horizontal or {s.dimension} numbers",
             )
         steps = 1 / (stage.frequency_hz * s.step_s)
-        if steps < 20:
+        if steps < LEAST_STEPS_A_PERIOD:
             yield Problem(
                 f"{key}.frequency_hz",
                 stage.frequency_hz,
-                f"at most {1 / (20 * s.step_s):.4g} Hz, 20 time steps a period",
+                f"at most {1 / (LEAST_STEPS_A_PERIOD * s.step_s):.4g} Hz, "
+                f"{LEAST_STEPS_A_PERIOD} time steps a period",
             )
 
 

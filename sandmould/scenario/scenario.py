@@ -196,7 +196,12 @@ class Scenario(Section):
     def step_s(self) -> float:
         """The time step: the user's own, or the asked fraction of the critical one."""
         own = self.time_step.step_s
-        return self.time_step.fraction * self.critical_step.step_s if own is None else own
+        return self.planned_step_s if own is None else own
+
+    @property
+    def planned_step_s(self) -> float:
+        """The asked fraction of the critical time step, which is known before there is a bed."""
+        return self.time_step.fraction * self.critical_step.step_s
 
     @property
     def vertical(self) -> int:

@@ -34,6 +34,19 @@ class TimeStep(Section):
         None, "A time step of the user's own, at most the critical one.", unit="s",
         source="user", ge=1e-12,
     )  # fmt: skip
+    bed_fraction: float | None = quantity(
+        None,
+        "Time step after the fill over the exact limit of the filled bed, found once when the fill "
+        "is at rest; 0.7 leaves room for a bed that vibration packs. Unless given, the planned "
+        "step stays.",
+        source="user",
+        ge=1e-3,
+        le=1,
+    )
+
+
+LEAST_STEPS_A_PERIOD = 20
+"""Time steps of a period of vibration."""
 
 
 @dataclass(frozen=True)

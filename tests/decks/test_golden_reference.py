@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from sandmould.dem import source_hash
+from sandmould.engines.bed_step import with_bed_step
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.engine import write_deck
 from sandmould.scenario.scenario import Scenario
@@ -17,6 +18,9 @@ GOLDEN = Path(__file__).parent / "golden"
 SCENES = {
     "reference_tube_2d": tube_scene(engine={"name": "reference"}),
     "reference_hopper": hopper_scene("reference"),
+    "reference_step_of_bed": with_bed_step(
+        tube_scene(engine={"name": "reference"}, time_step={"bed_fraction": 0.7}), 4e-5
+    ),
 }
 
 

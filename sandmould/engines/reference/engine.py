@@ -49,7 +49,8 @@ def refuse(scenario: Scenario) -> None:
 def session_sources(scenario: Scenario) -> list[Path]:
     """The solver, and how it is given a scene."""
     here = Path(__file__).parent
-    session = [here / name for name in ("model.py", "moved_solver.py", "session.py")]
+    names = ("model.py", "moved_solver.py", "session.py", "exact_limit.py")
+    session = [here / name for name in names]
     return [*source_files(), *session, here.parent / "solid_surfaces.py"]
 
 
@@ -69,6 +70,7 @@ def render_deck(program: Program, sources: Mapping[str, str], run: str, study: s
         "keys": keys,
         "inertia_factor": inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d),
         "surfaces": surfaces_of(scenario).names,
+        "planned_step_s": scenario.planned_step_s,
     }
     return Deck.render("reference", context)
 

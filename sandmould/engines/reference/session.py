@@ -77,6 +77,9 @@ class ReferenceSession(StagedSession):
         with np.load(checkpoint / "solver.npz", allow_pickle=False) as arrays:
             self.solver.restore(dict(arrays))
 
+    def _change_step(self, earlier_s: float, steps: int) -> None:
+        self.solver.change_step(earlier_s, steps)
+
     def _begin_stage(self) -> None:
         self.solver.scene = scene_of(self._scenario, self.stage, self.step_s)
 

@@ -15,7 +15,8 @@ from sandmould.report.method import measured_when, sand_method
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import SandPages, sand_pages
 from sandmould.report.time_series import curve_figures
-from sandmould.runs.columns import LARGEST_OVERLAP_FRACTION
+from sandmould.runs.columns import LARGEST_OVERLAP_FRACTION, LEAST_LIMIT_S, TIME_STEP_S
+from sandmould.runs.formatting import number
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import sand_notes
 from sandmould.study.collect import Collected
@@ -29,7 +30,22 @@ def _sand_notes(
 ) -> tuple[str, ...]:
     stage = scenario.vibrations[0] if scenario.vibrations else None
     deepest = _deepest_overlap_fraction(collected.summary)
-    return sand_notes(collected.keys, stage, deepest, seeks_best, is_controlled)
+    notes = sand_notes(collected.keys, stage, deepest, seeks_best, is_controlled)
+    return (*_steps_above_limit(collected.summary), *notes)
+
+
+def _steps_above_limit(summary: pd.DataFrame) -> tuple[str, ...]:
+    """Say in how many runs the time step of the filled bed was too long for the shaken one."""
+    if LEAST_LIMIT_S not in summary:
+        return ()
+    above = summary[summary[LEAST_LIMIT_S] < summary[TIME_STEP_S]]
+    if not len(above):
+        return ()
+    share = number(float((above[LEAST_LIMIT_S] / above[TIME_STEP_S]).min()))
+    return (
+        f"In {len(above)} of {len(summary)} runs the exact limit of the shaken bed fell below the "
+        f"time step, to {share} of it at the least: take a smaller time_step.bed_fraction.",
+    )
 
 
 def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:

@@ -153,9 +153,11 @@ def _longer(factor: float) -> Change:
 
 def _finer(factor: float) -> Change:
     def change(scenario: Scenario) -> Scenario:
-        fraction = factor * scenario.time_step.fraction
-        step = scenario.time_step.model_copy(update={"fraction": fraction})
-        return scenario.model_copy(update={"time_step": step})
+        step = scenario.time_step
+        finer = {"fraction": factor * step.fraction}
+        if step.bed_fraction is not None:
+            finer["bed_fraction"] = factor * step.bed_fraction
+        return scenario.model_copy(update={"time_step": step.model_copy(update=finer)})
 
     return change
 

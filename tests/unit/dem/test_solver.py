@@ -264,6 +264,18 @@ def test_orientation_turns_by_the_integral_of_the_spin() -> None:
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-11)
 
 
+def test_another_step_leaves_the_velocities_of_now() -> None:
+    s = solver(2, 30)
+    s.advance(np.zeros(502))
+    before, spin = s.whole_step_velocities()
+    s.scene = s.scene._replace(dt=2.0 * STEP_S)
+    s.change_step(STEP_S, 700)
+    after, spin_after = s.whole_step_velocities()
+    np.testing.assert_allclose(after, before, atol=1e-14)
+    np.testing.assert_allclose(spin_after, spin, atol=1e-11)
+    assert s.steps == 700
+
+
 def test_a_speed_without_bounds_is_told() -> None:
     s = solver(2, 30)
     s.grains.velocity[3] = np.nan

@@ -104,6 +104,13 @@ def test_each_control_changes_what_it_is_named_after(tmp_path: Path) -> None:
     assert longer.length_m == pytest.approx(1.5 * tube.length_m)
     assert longer.right_end_x_m == pytest.approx(tube.right_end_x_m)
     assert new("time_step x0.5").step_s == pytest.approx(0.5 * old.step_s)
+    of_bed = old.time_step.model_copy(update={"bed_fraction": 0.7})
+    of_bed = (
+        by_part(study)["control: time_step x0.5"]
+        .change(old.model_copy(update={"time_step": of_bed}))
+        .time_step
+    )
+    assert (of_bed.fraction, of_bed.bed_fraction) == (0.5 * old.time_step.fraction, 0.35)
     assert new("engine lammps").engine.name == "lammps"
     shaken = new("spectrum small shake")
     assert [s.frequency_hz for s in shaken.vibration] == list(SHAKEN_HZ)

@@ -8,7 +8,7 @@ from pathlib import Path
 from sandmould.engines import recording, registry
 from sandmould.engines.cost import cost_before
 from sandmould.engines.driver import Driver, Opening
-from sandmould.engines.program import build_program
+from sandmould.engines.program import Program, build_program
 from sandmould.engines.snapshot_file import close_torn
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.products import SAND_PRODUCTS, Computed
@@ -20,7 +20,10 @@ from sandmould.study.kinds.sand.shared_fill import lay_fill
 
 def render(run: Run, folder: Path) -> None:
     """Write the deck and the layers."""
-    program = build_program(run.scenario)
+    _write_deck(build_program(run.scenario), run, folder)
+
+
+def _write_deck(program: Program, run: Run, folder: Path) -> None:
     engine = registry.engine_of(run.scenario)
     engine.write_deck(program, run.sources, folder, run.run, run.study)
 
@@ -37,7 +40,11 @@ def compute(run: Run, folder: Path) -> Computed:
 
         opening = open_coupled
     run_hash, is_fill = scenario_hash(run.scenario), run.part == FILL
-    driver = Driver(program, folder, run.run, run_hash, opening, keeps_end=is_fill)
+
+    def write_deck(program: Program) -> None:
+        _write_deck(program, run, folder)
+
+    driver = Driver(program, folder, run.run, run_hash, opening, is_fill, write_deck)
     outcome = driver.run()
     return Computed(outcome, driver.cost, driver.is_root)
 
@@ -58,6 +65,8 @@ def measure(run: Run, folder: Path) -> None:
 def load_computing(scenario: Scenario) -> None:
     """Import the engine's side of the house, and the pattern's where there is one."""
     registry.engine_of(scenario)
+    if scenario.time_step.bed_fraction is not None:
+        importlib.import_module("sandmould.engines.reference.exact_limit")
     if scenario.pattern is not None:
         importlib.import_module("pattern_fe.coupling.opening")
 

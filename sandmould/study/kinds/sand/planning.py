@@ -167,9 +167,10 @@ def speed_class(scenario: Scenario) -> SpeedClass:
 
 def plan_cells(scenario: Scenario) -> Mapping[str, str]:
     """Grains, time step and steps."""
+    takes_step_of_bed = scenario.time_step.bed_fraction is not None
     return {
         "grains": f"{sum(plan_counts(scenario)):,}",
-        "time step": f"{scenario.step_s:.3g} s",
+        "time step": f"{scenario.step_s:.3g} s" + (" planned" if takes_step_of_bed else ""),
         "steps": f"{planned_steps(scenario):,}",
     }
 
@@ -178,6 +179,13 @@ def notes(scenario: Scenario) -> list[Note]:
     """Obstacles drawn with walls thinner than a grain, and shells that were no cavities."""
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
     told = []
+    if scenario.time_step.bed_fraction is not None:
+        text = (
+            "The price counts the planned time step. What follows the fill takes "
+            f"{scenario.time_step.bed_fraction:g} of the exact limit of the filled bed, "
+            "which nobody knows before; it is mostly longer."
+        )
+        told.append(Note("time step of the bed", text))
     solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
     for solid in solids:
         wall = thinnest_wall([solid], smallest_m)
