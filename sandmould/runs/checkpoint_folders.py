@@ -37,6 +37,8 @@ class CheckpointMark:
     """Stages at the beginning that another run has computed and pays for."""
     layout: int = 1
     """``LAYOUT`` of the version that wrote it."""
+    table_bytes: int = 0
+    """Size of the table of a vibrating table's periods; 0 where there is none yet."""
 
 
 def _digests(folder: Path) -> dict[str, str]:

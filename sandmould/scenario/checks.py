@@ -14,6 +14,7 @@ from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
+from sandmould.scenario.unbalance_checks import table_mass_problem, unbalance_problems
 from sandmould.scenario.vibration import VibrationStage
 
 SHORTEST_STEP_S = 1e-9
@@ -41,9 +42,10 @@ def problems(scenario: Scenario) -> list[Problem]:
         *_springs(scenario),
         *_time(scenario),
         *_vibration(scenario),
+        *unbalance_problems(scenario),
     ]
     # The bed can only be predicted for a scene that is otherwise sound.
-    return faults or [*_fill(scenario)]
+    return faults or [*_fill(scenario), *table_mass_problem(scenario)]
 
 
 def _obstacles(s: Scenario) -> Iterator[Problem]:

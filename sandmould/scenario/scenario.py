@@ -23,6 +23,7 @@ from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.springs import springs_in_use
 from sandmould.scenario.stages import is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
+from sandmould.scenario.unbalance import Unbalance
 from sandmould.scenario.vibration import BoxStage, VibrationStage
 
 
@@ -197,6 +198,12 @@ class Scenario(Section):
         """The time step: the user's own, or the asked fraction of the critical one."""
         own = self.time_step.step_s
         return self.time_step.fraction * self.critical_step.step_s if own is None else own
+
+    def sand_share(self, unbalance: Unbalance) -> float:
+        """How often a table feels the force of the grains: in 2D its depth over their thickness."""
+        return (unbalance.flask_depth_m or 1.0) / (
+            self.sand.disc_thickness_m if self.dimension == 2 else 1.0
+        )
 
     @property
     def vertical(self) -> int:
