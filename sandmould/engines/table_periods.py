@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from sandmould.dem.table import Table, TableDrive
 from sandmould.scenario.geometry import Array
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:  # compiled code is slow to import, and every session names this file
-    from sandmould.dem.table import Table, TableDrive
 
 
 @dataclass(frozen=True)

@@ -201,9 +201,9 @@ class Scenario(Section):
 
     def sand_share(self, unbalance: Unbalance) -> float:
         """How often a table feels the force of the grains: in 2D its depth over their thickness."""
-        return (unbalance.flask_depth_m or 1.0) / (
-            self.sand.disc_thickness_m if self.dimension == 2 else 1.0
-        )
+        if self.dimension == 3 or unbalance.flask_depth_m is None:
+            return 1.0
+        return unbalance.flask_depth_m / self.sand.disc_thickness_m
 
     @property
     def vertical(self) -> int:
