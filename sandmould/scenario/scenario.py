@@ -203,7 +203,7 @@ class Scenario(Section):
         """How often a table feels the force of the grains: in 2D its depth over their thickness."""
         if self.dimension == 3 or unbalance.flask_depth_m is None:
             return 1.0
-        return unbalance.flask_depth_m / self.sand.disc_thickness_m
+        return unbalance.flask_depth_m / self.sand.thickness_m
 
     @property
     def vertical(self) -> int:
