@@ -13,6 +13,7 @@ from sandmould.engines.program import Stage
 from sandmould.engines.session import Session, Shared
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
+from sandmould.engines.table_periods import TablePeriod
 
 Array = NDArray[np.float64]
 
@@ -115,6 +116,10 @@ class DelegatingSession:
     def surface_loads(self) -> Mapping[str, Array] | None:
         """Mean force of the sand on each surface over the last check, N."""
         return self.sand.surface_loads()
+
+    def table_periods(self) -> list[TablePeriod]:
+        """Give the periods of a vibration on mounts that have ended since the last asking."""
+        return self.sand.table_periods()
 
     def vertex_loads(self, name: str) -> Array | None:
         """Mean force of the sand on each vertex of a surface since the last call, N."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -251,11 +252,8 @@ class Solver:
 
     def _run(self, steps: int, drifted: bool, displacement_m: Floats) -> tuple[int, int]:
         """Let all threads run the step loop together."""
-        chunks = len(self.moving.chunks.bound) - 1
-        threads = min(self._threads, chunks)
-        team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
 
-        def run_thread(thread: int) -> tuple[int, int]:
+        def run_thread(thread: int, threads: int, team: Team) -> tuple[int, int]:
             ended: tuple[int, int] = advance(
                 self._dim,
                 steps,
@@ -270,8 +268,23 @@ class Solver:
             )
             return ended
 
-        others = [self._pool.submit(run_thread, thread) for thread in range(1, threads)]
-        ended = run_thread(0)
+        return self._together(run_thread)
+
+    def _together(self, run_thread: Callable[[int, int, Team], tuple[int, int]]) -> tuple[int, int]:
+        """Call a step loop in all threads: with the thread's number, how many, and what they share.
+
+        Returns
+        -------
+        done, state : int
+            See ``advance``; all threads end alike.
+        """
+        chunks = len(self.moving.chunks.bound) - 1
+        threads = min(self._threads, chunks)
+        team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
+        others = [
+            self._pool.submit(run_thread, thread, threads, team) for thread in range(1, threads)
+        ]
+        ended = run_thread(0, threads, team)
         for other in others:
             other.result()
         return ended

@@ -27,3 +27,5 @@ class Capabilities:
     that a window may be as short as one step."""
     checkpoints_at_setups: bool
     """Whether a checkpoint forces a setup of the engine, so that it has to come with one."""
+    moves_tables: bool
+    """Whether the box can stand on a table that rotating masses, mounts and the sand move."""

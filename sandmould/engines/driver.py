@@ -276,6 +276,7 @@ class Driver:
         ended_record = session.steps % self._record_steps == 0
         if self._recorder is not None:
             self._recorder.add_loads(loads)
+            self._recorder.add_periods(session.table_periods())
             if ended_record or session.stage_over:
                 self._recorder.record(snapshot, health)
             if session.steps % self._snapshot_steps == 0 or session.stage_over:
@@ -338,7 +339,7 @@ class Driver:
         if self._recorder is None:
             return
         self._read_clocks()
-        series_bytes, loads_bytes = self._recorder.sizes()
+        series_bytes, loads_bytes, table_bytes = self._recorder.sizes()
         checkpoints.seal(
             folder,
             CheckpointMark(
@@ -351,5 +352,6 @@ class Driver:
                 self.cost.row(),
                 self._shared_stages,
                 self._bed_limit_s,
+                table_bytes=table_bytes,
             ),
         )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -10,7 +11,9 @@ from sandmould.engines.guard import Health
 from sandmould.engines.session import Array
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import SnapshotFile
+from sandmould.engines.table_periods import TablePeriod
 from sandmould.runs.checkpoint_folders import CheckpointMark
+from sandmould.runs.products import TABLE_PERIODS
 
 _SERIES = ("time_s", "vibration_time_s", "stage", "grains", "kinetic_energy_j", "rms_speed_m_s",
            "largest_overlap_fraction")  # fmt: skip
@@ -39,6 +42,8 @@ class Recorder:
             _open(work / name, len("\t".join(columns)) + 1, sizes.get(name))
             for name, columns in headers.items()
         )
+        self._periods = work / TABLE_PERIODS
+        _cut(self._periods, mark.table_bytes if mark else 0)
 
     @property
     def snapshots(self) -> int:
@@ -65,15 +70,25 @@ class Recorder:
             self._loads.write("\t".join((*when, surface, *mean)) + "\n")
         self._load_sums, self._checks = {}, 0
 
+    def add_periods(self, periods: Sequence[TablePeriod]) -> None:
+        """Write a row for each period of a table on mounts, on disk at once."""
+        for cells in (period.cells() for period in periods):
+            is_new = not self._periods.exists()
+            with self._periods.open("a", encoding="utf-8") as file:
+                if is_new:
+                    file.write("\t".join(cells) + "\n")
+                file.write("\t".join(cells.values()) + "\n")
+
     def save(self, snapshot: Snapshot) -> None:
         """Write the next snapshot."""
         self._snapshots.append(snapshot)
 
-    def sizes(self) -> tuple[int, int]:
-        """Flush the tables and give their sizes in bytes."""
+    def sizes(self) -> tuple[int, int, int]:
+        """Flush the tables and give their sizes in bytes, 0 of one that is not there."""
         for file in (self._series, self._loads):
             file.flush()
-        return self._series.tell(), self._loads.tell()
+        of_periods = self._periods.stat().st_size if self._periods.exists() else 0
+        return self._series.tell(), self._loads.tell(), of_periods
 
     def close(self) -> None:
         """Close the files."""
@@ -95,6 +110,14 @@ def create_tables(work: Path, dimension: int) -> None:
     for name, columns in _headers(dimension).items():
         if not (work / name).exists():
             (work / name).write_text("\t".join(columns) + "\n", encoding="utf-8")
+
+
+def _cut(path: Path, trusted_bytes: int) -> None:
+    """Cut a table back to its trusted part; without any it goes."""
+    if trusted_bytes:
+        os.truncate(path, trusted_bytes)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _open(path: Path, header_bytes: int, trusted_bytes: int | None) -> TextIO:

@@ -18,6 +18,7 @@ from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.unbalance_checks import unbalance_key
 
 _OF_EVERY_ENGINE = (
     "scenario/placement.py", "engines/program.py", "engines/step_counts.py",
@@ -169,6 +170,13 @@ def engine_problem(scenario: Scenario) -> Problem | None:
     valid = engine.installation_problem()
     if valid is not None:
         return Problem("engine.name", scenario.engine.name, valid)
+    if not engine.CAPABILITIES.moves_tables and (key := unbalance_key(scenario)):
+        able = " or ".join(engines_that(lambda can: can.moves_tables))
+        valid = (
+            f"acceleration, velocity or displacement on engine {scenario.engine.name}; a table on "
+            f"mounts moves on engine {able} alone, whose runs say with what amplitude"
+        )
+        return Problem(f"{key}.hold", "unbalance", valid)
     try:
         engine.refuse(scenario)
     except RefusedError as refusal:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sandmould.engines.program import Stage
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
+from sandmould.engines.table_periods import TablePeriod
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.bad_input import Problem
 
@@ -161,6 +162,9 @@ class Session(Protocol):
         mapping of surface to (d,) float64, N, or None
             None when the last advance did not end a check.
         """
+
+    def table_periods(self) -> list[TablePeriod]:
+        """Give the periods of a vibration on mounts that have ended since the last asking."""
 
     def vertex_loads(self, name: str) -> Array | None:
         """Give the mean force of the sand on each vertex of a surface since the last asking.

@@ -21,6 +21,7 @@ from sandmould.engines.session import Array, RefusedError, Shared
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.step_mover import StepMover
+from sandmould.engines.table_periods import TablePeriod
 from sandmould.scenario.fill import Settling
 from sandmould.scenario.stages import StageKind
 
@@ -225,9 +226,7 @@ class StagedSession(ABC):
         spin_rad_s, radius_m, orientation
             See ``Snapshot``.
         """
-        shift, speed = box_motion(
-            self._scenario, self.stage, self.steps - self._stage_start, self.step_s
-        )
+        shift, speed = self._box_motion()
         start = self._vibration_start
         shaken = self._stage_start if self.stage.kind is StageKind.REST else self.steps
         return Snapshot(
@@ -242,6 +241,15 @@ class StagedSession(ABC):
             radius_m=radius_m,
             orientation=orientation,
         )
+
+    def _box_motion(self) -> tuple[Array, Array]:
+        """Displacement and velocity of the walls in the frame of the computation."""
+        steps = self.steps - self._stage_start
+        return box_motion(self._scenario, self.stage, steps, self.step_s)
+
+    def table_periods(self) -> list[TablePeriod]:
+        """None: the box moves as it is laid down."""
+        return []
 
     def surface_loads(self) -> Mapping[str, Array] | None:
         """Mean force of the sand on each surface over the last check, N."""

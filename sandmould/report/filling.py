@@ -13,8 +13,10 @@ from scipy.special import stdtrit
 from analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.report.chart import Chart, Line, tints
 from sandmould.report.curves import reported_lines, runs_by_setting, runs_of
+from sandmould.report.drive import drive_of
 from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
+from sandmould.scenario.drive import Drive
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred
 from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
@@ -66,7 +68,9 @@ def filling_pages(
         isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
     )
     settings = [s for s in verdict.settings if s.n]
-    advice = (_drive(scenario, best), _time_to_fill(collected.summary, shaken, best, measure))
+    drive = drive_of(scenario, runs_of(collected.summary, best))
+    filled = _time_to_fill(collected.summary, shaken, best, measure)
+    advice = (filled,) if drive is None else (_drive(drive, best), filled)
     if not is_on_a_scale or len(settings) < 3:
         return FillingPages(advice, None, "")
     table = _fill_at_times(collected.summary, shaken, settings, keys[0], measure)
@@ -82,13 +86,11 @@ def _shaken(collected: Collected, measure: str) -> pd.DataFrame:
     return during_vibration(curves[curves[RUN].isin(used)])
 
 
-def _drive(scenario: Scenario, best: Setting) -> str:
-    stage = scenario.vibrations[0]
-    velocity_m_s = stage.amplitude_m * stage.angular_frequency_rad_s
+def _drive(drive: Drive, best: Setting) -> str:
     return (
-        f"At {best.label} the box moves {number(1e3 * stage.amplitude_m)} mm to either side at "
-        f"{number(stage.frequency_hz)} Hz: {number(1e3 * velocity_m_s)} mm/s and "
-        f"{number(stage.peak_acceleration_g)} g at most."
+        f"At {best.label} the box moves {number(1e3 * drive.displacement_m)} mm to either side at "
+        f"{number(drive.frequency_hz)} Hz: {number(1e3 * drive.velocity_m_s)} mm/s and "
+        f"{number(drive.acceleration_g)} g at most."
     )
 
 

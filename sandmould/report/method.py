@@ -25,6 +25,7 @@ from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.unbalance import Unbalance
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.definition.study import Objective
 
@@ -187,13 +188,24 @@ def _vibration(stage: VibrationStage, scenario: Scenario, keys: Sequence[str]) -
         if scenario.frame == "box"
         else "the laboratory frame: moving walls"
     )
-    what = (
-        f"{stage.hold} held constant while the frequency changes"
-        if swept
-        else f"{stage.frequency_hz:g} Hz, {stage.peak_acceleration_g:.3g} g"
-    )
+    if stage.unbalance is not None:
+        what = _table(stage.unbalance) + ("" if swept else f", {stage.frequency_hz:g} Hz")
+    elif swept:
+        what = f"{stage.hold} held constant while the frequency changes"
+    else:
+        what = f"{stage.frequency_hz:g} Hz, {stage.peak_acceleration_g:.3g} g"
     ramp = f", ramp {seconds(stage.ramp_s)}" if stage.ramp_s else ""
     return f"{where}, sinusoidal, {what}; {seconds(stage.whole_duration_s)}{ramp}; in {frame}"
+
+
+def _table(unbalance: Unbalance) -> str:
+    depth_m = unbalance.flask_depth_m
+    depth = "" if depth_m is None else f", the sand counted over a depth of {depth_m:g} m"
+    return (
+        f"an unbalance of {unbalance.moment_kg_m:g} kg m moves a table of "
+        f"{unbalance.moving_mass_kg:g} kg on mounts of {unbalance.mount_frequency_hz:g} Hz with "
+        f"{100 * unbalance.mount_damping_ratio:g} % of the critical damping{depth}"
+    )
 
 
 def measured_when(scenario: Scenario) -> str:

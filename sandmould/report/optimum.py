@@ -12,6 +12,7 @@ from scipy.special import ndtri
 
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.curves import reported_lines
+from sandmould.report.drive import amplitudes_text, drive_at
 from sandmould.report.robustness import RobustnessPages, opening_sentences
 from sandmould.runs.columns import CPU_S, total_s
 from sandmould.runs.formatting import (
@@ -79,6 +80,9 @@ def optimum_pages(
         if optimum.interval(key)[1] - optimum.interval(key)[0] > width
     ]
     said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
+    drive = drive_at(summary, keys, optimum.setting)
+    if drive is not None:
+        said.insert(1, f"There the box moves {amplitudes_text(drive)}.")
     said += _beside(optimum, study)
     if study.refine.rounds:
         said.append(_effort(log, study, summary))

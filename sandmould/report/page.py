@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
@@ -87,7 +88,8 @@ class _Page:
     verdict: Verdict
     scenario: AnyScenario
     """Of the run that is shown."""
-    by_setting: dict[str, AnyScenario]
+    by_setting: dict[str, tuple[AnyScenario, pd.DataFrame]]
+    """Scenario and rows of the summary of the settings that are listed, by label."""
 
 
 def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
@@ -108,14 +110,13 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     by_setting = {}
     for values, rows in setting_rows(summary, keys):
         if (label := setting_text(values)) in listed:
-            by_setting[label] = _scenario_of(study_folder, summary[RUN].iloc[rows])
+            own = _scenario_of(study_folder, summary[RUN].iloc[rows])
+            if own is not None:
+                by_setting[label] = own, summary.iloc[rows]
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario
-    return _Page(
-        study_folder, href, study, collected, verdict, scenario,
-        {label: own for label, own in by_setting.items() if own is not None},
-    )  # fmt: skip
+    return _Page(study_folder, href, study, collected, verdict, scenario, by_setting)
 
 
 def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:

@@ -37,7 +37,7 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import name_of, number, seconds, size, titled, with_margin
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.drive import Drive
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.evidence import NOT_FINISHED, left_out, reason_text
 from sandmould.statistics.verdict import Verdict
@@ -151,17 +151,16 @@ def _total(summary: pd.DataFrame, column: str, how: str) -> float | None:
     return value if math.isfinite(value) and value else None
 
 
-def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table:
+def settings_table(verdict: Verdict, drives: Mapping[str, Drive]) -> Table:
     """Every setting with its mean, and the best against it.
 
     Parameters
     ----------
     verdict : Verdict
-    scenarios : mapping of str to Scenario
-        One scenario a setting, by label, for the drive of the vibrating table.
+    drives : mapping of str to Drive
+        That of the vibrating table at a setting, by label.
     """
-    shaken = any(s.vibrations for s in scenarios.values())
-    drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if shaken else ()
+    drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if drives else ()
     columns = (
         Column("setting", False),
         *map(Column, ("mean ± 95 %", "best minus this", "95 % interval", "p")),
@@ -190,7 +189,7 @@ def settings_table(verdict: Verdict, scenarios: Mapping[str, Scenario]) -> Table
                 Cell(standing, standing),
                 *_number_cells((setting.sd, 2)),
                 Cell(f"{setting.n} of {setting.planned}", str(setting.n)),
-                *_drive_cells(scenarios.get(setting.label), bool(drive)),
+                *_drive_cells(drives.get(setting.label), bool(drives)),
             )
         )
         marked.append(is_best)
@@ -205,16 +204,14 @@ def _p_text(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
-def _drive_cells(scenario: Scenario | None, shaken: bool) -> tuple[Cell, ...]:
-    """Peak displacement, velocity and acceleration of the first stage of vibration."""
+def _drive_cells(drive: Drive | None, shaken: bool) -> tuple[Cell, ...]:
+    """Amplitudes of displacement, velocity and acceleration."""
     if not shaken:
         return ()
-    if scenario is None or not scenario.vibrations:
+    if drive is None:
         return _number_cells(*[(math.nan, 3)] * 3)
-    stage = scenario.vibrations[0]
-    velocity = stage.amplitude_m * stage.angular_frequency_rad_s
     return _number_cells(
-        (1e3 * stage.amplitude_m, 3), (1e3 * velocity, 3), (stage.peak_acceleration_g, 3)
+        (1e3 * drive.displacement_m, 3), (1e3 * drive.velocity_m_s, 3), (drive.acceleration_g, 3)
     )
 
 

@@ -39,6 +39,8 @@ class CheckpointMark:
     """Exact critical step of the filled bed, where the run takes its step from it."""
     layout: int = 1
     """``LAYOUT`` of the version that wrote it."""
+    table_bytes: int = 0
+    """Size of the table of a vibrating table's periods; 0 where there is none yet."""
 
 
 def _digests(folder: Path) -> dict[str, str]:

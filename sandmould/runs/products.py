@@ -77,7 +77,11 @@ def peak_memory_bytes() -> int:
 
 LAST_WORK = "last_work"
 """Folder of what a failed run leaves besides its products, its last checkpoint above all."""
-SAND_TABLES = ("series.tsv", "loads.tsv", "snapshots.npz", "pattern.tsv", "pattern_shapes.f8")
+TABLE_PERIODS = "table.tsv"
+"""What a vibrating table on mounts did in each period."""
+SAND_TABLES = (
+    "series.tsv", "loads.tsv", "snapshots.npz", TABLE_PERIODS, "pattern.tsv", "pattern_shapes.f8"
+)  # fmt: skip
 """What a run of sand writes on and on; a run that begins with a shared fill takes up the fill's."""
 SAND_PRODUCTS = (*SAND_TABLES, "engine.log", "pattern.log", END_CHECKPOINT)
 

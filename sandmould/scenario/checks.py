@@ -15,6 +15,7 @@ from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
 from sandmould.scenario.time_step import LEAST_STEPS_A_PERIOD
+from sandmould.scenario.unbalance_checks import table_mass_problem, unbalance_problems
 from sandmould.scenario.vibration import VibrationStage
 
 SHORTEST_STEP_S = 1e-9
@@ -42,9 +43,10 @@ def problems(scenario: Scenario) -> list[Problem]:
         *_springs(scenario),
         *_time(scenario),
         *_vibration(scenario),
+        *unbalance_problems(scenario),
     ]
     # The bed can only be predicted for a scene that is otherwise sound.
-    return faults or [*_fill(scenario)]
+    return faults or [*_fill(scenario), *table_mass_problem(scenario)]
 
 
 def _obstacles(s: Scenario) -> Iterator[Problem]:

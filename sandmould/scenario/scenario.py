@@ -23,6 +23,7 @@ from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.springs import springs_in_use
 from sandmould.scenario.stages import is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
+from sandmould.scenario.unbalance import Unbalance
 from sandmould.scenario.vibration import BoxStage, VibrationStage
 
 
@@ -202,6 +203,12 @@ class Scenario(Section):
     def planned_step_s(self) -> float:
         """The asked fraction of the critical time step, which is known before there is a bed."""
         return self.time_step.fraction * self.critical_step.step_s
+
+    def sand_share(self, unbalance: Unbalance) -> float:
+        """How often a table feels the force of the grains: in 2D its depth over their thickness."""
+        if self.dimension == 3 or unbalance.flask_depth_m is None:
+            return 1.0
+        return unbalance.flask_depth_m / self.sand.thickness_m
 
     @property
     def vertical(self) -> int:

@@ -7,6 +7,9 @@ ends where it began and the next stage needs no jump.
 Where the sand comes to rest after a stage without a ramp, the box stops smoothly: once the stage
 is over the sinusoid goes on, and its amplitude falls as (1 + cos(pi t / t_stop)) / 2. Neither the
 place nor the velocity of the box jumps at either end of the stop, at whatever phase it begins.
+
+With ``hold: unbalance`` the same sinusoid is the force of rotating masses instead, and the table's
+motion follows from it (``sandmould.scenario.unbalance``).
 """
 
 from __future__ import annotations
@@ -16,11 +19,12 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
+from sandmould.scenario.unbalance import Unbalance
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 """The 'g' of an acceleration_g (CGPM 1901), whatever gravity the scene has."""
@@ -40,8 +44,14 @@ class VibrationStage(Section):
     frequency_hz: float = quantity(
         50.0, "Frequency.", unit="Hz", source=TUBE_PAPER, ge=0.1, le=10000
     )
-    hold: Literal["acceleration", "velocity", "displacement"] = quantity(
-        "acceleration", "Which amplitude stays the same when the frequency changes.", source=ARGUED
+    hold: Literal["acceleration", "velocity", "displacement", "unbalance"] = quantity(
+        "acceleration",
+        "Which amplitude stays the same when the frequency changes; with unbalance, the rotating "
+        "masses do, and the table moves as they, its mounts and the sand make it.",
+        source=ARGUED,
+    )
+    unbalance: Unbalance | None = Field(
+        None, description="Table and rotating masses, with hold unbalance alone."
     )
     acceleration_g: float | None = quantity(
         None, "Acceleration amplitude over 9.80665 m/s2.", unit="g", source=TUBE_PAPER, gt=0, le=100
@@ -70,12 +80,16 @@ class VibrationStage(Section):
     @model_validator(mode="after")
     def _one_amplitude(self) -> VibrationStage:
         given = self._given()
-        if len(given) != 1:
+        if self.hold == "unbalance":
+            self._unbalance_alone()
+        elif self.unbalance is not None:
+            raise PydanticCustomError("unbalance", "no section unbalance, or hold: unbalance")
+        elif len(given) != 1:
             raise PydanticCustomError(
                 "amplitude",
                 "exactly one of acceleration_g, velocity_m_s and displacement_m",
             )
-        if given[0] != self.hold and self.reference_frequency_hz is None:
+        elif given[0] != self.hold and self.reference_frequency_hz is None:
             raise PydanticCustomError(
                 "amplitude",
                 "an amplitude of the kind that hold names, or reference_frequency_hz beside it",
@@ -85,6 +99,19 @@ class VibrationStage(Section):
         if not isinstance(self.direction, str) and not any(self.direction):
             raise PydanticCustomError("direction", "a direction vector that is not zero")
         return self
+
+    def _unbalance_alone(self) -> None:
+        if self.unbalance is None:
+            raise PydanticCustomError(
+                "unbalance",
+                "a section unbalance with moment_kg_m, moving_mass_kg and mount_frequency_hz",
+            )
+        if self._given() or self.reference_frequency_hz is not None:
+            raise PydanticCustomError(
+                "unbalance",
+                "none of acceleration_g, velocity_m_s, displacement_m and reference_frequency_hz "
+                "with hold unbalance: the table's motion is computed",
+            )
 
     def _given(self) -> list[str]:
         values = {
@@ -101,7 +128,9 @@ class VibrationStage(Section):
 
     @property
     def amplitude_m(self) -> float:
-        """Displacement amplitude A at this stage's frequency."""
+        """Displacement amplitude A at this stage's frequency; with an unbalance, without sand."""
+        if self.unbalance is not None:
+            return self.unbalance.empty_amplitude_m(self.angular_frequency_rad_s)
         kind = self._given()[0]
         order = {"acceleration": 2, "velocity": 1, "displacement": 0}
         value = {
@@ -158,8 +187,25 @@ class VibrationStage(Section):
         float64, m
             Zero before the stage, and once the box has stopped.
         """
+        return self._waves(self.amplitude_m, time_s, stops_smoothly)
+
+    def unbalance_forces_at(
+        self, time_s: NDArray[np.float64], stops_smoothly: bool = False
+    ) -> NDArray[np.float64]:
+        """Force of the rotating masses along the direction, N; see ``displacements_at``.
+
+        The masses are turned against each other in the time in which a box would stop.
+        """
+        assert self.unbalance is not None
+        force_n = self.unbalance.force_n(self.angular_frequency_rad_s)
+        return self._waves(force_n, time_s, stops_smoothly)
+
+    def _waves(
+        self, scale: float, time_s: NDArray[np.float64], stops_smoothly: bool
+    ) -> NDArray[np.float64]:
+        """The sinusoid of an amplitude with its ramps, or with its stop."""
         end, stop_s = self.whole_duration_s, self.stop_s if stops_smoothly else 0.0
-        amplitude = np.full_like(time_s, self.amplitude_m)
+        amplitude = np.full_like(time_s, scale)
         if self.ramp_s > 0:
             amplitude *= np.minimum(1.0, np.minimum(time_s, end - time_s) / self.ramp_s)
         elif stop_s > 0:

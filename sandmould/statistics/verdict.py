@@ -190,8 +190,9 @@ def sand_notes(
         )
     if stage is not None and any(k.endswith("frequency_hz") for k in keys):
         others = [w for w in ("acceleration", "velocity", "displacement") if w != stage.hold]
+        held = "moment of the" if stage.hold == "unbalance" else "amplitude of"
         notes.append(
-            f"The amplitude of {stage.hold} was held constant while the frequency changed; with "
+            f"The {held} {stage.hold} was held constant while the frequency changed; with "
             f"{' or '.join(others)} held instead, another frequency may be best."
         )
     return (*notes, NOT_TESTED) if seeks_best and not is_controlled else tuple(notes)

@@ -92,8 +92,14 @@ def flow(**case: Any) -> MetalFlow:
     )
 
 
+SHAKE = {"frequency_hz": 200, "duration_s": 0.01}
+TABLE = {"moment_kg_m": 1e-3, "moving_mass_kg": 60, "mount_frequency_hz": 8, "flask_depth_m": 0.3}
 SCENES = {
     "tube": lambda: tube_scene(**BRIEF),
+    "vibration": lambda: tube_scene(**BRIEF | {"vibration": [SHAKE | {"acceleration_g": 1}]}),
+    "table with an unbalance": lambda: tube_scene(
+        **BRIEF | {"vibration": [SHAKE | {"hold": "unbalance", "unbalance": TABLE}]}
+    ),
     "tube in 3D": lambda: tube_scene(**BRIEF, **TUBE_IN_3D),
     "level gate": hopper,
     "level gate in 3D": lambda: hopper(**DEEP),

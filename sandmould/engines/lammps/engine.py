@@ -27,6 +27,7 @@ CAPABILITIES = Capabilities(
     calls_movers=True,
     loads_of_every_step=False,
     checkpoints_at_setups=True,
+    moves_tables=False,
 )
 
 

@@ -25,6 +25,7 @@ CAPABILITIES = Capabilities(
     calls_movers=False,
     loads_of_every_step=False,
     checkpoints_at_setups=True,
+    moves_tables=False,
 )
 
 

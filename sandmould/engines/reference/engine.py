@@ -30,6 +30,7 @@ CAPABILITIES = Capabilities(
     calls_movers=True,
     loads_of_every_step=True,
     checkpoints_at_setups=False,
+    moves_tables=True,
 )
 
 
@@ -51,7 +52,8 @@ def session_sources(scenario: Scenario) -> list[Path]:
     here = Path(__file__).parent
     names = ("model.py", "moved_solver.py", "session.py", "exact_limit.py")
     session = [here / name for name in names]
-    return [*source_files(), *session, here.parent / "solid_surfaces.py"]
+    shared = [here.parent / name for name in ("solid_surfaces.py", "table_drive.py")]
+    return [*source_files(), *session, *shared]
 
 
 def render_deck(program: Program, sources: Mapping[str, str], run: str, study: str) -> Deck:

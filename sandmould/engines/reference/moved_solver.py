@@ -8,10 +8,10 @@ import numpy as np
 
 from sandmould.compiled import njit
 from sandmould.dem.addresses import call_with_two
-from sandmould.dem.barrier import new_barrier, wait_for_all
+from sandmould.dem.barrier import wait_for_all
 from sandmould.dem.grains import Floats, Ints
-from sandmould.dem.solver import Solver
 from sandmould.dem.steps import DONE, DemScene, Moving, Team, Walls, advance
+from sandmould.dem.table import TableSolver
 from sandmould.dem.vectors import OPTIONS
 from sandmould.engines.step_mover import StepMover
 
@@ -88,7 +88,7 @@ def _advance(
     return done, state
 
 
-class MovedSolver(Solver):
+class MovedSolver(TableSolver):
     """A solver one of whose surfaces may be moved in every step."""
 
     _mover: _Mover | None = None
@@ -112,11 +112,8 @@ class MovedSolver(Solver):
         rows = slice(mover.addresses[2], mover.addresses[2] + len(mover.load))
         mover.sum[:] = loads[:, rows].sum(axis=0)
         loads[:, rows] = 0.0
-        chunks = len(self.moving.chunks.bound) - 1
-        threads = min(self._threads, chunks)
-        team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
 
-        def run_thread(thread: int) -> tuple[int, int]:
+        def run_thread(thread: int, threads: int, team: Team) -> tuple[int, int]:
             ended: tuple[int, int] = _advance(
                 self._dim,
                 self.steps,
@@ -133,9 +130,6 @@ class MovedSolver(Solver):
             )
             return ended
 
-        others = [self._pool.submit(run_thread, thread) for thread in range(1, threads)]
-        ended = run_thread(0)
-        for other in others:
-            other.result()
+        ended = self._together(run_thread)
         loads[0, rows] = mover.sum
         return ended

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from sandmould.dem import source_hash
 from sandmould.dem.solver import NotANumberError
+from sandmould.dem.table import Table
 from sandmould.engines.box_motion import displacements
 from sandmould.engines.program import Program
 from sandmould.engines.reference.model import grains_of, scene_of, solver_of
@@ -18,7 +20,10 @@ from sandmould.engines.session import Array, EngineStop, RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.staged_session import StagedSession
 from sandmould.engines.step_mover import StepMover
+from sandmould.engines.table_drive import table_motion
+from sandmould.engines.table_periods import TablePeriod, TablePeriods, window_of
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.fill import Settling
 
 
 class ReferenceSession(StagedSession):
@@ -36,6 +41,11 @@ class ReferenceSession(StagedSession):
         super().__init__(program)
         self.version = source_hash()
         self.solver = solver_of(self._scenario, self.stage, self.step_s)
+        self._motion = table_motion(program, self.stage)
+        self._table_speed_m_s = 0.0
+        """Largest of the table in the last computation."""
+        self._periods = TablePeriods()
+        self._ended_periods: list[TablePeriod] = []
         self._loads: dict[str, Array] = {}
         self._check_sums: Array = np.zeros((0, self._scenario.dimension))
         if checkpoint is not None:
@@ -76,18 +86,27 @@ class ReferenceSession(StagedSession):
     def _restore(self, checkpoint: Path) -> None:
         with np.load(checkpoint / "solver.npz", allow_pickle=False) as arrays:
             self.solver.restore(dict(arrays))
+            # Fills that runs share may be older than tables.
+            self._periods.steps = arrays.get("table_steps", self._periods.steps)
 
     def _change_step(self, earlier_s: float, steps: int) -> None:
         self.solver.change_step(earlier_s, steps)
 
     def _begin_stage(self) -> None:
-        self.solver.scene = scene_of(self._scenario, self.stage, self.step_s)
+        self._motion = table_motion(self._program, self.stage)
+        stage = self.stage
+        if self._motion is not None:
+            stage = replace(stage, vibration=self._motion.vibration)
+        self.solver.scene = scene_of(self._scenario, stage, self.step_s)
 
     def _compute_to(self, target: int) -> None:
         first = self.steps - self._stage_start - 1
-        moved = displacements(self.stage, first, target - self.steps + 2, self.step_s)
         try:
-            self.solver.advance(moved)
+            if self._motion is None:
+                moved = displacements(self.stage, first, target - self.steps + 2, self.step_s)
+                self.solver.advance(moved)
+            else:
+                self._compute_on_table(target)
         except NotANumberError as error:
             raise EngineStop(
                 Outcome.UNSTABLE, f"a velocity is not a number after {error} steps"
@@ -95,6 +114,40 @@ class ReferenceSession(StagedSession):
         self._check_sums = self.solver.moving.walls.loads.sum(axis=0)
         if self.steps % self._counts.check == 0:
             self._loads = self.solver.mean_loads(self._counts.check)
+
+    def _table(self) -> Table:
+        assert self._motion is not None
+        return self._motion.table(self._scenario, self._weight_n())
+
+    def _compute_on_table(self, target: int) -> None:
+        motion, table = self._motion, self._table()
+        assert motion is not None
+        first = self.steps - self._stage_start
+        times_s = motion.times_s(first, target - self.steps, self.step_s)
+        drive = motion.drive(times_s)
+        places_m = self.solver.advance_on_table(table, drive)
+        self._table_speed_m_s = float(np.abs(np.diff(places_m)).max()) / self.step_s
+        if self.stage.counts_as_vibration:
+            start = self._vibration_start or 0
+            vibration = motion.vibration
+            self._ended_periods += self._periods.add(
+                self.stage.name,
+                vibration.frequency_hz,
+                round(vibration.whole_duration_s * vibration.frequency_hz),
+                (self._stage_start - start) * self.step_s,
+                window_of(table, drive, places_m, times_s, self.step_s),
+            )
+
+    def table_periods(self) -> list[TablePeriod]:
+        """Periods of a vibration on mounts that have ended since the last asking."""
+        ended, self._ended_periods = self._ended_periods, []
+        return ended
+
+    def _check_rest(self, settling: Settling) -> None:
+        """The same rule, once the table under the sand is slow too."""
+        if self._motion is not None and self._table_speed_m_s > self._watch.speed_limit_m_s:
+            self.hold_rest(f"the table still moved at {self._table_speed_m_s:.3g} m/s")
+        super()._check_rest(settling)
 
     def _rms_speed_m_s(self) -> float:
         mass = self.solver.grains.mass
@@ -108,9 +161,27 @@ class ReferenceSession(StagedSession):
         """Acceleration of the box along its direction in the frame of the box, m/s2."""
         if self._scenario.frame == "laboratory":
             return 0.0
-        first = self.steps - self._stage_start - 1
-        before, now, ahead = displacements(self.stage, first, 3, self.step_s)
+        before, now, ahead = self._places_m()
         return float(((ahead - now) - (now - before)) / self.step_s**2)
+
+    def _places_m(self) -> tuple[float, float, float]:
+        """Displacement of the box one step ago, now and one step on."""
+        first = self.steps - self._stage_start - 1
+        if self._motion is None:
+            before, now, ahead = displacements(self.stage, first, 3, self.step_s).tolist()
+            return before, now, ahead
+        push, damping = self._motion.drive(self._motion.times_s(first + 1, 1, self.step_s))
+        before, now = self.solver.table_places_m.tolist()
+        ahead = self.solver.next_table_place_m(self._table(), float(push[0]), float(damping[0]))
+        return before, now, ahead
+
+    def _box_motion(self) -> tuple[Array, Array]:
+        """Displacement and velocity of the walls in the frame of the computation."""
+        if self._motion is None or self._scenario.frame == "box":
+            return super()._box_motion()
+        before, now, ahead = self._places_m()
+        direction = np.array(self.solver.scene.direction)
+        return now * direction, (ahead - before) / (2 * self.step_s) * direction
 
     def snapshot(self) -> Snapshot:
         """State of all grains, relative to the box."""
@@ -156,11 +227,11 @@ class ReferenceSession(StagedSession):
         """Copies of the solver's arrays, loads of this check, where the stage stands."""
         loads = self.solver.moving.walls.loads.sum(axis=0)
         state = copy.deepcopy(self.solver.state())
-        return state, loads, dict(self._loads), self._stage_state()
+        return state, loads, dict(self._loads), self._periods.steps, self._stage_state()
 
     def restore_checkpoint(self, checkpoint: Any) -> None:
         """Compute on from what ``save_checkpoint`` gave."""
-        arrays, loads, means, stage = checkpoint
+        arrays, loads, means, self._periods.steps, stage = checkpoint
         self.solver.restore(copy.deepcopy(arrays))
         self.solver.moving.walls.loads[0] = loads
         self._loads = dict(means)
@@ -168,7 +239,7 @@ class ReferenceSession(StagedSession):
 
     def _save(self, folder: Path) -> None:
         """Write the solver's state, of which nothing is lost."""
-        arrays: dict[str, Any] = self.solver.state()
+        arrays: dict[str, Any] = self.solver.state() | {"table_steps": self._periods.steps}
         np.savez(folder / "solver.npz", **arrays)
 
     def close(self) -> None:

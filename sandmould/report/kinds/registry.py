@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pandas as pd
 
+from sandmould.report.drive import drive_of
 from sandmould.report.heaps import Heap
 from sandmould.report.kinds.deck import DECK_REPORT
 from sandmould.report.kinds.flow import FLOW_REPORT
@@ -15,6 +16,8 @@ from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.kinds.sand import SAND_REPORT
 from sandmould.report.kinds.solidification import SOLIDIFICATION_REPORT
 from sandmould.report.robustness import RobustnessPages
+from sandmould.scenario.drive import Drive
+from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
@@ -59,9 +62,22 @@ def kind_pages(
     return _report_of(scenario).pages(findings)
 
 
-def drives_of(by_setting: Mapping[str, AnyScenario]) -> dict[str, Any]:
-    """Scenarios among those of the settings that have a vibrating table, for its drive."""
-    return {label: s for label, s in by_setting.items() if _report_of(s).shows_drives}
+def drives_of(
+    by_setting: Mapping[str, tuple[AnyScenario, pd.DataFrame]],
+) -> dict[str, Drive]:
+    """Drives of the settings that have a vibrating table, by label.
+
+    Parameters
+    ----------
+    by_setting : mapping of str to scenario and DataFrame
+        The rows of the summary at each setting beside its scenario.
+    """
+    shown = (
+        (label, drive_of(cast(Scenario, scenario), runs))
+        for label, (scenario, runs) in by_setting.items()
+        if _report_of(scenario).shows_drives
+    )
+    return {label: drive for label, drive in shown if drive is not None}
 
 
 def robustness_of(

@@ -45,10 +45,11 @@ def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Itera
     """
     for control in checks.controls:
         if control == "hold":
-            # At the middle frequency nothing differs from the sweep.
-            others = {"acceleration", "velocity", "displacement"} - {scenario.vibrations[0].hold}
-            for hold in sorted(others):
-                yield Case(control, hold, None, _holding(hold, best_hz), (0, 2))
+            swept = scenario.vibrations[0].hold
+            # At the middle frequency nothing differs from a sweep whose motion is laid down.
+            places = (0, 1, 2) if swept == "unbalance" else (0, 2)
+            for hold in sorted({"acceleration", "velocity", "displacement"} - {swept}):
+                yield Case(control, hold, None, _holding(hold, best_hz), places)
         elif control in BY_FACTOR:
             factors, changed = BY_FACTOR[control]
             for factor in factors:
@@ -63,10 +64,11 @@ def _holding(hold: str, best_hz: float) -> Change:
     def change(scenario: Scenario) -> Scenario:
         stage = scenario.vibrations[0]
         at_best = stage.model_copy(update={"frequency_hz": best_hz})
-        # The same motion at the best frequency, whatever is held from there.
+        # The same motion at the best frequency, whatever is held from there; that of the empty
+        # table where the sweep has an unbalance.
         new = VibrationStage(
             **stage.model_dump(
-                exclude={"hold", "acceleration_g", "velocity_m_s", "displacement_m",
+                exclude={"hold", "unbalance", "acceleration_g", "velocity_m_s", "displacement_m",
                          "reference_frequency_hz"}
             ),
             hold=hold,

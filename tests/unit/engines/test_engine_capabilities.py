@@ -23,6 +23,7 @@ BARE = Capabilities(
     calls_movers=False,
     loads_of_every_step=False,
     checkpoints_at_setups=False,
+    moves_tables=False,
 )
 
 

@@ -9,6 +9,10 @@ import pytest
 from sandmould import ROOT
 from tests.unit.refusing import refused
 
+TABLE = (
+    "based_on: tube\nscenario: {vibration: [{frequency_hz: 50, hold: unbalance, unbalance: {%s}}]}"
+)
+FULL = "moment_kg_m: 0.05, moving_mass_kg: 60, mount_frequency_hz: 8, flask_depth_m: 0.3"
 CASES: dict[str, tuple[str, str]] = {
     "pattern outside the box": (
         "based_on: l_pattern\nscenario: {pattern: {position_m: [0.2, 0.0]}}",
@@ -243,6 +247,84 @@ CASES: dict[str, tuple[str, str]] = {
         "based_on: tube\nscenario: {sand: {density_kg_m3: {value: 2.4, unit: g/cm3, source: x}}}",
         "trial.yaml: scenario.sand.density_kg_m3.unit = 'g/cm3' cannot be used: "
         "valid is the unit of the key, kg/m3.",
+    ),
+    "table without a mass": (
+        TABLE % "moment_kg_m: 0.05, mount_frequency_hz: 8, flask_depth_m: 0.3",
+        "trial.yaml: scenario.vibration.0.unbalance.moving_mass_kg = None cannot be used: valid "
+        "is a value: this key must be given.",
+    ),
+    "table without a flask in 2D": (
+        TABLE % "moment_kg_m: 0.05, moving_mass_kg: 60, mount_frequency_hz: 8",
+        "trial.yaml: scenario.vibration.0.unbalance.flask_depth_m = None cannot be used: valid is"
+        " the flask's depth across the plane in m: in 2D the sand's force on the table is that of"
+        " discs as thick as sand.disc_thickness_m.",
+    ),
+    "unbalance without a moment": (
+        TABLE % "moment_kg_m: 0, moving_mass_kg: 60, mount_frequency_hz: 8, flask_depth_m: 0.3",
+        "trial.yaml: scenario.vibration.0.unbalance.moment_kg_m = 0 cannot be used: valid is a "
+        "number greater than 0.",
+    ),
+    "mounts of no frequency": (
+        TABLE % "moment_kg_m: 0.05, moving_mass_kg: 60, mount_frequency_hz: 0, flask_depth_m: 0.3",
+        "trial.yaml: scenario.vibration.0.unbalance.mount_frequency_hz = 0 cannot be used: valid "
+        "is a number of at least 0.01.",
+    ),
+    "negative damping of mounts": (
+        TABLE
+        % "moment_kg_m: 1, moving_mass_kg: 60, mount_frequency_hz: 8, mount_damping_ratio: -1",
+        "trial.yaml: scenario.vibration.0.unbalance.mount_damping_ratio = -1 cannot be used: "
+        "valid is a number of at least 0.",
+    ),
+    "table lighter than its sand": (
+        TABLE
+        % "moment_kg_m: 0.05, moving_mass_kg: 0.01, mount_frequency_hz: 8, flask_depth_m: 0.3",
+        "trial.yaml: scenario.vibration.0.unbalance.moving_mass_kg = 0.01 cannot be used: valid "
+        "is at least 0.56 kg, a tenth of the mass of the sand in the flask: the time step does "
+        "not resolve a lighter table.",
+    ),
+    "unbalance without a table": (
+        "based_on: tube\nscenario: {vibration: [{hold: unbalance}]}",
+        "trial.yaml: scenario.vibration.0 = {'hold': 'unbalance'} cannot be used: valid is a "
+        "section unbalance with moment_kg_m, moving_mass_kg and mount_frequency_hz.",
+    ),
+    "table that is moved as laid down": (
+        "based_on: tube\nscenario: {vibration: [{acceleration_g: 1.5, unbalance: {moment_kg_m: 1, "
+        "moving_mass_kg: 60, mount_frequency_hz: 8}}]}",
+        "trial.yaml: scenario.vibration.0 = {'acceleration_g': 1.5, 'unbalance': {'moment_kg_m': "
+        "1, 'moving_mass_kg': 60, 'mount_frequency_hz': 8}} cannot be used: valid is no section "
+        "unbalance, or hold: unbalance.",
+    ),
+    "amplitude of a table with an unbalance": (
+        "based_on: tube\nscenario: {vibration: [{hold: unbalance, velocity_m_s: 1, unbalance: "
+        "{moment_kg_m: 1, moving_mass_kg: 60, mount_frequency_hz: 8}}]}",
+        "trial.yaml: scenario.vibration.0 = {'hold': 'unbalance', 'velocity_m_s': 1, 'unbalance': "
+        "{'moment_kg_m': 1, 'moving_mass_kg': 60, 'mount_frequency_hz': 8}} cannot be used: valid "
+        "is none of acceleration_g, velocity_m_s, displacement_m and reference_frequency_hz with "
+        "hold unbalance: the table's motion is computed.",
+    ),
+    "table in one stage of two": (
+        (TABLE % FULL).replace("}]}", "}, {acceleration_g: 2}]}"),
+        "trial.yaml: scenario.vibration.1.hold = 'acceleration' cannot be used: "
+        "valid is unbalance in every stage of vibration, or in none.",
+    ),
+    "table that moves between layers": (
+        "based_on: tube\nscenario: {fill: {vibration_between_layers: {hold: unbalance, unbalance: "
+        "{moment_kg_m: 1, moving_mass_kg: 60, mount_frequency_hz: 8}}}}",
+        "trial.yaml: scenario.fill.vibration_between_layers.hold = 'unbalance' cannot be used: "
+        "valid is acceleration, velocity or displacement between layers: the table stands while it "
+        "is filled.",
+    ),
+    "table under a pattern": (
+        (TABLE % FULL).replace("tube", "l_pattern"),
+        "trial.yaml: scenario.vibration.0.hold = 'unbalance' cannot be used: "
+        "valid is acceleration, velocity or displacement in a scene with a pattern.",
+    ),
+    "flask depth in 3D": (
+        (TABLE % FULL).replace(
+            "{vibration", "{dimension: 3, sand: {size_scale: 8}, box: {depth_m: 0.05}, vibration"
+        ),
+        "trial.yaml: scenario.vibration.0.unbalance.flask_depth_m = 0.3 cannot be used: "
+        "valid is absent in 3D, where box.depth_m is the flask's depth.",
     ),
 }
 

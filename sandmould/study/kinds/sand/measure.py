@@ -30,6 +30,7 @@ from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.runs.files import replaced
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import LAST_MEASURED
+from sandmould.study.kinds.sand.drive import add_drive
 from sandmould.study.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.study.kinds.sand.outflow import add_outflow, measure_outflow
 
@@ -183,7 +184,7 @@ def write_measures(scenario: Scenario, folder: Path, out: Path) -> None:
             rows.append({"stage": f"unreadable: {error}"})
     columns = ["time_s", "vibration_time_s", "stage", "grains"]
     table = pd.DataFrame(rows) if rows else pd.DataFrame(columns=columns)
-    table = add_outflow(table, folder)
+    table = add_drive(scenario, add_outflow(table, folder), folder)
     if bent is not None:
         table = add_loop(table, folder, bent.reach_m)
     with replaced(out) as partial:

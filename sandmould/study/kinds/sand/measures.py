@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sandmould.runs.measures import Measure, MeasureGroup, once
+from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY
 from sandmould.scenario.scenario import Scenario
 
 
@@ -77,6 +78,19 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
         "with a tube, in 3D",
         lambda scenario: _bores(scenario, 3),
         (Measure("<tube>_sand_m3", "Volume of the grains in the tube <tube>."),),
+    ),
+    MeasureGroup(
+        "with vibration",
+        lambda scenario: once(bool(scenario.vibrations)),
+        (
+            Measure(
+                DISPLACEMENT,
+                "Amplitude of the box's motion at the frequency of its drive: as laid down, or "
+                "measured over the second half of the vibration so far with hold unbalance.",
+            ),
+            Measure(VELOCITY, "The same of its velocity."),
+            Measure(ACCELERATION, "The same of its acceleration."),
+        ),
     ),
     MeasureGroup(
         "with a discharge",

@@ -1,0 +1,89 @@
+"""How hard the box is shaken at a setting, in words and for tables: mm, mm/s and g."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from sandmould.runs.columns import finished
+from sandmould.runs.formatting import number
+from sandmould.scenario.drive import (
+    ACCELERATION,
+    DISPLACEMENT,
+    VELOCITY,
+    Drive,
+    laid_down_drive,
+)
+from sandmould.scenario.scenario import Scenario
+
+_COLUMNS = (DISPLACEMENT, VELOCITY, ACCELERATION)
+
+
+def drive_of(scenario: Scenario, runs: pd.DataFrame) -> Drive | None:
+    """Drive of the first vibration of a setting; None where there is none, or none was measured.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        At the setting.
+    runs : DataFrame
+        Rows of the summary at the setting: a table on mounts moves as it was measured.
+    """
+    if not scenario.vibrations:
+        return None
+    stage = scenario.vibrations[0]
+    if stage.unbalance is None:
+        return laid_down_drive(stage)
+    measured = runs.loc[finished(runs), DISPLACEMENT] if DISPLACEMENT in runs else pd.Series()
+    displacement_m = float(pd.to_numeric(measured).mean())
+    return Drive(stage.frequency_hz, displacement_m) if math.isfinite(displacement_m) else None
+
+
+def drive_at(
+    summary: pd.DataFrame, keys: Sequence[str], setting: Mapping[str, float]
+) -> dict[str, float] | None:
+    """Amplitudes of the drive between the settings of a sweep; None where runs have none.
+
+    Parameters
+    ----------
+    summary : DataFrame
+        One row a run.
+    keys : sequence of str
+        Swept keys, all numbers.
+    setting : mapping of str to float
+        A value of each key.
+
+    Returns
+    -------
+    dict of str to float, or None
+        By ``DISPLACEMENT``, ``VELOCITY`` and ``ACCELERATION``. Over one key logarithms are
+        interpolated between the means of its settings, which is exact for an amplitude that is
+        held. Over several keys it is the nearest setting's, each key over its range.
+    """
+    if not all(column in summary for column in _COLUMNS):
+        return None
+    rows = summary[finished(summary)].dropna(subset=[*_COLUMNS, *keys])
+    if rows.empty:
+        return None
+    means = rows.groupby(list(keys))[list(_COLUMNS)].mean().reset_index()
+    at = means[list(keys)].to_numpy(dtype=np.float64)
+    wanted = np.array([setting[key] for key in keys])
+    values = means[list(_COLUMNS)].to_numpy(dtype=np.float64)
+    if len(keys) == 1 and (at > 0).all() and (values > 0).all():
+        x, log = np.log(wanted[0]), np.log(values)
+        found = np.exp([np.interp(x, np.log(at[:, 0]), log[:, i]) for i in range(len(_COLUMNS))])
+    else:
+        width = np.maximum(np.ptp(at, axis=0), np.finfo(float).tiny)
+        found = values[int((((at - wanted) / width) ** 2).sum(axis=1).argmin())]
+    return dict(zip(_COLUMNS, found.tolist(), strict=True))
+
+
+def amplitudes_text(drive: Mapping[str, float]) -> str:
+    """Amplitudes as a person sets a table: ``0.15 mm to either side, 47 mm/s and 1.5 g``."""
+    return (
+        f"{number(1e3 * drive[DISPLACEMENT])} mm to either side, "
+        f"{number(1e3 * drive[VELOCITY])} mm/s and {number(drive[ACCELERATION])} g"
+    )
