@@ -16,6 +16,7 @@ from sandmould.runs.formatting import size_text
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, read_planned, validated
+from sandmould.statistics.control_case import SPRINGS
 from sandmould.study.definition.run import FILL, Part, Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
@@ -211,6 +212,30 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     )
     lines += [_note_line(told, len(points)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def later_line(later: Sequence[Run], prices: Prices, cores: int) -> str:
+    """What the controls of an optimum will take, as a line; empty where there are none to come.
+
+    Parameters
+    ----------
+    later : sequence of Run
+        At frequencies in place of those that are not known yet, with the fills that come with them.
+    prices : Prices
+    cores : int
+    """
+    if not later:
+        return ""
+    runs = [run for run in later if run.part != FILL]
+    of_springs = sum(SPRINGS in run.part for run in runs)
+    springs = f", {of_springs} of them with other springs" if of_springs else ""
+    work = sum(own_work(run) for run in later)
+    unit = kind_of(runs[0].scenario).planning.work_unit
+    whole = duration_text(study_s([prices.piece(run) for run in later], cores))
+    return (
+        f"Then, once the optimum is known, its controls: about {len(runs)} runs{springs}, "
+        f"{work:.3g} {unit}, wall time on {cores} cores: {whole}\n"
+    )
 
 
 def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
