@@ -21,7 +21,7 @@ class ModelWaveSpeed:
 
     speed_m_s: float
     how: str
-    """How it is known, in words that go before "of the model"."""
+    """How it is known, in a few words."""
 
 
 @dataclass(frozen=True)
@@ -72,12 +72,12 @@ def recommend(
             "the optimum follows the springs, so it is known as well as the wave speed of the real "
             "sand is, and certificate.sand_wave_speed names no source of that"
         )
-    speed = f"{number(model.speed_m_s)} m/s"
+    speed = f"{number(model.speed_m_s)} m/s ({model.how})"
     spread = f"{number(sand.low_m_s)} to {number(sand.high_m_s)} m/s ({sand.by})"
     if not sand.low_m_s <= model.speed_m_s <= sand.high_m_s:
         return _none(
-            f"the optimum follows the springs, and the wave speed {model.how} of the model, "
-            f"{speed}, is not that of the sand, {spread}"
+            f"the optimum follows the springs, and the model's wave speed, {speed}, is not that of "
+            f"the sand, {spread}"
         )
     low_hz, high_hz = interval_hz
     wide_hz = (
@@ -86,7 +86,7 @@ def recommend(
     return _said(
         wide_hz, held,
         f"the optimum follows the springs, so the interval holds the spread of the sand's wave "
-        f"speed, {spread}; the model's is {speed} {model.how}",
+        f"speed, {spread}; the model's is {speed}",
     )  # fmt: skip
 
 

@@ -16,15 +16,13 @@ from sandmould.statistics.config import Objective
 from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import CONFIDENCE
-from sandmould.statistics.spring_dependence import FOLLOWS, STAYS, SpringCheck
+from sandmould.statistics.spring_dependence import FOLLOWS, SHARE, STAYS, SpringCheck
 
 ShiftVerdict = Literal["up", "down", "held", "unclear", "no result"]
 Cause = Literal[
     "rearrangement of grains", "follows the springs", "resonance of the bed", "no inner optimum",
     "artefact of what is held constant", "artefact of the numerics", "unresolved",
 ]  # fmt: skip
-SHARE = 0.05
-"""Of the measure at the optimum, the margin where the study sets none."""
 MUST_HOLD = ("hold", "time_step", "engine")
 """Controls that, with the springs, move nothing where the optimum belongs to the grains."""
 _SPECTRUM = "spectrum"

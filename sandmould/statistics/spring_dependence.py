@@ -33,6 +33,10 @@ Dependence = Literal[
 ]  # fmt: skip
 FOLLOWS: Dependence = "inner optimum that follows the springs"
 STAYS: Dependence = "inner optimum that does not follow the springs"
+SHARE = 0.05
+"""Of the measure at the optimum, the margin where the study sets none."""
+BLIND = 2.0
+"""Margins: runs that cannot tell a drop of so many say nothing of an optimum that they miss."""
 _FOLLOWING = {FOLLOWS: "it follows the springs", STAYS: "it does not follow the springs"}
 _SHAPES: dict[Shape, str] = {
     "rising": "no frequency is better than the highest one",
@@ -115,6 +119,7 @@ def assess_springs(
     objective: Objective,
     cases: Sequence[ControlCase],
     own_hold: str,
+    margin: float | None,
 ) -> SpringCheck | None:
     """Say for each amplitude held whether there is an optimum, and whether it follows the springs.
 
@@ -131,6 +136,9 @@ def assess_springs(
         Of all controls.
     own_hold : str
         The amplitude that the study holds.
+    margin : float or None
+        Drop that counts as none, in the unit of the measure; None for ``SHARE`` of its mean at the
+        best frequency.
 
     Returns
     -------
@@ -146,6 +154,8 @@ def assess_springs(
     if own_hold not in of_hold:
         return None
     table = summary.assign(_block=number_blocks(summary))
+    at_best = table[(table[PART] == SWEEP) & (table[key] == best_hz)]
+    blind = BLIND * (margin or SHARE * abs(float(usable_values(at_best, objective.measure).mean())))
     verdicts = {}
     for hold, here in of_hold.items():
         curves = [
@@ -156,7 +166,7 @@ def assess_springs(
             swept = table[(table[PART] == SWEEP) & _is_certified(table, key, mine)]
             own = ControlCase(SPRINGS, "x1", 1.0, hold=hold)
             curves.append(_curve(swept, key, objective, own))
-        verdicts[hold] = _judge(hold, sorted(curves, key=lambda curve: curve.factor))
+        verdicts[hold] = _judge(hold, sorted(curves, key=lambda curve: curve.factor), blind)
     own_verdict = verdicts.pop(own_hold)
     return SpringCheck(own_verdict, tuple(verdicts.values()))
 
@@ -285,10 +295,13 @@ class _Contrasts:
         return float(weights @ self._fitted), error
 
 
-def _judge(hold: str, curves: Sequence[SpringCurve]) -> HoldVerdict:
-    """One verdict of the curves of a hold, softest springs first."""
+def _judge(hold: str, curves: Sequence[SpringCurve], blind: float) -> HoldVerdict:
+    """One verdict of the curves of a hold, softest springs first.
+
+    Curves whose runs could not tell a drop of so much do not show that there is no optimum.
+    """
     if without := [curve for curve in curves if curve.limbs.shape != "inner"]:
-        told = [curve for curve in without if curve.limbs.shape != "no result"]
+        told = [curve for curve in without if curve.limbs.seen <= blind]
         dependence: Dependence = "none" if told else "unresolved"
         what = "there is no inner optimum" if told else "nothing can be told"
         said = f"With the {hold} held {what}: {'; '.join(_lacking(told or without))}."
@@ -318,7 +331,7 @@ def _lacking(curves: Sequence[SpringCurve]) -> Iterator[str]:
         some = [curve for curve in curves if curve.limbs.shape == shape]
         said = f"{_SHAPES[shape]} with springs {listed([f'x{c.factor:g}' for c in some])}"
         seen = [c.limbs.seen for c in some if math.isfinite(c.limbs.seen)]
-        yield f"{said} (a drop of {number(max(seen), 2)} would be told)" if seen else said
+        yield f"{said} (a drop below {number(max(seen), 2)} is not told)" if seen else said
 
 
 def _drawn(curve: SpringCurve) -> Array:
