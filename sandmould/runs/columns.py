@@ -54,6 +54,8 @@ TIME_STEP_FRACTION: Final = "time_step_fraction"
 """Of the critical one."""
 LARGEST_OVERLAP_FRACTION: Final = "largest_overlap_fraction"
 """Of a radius; of the whole run in ``summary.tsv``, of one moment in the other tables."""
+OVERLAP_P99_FRACTION: Final = "overlap_p99_fraction"
+"""Of a radius: what 99 of 100 contacts do not exceed, at one moment."""
 
 TIME_S: Final = "time_s"
 VIBRATION_TIME_S: Final = "vibration_time_s"

@@ -27,6 +27,7 @@ _NAMES = {
     "rolling_arm_fraction": "rolling arm",
     "solid_fraction": "solid fraction",
     "bed_height_m": "bed height",
+    "overlap_p99_fraction": "overlap that 99 of 100 contacts do not exceed",
     "pattern_tip_deflection_m": "deflection of the pattern's tip",
     "pattern_tip_filled_m": "deflection of the pattern's tip after filling",
     "pattern_tip_recovered_m": "what vibration gave back of the tip's deflection",

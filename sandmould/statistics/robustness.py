@@ -71,6 +71,11 @@ class Robustness:
         """Whether the optimum is none of the sand's, or none at all."""
         return self.cause.startswith("artefact") or self.cause == "no inner optimum"
 
+    @property
+    def is_sound(self) -> bool:
+        """Whether the optimum is one, and the controls say what it belongs to."""
+        return not self.is_artefact and self.cause != "unresolved"
+
 
 def assess_robustness(
     summary: pd.DataFrame,

@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from sandmould.report.bed_mode import BedMode
 from sandmould.report.heaps import Heap
 from sandmould.report.kinds.deck import DECK_REPORT
 from sandmould.report.kinds.flow import FLOW_REPORT
@@ -73,6 +74,19 @@ def robustness_of(
     """
     robustness = _report_of(scenario).robustness
     return robustness(study_folder, study, collected, scenario) if robustness else None
+
+
+def mode_of(scenario: AnyScenario, summary: pd.DataFrame) -> BedMode | None:
+    """Estimate the first mode of the bed; None of a kind without any.
+
+    Parameters
+    ----------
+    scenario : scenario of any kind
+    summary : DataFrame
+        One row a run.
+    """
+    mode = _report_of(scenario).mode
+    return mode(scenario, summary) if mode else None
 
 
 def heaps_of(

@@ -19,6 +19,7 @@ from sandmould.scenario.reading import Origin, Tree, read_planned, validated
 from sandmould.statistics.control_case import SPRINGS
 from sandmould.study.definition.run import FILL, Part, Run
 from sandmould.study.definition.study import Study
+from sandmould.study.kinds.kind import Note
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
 from sandmould.study.plan.fills import own_work
 from sandmould.study.plan.price import Prices, study_s
@@ -177,7 +178,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         size = kind_of(run.scenario).planning.planned_work(run.scenario) if run.part == FILL else ""
         alike_in = run.part, json.dumps(run.parameters), bool(run.fill), size
         points.setdefault(alike_in, []).append(run)
-    notes: dict[str, list[tuple[str, str]]] = {}
+    notes: dict[str, list[tuple[str, Note]]] = {}
     planning = kind_of(runs[0].scenario).planning
     heads = [*planning.plan_cells(runs[0].scenario), planning.work_unit]
     rows = [["point", "runs", *heads, "wall time a run"]]
@@ -187,7 +188,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         work_a_run = own_work(alike[0])
         work += work_a_run * len(alike)
         for note in planning.notes(scenario):
-            notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note.text))
+            notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note))
         if len(rows) <= LISTED_POINTS:
             rows.append(
                 [
@@ -249,10 +250,11 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     )
 
 
-def _note_line(told: Sequence[tuple[str, str]], points: int) -> str:
+def _note_line(told: Sequence[tuple[str, Note]], points: int) -> str:
     """One line of what was found at some of a study's points, in the words of the first."""
-    label, text = told[0]
-    if points == 1:
-        return f"Note: {text}"
-    alike = "" if len({each for _, each in told}) == 1 else ", with other figures at others"
-    return f"Note: {text} (At {len(told)} of {points} points{alike}; first at {label}.)"
+    label, first = told[0]
+    is_one = len({note.text for _, note in told}) == 1
+    if points == 1 or (is_one and len(told) == points):
+        return f"{first.head}: {first.text}"
+    alike = "" if is_one else ", with other figures at others"
+    return f"{first.head}: {first.text} (At {len(told)} of {points} points{alike}; first at {label}.)"

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from analysis.spectrum import column_frequency_hz, first_resonance_hz, transfer
+from analysis.spectrum import first_resonance_hz, transfer
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.box import Tube
@@ -394,8 +394,3 @@ def test_transfer_is_that_of_a_mass_on_a_spring() -> None:
     assert np.isnan(first_resonance_hz(shaken, np.linspace(1.0, 0.1, len(shaken))))
     assert np.isnan(transfer(np.array([0.0, 1e-3]), np.zeros(2), 50.0, 1e-3, 1.0))
 
-
-def test_column_of_springs_has_the_frequency_of_its_wave() -> None:
-    # The numbers of the design notes: 2.25 mm spheres of 2400 kg/m3, 7e4 N/m, 0.3 m of bed.
-    mass_kg = 2400 * np.pi / 6 * 2.25e-3**3
-    assert column_frequency_hz(2.25e-3, mass_kg, 7e4, 0.3) == pytest.approx(131, abs=1)
