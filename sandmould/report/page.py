@@ -40,7 +40,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
-from sandmould.study.definition.certificate import frequency_key
+from sandmould.study.definition.certificate import frequency_among
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, VERDICT_FILE, read_run
@@ -214,7 +214,7 @@ def _render(
 
 def _beside_mode(page: _Page, mode: BedMode | None) -> list[str]:
     """The best of swept frequencies over the first mode of the bed."""
-    key, best = frequency_key(page.study.sweep), page.verdict.best
+    key, best = frequency_among(page.collected.keys), page.verdict.best
     if mode is None or best is None or not key or not page.study.seeks_best:
         return []
     return [mode.beside(float(best.values[key]))]

@@ -53,7 +53,12 @@ class RobustnessChecks(Section):
 
 def frequency_key(sweep: Sweep) -> str:
     """The one swept key, a frequency; empty where a sweep is of anything else."""
-    (key,) = sweep.swept if len(sweep.swept) == 1 else ("",)
+    return frequency_among(sweep.swept)
+
+
+def frequency_among(keys: Sequence[str]) -> str:
+    """The one of some swept keys, a frequency; empty where there are several, or another."""
+    (key,) = keys if len(keys) == 1 else ("",)
     return key if key.endswith(".frequency_hz") else ""
 
 

@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.report.optimum import optimum_pages
 from sandmould.report.page import write_report
 from sandmould.report.robustness import robustness_pages
+from sandmould.statistics.config import SandWaveSpeed
 from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.definition.certificate import spanned_hz
 from sandmould.study.definition.run import Run
@@ -28,7 +30,7 @@ WEIGHT_N = 3.0
 
 
 def hill(frequency_hz: float, best_hz: float) -> float:
-    return 0.6 - 0.3 * float(np.log(frequency_hz / best_hz)) ** 2
+    return 0.6 - 0.15 * float(np.log(frequency_hz / best_hz)) ** 2
 
 
 def write_certified(folder: Path, moved: dict[str, float]) -> Path:
@@ -133,6 +135,35 @@ def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Pat
         f"55 Hz is {55 / own_hz:.2f} times the bed's own first mode, measured by a small shake at "
         f"{own_hz:.0f} Hz."
     )
+
+
+def test_without_a_source_of_the_wave_speed_no_frequency_is_named_first(tmp_path: Path) -> None:
+    holds = ("acceleration", "velocity", "displacement")
+    moved = {f"springs x0.25 {hold}": 25.0 for hold in holds}
+    moved |= {f"springs x4 {hold}": 100.0 for hold in holds}
+    folder = write_certified(tmp_path / "follows", moved)
+    study, collected = read_study(folder), gather(folder)
+    pages = robustness_pages(folder, study, collected, scenario(50.0))
+    assert pages is not None
+    assert pages.assessment.cause == "follows the springs"
+    optimum = optimum_pages(folder, study, collected.of_sweep.summary, pages, pages.mode)
+    assert optimum is not None
+    assert not optimum.sound
+    first, second, third, fourth, *_ = optimum.sentences
+    assert first.startswith("The optimum at 50 Hz follows the springs, so it is that of sand")
+    assert second.startswith("No frequency in Hz is recommended: the optimum follows the springs")
+    assert third.startswith("The fill of the tube is highest at frequency")
+    assert "times the bed's own first mode, measured by a small shake" in fourth
+    # The waves of the bed, some 36 m/s by its mode, are those of a sand with a source here.
+    sand = SandWaveSpeed(low_m_s=30.0, high_m_s=40.0, by="Somebody 2020")
+    asked = study.certificate.model_copy(update={"sand_wave_speed": sand})
+    sourced = study.model_copy(update={"certificate": asked})
+    advised = optimum_pages(folder, sourced, collected.of_sweep.summary, pages, pages.mode)
+    assert advised is not None
+    assert advised.sound
+    assert advised.sentences[0] == third
+    assert advised.sentences[2].startswith("Recommended with the acceleration held: ")
+    assert "30 to 40 m/s (Somebody 2020)" in advised.sentences[2]
 
 
 def test_there_is_no_certificate_before_its_frequencies_are_chosen(tmp_path: Path) -> None:
