@@ -71,7 +71,7 @@ def test_soft_sand_is_told_beside_the_verdict_and_hard_sand_is_not(tmp_path: Pat
     folder = write_study(tmp_path / "overlaps", count=8, grains=60)
     hard = said_beside_the_verdict(folder)
     assert "Soft sand" not in hard
-    assert "50 Hz is 0.13 times c/(4 H) = 387 Hz, an estimate of the bed's first mode" in hard
+    assert "50 Hz is 0.13 times c/(4 H) = 389 Hz, an estimate of the bed's first mode" in hard
     for path in folder.glob("runs/*/measures.tsv"):
         measures = pd.read_csv(path, sep="\t")
         measures.assign(overlap_p99_fraction=0.081).to_csv(path, sep="\t", index=False)
