@@ -171,6 +171,7 @@ def _render(
         verdict,
         film_budget_bytes,
         page.href,
+        page.by_setting,
     )
     method: tuple[Row, ...] = (
         *of_kind.method,

@@ -207,7 +207,7 @@ def _curve(
         none = (math.nan, math.nan)
         limbs = Limbs("no result", math.nan, none, none, math.nan)
         return SpringCurve(case.hold, factor, math.nan, math.nan, limbs, None)
-    worth: Array = sign * values.to_numpy(dtype=np.float64)
+    worth = np.asarray(sign * values, dtype=np.float64)
     limbs = find_limbs(hz, used["_block"].to_numpy(), worth)
     # Draws of two curves must not share their random numbers, or their ratio is too certain.
     seed = round(1000 * factor)

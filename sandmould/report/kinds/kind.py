@@ -53,6 +53,8 @@ class Findings(Generic[ScenarioT]):
     """Most that the film of one run may weigh."""
     href: str
     """Address of the study's folder, seen from the report."""
+    by_setting: Mapping[str, ScenarioT]
+    """A scenario of each setting, by its label."""
 
 
 @dataclass(frozen=True)

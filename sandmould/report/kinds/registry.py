@@ -54,9 +54,12 @@ def kind_pages(
     verdict: Verdict,
     film_budget_bytes: int,
     href: str,
+    by_setting: Mapping[str, AnyScenario],
 ) -> KindPages:
     """Draw what the kind of study shows; parameters are the fields of ``Findings``."""
-    findings = Findings(study_folder, study, scenario, collected, verdict, film_budget_bytes, href)
+    findings = Findings(
+        study_folder, study, scenario, collected, verdict, film_budget_bytes, href, by_setting
+    )
     return _report_of(scenario).pages(findings)
 
 

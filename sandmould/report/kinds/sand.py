@@ -10,6 +10,7 @@ from sandmould.report.bed_mode import BedMode, bed_mode
 from sandmould.report.chart import Chart
 from sandmould.report.figure_files import pictures, strip
 from sandmould.report.filling import FillingPages, filling_pages
+from sandmould.report.hard_limit_text import hard_limit_text
 from sandmould.report.heaps import steepest_heaps
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import measured_when, sand_method
@@ -60,11 +61,12 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
         bending = bending_pages(
             folder, findings.href, scenario, of_sweep, verdict, pages.pictured_run
         )
+    limit = hard_limit_text(verdict, collected.keys, findings.by_setting)
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),
         measured_when(scenario),
-        filling.advice if filling else (),
+        (*(filling.advice if filling else ()), *filter(None, [limit])),
         {
             "pages": pages,
             "bending": bending,
