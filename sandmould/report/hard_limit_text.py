@@ -49,6 +49,5 @@ def hard_limit_text(
         return f"{what} cannot be told: {limit.why_not}."
     value = f"{with_margin(limit.value, limit.half_width)} {unit_of(measure)}".rstrip()
     span = f"{number(float(f'{kappa.min():.3g}'))} to {number(float(f'{kappa.max():.3g}'))}"
-    return (
-        f"{what} is {value}, by a line through {len(kappa)} levels of kappa, {span} (95 % interval)."
-    )
+    levels_text = f"{len(kappa)} levels of kappa, {span}"
+    return f"{what} is {value} (95 % interval), by a line through {levels_text}."

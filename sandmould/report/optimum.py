@@ -130,17 +130,13 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
     )
 
 
-def _advised(
-    optimum: Optimum, study: Study, robustness: RobustnessPages
-) -> Recommendation | None:
+def _advised(optimum: Optimum, study: Study, robustness: RobustnessPages) -> Recommendation | None:
     """A frequency for the table, where the springs allow one."""
     key = frequency_key(study.sweep)
     if robustness.mode is None or not key:
         return None
     sand = study.certificate.sand_wave_speed
-    return recommend(
-        robustness.assessment, optimum.interval(key), robustness.mode.wave_speed, sand
-    )
+    return recommend(robustness.assessment, optimum.interval(key), robustness.mode.wave_speed, sand)
 
 
 def _flat(optimum: Optimum, study: Study, key: str) -> str:

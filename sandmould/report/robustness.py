@@ -73,9 +73,7 @@ def robustness_pages(
     summary, objective = collected.summary, study.objective
     margin = study.equivalence.margins.get(objective.measure)
     hold = scenario.vibrations[0].hold
-    springs = assess_springs(
-        summary, key, certified_hz[1], objective, controlled, hold, margin
-    )
+    springs = assess_springs(summary, key, certified_hz[1], objective, controlled, hold, margin)
     robustness = assess_robustness(
         summary, key, certified_hz, objective, margin, controlled, springs
     )
@@ -172,8 +170,8 @@ def _column(mode: BedMode, is_shaken: bool) -> str:
     """Frequency of a column of springs as deep as the bed, beside the bed's own."""
     said = (
         f"A column of the model's springs, {number(1e3 * mode.depth_m)} mm high, would resonate at "
-        f"about {number(mode.estimate_hz, 2)} Hz, c/(4 H) with c = {number(mode.row_speed_m_s)} m/s "
-        "of a row of grains, and at odd multiples"
+        f"about {number(mode.estimate_hz, 2)} Hz, c/(4 H) with c = {number(mode.row_speed_m_s)} "
+        "m/s of a row of grains, and at odd multiples"
     )
     if mode.is_measured:
         own_hz = number(mode.measured_hz)

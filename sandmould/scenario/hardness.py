@@ -1,4 +1,4 @@
-"""How hard a bed of sand is under its own weight: kappa, wave speed, and the mode that goes with it.
+"""How hard a bed of sand is under its own weight: kappa, wave speed, and its first mode.
 
 kappa is about the size of a grain over its mean overlap. A contact of spheres of diameter d under
 the pressure P bears P d^2, so k_n over it is d over the overlap of k_n/(P d); one of discs of
@@ -70,9 +70,7 @@ def bed_hardness(scenario: Scenario) -> Hardness | None:
     """
     depth_m = predicted_bed_depth_m(scenario, plan_counts(scenario))
     sand, laws = scenario.sand, scenario.laws
-    pressure_pa = (
-        sand.density_kg_m3 * nominal_fraction(scenario) * scenario.gravity_m_s2 * depth_m
-    )
+    pressure_pa = sand.density_kg_m3 * nominal_fraction(scenario) * scenario.gravity_m_s2 * depth_m
     if pressure_pa <= 0.0:
         return None
     across_m = sand.thickness_m if scenario.dimension == 2 else sand.mass_median_diameter_m

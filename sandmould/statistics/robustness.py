@@ -180,7 +180,9 @@ def _together(
         first = f"{at} is an artefact of the numerics: it moves with {_names(numerics)}."
         return "artefact of the numerics", (first, *said)
     if own and own.dependence == "none":
-        first = f"{at} is no inner optimum of the sand: with softer or stiffer springs there is none."
+        first = (
+            f"{at} is no inner optimum of the sand: with softer or stiffer springs there is none."
+        )
         return "no inner optimum", (first, *said)
     if own and own.dependence == FOLLOWS and as_column:
         first = (

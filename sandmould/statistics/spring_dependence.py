@@ -47,7 +47,7 @@ _SHAPES: dict[Shape, str] = {
 
 
 @dataclass(frozen=True)
-class Limbs:
+class CurveLimbs:
     """How far a curve falls from a frequency inside the range to both of its ends."""
 
     shape: Shape
@@ -70,7 +70,7 @@ class SpringCurve:
     """Of the springs of bed and walls."""
     low_hz: float
     high_hz: float
-    limbs: Limbs
+    limbs: CurveLimbs
     optimum: Optimum | None
     """None where too few runs can be used."""
 
@@ -187,16 +187,12 @@ def _rows(
     return table[is_mine]
 
 
-def _is_certified(
-    table: pd.DataFrame, key: str, cases: Sequence[ControlCase]
-) -> pd.Series[bool]:
+def _is_certified(table: pd.DataFrame, key: str, cases: Sequence[ControlCase]) -> pd.Series[bool]:
     """Whether runs stand at a frequency of the control, so that curves are as well known."""
     return table[key].isin(table.loc[table[PART].isin([c.part for c in cases]), key].unique())
 
 
-def _curve(
-    rows: pd.DataFrame, key: str, objective: Objective, case: ControlCase
-) -> SpringCurve:
+def _curve(rows: pd.DataFrame, key: str, objective: Objective, case: ControlCase) -> SpringCurve:
     values = usable_values(rows, objective.measure).dropna()
     used = rows.loc[values.index]
     hz = used[key].to_numpy(dtype=np.float64)
@@ -205,7 +201,7 @@ def _curve(
     factor = case.factor or 1.0
     if len(np.unique(hz)) < fewest_points(1):
         none = (math.nan, math.nan)
-        limbs = Limbs("no result", math.nan, none, none, math.nan)
+        limbs = CurveLimbs("no result", math.nan, none, none, math.nan)
         return SpringCurve(case.hold, factor, math.nan, math.nan, limbs, None)
     worth = np.asarray(sign * values, dtype=np.float64)
     limbs = find_limbs(hz, used["_block"].to_numpy(), worth)
@@ -215,7 +211,7 @@ def _curve(
     return SpringCurve(case.hold, factor, float(hz.min()), float(hz.max()), limbs, optimum)
 
 
-def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> Limbs:
+def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> CurveLimbs:
     """Ask whether some frequency inside the range is better than both of its ends.
 
     Means are compared with fillings as blocks, which takes the spread between fillings out. That
@@ -233,7 +229,7 @@ def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> Limbs:
 
     Returns
     -------
-    Limbs
+    CurveLimbs
     """
     distinct, place = np.unique(hz, return_inverse=True)
     last = len(distinct) - 1
@@ -255,7 +251,7 @@ def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> Limbs:
         shape = "no result"
     elif rises != falls:
         shape = "rising" if rises else "falling"
-    return Limbs(
+    return CurveLimbs(
         shape,
         float(distinct[top]),
         (float(drop[0, top]), float(drop[1, top])),

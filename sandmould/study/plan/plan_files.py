@@ -257,4 +257,6 @@ def _note_line(told: Sequence[tuple[str, Note]], points: int) -> str:
     if points == 1 or (is_one and len(told) == points):
         return f"{first.head}: {first.text}"
     alike = "" if is_one else ", with other figures at others"
-    return f"{first.head}: {first.text} (At {len(told)} of {points} points{alike}; first at {label}.)"
+    return (
+        f"{first.head}: {first.text} (At {len(told)} of {points} points{alike}; first at {label}.)"
+    )

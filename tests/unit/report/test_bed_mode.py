@@ -1,4 +1,4 @@
-"""The first mode of the bed beside a frequency, measured or estimated; soft sand beside the verdict."""
+"""The first mode of the bed beside a frequency, and soft sand beside the verdict."""
 
 from __future__ import annotations
 

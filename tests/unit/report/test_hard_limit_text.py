@@ -45,10 +45,8 @@ def said(measure: str, key: str = KEY, levels: tuple[float, ...] = THICKNESS_M) 
 def test_packing_is_extrapolated_with_its_interval() -> None:
     # Thickness halves, kappa doubles: 398, 796, 1592, 3184 with the tube's bed.
     text = said("solid_fraction").replace("\u202f", "")
-    assert text.startswith(
-        "The limit of the solid fraction for hard grains, 1/kappa = 0, is 0.82"
-    )
-    assert text.endswith("by a line through 4 levels of kappa, 398 to 3180 (95 % interval).")
+    assert text.startswith("The limit of the solid fraction for hard grains, 1/kappa = 0, is 0.82")
+    assert text.endswith("(95 % interval), by a line through 4 levels of kappa, 398 to 3180.")
 
 
 def test_three_levels_say_why_there_is_none() -> None:

@@ -109,7 +109,8 @@ def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Pat
     assert pages.assessment.cause == "rearrangement of grains"
     names = [row[0].text for row in pages.table.rows]
     assert names == [
-        "the sweep itself", "displacement held", "velocity held", "bed depth x0.5", "bed depth x2", "time step x0.5", "engine lammps",
+        "the sweep itself", "displacement held", "velocity held", "bed depth x0.5",
+        "bed depth x2", "time step x0.5", "engine lammps",
     ]  # fmt: skip
     assert {row[-1].text for row in pages.table.rows[1:]} == {"stays"}
     assert pages.spring_table is not None

@@ -268,9 +268,7 @@ def assess_study(table: pd.DataFrame, study: Study) -> Robustness:
     springs = assess_springs(
         table, FREQUENCY, BEST_HZ, objective, controlled, "acceleration", margin
     )
-    return assess_robustness(
-        table, FREQUENCY, CERTIFIED_HZ, objective, margin, controlled, springs
-    )
+    return assess_robustness(table, FREQUENCY, CERTIFIED_HZ, objective, margin, controlled, springs)
 
 
 def assessed(
@@ -297,8 +295,9 @@ def test_an_optimum_that_goes_with_springs_and_depth_is_the_beds(tmp_path: Path)
     found = assessed(tmp_path, column)
     assert found.cause == "resonance of the bed"
     assert not found.is_artefact
-    assert "moves with the springs and with bed depth x0.5 and bed depth x2 as c/(4 H)" in (
-        found.sentences[0]
+    assert (
+        "moves with the springs and with bed depth x0.5 and bed depth x2 as c/(4 H)"
+        in (found.sentences[0])
     )
     # Springs alone are not enough to call it a column.
     alone = assessed(tmp_path, FOLLOWING)
@@ -393,4 +392,3 @@ def test_transfer_is_that_of_a_mass_on_a_spring() -> None:
     assert first_resonance_hz(shaken, np.array(found)) == pytest.approx(own_hz, rel=0.1)
     assert np.isnan(first_resonance_hz(shaken, np.linspace(1.0, 0.1, len(shaken))))
     assert np.isnan(transfer(np.array([0.0, 1e-3]), np.zeros(2), 50.0, 1e-3, 1.0))
-

@@ -256,7 +256,9 @@ def test_a_wave_speed_with_a_source_gives_a_frequency_with_its_spread() -> None:
     assert "120 m/s (of a row of grains, an estimate)" in found.sentence
     soft = recommended(robustness, sand, ModelWaveSpeed(19.0, "measured"))
     assert soft.interval_hz is None
-    assert "the model's wave speed, 19 m/s (measured), is not that of the sand, 100" in soft.sentence
+    assert (
+        "the model's wave speed, 19 m/s (measured), is not that of the sand, 100" in soft.sentence
+    )
 
 
 def test_numerics_that_move_it_forbid_a_recommendation() -> None:
@@ -288,9 +290,7 @@ def test_drops_are_those_of_a_textbook() -> None:
     left = values - rows - columns + values.mean()
     error = math.sqrt(2 * float((left**2).sum()) / 6 / 4)
     t = float(stats.t.ppf(0.975, 6))
-    found = find_limbs(
-        np.tile([10.0, 20.0, 30.0], 4), np.repeat(np.arange(4), 3), values.ravel()
-    )
+    found = find_limbs(np.tile([10.0, 20.0, 30.0], 4), np.repeat(np.arange(4), 3), values.ravel())
     assert found.shape == "inner"
     assert found.top_hz == 20.0
     assert found.drop == pytest.approx((0.25, 0.225))

@@ -37,7 +37,8 @@ def softness_warning(hardness: Hardness | None, overlap_fraction: float = 0.0) -
         )
     if not why:
         return ""
-    return f"Soft sand: {listed(why)}. Packing, density, angles and fills are not those of hard grains."
+    of_what = "Packing, density, angles and fills are not those of hard grains."
+    return f"Soft sand: {listed(why)}. {of_what}"
 
 
 def _rounded(value: float) -> str:
