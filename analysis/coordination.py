@@ -13,7 +13,7 @@ from sandmould.scenario.geometry import Array, Scene, Solid, Wall, distance_with
 
 @dataclass(frozen=True)
 class ContactCounts:
-    """Number of contacts of the grains and the deepest of them."""
+    """Number of contacts of the grains, and how deep they are."""
 
     count: NDArray[np.int64]
     """(n,) int64: contacts of each grain with grains, walls and solids."""
@@ -29,6 +29,8 @@ class ContactCounts:
     """Share of the grains that bear: two or more contacts in 2D, three or more in 3D."""
     largest_overlap_fraction: float
     """Deepest overlap over the smaller radius, walls and solids included; 0 without overlap."""
+    overlap_p99_fraction: float
+    """What 99 of 100 overlaps over the smaller radius do not exceed; 0 without overlap."""
 
 
 def contacts(
@@ -56,13 +58,13 @@ def contacts(
     n, dimension = position_m.shape
     count = np.zeros(n, dtype=np.int64)
     grain_grain = grain_wall = 0
-    deepest = 0.0
+    depths: list[Array] = []
     for first, second, overlap_m in touching_pairs(position_m, radius_m, max(tolerance_m, 0.0)):
         touch = overlap_m > -tolerance_m
         count += np.bincount(first[touch], minlength=n) + np.bincount(second[touch], minlength=n)
         grain_grain += int(touch.sum())
         smaller_m = np.minimum(radius_m[first], radius_m[second])
-        deepest = max(deepest, float((overlap_m / smaller_m).max(initial=0.0)))
+        depths.append(overlap_m / smaller_m)
     reach_m = float(radius_m.max(initial=0.0)) + max(tolerance_m, 0.0)
     surfaces: tuple[Wall | Solid, ...] = ()
     if scene is not None:
@@ -72,7 +74,9 @@ def contacts(
         touch = overlap_m > -tolerance_m
         count += touch
         grain_wall += int(touch.sum())
-        deepest = max(deepest, float((overlap_m / radius_m).max(initial=0.0)))
+        depths.append(overlap_m / radius_m)
+    depth = np.concatenate(depths) if depths else np.empty(0)
+    depth = depth[depth > 0.0]
     bearing = count >= dimension
     return ContactCounts(
         count=count,
@@ -81,7 +85,8 @@ def contacts(
         mean_coordination=_mean(count),
         mean_coordination_bearing=_mean(count[bearing]),
         bearing_fraction=_mean(bearing),
-        largest_overlap_fraction=deepest,
+        largest_overlap_fraction=float(depth.max(initial=0.0)),
+        overlap_p99_fraction=float(np.quantile(depth, 0.99)) if len(depth) else 0.0,
     )
 
 

@@ -61,14 +61,3 @@ def first_resonance_hz(frequency_hz: Array, response: Array) -> float:
             top = -0.5 * b / a if a < 0 else 0.0
             return float(np.exp(x[i] + top))
     return float("nan")
-
-
-def column_frequency_hz(
-    diameter_m: float, mass_kg: float, stiffness_n_m: float, height_m: float
-) -> float:
-    """First mode of a column of grains on springs, fixed below and free above: c/(4 H).
-
-    The wave runs through a chain of equal grains with c = d sqrt(k/m): an estimate, good to a
-    third or so, since a bed is no chain.
-    """
-    return float(diameter_m * np.sqrt(stiffness_n_m / mass_kg) / (4.0 * height_m))

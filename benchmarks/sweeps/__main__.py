@@ -61,7 +61,7 @@ def _sweep(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
 
 
 def _certified(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
-    """One like ``tube_certified``: a stroke held, a round, and controls of hold and stiffness."""
+    """One like ``tube_certified``: a stroke held, a round, and two controls."""
     held = {**_SHAKE, "hold": "displacement", "reference_frequency_hz": 50}
     scenario = {
         "sand": {"size_scale": scale, "disc_thickness_m": 0.1},
@@ -72,7 +72,7 @@ def _certified(scale: float, duration_s: float, replicates: int) -> dict[str, An
         scenario, [25, 35, 50, 70, 100, 140], replicates=replicates,
         equivalence={"margins": {"tube_fill_fraction": 0.03}},
         refine={"rounds": 1, "runs": 6, "interval": {FREQUENCY: 20}},
-        certificate={"controls": ["hold", "stiffness"]},
+        certificate={"controls": ["hold", "bed_depth"], "replicates": 3},
     )  # fmt: skip
 
 
@@ -160,7 +160,8 @@ def page(results: dict[str, Any]) -> str:
             version: {key: median(row[key] for row in rows[version]) for key in rows[version][0]}
             for version in rows
         }
-        studies[name] = {**medians, "turns": len(rows["new"]), "rows": rows}
+        studies[name] = {**medians, "turns": len(rows["new"]), "rows": rows,
+                         "study": results[name]["study"]}  # fmt: skip
     values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
     values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)

@@ -22,12 +22,14 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import listed, name_of, number, seconds, value_text
 from sandmould.scenario.contact import ContactLaw
+from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.unbalance import Unbalance
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.definition.study import Objective
+from sandmould.study.kinds.sand.hardness_text import hardness_text
 
 _NO_TENSION = {
     "total": "the total normal force, spring and dashpot together, is never allowed to pull",
@@ -64,6 +66,7 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
     tuple of Row
     """
     sand, contact = scenario.sand, scenario.laws
+    hardness = bed_hardness(scenario)
     sizes = sand.classes(scenario.dimension)
     low, high = (1e3 * sizes[i].diameter_m for i in (0, -1))
     return (
@@ -77,6 +80,7 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
         ),
         Row("Grain on grain", _law(contact.grain_grain)),
         Row("Grain on wall", _law(contact.grain_wall)),
+        *([Row("Hardness", hardness_text(hardness))] if hardness else []),
         Row("No tension, eq. (18)", _NO_TENSION[contact.no_tension]),
         Row("Background damping", _damping(scenario)),
         Row("Filling", _filling(scenario)),

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
+from sandmould.report.bed_mode import BedMode
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.curves import reported_lines
 from sandmould.report.drive import amplitudes_text, drive_at
@@ -27,7 +28,9 @@ from sandmould.runs.formatting import (
 )
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
+from sandmould.statistics.recommendation import Recommendation, recommend
 from sandmould.statistics.settings import CONFIDENCE
+from sandmould.study.definition.certificate import frequency_key
 from sandmould.study.definition.study import Study
 from sandmould.study.rounds.round_log import RoundLog, read_rounds
 
@@ -53,6 +56,7 @@ def optimum_pages(
     study: Study,
     summary: pd.DataFrame,
     robustness: RobustnessPages | None = None,
+    mode: BedMode | None = None,
 ) -> OptimumPages | None:
     """Say where the optimum of a study with rounds or controls lies; None for others.
 
@@ -63,7 +67,10 @@ def optimum_pages(
     summary : DataFrame
         One row a run of the sweep and its rounds.
     robustness : RobustnessPages, optional
-        Its verdict comes first where the optimum is an artefact.
+        Its verdict comes first where the optimum is an artefact, or where no frequency is
+        recommended.
+    mode : BedMode, optional
+        First mode of the bed, told beside a frequency.
     """
     if not (study.refine.rounds or study.certificate.controls):
         return None
@@ -83,15 +90,22 @@ def optimum_pages(
     drive = drive_at(summary, keys, optimum.setting)
     if drive is not None:
         said.insert(1, f"There the box moves {amplitudes_text(drive)}.")
+    if mode and (key := frequency_key(study.sweep)):
+        said.insert(1, mode.beside(optimum.setting[key]))
     said += _beside(optimum, study)
     if study.refine.rounds:
         said.append(_effort(log, study, summary))
     sound = not ends and not wide
     if robustness is not None:
         opening = opening_sentences(robustness, objective.measure)
-        artefact = robustness.assessment.is_artefact
-        said = [*opening, *said] if artefact else [said[0], *opening, *said[1:]]
-        sound = sound and robustness.assessment.cause == "rearrangement of grains"
+        advised = _advised(optimum, study, robustness)
+        told = [*opening, *([advised.sentence] if advised else [])]
+        is_first = robustness.assessment.is_artefact or (
+            advised is not None and advised.interval_hz is None
+        )
+        said = [*told, *said] if is_first else [said[0], *told, *said[1:]]
+        is_advised = advised is not None and advised.interval_hz is not None
+        sound = sound and is_advised and robustness.assessment.is_sound
     return OptimumPages(tuple(said), sound, optimum)
 
 
@@ -118,6 +132,15 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
         f"Not resolved: among what was swept the {what} is {most} at {where}, but the interval "
         f"reaches {listed(reached)}, so the optimum may lie beyond."
     )
+
+
+def _advised(optimum: Optimum, study: Study, robustness: RobustnessPages) -> Recommendation | None:
+    """A frequency for the table, where the springs allow one."""
+    key = frequency_key(study.sweep)
+    if robustness.mode is None or not key:
+        return None
+    sand = study.certificate.sand_wave_speed
+    return recommend(robustness.assessment, optimum.interval(key), robustness.mode.wave_speed, sand)
 
 
 def _flat(optimum: Optimum, study: Study, key: str) -> str:

@@ -17,11 +17,18 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from sandmould import ROOT
 from sandmould.report.agreement import agreement_pages
 from sandmould.report.animation import BUDGET_BYTES
+from sandmould.report.bed_mode import BedMode
 from sandmould.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.report.curves import objective_charts
 from sandmould.report.estimate_section import estimate_figures, estimate_pages
 from sandmould.report.figure_files import numbered, write_figures
-from sandmould.report.kinds.registry import drives_of, kind_pages, notes_of, robustness_of
+from sandmould.report.kinds.registry import (
+    drives_of,
+    kind_pages,
+    mode_of,
+    notes_of,
+    robustness_of,
+)
 from sandmould.report.method import Row, provenance_rows, statistics_method
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.sand import pictured_runs
@@ -34,6 +41,7 @@ from sandmould.scenario.bad_input import BadInputError
 from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
+from sandmould.study.definition.certificate import frequency_among
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, VERDICT_FILE, read_run
@@ -149,7 +157,8 @@ def _render(
     agreement = agreement_pages(page.collected, page.study)
     estimate = estimate_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
     robustness = robustness_of(page.study_folder, page.study, page.collected, page.scenario)
-    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, robustness)
+    mode = robustness.mode if robustness else mode_of(page.scenario, of_sweep.summary)
+    optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, robustness, mode)
     drawn, drawn_verdict = drawn_part(of_sweep, verdict)
     charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
@@ -163,6 +172,7 @@ def _render(
         verdict,
         film_budget_bytes,
         page.href,
+        page.by_setting,
     )
     method: tuple[Row, ...] = (
         *of_kind.method,
@@ -193,7 +203,8 @@ def _render(
         files=data_files(page.study_folder, page.href),
         both_sizes=_both_sizes,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
-        advice=of_kind.advice,
+        advice=(*of_kind.advice, *([] if optimum else _beside_mode(page, mode))),
+        warning=of_kind.warning,
         reported_best=page.study.objective.reported_best,
         **of_kind.context,
     )
@@ -201,6 +212,14 @@ def _render(
     sentences = verdict.sentences if statement is None or is_verdict else statement.sentences
     figures = {**numbered("objective", charts), **of_estimate, **of_kind.figures}
     return text, figures, sentences[0]
+
+
+def _beside_mode(page: _Page, mode: BedMode | None) -> list[str]:
+    """The best of swept frequencies over the first mode of the bed."""
+    key, best = frequency_among(page.collected.keys), page.verdict.best
+    if mode is None or best is None or not key or not page.study.seeks_best:
+        return []
+    return [mode.beside(float(best.values[key]))]
 
 
 def _both_sizes(chart: Any) -> tuple[Any, Any]:

@@ -10,15 +10,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.spectrum import column_frequency_hz, first_resonance_hz, transfer
+from analysis.spectrum import transfer
+from sandmould.report.bed_mode import BedMode, Response, bed_mode
 from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.tables import Cell, Column, Table
-from sandmould.runs.columns import BED_HEIGHT_M, STAGE, TIME_S
+from sandmould.runs.columns import STAGE, TIME_S
 from sandmould.runs.formatting import name_of, number
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind, is_filling
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.robustness import Robustness, assess_robustness, shaken_runs
+from sandmould.statistics.spring_dependence import SpringCheck, assess_springs
 from sandmould.study.collect import Collected
 from sandmould.study.definition.certificate import frequency_key
 from sandmould.study.definition.study import Study
@@ -26,6 +28,13 @@ from sandmould.study.plan.plan_files import read_run
 from sandmould.study.robustness.controls import SHAKE_G, cases
 from sandmould.study.rounds.round_log import read_rounds
 
+_LIMBS = {
+    "inner": "both",
+    "rising": "the lower alone",
+    "falling": "the upper alone",
+    "open": "not told",
+    "no result": "too few runs",
+}
 _WORDS = {"up": "moves up", "down": "moves down", "held": "stays"}
 
 
@@ -35,9 +44,11 @@ class RobustnessPages:
 
     assessment: Robustness
     table: Table
+    spring_table: Table | None
     spectrum: Chart | None
+    mode: BedMode | None
     column: str
-    """What a column of springs would do, as a sentence."""
+    """What a column of springs would do, as a sentence; empty where nothing vibrates."""
 
 
 def robustness_pages(
@@ -59,20 +70,22 @@ def robustness_pages(
     if not key or not certified_hz:
         return None
     controlled = tuple(cases(study.certificate, scenario, certified_hz[1]))
+    summary, objective = collected.summary, study.objective
+    margin = study.equivalence.margins.get(objective.measure)
+    hold = scenario.vibrations[0].hold
+    springs = assess_springs(summary, key, certified_hz[1], objective, controlled, hold, margin)
     robustness = assess_robustness(
-        collected.summary,
-        key,
-        certified_hz,
-        study.objective,
-        study.equivalence.margins.get(study.objective.measure),
-        controlled,
+        summary, key, certified_hz, objective, margin, controlled, springs
     )
-    responses = _responses(study_folder, shaken_runs(collected.summary, controlled))
+    responses = _responses(study_folder, shaken_runs(summary, controlled))
+    mode = bed_mode(scenario, collected.of_sweep.summary, responses)
     return RobustnessPages(
         robustness,
         _table(robustness, certified_hz),
+        _spring_table(springs) if springs else None,
         _chart(responses) if responses else None,
-        _column(scenario, collected.summary, responses),
+        mode,
+        _column(mode, bool(responses)) if mode else "",
     )
 
 
@@ -102,10 +115,6 @@ def _table(robustness: Robustness, certified_hz: Sequence[float]) -> Table:
     )
     marked = tuple(verdict.startswith("moves") for *_, verdict in rows)
     return Table(columns, cells, marked)
-
-
-Response = tuple[np.ndarray, np.ndarray]
-"""Frequencies, Hz, and the amplification at each."""
 
 
 def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
@@ -157,28 +166,48 @@ def _chart(responses: Sequence[Response]) -> Chart:
     )
 
 
-def _column(scenario: Scenario, summary: pd.DataFrame, responses: Sequence[Response]) -> str:
+def _column(mode: BedMode, is_shaken: bool) -> str:
     """Frequency of a column of springs as deep as the bed, beside the bed's own."""
-    classes = scenario.sand.classes(scenario.dimension)
-    shares = np.array([c.mass_fraction for c in classes])
-    mean_m = float(shares @ np.array([c.diameter_m for c in classes]))
-    mass_kg = scenario.sand.grain_mass_kg(mean_m, scenario.dimension)
-    height_m = float(pd.to_numeric(summary[BED_HEIGHT_M], errors="coerce").median())
-    estimate_hz = column_frequency_hz(
-        mean_m, mass_kg, scenario.laws.grain_grain.normal_stiffness_n_m, height_m
-    )
     said = (
-        f"A column of the model's springs, {number(1e3 * height_m)} mm high, would resonate at "
-        f"about {number(estimate_hz, 2)} Hz, c/(4 H) with c = d sqrt(k/m), and at odd multiples"
+        f"A column of the model's springs, {number(1e3 * mode.depth_m)} mm high, would resonate at "
+        f"about {number(mode.estimate_hz, 2)} Hz, c/(4 H) with c = {number(mode.row_speed_m_s)} "
+        "m/s of a row of grains, and at odd multiples"
     )
-    own_hz = [first_resonance_hz(f, r) for f, r in responses]
-    if not own_hz:
-        return f"{said}."
-    finite_hz = [f for f in own_hz if math.isfinite(f)]
-    if not finite_hz:
-        return f"{said}; shaken weakly, the bed shows no resonance."
-    mean_hz = number(np.mean(finite_hz))
-    return f"{said}; shaken weakly, the bed's own first resonance is at {mean_hz} Hz."
+    if mode.is_measured:
+        own_hz = number(mode.measured_hz)
+        return f"{said}; shaken weakly, the bed's own first resonance is at {own_hz} Hz."
+    return f"{said}; shaken weakly, the bed shows no resonance." if is_shaken else f"{said}."
+
+
+def _spring_table(springs: SpringCheck) -> Table:
+    """A row a curve: springs, what is held, where the optimum lies, its limbs."""
+    columns = (
+        Column("held", False),
+        Column("springs"),
+        Column("optimum, Hz"),
+        Column("95 % interval, Hz"),
+        Column("better than the lowest by"),
+        Column("better than the highest by"),
+        Column("limbs", False),
+    )
+    rows, marked = [], []
+    for hold in springs.holds:
+        for curve in hold.curves:
+            best, low, high = curve.place_hz
+            is_inner = curve.limbs.shape == "inner"
+            place = f"{number(low)} to {number(high)}" if is_inner else "–"
+            rows.append(
+                (
+                    Cell(hold.hold, hold.hold),
+                    Cell(f"x{curve.factor:g}", repr(curve.factor)),
+                    Cell(number(best) if is_inner else "–", repr(best)),
+                    Cell(place, place),
+                    *(Cell(number(drop, 2), repr(drop)) for drop in curve.limbs.drop),
+                    Cell(_LIMBS[curve.limbs.shape], curve.limbs.shape),
+                )
+            )
+            marked.append(not is_inner)
+    return Table(columns, tuple(rows), tuple(marked))
 
 
 def opening_sentences(pages: RobustnessPages, measure: str) -> tuple[str, ...]:

@@ -59,6 +59,8 @@ LIMIT_MOMENTS: Final = "limit_moments"
 that was found; only runs that take their step from the bed have them."""
 LARGEST_OVERLAP_FRACTION: Final = "largest_overlap_fraction"
 """Of a radius; of the whole run in ``summary.tsv``, of one moment in the other tables."""
+OVERLAP_P99_FRACTION: Final = "overlap_p99_fraction"
+"""Of a radius: what 99 of 100 contacts do not exceed, at one moment."""
 
 TIME_S: Final = "time_s"
 VIBRATION_TIME_S: Final = "vibration_time_s"

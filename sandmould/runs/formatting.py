@@ -30,6 +30,7 @@ _NAMES = {
     "drive_displacement_m": "amplitude of the box",
     "drive_velocity_m_s": "velocity of the box",
     "drive_acceleration_g": "acceleration of the box",
+    "overlap_p99_fraction": "overlap that 99 of 100 contacts do not exceed",
     "pattern_tip_deflection_m": "deflection of the pattern's tip",
     "pattern_tip_filled_m": "deflection of the pattern's tip after filling",
     "pattern_tip_recovered_m": "what vibration gave back of the tip's deflection",

@@ -41,7 +41,8 @@ class PlannedLayer:
         return float((self.position_m[:, -1] + self.radius_m).max())
 
 
-def _nominal_fraction(s: Scenario) -> float:
+def nominal_fraction(s: Scenario) -> float:
+    """Solid fraction that turns the height of a layer into grains."""
     return s.fill.nominal_solid_fraction or NOMINAL_FRACTION[s.dimension]
 
 
@@ -69,7 +70,7 @@ def plan_counts(s: Scenario) -> list[int]:
         elif layer.mass_kg is not None:
             counts.append(round(layer.mass_kg / mean_mass))
         else:
-            solid = (layer.height_m or 0.0) * s.floor_measure * _nominal_fraction(s)
+            solid = (layer.height_m or 0.0) * s.floor_measure * nominal_fraction(s)
             counts.append(round(solid / mean_measure))
     return counts
 
@@ -85,13 +86,18 @@ def predicted_bed_height_m(s: Scenario, counts: list[int]) -> float:
     Sand that stands on a gate, or is poured over a part of the box, displaces no obstacles; all
     other sand has obstacles and empty bores in it.
     """
-    sand = filled_measure(s, counts) / _nominal_fraction(s)
+    sand = filled_measure(s, counts) / nominal_fraction(s)
     gate_m = _gate_under_sand_m(s)
     if gate_m > 0.0 or s.fill.over_x_m or s.fill.over_y_m:
         return gate_m + sand / s.floor_measure
     displaced = sum(solid.measure for solid in s.scene.solids)
     displaced += sum(bore.measure for bore in s.scene.bores)
     return (sand + displaced) / s.floor_measure
+
+
+def predicted_bed_depth_m(s: Scenario, counts: list[int]) -> float:
+    """Depth of the filled bed over the floor, or over the gate that it stands on."""
+    return predicted_bed_height_m(s, counts) - _gate_under_sand_m(s)
 
 
 def _gate_under_sand_m(s: Scenario) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
@@ -43,6 +44,26 @@ class Objective(Section):
         source=ARGUED,
         ge=0,
     )
+
+
+class SandWaveSpeed(Section):
+    """Speed of compression waves in the real sand as somebody measured it, with its spread."""
+
+    low_m_s: float = quantity(
+        ..., "Lowest value that is likely.", unit="m/s", source="user", gt=0, le=1e4
+    )
+    high_m_s: float = quantity(
+        ..., "Highest value that is likely.", unit="m/s", source="user", gt=0, le=1e4
+    )
+    by: str = quantity(
+        ..., "Who measured it, where, and at which pressure.", source="user", min_length=1
+    )
+
+    @model_validator(mode="after")
+    def _spread(self) -> SandWaveSpeed:
+        if self.high_m_s < self.low_m_s:
+            raise PydanticCustomError("wave_speed", "a high_m_s that is not below the low_m_s")
+        return self
 
 
 class Equivalence(Section):

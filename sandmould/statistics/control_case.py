@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sandmould.runs.columns import CONTROL
+
+SPRINGS = "springs"
+"""Control whose cases are whole curves, each over frequency in one hold."""
 
 
 @dataclass(frozen=True)
@@ -16,6 +19,8 @@ class ControlCase:
     """In words."""
     factor: float | None
     """What the property is multiplied by; None where a control does not multiply."""
+    hold: str = field(default="", kw_only=True)
+    """Amplitude that is held in a curve of the control springs; empty of all others."""
 
     @property
     def part(self) -> str:

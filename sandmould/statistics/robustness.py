@@ -13,19 +13,18 @@ from scipy.special import stdtrit
 from sandmould.runs.columns import PART, RUN, SWEEP, finished
 from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective
-from sandmould.statistics.control_case import ControlCase
+from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import CONFIDENCE
+from sandmould.statistics.spring_dependence import FOLLOWS, SHARE, STAYS, SpringCheck
 
 ShiftVerdict = Literal["up", "down", "held", "unclear", "no result"]
 Cause = Literal[
-    "rearrangement of grains", "column resonance of the springs",
+    "rearrangement of grains", "follows the springs", "resonance of the bed", "no inner optimum",
     "artefact of what is held constant", "artefact of the numerics", "unresolved",
 ]  # fmt: skip
-SHARE = 0.05
-"""Of the measure at the optimum, the margin where the study sets none."""
-MUST_HOLD = ("hold", "stiffness", "time_step", "engine")
-"""Controls that move nothing where the optimum belongs to the sand."""
+MUST_HOLD = ("hold", "time_step", "engine")
+"""Controls that, with the springs, move nothing where the optimum belongs to the grains."""
 _SPECTRUM = "spectrum"
 
 
@@ -47,13 +46,11 @@ class OptimumShift:
         return self.case.name
 
     @property
-    def follows_springs(self) -> bool:
-        """Whether it goes as the resonance of a column of springs, sqrt(k)/H: up with stiffness."""
-        factor = self.case.factor
-        if factor is None or self.case.control not in ("stiffness", "bed_depth"):
+    def follows_depth(self) -> bool:
+        """Whether it goes as the resonance of a column, c/(4 H): down with a deeper bed."""
+        if self.case.factor is None or self.case.control != "bed_depth":
             return False
-        rises = (factor > 1.0) == (self.case.control == "stiffness")
-        return self.verdict == ("up" if rises else "down")
+        return self.verdict == ("down" if self.case.factor > 1.0 else "up")
 
 
 @dataclass(frozen=True)
@@ -66,11 +63,18 @@ class Robustness:
     """Means of the sweep's own runs at the three frequencies."""
     shifts: tuple[OptimumShift, ...]
     margin: float
+    springs: SpringCheck | None
+    """None where that control was not run."""
 
     @property
     def is_artefact(self) -> bool:
-        """Whether the optimum is none of the sand's."""
-        return self.cause not in ("rearrangement of grains", "unresolved")
+        """Whether the optimum is none of the sand's, or none at all."""
+        return self.cause.startswith("artefact") or self.cause == "no inner optimum"
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the optimum is one, and the controls say what it belongs to."""
+        return not self.is_artefact and self.cause != "unresolved"
 
 
 def assess_robustness(
@@ -80,6 +84,7 @@ def assess_robustness(
     objective: Objective,
     margin: float | None,
     cases: Sequence[ControlCase],
+    springs: SpringCheck | None = None,
 ) -> Robustness:
     """Classify an optimum by its controls.
 
@@ -98,6 +103,8 @@ def assess_robustness(
         the optimum.
     cases : sequence of ControlCase
         Of all controls; those without runs in the summary are left out.
+    springs : SpringCheck, optional
+        What the control of the springs says.
     """
     measure = objective.measure
     sign = 1.0 if objective.better == "larger" else -1.0
@@ -108,6 +115,9 @@ def assess_robustness(
             "value": sign * usable_values(summary, measure),
         }
     ).dropna(subset=["value"])
+    # Other springs at other accelerations have a noise of their own.
+    of_springs = {case.part for case in cases if case.control == SPRINGS}
+    table = table[~table[PART].isin(of_springs)]
     groups = table.groupby([PART, "hz"])["value"]
     freedom = int((groups.count() - 1).sum())
     squares = groups.var(ddof=1).fillna(0.0) * (groups.count() - 1)
@@ -115,7 +125,7 @@ def assess_robustness(
     mean, count = groups.mean().to_dict(), groups.count().to_dict()
     sweep = tuple(mean.get((SWEEP, f), math.nan) for f in certified_hz)
     margin = margin or SHARE * abs(sweep[1])
-    by_part = {case.part: case for case in cases if case.control != _SPECTRUM}
+    by_part = {case.part: case for case in cases if case.control not in (_SPECTRUM, SPRINGS)}
     planned = summary[PART].astype(str).unique() if PART in summary else ()
     shifts = []
     for part in (p for p in planned if p in by_part):
@@ -130,8 +140,9 @@ def assess_robustness(
             verdict = _of_interval(ci, margin)
         means = tuple(sign * mean.get((part, f), math.nan) for f in certified_hz)
         shifts.append(OptimumShift(by_part[part], means, shift, ci, verdict))
-    cause, sentences = _together(shifts, certified_hz[1])
-    return Robustness(cause, sentences, tuple(sign * v for v in sweep), tuple(shifts), margin)
+    cause, sentences = _together(shifts, springs, certified_hz[1])
+    of_sweep = tuple(sign * v for v in sweep)
+    return Robustness(cause, sentences, of_sweep, tuple(shifts), margin, springs)
 
 
 def _without_interval(shift: float) -> ShiftVerdict:
@@ -151,40 +162,54 @@ def _of_interval(ci: tuple[float, float], margin: float) -> ShiftVerdict:
     return "down" if high < 0.0 else "unclear"
 
 
-def _together(shifts: Sequence[OptimumShift], best_hz: float) -> tuple[Cause, tuple[str, ...]]:
+def _together(
+    shifts: Sequence[OptimumShift], springs: SpringCheck | None, best_hz: float
+) -> tuple[Cause, tuple[str, ...]]:
     """The verdict, and the reasons for it."""
     at = f"The optimum at {number(best_hz)} Hz"
     moved = [m for m in shifts if m.verdict in ("up", "down")]
     open_ = [m for m in shifts if m.verdict in ("unclear", "no result")]
     said = [f"{_listed(moved)}."] if moved else []
     said += [f"Not told: {listed([m.name for m in open_])}."] if open_ else []
+    said += [hold.sentence for hold in springs.holds] if springs else []
+    own = springs.own if springs else None
     numerics = [m for m in moved if m.case.control in ("time_step", "engine")]
-    as_springs = [m for m in moved if m.case.control == "stiffness" and m.follows_springs]
-    as_column = [m for m in moved if m.case.control == "bed_depth" and m.follows_springs]
+    as_column = [m for m in moved if m.follows_depth]
     held = [m for m in moved if m.case.control == "hold"]
     if numerics:
         first = f"{at} is an artefact of the numerics: it moves with {_names(numerics)}."
         return "artefact of the numerics", (first, *said)
-    if as_springs and as_column:
+    if own and own.dependence == "none":
         first = (
-            f"{at} is a resonance of the column of springs, not of the sand: it moves with "
-            f"{_names([*as_springs, *as_column])} as c/(4 H) does."
+            f"{at} is no inner optimum of the sand: with softer or stiffer springs there is none."
         )
-        return "column resonance of the springs", (first, *said)
+        return "no inner optimum", (first, *said)
+    if own and own.dependence == FOLLOWS and as_column:
+        first = (
+            f"{at} is a resonance of the bed: it moves with the springs and with "
+            f"{_names(as_column)} as c/(4 H) does, so it is that of sand as hard as the model's."
+        )
+        return "resonance of the bed", (first, *said)
+    if own and own.dependence == FOLLOWS:
+        first = f"{at} follows the springs, so it is that of sand as hard as the model's."
+        return "follows the springs", (first, *said)
     if held:
         first = f"{at} is an artefact of what is held constant: it moves with {_names(held)}."
         return "artefact of what is held constant", (first, *said)
     wanted = [m for m in shifts if m.case.control in MUST_HOLD]
     missing = [c.replace("_", " ") for c in MUST_HOLD
                if c not in {m.case.control for m in wanted}]  # fmt: skip
-    if not missing and all(m.verdict == "held" for m in wanted):
+    missing += [] if own else [SPRINGS]
+    stays = own is not None and own.dependence == STAYS
+    if not missing and stays and all(m.verdict == "held" for m in wanted):
         first = (
-            f"{at} belongs to the sand: neither what is held constant nor stiffness, time step or "
-            "engine moves it by more than the margin."
+            f"{at} belongs to the sand: it does not follow the springs, and neither what is held "
+            "constant nor time step or engine moves it by more than the margin."
         )
         return "rearrangement of grains", (first, *said)
     why = [f"{m.name} {'moves it' if m in moved else 'does not tell'}" for m in wanted
            if m.verdict != "held"]  # fmt: skip
+    why += ["the springs do not tell"] if own and not stays else []
     why += [f"{c} was not asked" for c in missing]
     first = f"Whether the optimum at {number(best_hz)} Hz belongs to the sand is unresolved: "
     return "unresolved", (f"{first}{listed(why)}.", *said)

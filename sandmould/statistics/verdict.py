@@ -25,11 +25,9 @@ from sandmould.statistics.settings import (
 
 Better = Literal["larger", "smaller", "neither"]
 _FEW = 3
-_DEEP = 0.05
-"""Overlap over radius from which the reader is told of it."""
 NOT_TESTED = (
     "Whether the optimum belongs to the sand or to the model's springs is not tested here: its "
-    "robustness checks (contact stiffness, bed depth, grain size, time step) have not been run."
+    "robustness checks (springs, bed depth, grain size, time step) have not been run."
 )
 
 
@@ -160,7 +158,6 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
 def sand_notes(
     keys: Sequence[str],
     stage: VibrationStage | None,
-    largest_overlap_fraction: float = 0.0,
     seeks_best: bool = True,
     is_controlled: bool = False,
 ) -> tuple[str, ...]:
@@ -171,8 +168,6 @@ def sand_notes(
     keys : sequence of str
         Swept keys.
     stage : VibrationStage, optional
-    largest_overlap_fraction : float
-        Of all runs, over the smaller radius.
     seeks_best : bool
         Whether the study looks for the best setting.
     is_controlled : bool
@@ -183,11 +178,6 @@ def sand_notes(
     tuple of str
     """
     notes = []
-    if largest_overlap_fraction > _DEEP:
-        notes.append(
-            f"Grains overlapped by up to {100 * largest_overlap_fraction:.0f} % of a radius, where "
-            "a few percent are usual: the springs are soft for these loads."
-        )
     if stage is not None and any(k.endswith("frequency_hz") for k in keys):
         others = [w for w in ("acceleration", "velocity", "displacement") if w != stage.hold]
         held = "moment of the" if stage.hold == "unbalance" else "amplitude of"

@@ -9,6 +9,7 @@ from typing import Any, Generic
 
 import pandas as pd
 
+from sandmould.report.bed_mode import BedMode
 from sandmould.report.chart import Chart
 from sandmould.report.heaps import Heap
 from sandmould.report.method import Row
@@ -34,6 +35,8 @@ class KindPages:
     """What the template is given beside what all are given."""
     figures: Mapping[str, Chart | bytes] = field(default_factory=dict)
     """What is written as files too, by name."""
+    warning: str = ""
+    """Why the verdict is to be doubted, beside it; empty where there is no reason."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,8 @@ class Findings(Generic[ScenarioT]):
     """Most that the film of one run may weigh."""
     href: str
     """Address of the study's folder, seen from the report."""
+    by_setting: Mapping[str, ScenarioT]
+    """A scenario of each setting, by its label."""
 
 
 @dataclass(frozen=True)
@@ -64,5 +69,7 @@ class KindReport(Generic[ScenarioT]):
     """Whether settings are listed with the drive of a vibrating table."""
     robustness: Callable[[Path, Study, Collected, ScenarioT], RobustnessPages | None] | None = None
     """What its controls say; arguments are those of ``robustness_of``."""
+    mode: Callable[[ScenarioT, pd.DataFrame], BedMode | None] | None = None
+    """First mode of the bed, for a frequency; arguments are those of ``mode_of``."""
     heaps: Callable[[Path, pd.DataFrame, Verdict, ScenarioT], tuple[Heap, ...]] | None = None
     """Pictures of what was measured; arguments are those of ``heaps_of``."""

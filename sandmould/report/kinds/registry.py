@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import pandas as pd
 
+from sandmould.report.bed_mode import BedMode
 from sandmould.report.drive import drive_of
 from sandmould.report.heaps import Heap
 from sandmould.report.kinds.deck import DECK_REPORT
@@ -56,9 +57,12 @@ def kind_pages(
     verdict: Verdict,
     film_budget_bytes: int,
     href: str,
+    by_setting: Mapping[str, AnyScenario],
 ) -> KindPages:
     """Draw what the kind of study shows; parameters are the fields of ``Findings``."""
-    findings = Findings(study_folder, study, scenario, collected, verdict, film_budget_bytes, href)
+    findings = Findings(
+        study_folder, study, scenario, collected, verdict, film_budget_bytes, href, by_setting
+    )
     return _report_of(scenario).pages(findings)
 
 
@@ -89,6 +93,19 @@ def robustness_of(
     """
     robustness = _report_of(scenario).robustness
     return robustness(study_folder, study, collected, scenario) if robustness else None
+
+
+def mode_of(scenario: AnyScenario, summary: pd.DataFrame) -> BedMode | None:
+    """Estimate the first mode of the bed; None of a kind without any.
+
+    Parameters
+    ----------
+    scenario : scenario of any kind
+    summary : DataFrame
+        One row a run.
+    """
+    mode = _report_of(scenario).mode
+    return mode(scenario, summary) if mode else None
 
 
 def heaps_of(

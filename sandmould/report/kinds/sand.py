@@ -6,20 +6,24 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from sandmould.report.bed_mode import BedMode, bed_mode
 from sandmould.report.chart import Chart
 from sandmould.report.figure_files import pictures, strip
 from sandmould.report.filling import FillingPages, filling_pages
+from sandmould.report.hard_limit_text import hard_limit_text
 from sandmould.report.heaps import steepest_heaps
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import SandPages, sand_pages
 from sandmould.report.time_series import curve_figures
-from sandmould.runs.columns import LARGEST_OVERLAP_FRACTION, LEAST_LIMIT_S, TIME_STEP_S
+from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, TIME_STEP_S, finished
 from sandmould.runs.formatting import number
+from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import sand_notes
 from sandmould.study.collect import Collected
+from sandmould.study.kinds.sand.hardness_text import softness_warning
 
 if TYPE_CHECKING:
     from sandmould.report.bending import BendingPages
@@ -29,8 +33,7 @@ def _sand_notes(
     scenario: Scenario, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
     stage = scenario.vibrations[0] if scenario.vibrations else None
-    deepest = _deepest_overlap_fraction(collected.summary)
-    notes = sand_notes(collected.keys, stage, deepest, seeks_best, is_controlled)
+    notes = sand_notes(collected.keys, stage, seeks_best, is_controlled)
     return (*_steps_above_limit(collected.summary), *notes)
 
 
@@ -48,10 +51,17 @@ def _steps_above_limit(summary: pd.DataFrame) -> tuple[str, ...]:
     )
 
 
-def _deepest_overlap_fraction(summary: pd.DataFrame) -> float:
-    column = LARGEST_OVERLAP_FRACTION
-    deepest = pd.to_numeric(summary[column], errors="coerce").max() if column in summary else 0.0
-    return float(deepest) if deepest > 0 else 0.0
+def _softness(scenario: Scenario, summary: pd.DataFrame) -> str:
+    """A warning where the bed is soft by its springs, or by the overlaps that were measured."""
+    deepest = 0.0
+    if OVERLAP_P99_FRACTION in summary:
+        measured = pd.to_numeric(summary[OVERLAP_P99_FRACTION], errors="coerce")
+        deepest = float(measured[finished(summary)].max())
+    return softness_warning(bed_hardness(scenario), deepest)
+
+
+def _mode(scenario: Scenario, summary: pd.DataFrame) -> BedMode | None:
+    return bed_mode(scenario, summary)
 
 
 def _sand_pages(findings: Findings[Scenario]) -> KindPages:
@@ -67,11 +77,12 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
         bending = bending_pages(
             folder, findings.href, scenario, of_sweep, verdict, pages.pictured_run
         )
+    limit = hard_limit_text(verdict, collected.keys, findings.by_setting)
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),
         measured_when(scenario),
-        filling.advice if filling else (),
+        (*(filling.advice if filling else ()), *filter(None, [limit])),
         {
             "pages": pages,
             "bending": bending,
@@ -81,6 +92,7 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
             "filling": filling,
         },
         _sand_figures(pages, filling, bending),
+        _softness(scenario, of_sweep.summary),
     )
 
 
@@ -105,5 +117,6 @@ SAND_REPORT = KindReport(
     _sand_pages,
     shows_drives=True,
     robustness=robustness_pages,
+    mode=_mode,
     heaps=steepest_heaps,
 )

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from typing import Literal
+
+from pydantic import Field
 
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.box import Tube
@@ -11,45 +14,76 @@ from sandmould.scenario.engine import EngineName
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.config import fewest_points
+from sandmould.statistics.config import SandWaveSpeed, fewest_points
 from sandmould.study.definition.sweep import Sweep, points
 
 Control = Literal[
-    "hold", "stiffness", "bed_depth", "grain_scale", "tube_length", "time_step", "engine",
+    "hold", "springs", "bed_depth", "grain_scale", "tube_length", "time_step", "engine",
     "spectrum",
 ]  # fmt: skip
 
 
 class RobustnessChecks(Section):
-    """Controls at three frequencies round the optimum, which tell the sand from the model."""
+    """Controls at frequencies round the optimum, which tell the sand from the model."""
 
     controls: tuple[Control, ...] = quantity(
         (),
-        "hold: the other amplitudes held constant; stiffness: all springs x 0.1 and 10; bed_depth: "
-        "x 0.5 and 2; grain_scale: x 0.75 and 1.5; tube_length: x 0.6 and 1.5; time_step: x 0.5; "
-        "engine: another one; spectrum: the bed's own, from a small shake.",
+        "hold: the other amplitudes held constant; springs: those of bed and walls x 0.25 and 4, "
+        "with each amplitude held, at seven frequencies; bed_depth: x 0.5 and 2; grain_scale: x "
+        "0.75 and 1.5; tube_length: x 0.6 and 1.5; time_step: x 0.5; engine: another one; "
+        "spectrum: the bed's own, from a small shake.",
         source=ARGUED,
     )
     ratio: float = quantity(
-        1.4,
-        "The frequencies are the optimum's, and that over and times this.",
+        1.41,
+        "The frequencies are the optimum's, and that over and times this; of the control springs "
+        "also over and times its second and third power.",
         source=ARGUED,
         gt=1,
         le=4,
     )
-    replicates: int = quantity(3, "Seeds of every control.", source=ARGUED, ge=2, le=100)
+    replicates: int = quantity(4, "Seeds of every control.", source=ARGUED, ge=2, le=100)
     engine: EngineName = quantity("lammps", "Engine of the control engine.", source=ARGUED)
+    sand_wave_speed: SandWaveSpeed | None = Field(
+        None,
+        description="Speed of compression waves in the real sand, from a source: an optimum that "
+        "follows the springs is recommended in Hz with its spread alone.",
+    )
 
 
 def frequency_key(sweep: Sweep) -> str:
     """The one swept key, a frequency; empty where a sweep is of anything else."""
-    (key,) = sweep.swept if len(sweep.swept) == 1 else ("",)
+    return frequency_among(sweep.swept)
+
+
+def frequency_among(keys: Sequence[str]) -> str:
+    """The one of some swept keys, a frequency; empty where there are several, or another."""
+    (key,) = keys if len(keys) == 1 else ("",)
     return key if key.endswith(".frequency_hz") else ""
 
 
 def round_best_hz(best_hz: float, ratio: float) -> tuple[float, ...]:
     """Frequencies of the controls: the best in the middle."""
     return tuple(float(f"{best_hz * by:.3g}") for by in (1 / ratio, 1.0, ratio))
+
+
+def spanned_hz(certified_hz: Sequence[float]) -> dict[int, float]:
+    """All frequencies that a control may be run at, by their steps from the best.
+
+    Parameters
+    ----------
+    certified_hz : sequence of float, Hz
+        As ``round_best_hz`` gives them.
+
+    Returns
+    -------
+    dict of int to float, Hz
+        From -3 to 3; equal ratios outside those given.
+    """
+    low, best, high = certified_hz
+    ratio = math.sqrt(high / low)
+    outside = {step: float(f"{best * ratio**step:.3g}") for step in (-3, -2, 2, 3)}
+    return dict(sorted({-1: low, 0: best, 1: high, **outside}.items()))
 
 
 def provisional_hz(checks: RobustnessChecks, sweep: Sweep, scenario: Section) -> tuple[float, ...]:

@@ -31,6 +31,8 @@ class Note(NamedTuple):
     """Notes of several points about one thing are told once."""
     text: str
     """One sentence or two, with figures."""
+    head: str = "Note"
+    """What the line begins with."""
 
 
 def nothing_beside(scenario: Any) -> float:

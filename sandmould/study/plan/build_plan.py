@@ -16,7 +16,7 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.definition.certificate import provisional_hz
 from sandmould.study.definition.comparing import ENGINE
 from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import AnyScenario, Kind, SpeedClass
+from sandmould.study.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
 from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.batches import Batch, mark_done, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
@@ -25,7 +25,7 @@ from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
-from sandmould.study.plan.plan_files import plan_table, write_plan, write_study
+from sandmould.study.plan.plan_files import later_line, plan_table, write_plan, write_study
 from sandmould.study.plan.price import Prices
 from sandmould.study.plan.trust import may_run
 from sandmould.study.rounds.round_log import read_rounds
@@ -42,6 +42,8 @@ class Plan:
     runs: tuple[Run, ...]
     fills: tuple[Run, ...] = ()
     """Those that runs share."""
+    later: tuple[Run, ...] = ()
+    """Runs that round the optimum, and their fills, at frequencies that are not known yet."""
 
     @property
     def kind(self) -> Kind[Any]:
@@ -182,7 +184,20 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
     if problems:
         raise BadInputError(list(problems.values()))
     shared, fills = share_fills(runs, planning)
-    return Plan(study, tuple(shared), tuple(fills))
+    return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
+
+
+def _later(
+    runs: Sequence[Run], trial: Sequence[Run], fills: Sequence[Run], planning: Planning[Any]
+) -> list[Run]:
+    """Runs of a trial of the controls, and the fills that come with them."""
+    planned = {run.run for run in runs}
+    added = [run for run in trial if run.run not in planned]
+    if not added:
+        return []
+    shared, all_fills = share_fills([*runs, *added], planning)
+    known = {fill.run for fill in fills}
+    return [*(f for f in all_fills if f.run not in known), *shared[len(runs) :]]
 
 
 def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:
@@ -259,7 +274,10 @@ def writing(folder: Path) -> Iterator[None]:
 
 def price(plan: Plan, results: Path, cores: int) -> str:
     """Say what the runs will take, as far as the machine's speed is known at what was measured."""
-    return plan_table([*plan.fills, *plan.runs], Prices(stored_speeds(plan, results)), cores)
+    prices = Prices(stored_speeds(plan, results))
+    return plan_table([*plan.fills, *plan.runs], prices, cores) + later_line(
+        plan.later, prices, cores
+    )
 
 
 def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:

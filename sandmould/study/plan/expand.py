@@ -14,7 +14,7 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.definition.certificate import frequency_key
+from sandmould.study.definition.certificate import frequency_key, spanned_hz
 from sandmould.study.definition.comparing import ENGINE
 from sandmould.study.definition.run import Part, Run
 from sandmould.study.definition.sweep import Point, points, value_at
@@ -24,7 +24,7 @@ from sandmould.study.plan import measured
 from sandmould.study.plan.labels import Labels, letters
 from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.plan.trust import outside
-from sandmould.study.robustness.controls import Case, cases
+from sandmould.study.robustness.controls import Case, cases, swept_steps
 
 MOST_PROBLEMS = 10
 """Problems told at once; the first few are those that teach."""
@@ -77,9 +77,12 @@ def expand(
     added = [(point, range(replicate, replicate + 1)) for point, replicate in more]
     certificate = study.study.certificate
     key = frequency_key(study.study.sweep)
-    controlled = [{key: f} for f in certified_hz] if certificate.controls else []
+    controlled = {}
+    if certificate.controls and certified_hz:
+        controlled = {step: {key: f} for step, f in spanned_hz(certified_hz).items()
+                      if step in swept_steps(certificate)}  # fmt: skip
     seeds = range(1, certificate.replicates + 1)
-    added += [(point, seeds) for point in controlled]
+    added += [(point, seeds) for point in controlled.values()]
     for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point, labels)
         for problem in at_point.problems:
@@ -97,10 +100,10 @@ def expand(
                 problems[str(twice)] = twice
                 break
             runs[run.run] = run
-    for place, point in enumerate(controlled):
+    for step, point in controlled.items():
         at_point = _AtPoint(study, base, point, labels)
         for case in cases(certificate, study.study.scenario, certified_hz[1]):
-            if place not in case.places:
+            if step not in case.steps:
                 continue
             scenario, wrong = at_point.changed(case)
             problems |= {str(problem): problem for problem in wrong}

@@ -16,8 +16,10 @@ from sandmould.runs.formatting import size_text
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, read_planned, validated
+from sandmould.statistics.control_case import SPRINGS
 from sandmould.study.definition.run import FILL, Part, Run
 from sandmould.study.definition.study import Study
+from sandmould.study.kinds.kind import Note
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
 from sandmould.study.plan.fills import own_work
 from sandmould.study.plan.price import Prices, study_s
@@ -176,7 +178,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         size = kind_of(run.scenario).planning.planned_work(run.scenario) if run.part == FILL else ""
         alike_in = run.part, json.dumps(run.parameters), bool(run.fill), size
         points.setdefault(alike_in, []).append(run)
-    notes: dict[str, list[tuple[str, str]]] = {}
+    notes: dict[str, list[tuple[str, Note]]] = {}
     planning = kind_of(runs[0].scenario).planning
     heads = [*planning.plan_cells(runs[0].scenario), planning.work_unit]
     rows = [["point", "runs", *heads, "wall time a run"]]
@@ -186,7 +188,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         work_a_run = own_work(alike[0])
         work += work_a_run * len(alike)
         for note in planning.notes(scenario):
-            notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note.text))
+            notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note))
         if len(rows) <= LISTED_POINTS:
             rows.append(
                 [
@@ -213,6 +215,30 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 
+def later_line(later: Sequence[Run], prices: Prices, cores: int) -> str:
+    """What the controls of an optimum will take, as a line; empty where there are none to come.
+
+    Parameters
+    ----------
+    later : sequence of Run
+        At frequencies in place of those that are not known yet, with the fills that come with them.
+    prices : Prices
+    cores : int
+    """
+    if not later:
+        return ""
+    runs = [run for run in later if run.part != FILL]
+    of_springs = sum(SPRINGS in run.part for run in runs)
+    springs = f", {of_springs} of them with other springs" if of_springs else ""
+    work = sum(own_work(run) for run in later)
+    unit = kind_of(runs[0].scenario).planning.work_unit
+    whole = duration_text(study_s([prices.piece(run) for run in later], cores))
+    return (
+        f"Then, once the optimum is known, its controls: about {len(runs)} runs{springs}, "
+        f"{work:.3g} {unit}, wall time on {cores} cores: {whole}\n"
+    )
+
+
 def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     """How many runs share how many fills, and what the fills take of the disk."""
     sharing = sum(bool(run.fill) for run in runs)
@@ -224,10 +250,13 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     )
 
 
-def _note_line(told: Sequence[tuple[str, str]], points: int) -> str:
+def _note_line(told: Sequence[tuple[str, Note]], points: int) -> str:
     """One line of what was found at some of a study's points, in the words of the first."""
-    label, text = told[0]
-    if points == 1:
-        return f"Note: {text}"
-    alike = "" if len({each for _, each in told}) == 1 else ", with other figures at others"
-    return f"Note: {text} (At {len(told)} of {points} points{alike}; first at {label}.)"
+    label, first = told[0]
+    is_one = len({note.text for _, note in told}) == 1
+    if points == 1 or (is_one and len(told) == points):
+        return f"{first.head}: {first.text}"
+    alike = "" if is_one else ", with other figures at others"
+    return (
+        f"{first.head}: {first.text} (At {len(told)} of {points} points{alike}; first at {label}.)"
+    )

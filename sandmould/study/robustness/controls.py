@@ -11,9 +11,13 @@ import numpy as np
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.statistics.control_case import ControlCase
+from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.study.definition.certificate import RobustnessChecks
 
+SPRING_FACTORS = (0.25, 4.0)
+"""Of all springs: a wave speed and a resonance go as the root, by 2 either way."""
+_SPAN = (-3, -2, -1, 0, 1, 2, 3)
+"""Steps of the springs' curves: where a resonance goes, and one more beyond for its other limb."""
 SHAKEN_HZ = tuple(float(f"{f:.3g}") for f in np.geomspace(12.0, 400.0, 16))
 """Frequencies of the small shake."""
 SHAKE_G = 0.05
@@ -28,8 +32,8 @@ class Case(ControlCase):
     """One case of a control with what it changes in the scene."""
 
     change: Change
-    places: tuple[int, ...] = (0, 1, 2)
-    """Which of the three frequencies are run."""
+    steps: tuple[int, ...] = (-1, 0, 1)
+    """Which frequencies are run, by their steps from the best; see ``spanned_hz``."""
 
 
 def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Iterator[Case]:
@@ -45,11 +49,12 @@ def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Itera
     """
     for control in checks.controls:
         if control == "hold":
-            swept = scenario.vibrations[0].hold
             # At the middle frequency nothing differs from a sweep whose motion is laid down.
-            places = (0, 1, 2) if swept == "unbalance" else (0, 2)
-            for hold in sorted({"acceleration", "velocity", "displacement"} - {swept}):
+            places = (-1, 0, 1) if scenario.vibrations[0].hold == "unbalance" else (-1, 1)
+            for hold in _other_holds(scenario):
                 yield Case(control, hold, None, _holding(hold, best_hz), places)
+        elif control == SPRINGS:
+            yield from _of_springs(scenario, best_hz)
         elif control in BY_FACTOR:
             factors, changed = BY_FACTOR[control]
             for factor in factors:
@@ -57,7 +62,38 @@ def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Itera
         elif control == "engine":
             yield Case(control, checks.engine, None, _on(checks.engine))
         else:
-            yield Case(control, "small shake", None, _shaken, (1,))
+            yield Case(control, "small shake", None, _shaken, (0,))
+
+
+def swept_steps(checks: RobustnessChecks) -> tuple[int, ...]:
+    """Which frequencies the sweep itself is run at beside the controls."""
+    return _SPAN if SPRINGS in checks.controls else Case.steps
+
+
+def _other_holds(scenario: Scenario) -> list[str]:
+    holds = {"acceleration", "velocity", "displacement"}
+    return sorted(holds - {scenario.vibrations[0].hold})
+
+
+def _of_springs(scenario: Scenario, best_hz: float) -> Iterator[Case]:
+    """Softer and stiffer springs with each amplitude held, over the whole span.
+
+    At the best frequency all holds are one motion, which the study's own stands for where it is
+    laid down.
+    """
+    is_free = scenario.vibrations[0].hold == "unbalance"
+    beside = _SPAN if is_free else tuple(step for step in _SPAN if step)
+    for factor in SPRING_FACTORS:
+        stiffer = _stiffer(factor)
+        own = scenario.vibrations[0].hold
+        yield Case(SPRINGS, f"x{factor:g} {own}", factor, stiffer, _SPAN, hold=own)
+        for hold in _other_holds(scenario):
+            change = _both(stiffer, _holding(hold, best_hz))
+            yield Case(SPRINGS, f"x{factor:g} {hold}", factor, change, beside, hold=hold)
+
+
+def _both(first: Change, second: Change) -> Change:
+    return lambda scenario: second(first(scenario))
 
 
 def _holding(hold: str, best_hz: float) -> Change:
@@ -165,7 +201,6 @@ def _finer(factor: float) -> Change:
 
 
 BY_FACTOR: dict[str, tuple[tuple[float, ...], Callable[[float], Change]]] = {
-    "stiffness": ((0.1, 10.0), _stiffer),
     "bed_depth": ((0.5, 2.0), _deeper),
     "grain_scale": ((0.75, 1.5), _coarser),
     "tube_length": ((0.6, 1.5), _longer),

@@ -21,6 +21,7 @@ def test_hexagonal_patch():
     assert (got.grain_grain, got.grain_wall) == (12, 0)
     assert got.mean_coordination == pytest.approx(24 / 7)
     assert got.largest_overlap_fraction == pytest.approx(0.02 / 1.01)
+    assert got.overlap_p99_fraction == pytest.approx(0.02 / 1.01)
 
 
 def test_tolerance_closes_small_gaps_and_no_larger_ones():
@@ -29,6 +30,21 @@ def test_tolerance_closes_small_gaps_and_no_larger_ones():
     assert contacts(hexagon(), apart).largest_overlap_fraction == 0.0
     assert contacts(hexagon(), apart, tolerance_m=0.021).grain_grain == 12
     assert contacts(hexagon(), apart, tolerance_m=0.019).grain_grain == 0
+
+
+def test_overlap_that_99_of_100_contacts_do_not_exceed():
+    """A row of 102 grains of radius 1 has 101 contacts, k of them 0.001 k deep: the 99 % is 0.1."""
+    depth = 0.001 * np.arange(1, 102)
+    x = np.concatenate([[0.0], np.cumsum(2.0 - depth)])
+    row = np.column_stack([x, np.zeros(102)])
+    got = contacts(row, np.ones(102))
+    # 99 % of the way from the first to the last of 101 sorted depths is the 100th.
+    assert got.overlap_p99_fraction == pytest.approx(0.1)
+    assert got.largest_overlap_fraction == pytest.approx(0.101)
+    # A floor that all 102 press 0.02 deep counts too: of 203 depths the 201st to 202nd.
+    floor = Scene(2, (Wall("floor", np.array([0.0, -0.98]), np.array([0.0, 1.0])),), (), ())
+    assert contacts(row, np.ones(102), floor).overlap_p99_fraction == pytest.approx(0.09898)
+    assert contacts(row[:1], np.ones(1)).overlap_p99_fraction == 0.0
 
 
 def test_rattlers_are_left_out():

@@ -10,24 +10,27 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.report.optimum import optimum_pages
 from sandmould.report.page import write_report
 from sandmould.report.robustness import robustness_pages
+from sandmould.statistics.config import SandWaveSpeed
 from sandmould.study.collect import collect, gather, read_study
+from sandmould.study.definition.certificate import spanned_hz
 from sandmould.study.definition.run import Run
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKE_G, SHAKEN_HZ, cases
 from sandmould.study.rounds.round_log import RoundLog, basis_of, write_rounds
 from tests.unit.report_study import KEY, scenario, write_run
 
-CERTIFIED_HZ = (35.7, 50.0, 70.0)
-SWEPT_HZ = (25.0, *CERTIFIED_HZ, 100.0)
-ASKED = ("hold", "stiffness", "bed_depth", "time_step", "engine", "spectrum")
+CERTIFIED_HZ = (35.5, 50.0, 70.5)
+SPANNED_HZ = spanned_hz(CERTIFIED_HZ)
+ASKED = ("hold", "springs", "bed_depth", "time_step", "engine", "spectrum")
 OWN_HZ, DAMPING = 110.0, 0.15
 WEIGHT_N = 3.0
 
 
 def hill(frequency_hz: float, best_hz: float) -> float:
-    return 0.6 - 0.3 * float(np.log(frequency_hz / best_hz)) ** 2
+    return 0.6 - 0.15 * float(np.log(frequency_hz / best_hz)) ** 2
 
 
 def write_certified(folder: Path, moved: dict[str, float]) -> Path:
@@ -35,15 +38,14 @@ def write_certified(folder: Path, moved: dict[str, float]) -> Path:
     (folder).mkdir(parents=True)
     (folder / "study.yaml").write_text(
         "title: Is it the sand's?\nscenario: {engine: {name: reference}}\n"
-        f"sweep: {{keys: {{{KEY}: [25, 35.7, 50, 70, 100]}}}}\nreplicates: 3\n"
+        f"sweep: {{keys: {{{KEY}: {list(SPANNED_HZ.values())}}}}}\nreplicates: 3\n"
         f"certificate: {{controls: [{', '.join(ASKED)}]}}\n"
         "equivalence: {margins: {tube_fill_fraction: 0.03}}\n"
     )
     study = read_study(folder)
     runs = []
     for case in (None, *cases(study.certificate, scenario(50.0), CERTIFIED_HZ[1])):
-        places = SWEPT_HZ if case is None else [CERTIFIED_HZ[i] for i in case.places]
-        for f in places:
+        for f in [SPANNED_HZ[step] for step in (case.steps if case else SPANNED_HZ)]:
             for replicate in (1, 2, 3):
                 at = scenario(f).model_copy(update={"seed": 1000 + replicate})
                 part = "sweep" if case is None else case.part
@@ -107,10 +109,18 @@ def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Pat
     assert pages.assessment.cause == "rearrangement of grains"
     names = [row[0].text for row in pages.table.rows]
     assert names == [
-        "the sweep itself", "displacement held", "velocity held", "stiffness x0.1", "stiffness x10",
-        "bed depth x0.5", "bed depth x2", "time step x0.5", "engine lammps",
+        "the sweep itself", "displacement held", "velocity held", "bed depth x0.5",
+        "bed depth x2", "time step x0.5", "engine lammps",
     ]  # fmt: skip
     assert {row[-1].text for row in pages.table.rows[1:]} == {"stays"}
+    assert pages.spring_table is not None
+    curves = [(row[0].text, row[1].text) for row in pages.spring_table.rows]
+    assert curves == [
+        ("acceleration", "x0.25"), ("acceleration", "x1"), ("acceleration", "x4"),
+        ("displacement", "x0.25"), ("displacement", "x4"),
+        ("velocity", "x0.25"), ("velocity", "x4"),
+    ]  # fmt: skip
+    assert {row[-1].text for row in pages.spring_table.rows} == {"both"}
     assert pages.spectrum is not None
     assert len(pages.spectrum.lines) == 4
     frequency, gain = pages.spectrum.lines[-1].xy.T
@@ -118,6 +128,43 @@ def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Pat
     assert gain[0] == pytest.approx(1.0, abs=0.05)
     own_hz = float(re.search(r"first resonance is at ([\d.]+) Hz", pages.column).group(1))  # type: ignore[union-attr]
     assert own_hz == pytest.approx(OWN_HZ, rel=0.1)
+    assert pages.mode is not None
+    assert pages.mode.measured_hz == pytest.approx(own_hz, rel=0.01)
+    # The waves of the bed itself, 4 H f, and not those of a row of grains.
+    assert pages.mode.wave_speed.speed_m_s == pytest.approx(4 * 0.0826 * own_hz, rel=0.02)
+    assert pages.mode.beside(55.0) == (
+        f"55 Hz is {55 / own_hz:.2f} times the bed's own first mode, measured by a small shake at "
+        f"{own_hz:.0f} Hz."
+    )
+
+
+def test_without_a_source_of_the_wave_speed_no_frequency_is_named_first(tmp_path: Path) -> None:
+    holds = ("acceleration", "velocity", "displacement")
+    moved = {f"springs x0.25 {hold}": 25.0 for hold in holds}
+    moved |= {f"springs x4 {hold}": 100.0 for hold in holds}
+    folder = write_certified(tmp_path / "follows", moved)
+    study, collected = read_study(folder), gather(folder)
+    pages = robustness_pages(folder, study, collected, scenario(50.0))
+    assert pages is not None
+    assert pages.assessment.cause == "follows the springs"
+    optimum = optimum_pages(folder, study, collected.of_sweep.summary, pages, pages.mode)
+    assert optimum is not None
+    assert not optimum.sound
+    first, second, third, fourth, *_ = optimum.sentences
+    assert first.startswith("The optimum at 50 Hz follows the springs, so it is that of sand")
+    assert second.startswith("No frequency in Hz is recommended: the optimum follows the springs")
+    assert third.startswith("The fill of the tube is highest at frequency")
+    assert "times the bed's own first mode, measured by a small shake" in fourth
+    # The waves of the bed, some 36 m/s by its mode, are those of a sand with a source here.
+    sand = SandWaveSpeed(low_m_s=30.0, high_m_s=40.0, by="Somebody 2020")
+    asked = study.certificate.model_copy(update={"sand_wave_speed": sand})
+    sourced = study.model_copy(update={"certificate": asked})
+    advised = optimum_pages(folder, sourced, collected.of_sweep.summary, pages, pages.mode)
+    assert advised is not None
+    assert advised.sound
+    assert advised.sentences[0] == third
+    assert advised.sentences[2].startswith("Recommended with the acceleration held: ")
+    assert "30 to 40 m/s (Somebody 2020)" in advised.sentences[2]
 
 
 def test_there_is_no_certificate_before_its_frequencies_are_chosen(tmp_path: Path) -> None:

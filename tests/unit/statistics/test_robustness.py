@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,16 +11,19 @@ import pandas as pd
 import pytest
 import yaml
 
-from analysis.spectrum import column_frequency_hz, first_resonance_hz, transfer
+from analysis.spectrum import first_resonance_hz, transfer
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.robustness import Robustness, assess_robustness
-from sandmould.study.definition.certificate import RobustnessChecks, frequency_key
+from sandmould.statistics.spring_dependence import assess_springs
+from sandmould.study.definition.certificate import RobustnessChecks, frequency_key, spanned_hz
 from sandmould.study.definition.study import Study
-from sandmould.study.plan.build_plan import open_plan
+from sandmould.study.kinds.registry import kind_named
+from sandmould.study.plan.build_plan import open_plan, price
 from sandmould.study.plan.expand import expand
+from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.robustness.controls import BY_FACTOR, SHAKEN_HZ, Case, cases
 from sandmould.study.rounds.decide import choose_controls, next_round
@@ -30,8 +32,8 @@ from sandmould.study.rounds.round_log import RoundLog, basis_of, read_rounds, wr
 FREQUENCY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"
 BEST_HZ = 50.0
-CERTIFIED_HZ = (35.7, 50.0, 70.0)
-ALL = ["hold", "stiffness", "bed_depth", "grain_scale", "tube_length", "time_step", "engine",
+CERTIFIED_HZ = (35.5, 50.0, 70.5)
+ALL = ["hold", "springs", "bed_depth", "grain_scale", "tube_length", "time_step", "engine",
        "spectrum"]  # fmt: skip
 STUDY: dict[str, Any] = {
     "based_on": "tube",
@@ -76,23 +78,23 @@ def test_each_control_changes_what_it_is_named_after(tmp_path: Path) -> None:
     def new(part: str) -> Scenario:
         return by_part(study)[f"control: {part}"].change(old)
 
-    soft = new("stiffness x0.1").contact
+    soft = new("springs x0.25 acceleration").contact
     for pair in ("grain_grain", "grain_wall"):
         for key in ("normal", "tangential", "rolling"):
             name = f"{key}_stiffness_n_m"
             was, now = (getattr(getattr(c, pair), name) for c in (old.contact, soft))
-            assert now == pytest.approx(0.1 * was)
+            assert now == pytest.approx(0.25 * was)
     assert soft.grain_grain.friction == old.contact.grain_grain.friction
     allowed = {part: new(part).guard.largest_overlap_fraction
-               for part in ("stiffness x0.1", "stiffness x10", "bed_depth x2")}  # fmt: skip
-    root = math.sqrt(10.0)
+               for part in ("springs x0.25 velocity", "springs x4 velocity", "bed_depth x2")
+               }  # fmt: skip
     assert allowed == pytest.approx(
-        {"stiffness x0.1": 0.5 * root, "stiffness x10": 0.5, "bed_depth x2": 0.5}
+        {"springs x0.25 velocity": 1.0, "springs x4 velocity": 0.5, "bed_depth x2": 0.5}
     )
     loose = old.model_copy(
-        update={"guard": old.guard.model_copy(update={"largest_overlap_fraction": 0.9})}
+        update={"guard": old.guard.model_copy(update={"largest_overlap_fraction": 1.2})}
     )
-    softest = by_part(study)["control: stiffness x0.1"].change(loose)
+    softest = by_part(study)["control: springs x0.25 acceleration"].change(loose)
     assert softest.guard.largest_overlap_fraction == 2.0
     deep = new("bed_depth x2")
     assert deep.fill.layers[0].height_m == 2 * old.fill.layers[0].height_m
@@ -124,25 +126,72 @@ def test_sand_by_number_of_grains_stays_as_much(tmp_path: Path) -> None:
     assert coarse.fill.layers[0].count == 400
 
 
-def test_runs_are_added_at_three_frequencies_and_share_their_seeds(tmp_path: Path) -> None:
-    study = opened(tmp_path, certificate={"controls": ["hold", "stiffness", "spectrum"]})
+def test_springs_are_changed_with_each_amplitude_held(tmp_path: Path) -> None:
+    study = opened(tmp_path)
+    old, found = study.study.scenario, by_part(study)
+    springs = {part: case for part, case in found.items() if "springs" in part}
+    assert set(springs) == {
+        f"control: springs x{factor} {hold}"
+        for factor in ("0.25", "4") for hold in ("acceleration", "velocity", "displacement")
+    }  # fmt: skip
+    for case in springs.values():
+        changed = case.change(old)
+        ratio = (changed.contact.grain_wall.normal_stiffness_n_m
+                 / old.contact.grain_wall.normal_stiffness_n_m)  # fmt: skip
+        assert ratio == pytest.approx(case.factor)
+        (stage,) = changed.vibrations
+        assert stage.hold == case.hold
+        at_best = stage.model_copy(update={"frequency_hz": BEST_HZ})
+        assert at_best.peak_acceleration_g == pytest.approx(1.5)
+
+
+def test_runs_are_added_round_the_best_and_share_their_seeds(tmp_path: Path) -> None:
+    asked = {"controls": ["hold", "springs", "spectrum"], "replicates": 3}
+    study = opened(tmp_path, certificate=asked)
     swept = expand(study)
     runs = expand(study, (), CERTIFIED_HZ)
     assert [r.run for r in runs[: len(swept)]] == [r.run for r in swept]
     count: dict[str, int] = {}
     for run in runs:
         count[run.part] = count.get(run.part, 0) + 1
-    # 50 and 70 Hz are swept already... 35.7 Hz is not; what is held is not run at the best.
+    # Of seven frequencies 50 Hz is swept already; at it all holds are one motion.
+    of_springs = {
+        f"control: springs x{factor} {hold}": (7 if hold == "acceleration" else 6) * 3
+        for factor in ("0.25", "4") for hold in ("acceleration", "velocity", "displacement")
+    }  # fmt: skip
     assert count == {
-        "sweep": 5 * 3 + 3,
+        "sweep": 5 * 3 + 6 * 3,
         "control: hold velocity": 2 * 3, "control: hold displacement": 2 * 3,
-        "control: stiffness x0.1": 9, "control: stiffness x10": 9,
+        **of_springs,
         "control: spectrum small shake": 3,
     }  # fmt: skip
     assert len({r.run for r in runs}) == len(runs)
     assert {r.seed for r in runs} == {r.seed for r in swept}
-    soft = next(r for r in runs if r.part == "control: stiffness x0.1")
-    assert soft.run.startswith("control_stiffness_x0_1_frequency_35p7_r1_")
+    soft = [r for r in runs if r.part == "control: springs x0.25 velocity"]
+    assert soft[0].run.startswith("control_springs_x0_25_velocity_frequency_17p9_r1_")
+    # Fillings differ by springs and seed alone: holds and frequencies share them.
+    _, fills = share_fills(runs, kind_named("sand").planning)
+    assert len(fills) == 3 * 3
+    # Without springs three frequencies are enough.
+    few = expand(opened(tmp_path, certificate={"controls": ["hold"]}), (), CERTIFIED_HZ)
+    assert {r.parameters[FREQUENCY] for r in few} == {20, 35, 50, 70, 100, 35.5, 70.5}
+
+
+def test_the_plan_prices_controls_that_are_still_to_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    opened(tmp_path, certificate={"controls": ["springs"], "replicates": 2})
+    plan = open_plan(tmp_path / "trial.yaml")
+    said = price(plan, tmp_path / "results", 2)
+    # 2 x (7 + 6 + 6) runs of springs and six further frequencies of the sweep, 2 seeds each.
+    assert "Then, once the optimum is known, its controls: about 88 runs, 76 of them with" in said
+    log = RoundLog(basis_of(plan.study.study), (), "The sweep is done.", CERTIFIED_HZ)
+    (tmp_path / "results" / "trial").mkdir(parents=True)
+    write_rounds(log, tmp_path / "results" / "trial")
+    chosen = open_plan(tmp_path / "trial.yaml")
+    assert len(chosen.runs) == len(plan.runs) + 88
+    assert "Then," not in price(chosen, tmp_path / "results", 2)
 
 
 def test_a_control_that_cannot_be_run_is_told_before_anything_starts(tmp_path: Path) -> None:
@@ -193,13 +242,15 @@ def test_certificates_that_make_no_sense_are_told(
         opened(tmp_path, **changes)
 
 
-def planted(fill: Callable[[str, float], float], parts: list[str], sd: float) -> pd.DataFrame:
+def planted(
+    fill: Callable[[str, float], float], parts: list[str], sd: float, seed: int = 3
+) -> pd.DataFrame:
     """A summary of the sweep and its controls; the fill is given by part and frequency."""
-    noise = np.random.default_rng(3)
+    noise = np.random.default_rng(seed)
     rows = []
+    spanned = tuple(spanned_hz(CERTIFIED_HZ).values())
     for part in ("sweep", *(f"control: {p}" for p in parts)):
-        swept = (20.0, *CERTIFIED_HZ, 100.0) if part == "sweep" else CERTIFIED_HZ
-        for f in swept:
+        for f in CERTIFIED_HZ if part != "sweep" and "springs" not in part else spanned:
             for replicate in (1, 2, 3):
                 value = fill(part.removeprefix("control: "), f) + noise.normal(0.0, sd)
                 rows.append({"part": part, FREQUENCY: f, "replicate": replicate,
@@ -211,15 +262,20 @@ def hill(frequency_hz: float, best_hz: float) -> float:
     return 0.6 - 0.3 * float(np.log(frequency_hz / best_hz)) ** 2
 
 
-PARTS = ["hold velocity", "hold displacement", "stiffness x0.1", "stiffness x10", "bed_depth x0.5",
-         "bed_depth x2", "time_step x0.5", "engine lammps"]  # fmt: skip
+SPRINGS = ["springs x0.25 acceleration", "springs x4 acceleration"]
+PARTS = ["hold velocity", "hold displacement", *SPRINGS, "bed_depth x0.5", "bed_depth x2",
+         "time_step x0.5", "engine lammps"]  # fmt: skip
 
 
 def assess_study(table: pd.DataFrame, study: Study) -> Robustness:
     """Assess the controls of a study by its own objective and margin."""
     margin = study.equivalence.margins.get(study.objective.measure)
     controlled = tuple(cases(study.certificate, study.scenario, CERTIFIED_HZ[1]))
-    return assess_robustness(table, FREQUENCY, CERTIFIED_HZ, study.objective, margin, controlled)
+    objective = study.objective
+    springs = assess_springs(
+        table, FREQUENCY, BEST_HZ, objective, controlled, "acceleration", margin
+    )
+    return assess_robustness(table, FREQUENCY, CERTIFIED_HZ, objective, margin, controlled, springs)
 
 
 def assessed(
@@ -235,37 +291,38 @@ def test_an_optimum_that_nothing_moves_belongs_to_the_sand(tmp_path: Path) -> No
     assert found.cause == "rearrangement of grains"
     assert not found.is_artefact
     assert {m.verdict for m in found.shifts} == {"held"}
-    assert found.sentences[0].startswith("The optimum at 50 Hz belongs to the sand: neither")
+    assert found.sentences[0].startswith("The optimum at 50 Hz belongs to the sand: it does not")
 
 
-def test_an_optimum_that_goes_with_the_springs_is_theirs(tmp_path: Path) -> None:
-    root = 10**0.5
-    moved = {"stiffness x0.1": 50 / root, "stiffness x10": 50 * root,
-             "bed_depth x0.5": 100.0, "bed_depth x2": 25.0}  # fmt: skip
-    found = assessed(tmp_path, moved)
-    assert found.cause == "column resonance of the springs"
-    assert found.is_artefact
-    way = {m.name: m.verdict for m in found.shifts}
-    assert (way["stiffness x10"], way["stiffness x0.1"]) == ("up", "down")
-    # Stiffness alone is not enough to call it a column.
-    alone = assessed(tmp_path, {k: v for k, v in moved.items() if "stiffness" in k})
-    assert alone.cause == "unresolved"
-    assert "stiffness x0.1 moves it and stiffness x10 moves it" in alone.sentences[0]
+FOLLOWING = {SPRINGS[0]: 25.0, SPRINGS[1]: 100.0}
 
 
-def test_other_factors_of_the_controls_reach_the_same_verdict(
+def test_an_optimum_that_goes_with_springs_and_depth_is_the_beds(tmp_path: Path) -> None:
+    column = FOLLOWING | {"bed_depth x0.5": 100.0, "bed_depth x2": 25.0}
+    found = assessed(tmp_path, column)
+    assert found.cause == "resonance of the bed"
+    assert not found.is_artefact
+    assert (
+        "moves with the springs and with bed depth x0.5 and bed depth x2 as c/(4 H)"
+        in (found.sentences[0])
+    )
+    # Springs alone are not enough to call it a column.
+    alone = assessed(tmp_path, FOLLOWING)
+    assert alone.cause == "follows the springs"
+    against = assessed(tmp_path, FOLLOWING | {"bed_depth x0.5": 25.0, "bed_depth x2": 100.0})
+    assert against.cause == "follows the springs"
+
+
+def test_other_factors_of_the_depth_reach_the_same_verdict(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What a control multiplies by is passed on as a number: 8 stands for 10, and 3 for 2."""
-    for control, factors in (("stiffness", (0.125, 8.0)), ("bed_depth", (0.5, 3.0))):
-        monkeypatch.setitem(BY_FACTOR, control, (factors, BY_FACTOR[control][1]))
-    moved = {"stiffness x0.125": 50 / 8**0.5, "stiffness x8": 50 * 8**0.5,
-             "bed_depth x0.5": 100.0, "bed_depth x3": 50 / 3}  # fmt: skip
-    found = assessed(tmp_path, moved, parts=["hold velocity", *moved])
-    assert found.cause == "column resonance of the springs"
-    assert all(s.follows_springs for s in found.shifts if s.case.factor is not None)
-    against = assessed(tmp_path, moved | {"stiffness x8": 50 / 8**0.5}, parts=list(moved))
-    assert [s.follows_springs for s in against.shifts] == [True, False, True, True]
+    """What a control multiplies by is passed on as a number: 3 stands for 2."""
+    monkeypatch.setitem(BY_FACTOR, "bed_depth", ((0.5, 3.0), BY_FACTOR["bed_depth"][1]))
+    moved = {"bed_depth x0.5": 100.0, "bed_depth x3": 50 / 3}
+    found = assessed(tmp_path, moved, parts=list(moved))
+    assert all(s.follows_depth for s in found.shifts)
+    against = assessed(tmp_path, moved | {"bed_depth x3": 150.0}, parts=list(moved))
+    assert [s.follows_depth for s in against.shifts] == [True, False]
 
 
 def test_what_is_held_and_the_numerics_are_told_apart(tmp_path: Path) -> None:
@@ -280,18 +337,22 @@ def test_what_is_held_and_the_numerics_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_noise_leaves_it_unresolved(tmp_path: Path) -> None:
-    found = assessed(tmp_path, {}, sd=0.1)
+    # One control in twenty moves it by chance alone; with these draws none does.
+    table = planted(lambda part, f: hill(f, BEST_HZ), PARTS, 0.1, seed=4)
+    found = assess_study(table, opened(tmp_path).study)
     assert found.cause == "unresolved"
     assert "does not tell" in found.sentences[0]
     assert any(s.startswith("Not told: ") for s in found.sentences)
 
 
 def test_controls_that_were_not_asked_or_failed_keep_it_unresolved(tmp_path: Path) -> None:
-    table = planted(lambda part, f: hill(f, BEST_HZ), PARTS[2:6], 0.004)
-    table.loc[table["part"] == "control: stiffness x10", "outcome_code"] = 311
+    table = planted(lambda part, f: hill(f, BEST_HZ), [*PARTS[2:6], "time_step x0.5"], 0.004)
+    failed = ["control: springs x4 acceleration", "control: time_step x0.5"]
+    table.loc[table["part"].isin(failed), "outcome_code"] = 311
     found = assess_study(table, opened(tmp_path).study)
     assert found.cause == "unresolved"
-    for words in ("stiffness x10 does not tell", "hold was not asked", "engine was not asked"):
+    for words in ("time step x0.5 does not tell", "the springs do not tell", "hold was not asked",
+                  "engine was not asked"):  # fmt: skip
         assert words in found.sentences[0]
 
 
@@ -303,7 +364,7 @@ def test_frequencies_are_chosen_round_the_optimum_and_anew_after_more_rounds(
     log = choose_controls(RoundLog(basis_of(study)), study, table, [FREQUENCY])
     low, best, high = log.certified_hz
     assert best == pytest.approx(BEST_HZ, rel=0.06)
-    assert (low, high) == pytest.approx((best / 1.4, best * 1.4), rel=0.01)
+    assert (low, high) == pytest.approx((best / 1.41, best * 1.41), rel=0.01)
     write_rounds(log, tmp_path)
     assert read_rounds(tmp_path, study) == log
     assert next_round(log, study, table, [FREQUENCY]).certified_hz == ()
@@ -338,9 +399,3 @@ def test_transfer_is_that_of_a_mass_on_a_spring() -> None:
     assert first_resonance_hz(shaken, np.array(found)) == pytest.approx(own_hz, rel=0.1)
     assert np.isnan(first_resonance_hz(shaken, np.linspace(1.0, 0.1, len(shaken))))
     assert np.isnan(transfer(np.array([0.0, 1e-3]), np.zeros(2), 50.0, 1e-3, 1.0))
-
-
-def test_column_of_springs_has_the_frequency_of_its_wave() -> None:
-    # The numbers of the design notes: 2.25 mm spheres of 2400 kg/m3, 7e4 N/m, 0.3 m of bed.
-    mass_kg = 2400 * np.pi / 6 * 2.25e-3**3
-    assert column_frequency_hz(2.25e-3, mass_kg, 7e4, 0.3) == pytest.approx(131, abs=1)

@@ -170,5 +170,5 @@ def test_rounds_and_controls_of_the_vibration_go_on_from_the_fills_of_the_sweep(
     }
     # The weak shake is checked and recorded more often, so it is another scene from the start.
     assert sharing == {"hold"}
-    assert {"hold", "spectrum", "stiffness"} <= controls
+    assert {"hold", "spectrum", "springs"} <= controls
     assert len({fill.run for fill in fills}) == len(fills)

@@ -27,6 +27,7 @@ from analysis.solid_fraction import (
 from analysis.tube_fill import tube_fill
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.runs.columns import OVERLAP_P99_FRACTION
 from sandmould.runs.files import replaced
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import LAST_MEASURED
@@ -68,6 +69,7 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         "coordination_bearing": touching.mean_coordination_bearing,
         "bearing_fraction": touching.bearing_fraction,
         "largest_overlap_fraction": touching.largest_overlap_fraction,
+        OVERLAP_P99_FRACTION: touching.overlap_p99_fraction,
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
     for bore in scenario.scene.bores:

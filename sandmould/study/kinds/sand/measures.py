@@ -48,6 +48,10 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
             Measure("bearing_fraction", "Share of the grains that bear."),
             Measure("largest_overlap_fraction", "Largest overlap over the smaller radius."),
             Measure(
+                "overlap_p99_fraction",
+                "Overlap over the smaller radius that 99 of 100 contacts do not exceed.",
+            ),
+            Measure(
                 "layer_mixing_index",
                 "How far the layers of the fill are mixed: 0 as filled, 1 at random.",
             ),

@@ -13,6 +13,7 @@ from sandmould.engines.program import build_program
 from sandmould.runs.formatting import number
 from sandmould.scenario import checks
 from sandmould.scenario.bad_input import Problem
+from sandmould.scenario.hardness import Hardness, bed_hardness
 from sandmould.scenario.limits import FRAMES, RECORDS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.outline import Outline
@@ -22,6 +23,7 @@ from sandmould.scenario.solids import SolidMesh, filled_note, with_hash
 from sandmould.scenario.wall_thickness import thinnest_wall
 from sandmould.study.kinds.kind import MachineSpeed, Note, Planning, SpeedClass
 from sandmould.study.kinds.sand import speed
+from sandmould.study.kinds.sand.hardness_text import hardness_text, softness_warning
 from sandmould.study.kinds.sand.measures import MEASURES
 
 BASE_MEMORY_MB = 600
@@ -176,9 +178,10 @@ def plan_cells(scenario: Scenario) -> Mapping[str, str]:
 
 
 def notes(scenario: Scenario) -> list[Note]:
-    """Obstacles drawn with walls thinner than a grain, and shells that were no cavities."""
+    """How hard the bed is, obstacles thinner than a grain, and shells that were no cavities."""
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
-    told = []
+    hardness = bed_hardness(scenario)
+    told = [_hardness_note(hardness)] if hardness else []
     if scenario.time_step.bed_fraction is not None:
         text = (
             "The price counts the planned time step. What follows the fill takes "
@@ -202,6 +205,11 @@ def notes(scenario: Scenario) -> list[Note]:
         if isinstance(obstacle, SolidMesh) and (text := filled_note(obstacle, f"obstacles.{i}")):
             told.append(Note(f"filled {i}", text))
     return told
+
+
+def _hardness_note(hardness: Hardness) -> Note:
+    said = (f"{hardness_text(hardness)}.", softness_warning(hardness))
+    return Note("hardness", " ".join(filter(None, said)), "Hardness")
 
 
 PLANNING = Planning[Scenario](
