@@ -1,0 +1,350 @@
+"""Numbers of ours from committed records, results of benchmarks and scenarios."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from benchmarks.reproduction.ledger import OurSource
+from sandmould import ROOT
+from sandmould.casting.arpm import computation as arpm
+from sandmould.casting.mps import computation as mps
+from sandmould.runs.columns import CPU_S, REPLICATE, finished
+from sandmould.runs.formatting import listed
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.reading import read_yaml
+from sandmould.statistics.agreement import sweep_part
+from sandmould.statistics.settings import setting_of
+from sandmould.statistics.verdict import compare_settings
+from sandmould.study.collect import read_summary, swept_keys
+from sandmould.study.kinds.registry import kind_named
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.fills import share_fills
+from sandmould.study.plan.load_study import OpenStudy, open_study
+from sandmould.study.plan.price import Prices
+from sandmould.study.records import RECORDS, why_stale
+
+STUDIES = ROOT / "config" / "studies"
+MATERIALS = ROOT / "config" / "materials"
+BENCHMARKS = ROOT / "benchmarks"
+SOLVERS = {"arpm": arpm.source_hash, "mps": mps.source_hash}
+"""State of the solver that a theme of benchmarks measures."""
+_NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?")
+
+
+@dataclass(frozen=True)
+class OurNumber:
+    """What is taken of a record."""
+
+    low: float
+    high: float
+    """Ends of the 95 % interval of a mean, or of the settings not told apart from the best; both
+    the number itself where there is no interval."""
+    best: float
+    n: int
+    """Runs, or rows, that it rests on."""
+    cost_s: float = math.nan
+    """Processor time of the rows, where they have it."""
+
+    @property
+    def half_width(self) -> float:
+        """Half of the interval; 0 without one."""
+        return (self.high - self.low) / 2
+
+
+@dataclass(frozen=True)
+class StudyRecord:
+    """A committed record: its table, its texts and whether it stands."""
+
+    name: str
+    folder: Path
+    record: dict[str, Any]
+
+    @cached_property
+    def summary(self) -> pd.DataFrame:
+        """Runs of the sweep, failed ones included."""
+        return sweep_part(read_summary(self.folder))
+
+    @cached_property
+    def stale(self) -> str:
+        """What is wrong with it; empty where it stands."""
+        return why_stale(self.folder)
+
+    @cached_property
+    def told(self) -> pd.DataFrame:
+        """Tables of its section in the README of all records, one row a line."""
+        text = (self.folder.parent / "README.md").read_text(encoding="utf-8")
+        section = text.partition(f"\n## {self.name}\n")[2].partition("\n## ")[0]
+        return pd.DataFrame(list(table_rows(section)))
+
+    @property
+    def study(self) -> str:
+        """Name of its study, as the command takes it."""
+        return Path(self.record["study"]).stem
+
+    @property
+    def took_s(self) -> float:
+        """Wall time of all runs."""
+        return float(self.record["wall_s_of_all_runs"])
+
+
+def table_rows(text: str) -> Iterator[dict[str, str]]:
+    """Rows of all Markdown tables of a text, by the heads of their columns."""
+    head: list[str] = []
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        if not line.startswith("|"):
+            head = []
+        elif not head:
+            head = cells
+        elif set(line) - set("|-: "):
+            yield dict(zip(head, cells, strict=False))
+
+
+@dataclass
+class RecordedNumbers:
+    """All that the page refers to, each read once."""
+
+    records: Path = RECORDS
+    benchmarks: Path = BENCHMARKS
+    read: dict[str, StudyRecord] = field(default_factory=dict)
+    """Records that were asked for, by name."""
+    _results: dict[str, Any] = field(default_factory=dict)
+    _scenarios: dict[str, Any] = field(default_factory=dict)
+
+    def number(self, source: OurSource, file: str, key: str) -> OurNumber:
+        """Take a number from where a row says that it is.
+
+        Parameters
+        ----------
+        source : OurSource
+        file, key : str
+            Where the row stands, for messages.
+
+        Raises
+        ------
+        BadInputError
+            Where there is no such record, part, column, row or number.
+        """
+        if source.scenario or source.material:
+            value = self._key_of(source, file, key)
+            found = OurNumber(value, value, value, 1)
+        else:
+            found = _taken(self._rows(source, file, key), source)
+        if source.minus is not None:
+            found = _less(found, self.number(source.minus, file, f"{key}.minus"))
+        if source.over is not None:
+            found = _over(found, self.number(source.over, file, f"{key}.over"))
+        if not math.isfinite(found.best):
+            raise _bad(file, f"{key}.column", source.column, "a column with a number in these rows")
+        ends = sorted((found.low * source.times, found.high * source.times))
+        return OurNumber(*ends, found.best * source.times, found.n, found.cost_s)
+
+    def record_of(self, name: str, file: str, key: str) -> StudyRecord:
+        """Read a record once.
+
+        Raises
+        ------
+        BadInputError
+            Where there is none of this name.
+        """
+        if name not in self.read:
+            folder = self.records / name
+            if not (folder / "record.json").is_file():
+                has = sorted(path.parent.name for path in self.records.glob("*/record.json"))
+                raise _bad(file, key, name, f"a folder of docs/results{_near(name, has)}")
+            record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
+            self.read[name] = StudyRecord(name, folder, record)
+        return self.read[name]
+
+    def results_of(self, theme: str, file: str, key: str) -> Any:
+        """Read the results of a theme of benchmarks once.
+
+        Raises
+        ------
+        BadInputError
+            Where there are none.
+        """
+        if theme not in self._results:
+            path = self.benchmarks / theme / "results.json"
+            if not path.is_file():
+                has = sorted(p.parent.name for p in self.benchmarks.glob("*/results.json"))
+                raise _bad(file, key, theme, f"a theme with results.json{_near(theme, has)}")
+            self._results[theme] = json.loads(path.read_text(encoding="utf-8"))
+        return self._results[theme]
+
+    def _rows(self, source: OurSource, file: str, key: str) -> pd.DataFrame:
+        """Rows that a source counts, with its column."""
+        if source.results:
+            table = self._part(source, file, key)
+        else:
+            record = self.record_of(source.record, file, f"{key}.record")
+            table = record.told if source.told else record.summary
+            if source.told and not len(table):
+                raise _bad(file, f"{key}.record", source.record, "a record with a table in README")
+        for column in (*source.where, source.column, *([source.of] if source.of else [])):
+            if column not in table:
+                has = [str(name) for name in table.columns]
+                place = source.record or f"{source.part} of {source.results}"
+                valid = f"a column of {place}{_near(column, has)}"
+                raise _bad(file, f"{key}.column", column, valid)
+        for column, value in source.where.items():
+            cells = value if isinstance(value, list) else [value]
+            table = table[[any(_is(cell, each) for each in cells) for cell in table[column]]]
+            if not len(table):
+                valid = f"a value of {column} in that table"
+                raise _bad(file, f"{key}.where.{column}", value, valid)
+        if source.told:
+            numbers = [_first_number(cell) for cell in table[source.column]]
+            table = table.assign(**{source.column: numbers})
+        elif source.record:
+            table = table[finished(table)]
+        if source.take == "mean":
+            _one_setting(table, source, file, key)
+        return table
+
+    def _part(self, source: OurSource, file: str, key: str) -> pd.DataFrame:
+        part = self.results_of(source.results, file, f"{key}.results")
+        for name in source.part.split("."):
+            if not isinstance(part, dict) or name not in part:
+                has = list(part) if isinstance(part, dict) else []
+                valid = f"a path into the results{_near(name, has)}"
+                raise _bad(file, f"{key}.part", source.part, valid)
+            part = part[name]
+        # A cell that is a list, such as a course, is as many rows.
+        table = pd.json_normalize(part)
+        return table.explode(source.column) if source.column in table else table
+
+    def _key_of(self, source: OurSource, file: str, key: str) -> float:
+        """Value of a key in the scenario of a shipped study, or in a material."""
+        name = source.scenario or source.material
+        if source.scenario:
+            value = self._scenario(name, file, f"{key}.scenario")
+        else:
+            path = MATERIALS / f"{name}.yaml"
+            if not path.is_file():
+                has = sorted(each.stem for each in MATERIALS.glob("*.yaml"))
+                valid = f"a file of config/materials{_near(name, has)}"
+                raise _bad(file, f"{key}.material", name, valid)
+            value = read_yaml(path, path.name)
+        for part in source.column.split("."):
+            try:
+                value = value[int(part)] if isinstance(value, list) else value[part]
+            except (LookupError, TypeError, ValueError):
+                has = list(value) if isinstance(value, dict) else []
+                valid = f"a key of {name}{_near(part, has)}"
+                raise _bad(file, f"{key}.column", source.column, valid) from None
+        if isinstance(value, dict):
+            value = value.get("value")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise _bad(file, f"{key}.column", source.column, f"a key with a number, not {value!r}")
+        return float(value)
+
+    def _scenario(self, study: str, file: str, key: str) -> Any:
+        """Scenario of the first run of a shipped study, resolved once."""
+        if study not in self._scenarios:
+            scene = expand(shipped(study, file, key))[0].scenario
+            self._scenarios[study] = scene.model_dump(mode="json")
+        return self._scenarios[study]
+
+
+def shipped(name: str, file: str, key: str) -> OpenStudy:
+    """Open a shipped study by its name.
+
+    Raises
+    ------
+    BadInputError
+        Where none has this name.
+    """
+    path = STUDIES / f"{name}.yaml"
+    if not path.is_file():
+        has = sorted(p.stem for p in STUDIES.glob("*.yaml"))
+        raise _bad(file, key, name, f"a study of config/studies{_near(name, has)}")
+    return open_study(path)
+
+
+def planned_core_s(study: OpenStudy) -> float:
+    """Time that a study would take one core, s, at speeds that are the same on every machine."""
+    runs, fills = share_fills(expand(study), kind_named(study.study.kind).planning)
+    return sum(Prices().engine_s(run) for run in (*fills, *runs))
+
+
+def _one_setting(rows: pd.DataFrame, source: OurSource, file: str, key: str) -> None:
+    """Refuse a mean over rows that differ in more than chance."""
+    if source.record and not source.told:
+        several = [name for name in swept_keys(rows) if rows[name].astype(str).nunique() > 1]
+    else:
+        several = [str(name) for name in rows] if len(rows) > 1 else []
+    if several:
+        valid = f"rows of one setting, by {listed(several)} as well"
+        raise _bad(file, f"{key}.where", source.where, valid)
+
+
+def _taken(rows: pd.DataFrame, source: OurSource) -> OurNumber:
+    """What is taken of some rows."""
+    values = rows[source.column].astype(float)
+    if source.size:
+        values = values.abs()
+    cost = float(rows[CPU_S].sum()) if CPU_S in rows else math.nan
+    if source.take == "best":
+        verdict = compare_settings(rows, [source.of], source.column)
+        best = verdict.best
+        if best is None:
+            return OurNumber(math.nan, math.nan, math.nan, 0)
+        told_apart = {c.other for c in verdict.comparisons if c.separated}
+        near = [s.values[source.of] for s in verdict.settings if s.n and s.label not in told_apart]
+        return OurNumber(min(near), max(near), best.values[source.of], len(rows), cost)
+    if source.take == "where_least":
+        at = float(rows.loc[values.abs().idxmin(), source.of])
+        return OurNumber(at, at, at, len(rows), cost)
+    if source.take in ("least", "most"):
+        end = float(values.min() if source.take == "least" else values.max())
+        return OurNumber(end, end, end, len(rows), cost)
+    mean = setting_of({}, len(values), values.dropna())
+    # Only replicates scatter by chance; two of them tell no interval worth the name.
+    chance = REPLICATE in rows and mean.n > 2 and mean.sd > 0
+    half = mean.ci_half_width if chance else 0.0
+    return OurNumber(mean.mean - half, mean.mean + half, mean.mean, mean.n, cost)
+
+
+def _less(first: OurNumber, second: OurNumber) -> OurNumber:
+    """One number less another, both with independent intervals."""
+    half = math.hypot(first.half_width, second.half_width)
+    best = first.best - second.best
+    return OurNumber(best - half, best + half, best, min(first.n, second.n), first.cost_s)
+
+
+def _over(first: OurNumber, second: OurNumber) -> OurNumber:
+    """One number over another; rates are told without an interval."""
+    ratio = first.best / second.best if second.best else math.nan
+    return OurNumber(ratio, ratio, ratio, min(first.n, second.n), first.cost_s)
+
+
+def _is(cell: Any, value: Any) -> bool:
+    try:
+        return math.isclose(float(cell), float(value), rel_tol=1e-9)
+    except (TypeError, ValueError):
+        return str(cell) == str(value)
+
+
+def _first_number(cell: Any) -> float:
+    found = _NUMBER.search(str(cell))
+    return float(found[0].replace("−", "-")) if found else math.nan
+
+
+def _near(name: str, has: list[str]) -> str:
+    near = difflib.get_close_matches(name, has, n=3, cutoff=0.4)
+    return f", nearest {', '.join(near)}" if near else ""
+
+
+def _bad(file: str, key: str, value: Any, valid: str) -> BadInputError:
+    return BadInputError([Problem(key, value, valid, file)])
