@@ -10,6 +10,7 @@ from benchmarks.reproduction.recorded_numbers import OurNumber
 from sandmould.runs.formatting import number, with_margin
 
 AGREES, DIFFERS, UNRESOLVED = "agrees", "differs", "not resolved"
+POSSIBLE = "not ruled out"
 NO_INTERVAL = "no interval"
 TAKEN = "taken over"
 NOT_COMPUTED = "not computed"
@@ -19,10 +20,11 @@ TESTED = "tested"
 DEFINED = "defined"
 MEASURED = "their measurement"
 STATES = {
-    AGREES: "ours meets their number, range or bound: with several fillings our whole 95 % interval "
-    "lies in theirs, or holds their number",
+    AGREES: "ours meets their number, range or bound: with several fillings our whole 95 % "
+    "interval lies in theirs, or holds their number",
     DIFFERS: "it does not",
     UNRESOLVED: "our interval reaches over an end of their range",
+    POSSIBLE: "their best setting is one of several of ours that are not told apart",
     NO_INTERVAL: "two numbers without a spread: the difference stands, no verdict",
     TAKEN: "a number that is put in, the same in our study",
     PICTURE: "theirs is in a picture and not in the text, so that nothing can be compared",
@@ -62,7 +64,9 @@ def state_of(row: LedgerRow, ours: OurNumber | None) -> str:
         if ours.low == ours.high:
             is_equal = math.isclose(ours.best, theirs[0], rel_tol=_CLOSE)
             return AGREES if is_equal else NO_INTERVAL
-        return AGREES if ours.low <= theirs[0] <= ours.high else DIFFERS
+        if not ours.low <= theirs[0] <= ours.high:
+            return DIFFERS
+        return POSSIBLE if row.ours[0].take == "best" else AGREES
     if theirs[0] <= ours.low and ours.high <= theirs[1]:
         return AGREES
     return DIFFERS if ours.low > theirs[1] or ours.high < theirs[0] else UNRESOLVED
@@ -73,8 +77,10 @@ def difference_text(theirs: Theirs, ours: OurNumber | None) -> str:
     ends = theirs.interval
     if ends is None or ours is None:
         return ""
-    if ends[0] <= ours.best <= ends[1]:
-        return "0" if ends[0] == ends[1] else "inside"
+    if any(math.isclose(ours.best, end, rel_tol=_CLOSE) for end in ends):
+        return "0"
+    if ends[0] < ours.best < ends[1]:
+        return "holds" if math.isinf(ends[0]) or math.isinf(ends[1]) else "inside"
     end = ends[0] if ours.best < ends[0] else ends[1]
     off = ours.best - end
     share = f" ({number(100 * abs(off / end), 2)} %)" if end else ""
@@ -84,8 +90,9 @@ def difference_text(theirs: Theirs, ours: OurNumber | None) -> str:
 def theirs_text(theirs: Theirs) -> str:
     """What the paper gives."""
     if theirs.picture:
-        told = "curve or picture; not in the text"
-        return f"{told}. {theirs.says}" if theirs.says else told
+        return (
+            f"in a picture; text: {theirs.says}" if theirs.says else "in a picture, not in the text"
+        )
     ends = theirs.interval
     if ends is None:
         return theirs.says
@@ -106,8 +113,25 @@ def _as_printed(value: float) -> str:
     return thousands(value) if is_long else f"{value:.10g}".replace("-", "−")
 
 
-def ours_text(ours: OurNumber, unit: str, digits: int, is_best: bool) -> str:
-    """A number of ours with its interval and how many runs it rests on."""
+def ours_text(row: LedgerRow, place: int, ours: OurNumber) -> str:
+    """A number of ours with its interval and how many runs it rests on.
+
+    Parameters
+    ----------
+    row : LedgerRow
+    place : int
+        Which of its sources.
+    ours : OurNumber
+    """
+    source, unit = row.ours[place], row.theirs.unit
+    digits = source.digits
+    if row.kind == "input":
+        return f"{_as_printed(float(f'{ours.best:.10g}'))} {unit}".rstrip()
+    text = _with_interval(ours, unit, digits, source.take == "best")
+    return f"{source.name} {text}".lstrip()
+
+
+def _with_interval(ours: OurNumber, unit: str, digits: int, is_best: bool) -> str:
     runs = f", {ours.n} runs" if ours.n > 1 and ours.low != ours.high else ""
     if is_best:
         text = f"best at {number(ours.best, digits)} {unit}".rstrip()

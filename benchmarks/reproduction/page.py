@@ -61,6 +61,8 @@ class LedgerPage:
     verification: Path = VERIFICATION
     states: Counter[str] = field(default_factory=Counter)
     """How many rows stand how."""
+    on_stand_ins: Counter[str] = field(default_factory=Counter)
+    """How many of these have sizes or materials of ours."""
     old: int = 0
     """Rows whose record is no longer what the code would compute."""
 
@@ -76,8 +78,8 @@ class LedgerPage:
         elsewhere = self.measured_elsewhere()
         return render(Path(__file__).with_name("page.md.j2"), {
             "papers": papers, "elsewhere": elsewhere, "records": self.sources(),
-            "states": self.states, "meanings": judge.STATES, "old": self.old,
-            "rows": self.states.total(),
+            "states": self.states, "on_stand_ins": self.on_stand_ins,
+            "meanings": judge.STATES, "old": self.old, "rows": self.states.total(),
         })  # fmt: skip
 
     def paper(self, path: Path) -> dict[str, object]:
@@ -102,31 +104,21 @@ class LedgerPage:
         state = judge.state_of(row, one)
         if row.kind == "input" and state == judge.DIFFERS and not row.why:
             raise _bad(file, f"{key}.why", "", "why our study puts in another number")
+        # What is put in is no result: how old its record is does not matter.
+        is_result = row.kind == "result"
+        standing = self._standing(row.ours, file, key) if is_result else []
         self.states[state] += 1
-        standing = self._standing(row.ours, file, key)
+        self.on_stand_ins[state] += row.stand_in
         self.old += bool(standing)
         marks = [state, *([STAND_IN] if row.stand_in else []), *standing]
-        computed = self._spent(row, found) if row.ours else None
-        command, cost = computed or self._price(row, file, key)
-        return [
-            row.at,
-            row.shows,
-            judge.theirs_text(row.theirs),
-            self._ours(row, found, file, key),
-            judge.difference_text(row.theirs, one),
-            row.why,
-            command,
-            cost,
-            "; ".join(marks),
-        ]
+        spent = self._spent(row, found) if row.ours and is_result else None
+        command, cost = spent or self._price(row, file, key)
+        difference = judge.difference_text(row.theirs, one) if state != judge.TAKEN else ""
+        return [row.at, row.shows, judge.theirs_text(row.theirs), self._ours(row, found, file, key),
+                difference, row.why, command, cost, "; ".join(marks)]  # fmt: skip
 
     def _ours(self, row: LedgerRow, found: Sequence[OurNumber], file: str, key: str) -> str:
-        texts = [
-            f"{source.name} {text}".lstrip()
-            for source, ours in zip(row.ours, found, strict=True)
-            for text in [judge.ours_text(ours, row.theirs.unit, source.digits,
-                                         source.take == "best")]
-        ]  # fmt: skip
+        texts = [judge.ours_text(row, place, ours) for place, ours in enumerate(found)]
         texts += [_figure_link(figure, file, f"{key}.figures") for figure in row.figures]
         texts += [_test_text(test, file, f"{key}.tests") for test in row.tests]
         return "; ".join(texts)
@@ -148,16 +140,19 @@ class LedgerPage:
 
     def _spent(self, row: LedgerRow, found: Sequence[OurNumber]) -> tuple[str, str]:
         """Commands that computed a row, and what they took."""
-        commands, spent_s = {}, 0.0
+        spent_s: dict[str, float] = {}
+        commands = []
         for source, ours in zip(row.ours, found, strict=True):
             if source.record:
                 record = self.numbers.read[source.record]
-                commands[f"`sandmould run {record.study}`"] = record.took_s
+                spent_s[source.record] = record.took_s
+                commands.append(f"`sandmould run {record.study}`")
             elif source.results:
-                commands[f"`{COMMANDS[source.results]}`"] = 0.0
-                spent_s += ours.cost_s if ours.cost_s > 0 else 0.0
-        spent_s += sum(commands.values())
-        return ", ".join(commands), seconds(spent_s) if spent_s else ""
+                # Two numbers of the same rows are computed once.
+                spent_s[f"{source.results} {source.part} {source.where}"] = ours.cost_s
+                commands.append(f"`{COMMANDS[source.results]}`")
+        total_s = sum(spent_s.values())
+        return ", ".join(dict.fromkeys(commands)), seconds(total_s) if total_s else ""
 
     def _price(self, row: LedgerRow, file: str, key: str) -> tuple[str, str]:
         """Command and price of what is not computed."""
@@ -180,12 +175,19 @@ class LedgerPage:
         path = self.claims / "measured_elsewhere.yaml"
         rows = []
         for i, row in enumerate(read_elsewhere(path).rows):
-            command, price = "", row.price
-            if row.price_of:
-                command, price = _planned(row.price_of, display_path(path), f"rows.{i}.price_of")
-            rows.append([row.what, row.found, row.by, row.lacks, command, price])
-        return table(("what", "they found", "source", "what ours would take", "command", "price"),
-                     rows)  # fmt: skip
+            price = row.price or "not known"
+            if row.price_like:
+                price = f"like {self._like(row.price_like, path, f'rows.{i}.price_like')}"
+            rows.append([row.what, row.found, row.by, row.lacks, price])
+        return table(("what", "they found", "source", "what ours would take", "price"), rows)
+
+    def _like(self, study: str, path: Path, key: str) -> str:
+        """What a shipped study took, or what it is planned to take."""
+        file = display_path(path)
+        command, price = _planned(study, file, key)
+        if (self.numbers.records / study / "record.json").is_file():
+            price = f"{seconds(self.numbers.record_of(study, file, key).took_s)} of all runs"
+        return f"{command}: {price}"
 
     def sources(self) -> str:
         """Table of the records that rows refer to."""
@@ -198,8 +200,8 @@ class LedgerPage:
                 str(len(record.summary)), str(failed or ""), seconds(record.took_s),
                 record.stale or "stands",
             ])  # fmt: skip
-        return table(("record", "commit", "machine", "runs", "failed", "wall time of all", "stands"),
-                     rows)  # fmt: skip
+        head = ("record", "commit", "machine", "runs", "failed", "wall time of all", "stands")
+        return table(head, rows)
 
 
 def _with_second(sources: Sequence[OurSource]) -> Iterator[OurSource]:
@@ -210,8 +212,10 @@ def _with_second(sources: Sequence[OurSource]) -> Iterator[OurSource]:
 
 
 def _planned(study: str, file: str, key: str) -> tuple[str, str]:
-    took_s = planned_core_s(shipped(study, file, key))
-    return f"`sandmould run {study}`", f"{seconds(float(f'{took_s:.2g}'))} of one core, planned"
+    opened = shipped(study, file, key)
+    took_s = float(f"{planned_core_s(opened):.2g}")
+    rounds = ", rounds not counted" if opened.study.refine.rounds else ""
+    return f"`sandmould run {study}`", f"{seconds(took_s)} of one core, planned{rounds}"
 
 
 def _figure_link(figure: str, file: str, key: str) -> str:
@@ -234,9 +238,7 @@ def _cases(page: Path) -> pd.DataFrame:
     return cases.set_index(titles)
 
 
-def _checked(
-    equation: Equation, cases: pd.DataFrame, file: str, key: str
-) -> tuple[str, str]:
+def _checked(equation: Equation, cases: pd.DataFrame, file: str, key: str) -> tuple[str, str]:
     """What checks an equation, and the largest error over its tolerance of all cases."""
     checks, worst = [], 0.0
     for title in equation.cases:

@@ -52,8 +52,8 @@ class OurNumber:
     best: float
     n: int
     """Runs, or rows, that it rests on."""
-    cost_s: float = math.nan
-    """Processor time of the rows, where they have it."""
+    cost_s: float = 0.0
+    """Processor time of the rows; 0 where they have none."""
 
     @property
     def half_width(self) -> float:
@@ -82,7 +82,7 @@ class StudyRecord:
     @cached_property
     def told(self) -> pd.DataFrame:
         """Tables of its section in the README of all records, one row a line."""
-        text = (self.folder.parent / "README.md").read_text(encoding="utf-8")
+        text = "\n" + (self.folder.parent / "README.md").read_text(encoding="utf-8")
         section = text.partition(f"\n## {self.name}\n")[2].partition("\n## ")[0]
         return pd.DataFrame(list(table_rows(section)))
 
@@ -208,6 +208,8 @@ class RecordedNumbers:
             table = table.assign(**{source.column: numbers})
         elif source.record:
             table = table[finished(table)]
+        if not _are_numbers(table[source.column]):
+            raise _bad(file, f"{key}.column", source.column, "a column of numbers")
         if source.take == "mean":
             _one_setting(table, source, file, key)
         return table
@@ -220,9 +222,11 @@ class RecordedNumbers:
                 valid = f"a path into the results{_near(name, has)}"
                 raise _bad(file, f"{key}.part", source.part, valid)
             part = part[name]
-        # A cell that is a list, such as a course, is as many rows.
         table = pd.json_normalize(part)
-        return table.explode(source.column) if source.column in table else table
+        # Cells that are lists, such as a course over time, are as many rows.
+        asked = dict.fromkeys((source.column, *source.where))
+        lists = [c for c in asked if c in table and table[c].map(type).eq(list).any()]
+        return table.explode(lists) if lists else table
 
     def _key_of(self, source: OurSource, file: str, key: str) -> float:
         """Value of a key in the scenario of a shipped study, or in a material."""
@@ -294,7 +298,7 @@ def _taken(rows: pd.DataFrame, source: OurSource) -> OurNumber:
     values = rows[source.column].astype(float)
     if source.size:
         values = values.abs()
-    cost = float(rows[CPU_S].sum()) if CPU_S in rows else math.nan
+    cost = float(rows.loc[~rows.index.duplicated(), CPU_S].sum()) if CPU_S in rows else 0.0
     if source.take == "best":
         verdict = compare_settings(rows, [source.of], source.column)
         best = verdict.best
@@ -320,13 +324,15 @@ def _less(first: OurNumber, second: OurNumber) -> OurNumber:
     """One number less another, both with independent intervals."""
     half = math.hypot(first.half_width, second.half_width)
     best = first.best - second.best
-    return OurNumber(best - half, best + half, best, min(first.n, second.n), first.cost_s)
+    n = min(first.n, second.n)
+    return OurNumber(best - half, best + half, best, n, first.cost_s + second.cost_s)
 
 
 def _over(first: OurNumber, second: OurNumber) -> OurNumber:
     """One number over another; rates are told without an interval."""
     ratio = first.best / second.best if second.best else math.nan
-    return OurNumber(ratio, ratio, ratio, min(first.n, second.n), first.cost_s)
+    n = min(first.n, second.n)
+    return OurNumber(ratio, ratio, ratio, n, first.cost_s + second.cost_s)
 
 
 def _is(cell: Any, value: Any) -> bool:
@@ -334,6 +340,11 @@ def _is(cell: Any, value: Any) -> bool:
         return math.isclose(float(cell), float(value), rel_tol=1e-9)
     except (TypeError, ValueError):
         return str(cell) == str(value)
+
+
+def _are_numbers(cells: pd.Series[Any]) -> bool:
+    """Whether all cells are numbers or gaps; a course has some of either kind."""
+    return bool(pd.to_numeric(cells, errors="coerce").notna().eq(cells.notna()).all())
 
 
 def _first_number(cell: Any) -> float:
