@@ -6,7 +6,7 @@ import math
 
 from benchmarks.frame import thousands
 from benchmarks.reproduction.ledger import LedgerRow, Theirs
-from benchmarks.reproduction.recorded_numbers import OurNumber
+from benchmarks.reproduction.our_number import OurNumber
 from sandmould.runs.formatting import number, with_margin
 
 AGREES, DIFFERS, UNRESOLVED = "agrees", "differs", "not resolved"

@@ -51,7 +51,9 @@ class OurSource(Section):
 
     record: str = Field("", description="Folder of docs/results; its summary.tsv is read.")
     told: bool = Field(False, description="Read the tables of the record in docs/results/README.")
-    results: str = Field("", description="Theme of benchmarks; its results.json is read.")
+    results: Literal["", "arpm", "mps"] = Field(
+        "", description="Theme of benchmarks; its results.json is read."
+    )
     part: str = Field("", description="Path to a list of rows in the results, such as ways.rows.")
     scenario: str = Field("", description="Shipped study; the number is a key of its scenario.")
     material: str = Field("", description="File of config/materials; the number is a key of it.")

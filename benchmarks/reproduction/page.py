@@ -20,9 +20,9 @@ from benchmarks.reproduction.ledger import (
     read_elsewhere,
     read_paper,
 )
+from benchmarks.reproduction.our_number import OurNumber
 from benchmarks.reproduction.recorded_numbers import (
     SOLVERS,
-    OurNumber,
     RecordedNumbers,
     planned_core_s,
     shipped,
@@ -135,7 +135,7 @@ class LedgerPage:
         return list(dict.fromkeys(marks))
 
     def _solver(self, source: OurSource) -> str:
-        part = self.numbers.results_of(source.results, "", "")[source.part.split(".")[0]]
+        part = self.numbers.results_of(source.results)[source.part.split(".")[0]]
         return str(part["solver"])
 
     def _spent(self, row: LedgerRow, found: Sequence[OurNumber]) -> tuple[str, str]:

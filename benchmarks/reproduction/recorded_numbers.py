@@ -15,16 +15,15 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.reproduction.ledger import OurSource
+from benchmarks.reproduction.our_number import OurNumber, less, over, taken
 from sandmould import ROOT
 from sandmould.casting.arpm import computation as arpm
 from sandmould.casting.mps import computation as mps
-from sandmould.runs.columns import CPU_S, REPLICATE, finished
+from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.reading import read_yaml
 from sandmould.statistics.agreement import sweep_part
-from sandmould.statistics.settings import setting_of
-from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.expand import expand
@@ -39,26 +38,6 @@ BENCHMARKS = ROOT / "benchmarks"
 SOLVERS = {"arpm": arpm.source_hash, "mps": mps.source_hash}
 """State of the solver that a theme of benchmarks measures."""
 _NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?")
-
-
-@dataclass(frozen=True)
-class OurNumber:
-    """What is taken of a record."""
-
-    low: float
-    high: float
-    """Ends of the 95 % interval of a mean, or of the settings not told apart from the best; both
-    the number itself where there is no interval."""
-    best: float
-    n: int
-    """Runs, or rows, that it rests on."""
-    cost_s: float = 0.0
-    """Processor time of the rows; 0 where they have none."""
-
-    @property
-    def half_width(self) -> float:
-        """Half of the interval; 0 without one."""
-        return (self.high - self.low) / 2
 
 
 @dataclass(frozen=True)
@@ -139,15 +118,15 @@ class RecordedNumbers:
             value = self._key_of(source, file, key)
             found = OurNumber(value, value, value, 1)
         else:
-            found = _taken(self._rows(source, file, key), source)
+            found = taken(self._rows(source, file, key), source)
         if source.minus is not None:
-            found = _less(found, self.number(source.minus, file, f"{key}.minus"))
+            found = less(found, self.number(source.minus, file, f"{key}.minus"))
         if source.over is not None:
-            found = _over(found, self.number(source.over, file, f"{key}.over"))
+            found = over(found, self.number(source.over, file, f"{key}.over"))
         if not math.isfinite(found.best):
-            raise _bad(file, f"{key}.column", source.column, "a column with a number in these rows")
-        ends = sorted((found.low * source.times, found.high * source.times))
-        return OurNumber(*ends, found.best * source.times, found.n, found.cost_s)
+            raise _bad(file, f"{key}.over", source.column, "what is not 0")
+        low, high = sorted((found.low * source.times, found.high * source.times))
+        return OurNumber(low, high, found.best * source.times, found.n, found.cost_s)
 
     def record_of(self, name: str, file: str, key: str) -> StudyRecord:
         """Read a record once.
@@ -166,20 +145,11 @@ class RecordedNumbers:
             self.read[name] = StudyRecord(name, folder, record)
         return self.read[name]
 
-    def results_of(self, theme: str, file: str, key: str) -> Any:
-        """Read the results of a theme of benchmarks once.
-
-        Raises
-        ------
-        BadInputError
-            Where there are none.
-        """
+    def results_of(self, theme: str) -> Any:
+        """Read the results of a theme of benchmarks once."""
         if theme not in self._results:
-            path = self.benchmarks / theme / "results.json"
-            if not path.is_file():
-                has = sorted(p.parent.name for p in self.benchmarks.glob("*/results.json"))
-                raise _bad(file, key, theme, f"a theme with results.json{_near(theme, has)}")
-            self._results[theme] = json.loads(path.read_text(encoding="utf-8"))
+            text = (self.benchmarks / theme / "results.json").read_text(encoding="utf-8")
+            self._results[theme] = json.loads(text)
         return self._results[theme]
 
     def _rows(self, source: OurSource, file: str, key: str) -> pd.DataFrame:
@@ -209,13 +179,14 @@ class RecordedNumbers:
         elif source.record:
             table = table[finished(table)]
         if not _are_numbers(table[source.column]):
-            raise _bad(file, f"{key}.column", source.column, "a column of numbers")
+            valid = "a column with numbers in these rows"
+            raise _bad(file, f"{key}.column", source.column, valid)
         if source.take == "mean":
             _one_setting(table, source, file, key)
         return table
 
     def _part(self, source: OurSource, file: str, key: str) -> pd.DataFrame:
-        part = self.results_of(source.results, file, f"{key}.results")
+        part = self.results_of(source.results)
         for name in source.part.split("."):
             if not isinstance(part, dict) or name not in part:
                 has = list(part) if isinstance(part, dict) else []
@@ -225,7 +196,9 @@ class RecordedNumbers:
         table = pd.json_normalize(part)
         # Cells that are lists, such as a course over time, are as many rows.
         asked = dict.fromkeys((source.column, *source.where))
-        lists = [c for c in asked if c in table and table[c].map(type).eq(list).any()]
+        lists = [
+            c for c in asked if c in table and any(isinstance(cell, list) for cell in table[c])
+        ]
         return table.explode(lists) if lists else table
 
     def _key_of(self, source: OurSource, file: str, key: str) -> float:
@@ -293,48 +266,6 @@ def _one_setting(rows: pd.DataFrame, source: OurSource, file: str, key: str) -> 
         raise _bad(file, f"{key}.where", source.where, valid)
 
 
-def _taken(rows: pd.DataFrame, source: OurSource) -> OurNumber:
-    """What is taken of some rows."""
-    values = rows[source.column].astype(float)
-    if source.size:
-        values = values.abs()
-    cost = float(rows.loc[~rows.index.duplicated(), CPU_S].sum()) if CPU_S in rows else 0.0
-    if source.take == "best":
-        verdict = compare_settings(rows, [source.of], source.column)
-        best = verdict.best
-        if best is None:
-            return OurNumber(math.nan, math.nan, math.nan, 0)
-        told_apart = {c.other for c in verdict.comparisons if c.separated}
-        near = [s.values[source.of] for s in verdict.settings if s.n and s.label not in told_apart]
-        return OurNumber(min(near), max(near), best.values[source.of], len(rows), cost)
-    if source.take == "where_least":
-        at = float(rows.loc[values.abs().idxmin(), source.of])
-        return OurNumber(at, at, at, len(rows), cost)
-    if source.take in ("least", "most"):
-        end = float(values.min() if source.take == "least" else values.max())
-        return OurNumber(end, end, end, len(rows), cost)
-    mean = setting_of({}, len(values), values.dropna())
-    # Only replicates scatter by chance; two of them tell no interval worth the name.
-    chance = REPLICATE in rows and mean.n > 2 and mean.sd > 0
-    half = mean.ci_half_width if chance else 0.0
-    return OurNumber(mean.mean - half, mean.mean + half, mean.mean, mean.n, cost)
-
-
-def _less(first: OurNumber, second: OurNumber) -> OurNumber:
-    """One number less another, both with independent intervals."""
-    half = math.hypot(first.half_width, second.half_width)
-    best = first.best - second.best
-    n = min(first.n, second.n)
-    return OurNumber(best - half, best + half, best, n, first.cost_s + second.cost_s)
-
-
-def _over(first: OurNumber, second: OurNumber) -> OurNumber:
-    """One number over another; rates are told without an interval."""
-    ratio = first.best / second.best if second.best else math.nan
-    n = min(first.n, second.n)
-    return OurNumber(ratio, ratio, ratio, n, first.cost_s + second.cost_s)
-
-
 def _is(cell: Any, value: Any) -> bool:
     try:
         return math.isclose(float(cell), float(value), rel_tol=1e-9)
@@ -343,8 +274,9 @@ def _is(cell: Any, value: Any) -> bool:
 
 
 def _are_numbers(cells: pd.Series[Any]) -> bool:
-    """Whether all cells are numbers or gaps; a course has some of either kind."""
-    return bool(pd.to_numeric(cells, errors="coerce").notna().eq(cells.notna()).all())
+    """Whether all cells are numbers or gaps, and not all gaps."""
+    numbers = pd.to_numeric(cells, errors="coerce").notna()
+    return bool(numbers.eq(cells.notna()).all() and numbers.any())
 
 
 def _first_number(cell: Any) -> float:

@@ -13,8 +13,9 @@ import pytest
 from benchmarks.reproduction import recorded_numbers
 from benchmarks.reproduction.judge import difference_text, ours_text, state_of, theirs_text
 from benchmarks.reproduction.ledger import CLAIMS, LedgerRow, OurSource, read_paper
+from benchmarks.reproduction.our_number import OurNumber
 from benchmarks.reproduction.page import LedgerPage
-from benchmarks.reproduction.recorded_numbers import OurNumber, RecordedNumbers, StudyRecord
+from benchmarks.reproduction.recorded_numbers import RecordedNumbers, StudyRecord
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 
@@ -115,13 +116,12 @@ SCENE = {"scenario": "tube_demo", "column": "sand.densty"}
         (FILL | {"where": {"hz": 20}}, "column = 'hz': a column of planted"),
         (FILL | {"where": {HZ: 30}}, f"where.{HZ} = 30: a value of {HZ} in that table."),
         (FILL, f"where = {{}}: rows of one setting, by {HZ} as well."),
-        (FILL | {"column": "run", "where": {HZ: 20}}, "column = 'run': a column of numbers."),
+        (FILL | {"column": "run", "where": {HZ: 20}}, "column = 'run': a column with numbers in"),
         (
             FILL | {"column": "6 s", "told": True},
             "column = '6 s': a column of planted, nearest 5 s",
         ),
         (ROWS | {"part": "way.rows"}, "part = 'way.rows': a path into the results, nearest ways."),
-        (ROWS | {"results": "apm"}, "results = 'apm': a theme with results.json, nearest arpm."),
         (ROWS | {"where": {"way": "c"}}, "where.way = 'c': a value of way in that table."),
         (
             SCENE | {"scenario": "tube_dem"},
@@ -235,6 +235,7 @@ def test_results_of_another_solver_are_marked(numbers: RecordedNumbers) -> None:
         ({"theirs": {}}, "a value, low or high"),
         ({"ours": [{"record": "a", "scenario": "b", "column": "x"}]}, "one of record"),
         ({"ours": [{"record": "a", "column": "x", "take": "best"}]}, "of with best"),
+        ({"ours": [{"results": "apm", "part": "x", "column": "x"}]}, "results = 'apm' cannot be"),
         ({"ours": []}, "ours, figures or tests, or else price_of or price"),
         ({"price": "1 h"}, "ours, figures or tests, or else price_of or price"),
         ({"kind": "input", "ours": []}, "one place of ours for what is put in"),
