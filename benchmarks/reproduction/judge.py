@@ -24,7 +24,7 @@ STATES = {
     "interval lies in theirs, or holds their number",
     DIFFERS: "it does not",
     UNRESOLVED: "our interval reaches over an end of their range",
-    POSSIBLE: "their best setting is one of several of ours that are not told apart",
+    POSSIBLE: "theirs lies among settings of ours that are not told apart from our best",
     NO_INTERVAL: "two numbers without a spread: the difference stands, no verdict",
     TAKEN: "a number that is put in, the same in our study",
     PICTURE: "theirs is in a picture and not in the text, so that nothing can be compared",
@@ -90,9 +90,7 @@ def difference_text(theirs: Theirs, ours: OurNumber | None) -> str:
 def theirs_text(theirs: Theirs) -> str:
     """What the paper gives."""
     if theirs.picture:
-        return (
-            f"in a picture; text: {theirs.says}" if theirs.says else "in a picture, not in the text"
-        )
+        return f"in a picture; text: {theirs.says}" if theirs.says else "in a picture, not in text"
     ends = theirs.interval
     if ends is None:
         return theirs.says
@@ -124,10 +122,9 @@ def ours_text(row: LedgerRow, place: int, ours: OurNumber) -> str:
     ours : OurNumber
     """
     source, unit = row.ours[place], row.theirs.unit
-    digits = source.digits
     if row.kind == "input":
         return f"{_as_printed(float(f'{ours.best:.10g}'))} {unit}".rstrip()
-    text = _with_interval(ours, unit, digits, source.take == "best")
+    text = _with_interval(ours, unit, source.digits, source.take == "best")
     return f"{source.name} {text}".lstrip()
 
 

@@ -202,7 +202,7 @@ def test_what_is_not_computed_says_its_price(numbers: RecordedNumbers) -> None:
         "1 h (estimate)",
         "not computed",
     ]
-    assert theirs_text(row({"picture": True}).theirs) == "in a picture, not in the text"
+    assert theirs_text(row({"picture": True}).theirs) == "in a picture, not in text"
 
 
 @pytest.mark.parametrize(
