@@ -13,7 +13,8 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
 .PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
-.PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow
+.PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow \
+  reproduction
 
 help:
 	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
@@ -152,6 +153,10 @@ solidification: $(INSTALLED)
 ## draw the rooms and write docs/architecture.md
 architecture: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.house.architecture
+
+## what the papers claim beside the committed results: docs/reproduction.md
+reproduction: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.reproduction
 
 ## render the golden decks again
 decks: $(INSTALLED)

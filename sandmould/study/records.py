@@ -157,15 +157,17 @@ def stale_records() -> list[tuple[str, str]]:
     A record from before the defaults changed says ``OLD_DEFAULTS``: it was right when it was made.
     One whose scenarios are those of today says ``OLDER_SOLVER`` where another code computes them.
     """
-    stale = []
-    for path in sorted(RECORDS.glob("*/record.json")):
-        record = json.loads(path.read_text(encoding="utf-8"))
-        study = ROOT / record["study"]
-        if not study.exists():
-            stale.append((path.parent.name, f"its study {record['study']} is gone"))
-        else:
-            stale.append((path.parent.name, _what_changed(open_study(study), record, path.parent)))
-    return stale
+    folders = [path.parent for path in sorted(RECORDS.glob("*/record.json"))]
+    return [(folder.name, why_stale(folder)) for folder in folders]
+
+
+def why_stale(folder: Path) -> str:
+    """Say what is wrong with one record; see ``stale_records``."""
+    record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
+    study = ROOT / record["study"]
+    if not study.exists():
+        return f"its study {record['study']} is gone"
+    return _what_changed(open_study(study), record, folder)
 
 
 def _what_changed(study: OpenStudy, record: dict[str, Any], folder: Path) -> str:

@@ -126,7 +126,10 @@ def test_a_table_has_a_line_a_row() -> None:
     assert text == "| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 |  |\n"
 
 
-@pytest.mark.parametrize("name", PAGED)
+# That of the ledger hashes the runs of all records that it names: ten seconds.
+@pytest.mark.parametrize(
+    "name", [*PAGED, pytest.param("reproduction", marks=pytest.mark.slow, id="reproduction")]
+)
 def test_pages_are_those_of_the_committed_results(name: str) -> None:
     theme: Benchmark = importlib.import_module(f"benchmarks.{name}.__main__").BENCHMARK
     path = Path(theme.main).with_name("results.json")

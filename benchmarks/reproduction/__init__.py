@@ -1,0 +1,1 @@
+"""What the papers claim beside what this program computes: docs/reproduction.md."""
