@@ -26,7 +26,7 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.module_main import run_main
-from sandmould.study.collect import CHECKS, read_summary
+from sandmould.study.collect import read_summary
 from sandmould.study.definition.run import Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import kind_of

@@ -8,7 +8,6 @@ from sandmould import ROOT
 from sandmould.runs.columns import SWEEP
 from sandmould.runs.words import say
 from sandmould.scenario.bad_input import BAD_INPUT_EXIT, BadInputError
-from sandmould.study.collect import CHECKS as CHECK_TABLES
 from sandmould.study.cluster.settings import goes_to_slurm
 from sandmould.study.cluster.submission import open_submission
 from sandmould.study.packs.recorded import take_up
@@ -23,6 +22,7 @@ from sandmould.study.plan.build_plan import (
     starts_jobs,
     study_path,
 )
+from sandmould.study.plan.plan_files import CHECKS as CHECK_TABLES
 from sandmould.study.plan.lacking import Need, notes_of
 from sandmould.study.process import take_turn
 from sandmould.study.definition.run import FILL, RUN_NAME

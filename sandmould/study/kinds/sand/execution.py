@@ -57,7 +57,7 @@ def measure(run: Run, folder: Path) -> None:
 
 def load_computing(scenario: Scenario) -> None:
     """Import the engine's side of the house, and the pattern's where there is one."""
-    registry.engine_of(scenario)
+    registry.engine_of(scenario).load_session(scenario)
     if scenario.pattern is not None:
         importlib.import_module("pattern_fe.coupling.opening")
 
