@@ -16,17 +16,16 @@ from sandmould.study.plan.build_plan import (
     RESULTS,
     announce,
     measure_speeds,
-    open_plan,
     prepare,
     price,
     starts_jobs,
     study_path,
 )
 from sandmould.study.plan.plan_files import CHECKS as CHECK_TABLES
+from sandmould.study.plan.handover import plan_of
 from sandmould.study.plan.lacking import Need, notes_of
 from sandmould.study.process import take_turn
 from sandmould.study.definition.run import FILL, RUN_NAME
-from sandmould.study.plan.trust import check_letters, check_places, check_trust
 
 OVERRIDES = dict(workflow.config_settings.config)
 # Set by a profile: how long a job should last at least, where jobs cost more than short runs, how
@@ -38,10 +37,7 @@ BATCH_CORES = int(OVERRIDES.pop("batch_cores", 1))
 MPI = OVERRIDES.pop("mpi", "mpiexec")
 CORES = workflow._cores or os.cpu_count()
 try:
-    PLAN = open_plan(study_path(workflow.configfiles, OVERRIDES))
-    check_places(PLAN.study)
-    check_letters(PLAN.runs)
-    check_trust(PLAN.study, PLAN.runs)
+    PLAN = plan_of(study_path(workflow.configfiles, OVERRIDES))
     if workflow.is_main_process and starts_jobs(sys.argv):
         # Held until this process ends.
         if turn := take_turn(RESULTS / PLAN.study.name):
