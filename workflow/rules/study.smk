@@ -45,14 +45,23 @@ try:
         PLAN, taken = take_up(PLAN, RESULTS)
         if taken:
             say(taken)
-    BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
+    LACKING = PLAN.lacks(RESULTS) if workflow.is_main_process else {}
+    # Jobs elsewhere plan the study again and must find the same batches there.
+    FREE_CORES = CORES if workflow.is_main_process and workflow.local_exec else 0
+    BATCHED = PLAN.batches(
+        BATCH_WALL_S,
+        BATCH_LEAST,
+        BATCH_CORES,
+        FREE_CORES,
+        LACKING if FREE_CORES else (),
+    )
     STATED = workflow.resource_settings.default_resources or {}
     SUBMISSION = open_submission(PLAN, sys.argv, STATED)
     if workflow.is_main_process and starts_jobs(sys.argv) and goes_to_slurm(sys.argv):
         SUBMISSION.ask(BATCHED)
     if workflow.is_main_process and "--lint" not in sys.argv:
         say(announce(PLAN, RESULTS, CORES))
-        if said := prepare(PLAN, RESULTS, BATCHED):
+        if said := prepare(PLAN, RESULTS, BATCHED, LACKING):
             say(f"{said}\n")
         for said in SUBMISSION.said:
             say(said)
