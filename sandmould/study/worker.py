@@ -24,6 +24,10 @@ from sandmould.study.process import listen, passed_on, watch
 from sandmould.study.simulate import measure, simulate, write_crash
 
 
+_LOADED: set[str] = set()
+"""Classes of runs whose measuring is loaded."""
+
+
 def load(scenario: Any, ahead: bool = True) -> None:
     """Load what runs of one kind and engine need.
 
@@ -46,8 +50,13 @@ def load_kept(scenario: Any) -> None:
 
 
 def _load_rest(scenario: Any) -> None:
-    """Load what is not needed before a run begins."""
-    kind_of(scenario).execution.load_measuring(scenario)
+    """Load what is not needed before a run begins, once for all runs like this one."""
+    if _class_of(scenario) in _LOADED:
+        return
+    _LOADED.add(_class_of(scenario))
+    kind = kind_of(scenario)
+    kind.execution.load_measuring(scenario)
+    kind.planning.template_hash(scenario)
     for asked_once in (commit, versions, processor):
         asked_once()
     gc.freeze()  # a child that looks through what is here would copy it

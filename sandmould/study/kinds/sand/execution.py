@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import tempfile
 from pathlib import Path
 
 from sandmould.engines import recording, registry
@@ -64,7 +65,11 @@ def load_computing(scenario: Scenario) -> None:
 
 def load_measuring(scenario: Scenario) -> None:
     """Import what measures and draws."""
-    importlib.import_module("sandmould.study.kinds.sand.measure")
+    from sandmould.study.kinds.sand.measure import write_picture
+
+    # The first picture loads fonts, which every forked process would do again.
+    with tempfile.TemporaryDirectory() as name:
+        write_picture(scenario, Path(name), Path(name) / "first.png")
     if scenario.pattern is not None:
         importlib.import_module("sandmould.study.kinds.sand.bent_files")
 
