@@ -23,7 +23,6 @@ from sandmould.study.kinds.registry import kind_of
 from sandmould.study.process import listen, passed_on, watch
 from sandmould.study.simulate import measure, simulate, write_crash
 
-
 _LOADED: set[str] = set()
 """Classes of runs whose measuring is loaded."""
 
