@@ -182,6 +182,27 @@ def load_kernels(kernels: Iterable[str]) -> None:
             _DISPATCHERS[name].compile(tuple(_type_of(each) for each in described))
 
 
+def keep_kernels(of: str, kernels: Iterable[str]) -> None:
+    """Note for later processes what some sort of runs has called, beside its machine code."""
+    if KEEPS:
+        path = _kept_file(of)
+        partial = path.with_suffix(f".{os.getpid()}")
+        partial.write_text("\n".join(sorted({*kept_kernels(of), *kernels})), encoding="utf-8")
+        partial.replace(path)
+
+
+def kept_kernels(of: str) -> set[str]:
+    """What runs of a sort have called until now, on this machine with this state of the house."""
+    try:
+        return set(_kept_file(of).read_text(encoding="utf-8").splitlines()) if KEEPS else set()
+    except OSError:
+        return set()
+
+
+def _kept_file(of: str) -> Path:
+    return _FOLDER / f"called_{of}.txt"
+
+
 def _described(kind: Any) -> Any:
     """A type of numba's as JSON; a TypeError for one of a sort that no kernel of ours has."""
     if isinstance(kind, types.Array):

@@ -242,9 +242,9 @@ def measures(study: StudyFile) -> None:
 def report(study: StudyFile) -> None:
     """Write the report of a study again from its results."""
     from sandmould.report.page import write_report
-    from sandmould.study.collect import SUMMARY
     from sandmould.study.plan.build_plan import RESULTS
     from sandmould.study.plan.ownership import check_owner
+    from sandmould.study.plan.plan_files import SUMMARY
     from sandmould.study.screen.ending import last_line
 
     folder = RESULTS / study.stem

@@ -7,15 +7,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import jinja2
 import numpy as np
-from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from sandmould import ROOT
 from sandmould.digest import sources_digest
 from sandmould.runs.files import write_text
+
+if TYPE_CHECKING:
+    import jinja2
 
 TEMPLATES = ROOT / "templates"
 _LONGEST_REMARK = 200
@@ -52,6 +53,9 @@ def environment(dialect: str) -> jinja2.Environment:
 
     Snakemake's own template engine has neither a loader nor this strictness.
     """
+    import jinja2  # plans read decks' hashes and render none
+    from jinja2.sandbox import ImmutableSandboxedEnvironment
+
     env = ImmutableSandboxedEnvironment(
         loader=jinja2.FileSystemLoader(TEMPLATES / dialect),
         undefined=jinja2.StrictUndefined,

@@ -64,6 +64,13 @@ class EngineModule(Protocol):
         """Files of ours that compute beside what the deck commands: its session, our kernels."""
 
     @staticmethod
+    def load_session(scenario: Scenario) -> None:
+        """Import what a session needs and no plan does.
+
+        What starts threads, MPI or the engine is left to the run's own process.
+        """
+
+    @staticmethod
     def open_session(
         program: Program, folder: Path, log: Path, checkpoint: Path | None = None
     ) -> Session:

@@ -41,8 +41,7 @@ from sandmould.scenario.drive import Drive
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.evidence import NOT_FINISHED, left_out, reason_text
 from sandmould.statistics.verdict import Verdict
-from sandmould.study.collect import CHECKS, CURVES, SUMMARY
-from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE
+from sandmould.study.plan.plan_files import CHECKS, CURVES, FIGURES, STUDY_FILE, SUMMARY
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from pydantic_core import PydanticCustomError
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
+from sandmould.scenario.drawing_file import MeshFileError, file_hash
 from sandmould.scenario.geometry import Block
 from sandmould.scenario.limits import PIXELS
 from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.mesh_file import MeshFileError, file_hash
 from sandmould.scenario.outline import Outline, outline_fault
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.solids import SolidMesh, mesh_solid, with_hash

@@ -8,8 +8,8 @@ import numpy as np
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_blocks, tube_wall
+from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.limits import GRAINS
-from sandmould.scenario.mesh_file import MeshFileError, check_surface
 from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
@@ -143,6 +143,8 @@ def _mesh(s: Scenario, solid: SolidMesh, key: str) -> Iterator[Problem]:
 
 
 def _triangles(s: Scenario, solid: Triangles, key: str) -> Iterator[Problem]:
+    from sandmould.scenario.mesh_file import check_surface  # slow to import, and few scenes have it
+
     size = f"{len(solid.triangles)} triangles"
     try:
         check_surface(solid.solid.vertices_m, solid.solid.triangles)

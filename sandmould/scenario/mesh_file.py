@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import stat
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,12 +11,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from sandmould.digest import file_digest
-from sandmould.scenario.limits import DRAWING_BYTES, TRIANGLES
+from sandmould.scenario.drawing_file import MeshFileError, file_hash
+from sandmould.scenario.limits import TRIANGLES
 from sandmould.scenario.mesh import signed_volumes_m3
 from sandmould.scenario.mesh_shells import (
     SAME,
-    MeshFileError,
     at,
     extent,
     facing,
@@ -29,26 +27,6 @@ from sandmould.scenario.mesh_union import united
 
 Array = NDArray[np.float64]
 Triangles = NDArray[np.int64]
-
-
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file.
-
-    Raises
-    ------
-    MeshFileError
-        When it cannot be read, or is a folder, a device or too large.
-    """
-    try:
-        what = path.stat()
-        if not stat.S_ISREG(what.st_mode):
-            raise MeshFileError("a file; here is a folder or a device")
-        if what.st_size > DRAWING_BYTES.most:
-            raise MeshFileError(f"a file {DRAWING_BYTES.sentence(what.st_size)}")
-        return file_digest(path)
-    except OSError as error:
-        reason = error.strerror or "it cannot be read"
-        raise MeshFileError(f"a readable file ({reason})") from error
 
 
 def read_surface(path: Path) -> tuple[Array, Triangles]:

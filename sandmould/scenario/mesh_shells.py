@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.mesh import signed_volumes_m3
 from sandmould.scenario.mesh_search import MeshSearch
 
@@ -28,10 +29,6 @@ MOST_SHELLS = 1000
 """Shells of one file: what each triangle lies in is asked of all of them."""
 _HELD = 5_000_000
 """Winding numbers held in memory together."""
-
-
-class MeshFileError(ValueError):
-    """A file that bounds no solid; its text says what would be valid."""
 
 
 def extent(points: Array) -> float:

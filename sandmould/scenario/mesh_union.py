@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.mesh_cuts import CutShells, cut
 from sandmould.scenario.mesh_search import MeshSearch
 from sandmould.scenario.mesh_shells import (
     BESIDE,
     SAME,
-    MeshFileError,
     extent,
     joined_sides,
     with_own_vertices,

@@ -7,13 +7,16 @@ it to the drop height over the bed that it finds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from sandmould.scenario.geometry import Array
 from sandmould.scenario.scenario import Scenario
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 LOOSE_FRACTION = {2: 0.45, 3: 0.25}
 """Solid fraction of the falling column: random sequential addition jams at 0.547 in 2D (Feder
@@ -156,6 +159,8 @@ def _add_sequentially(
     radius: Array, size_m: Array, height_m: float, rng: np.random.Generator
 ) -> Array | None:
     """Add grains in batches of one radius; None when a batch finds no room."""
+    from scipy.spatial import cKDTree  # no plan needs it: it counts grains and places none
+
     d = len(size_m) + 1
     placed = np.empty((0, d))
     for r in np.unique(radius)[::-1]:
@@ -181,6 +186,8 @@ def _add_sequentially(
 
 def _free_of(tree: cKDTree, placed_radius: Array, tried: Array, radius: float) -> NDArray[np.bool_]:
     """Which trial grains touch none of the placed ones."""
+    from scipy.spatial import cKDTree
+
     free = np.ones(len(tried), dtype=bool)
     pairs = cKDTree(tried).sparse_distance_matrix(
         tree, placed_radius.max() + radius, output_type="coo_matrix"
@@ -192,6 +199,8 @@ def _free_of(tree: cKDTree, placed_radius: Array, tried: Array, radius: float) -
 
 def _free_of_each_other(points: Array, distance_m: float, keep_first: int) -> Array:
     """Drop, of points nearer than a distance, the later one."""
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(points).query_pairs(distance_m, output_type="ndarray")
     later = np.unique(pairs.max(axis=1)) if len(pairs) else np.empty(0, dtype=int)
     keep = np.ones(len(points), dtype=bool)

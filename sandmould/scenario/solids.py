@@ -12,8 +12,8 @@ import numpy as np
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
+from sandmould.scenario.drawing_file import MeshFileError, file_hash
 from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.mesh_file import MeshFileError, file_hash, filled_shells, read_surface
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.revolved import Revolved
 
@@ -131,6 +131,8 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     BadInputError
         When the file bounds no solid, or is not the one that the scenario was planned with.
     """
+    from sandmould.scenario.mesh_file import read_surface  # slow to import, and few scenes have it
+
     file_name = display_path(solid.path)
     try:
         sha256_now = file_hash(solid.path)
@@ -156,6 +158,8 @@ def filled_note(solid: SolidMesh, key: str) -> str:
     key : str
         Key path, for the sentence.
     """
+    from sandmould.scenario.mesh_file import filled_shells  # see mesh_solid
+
     count = filled_shells(solid.path)
     if not count:
         return ""

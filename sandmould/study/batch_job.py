@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import multiprocessing
 import signal
@@ -13,7 +14,8 @@ from types import FrameType
 
 from sandmould.runs.formatting import listed
 from sandmould.runs.parent import end_with_parent
-from sandmould.study.definition.run import LAST_MEASURED
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.definition.run import LAST_MEASURED, Run
 from sandmould.study.plan.batches import is_done
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run
@@ -48,7 +50,8 @@ def compute_batch(
     """
     stop = _Stop()
     log.touch()
-    load(folders, ahead=side_by_side > 1)
+    with contextlib.suppress(BadInputError):  # the run says so itself
+        load(read_run(folders[0] / "scenario.yaml").scenario, ahead=side_by_side > 1)
 
     def work(place_of_next: Callable[[], int]) -> None:
         """Take the next run until none is left or the job is asked to end."""
@@ -114,11 +117,25 @@ def _compute(folder: Path, log: Path, ranks: int, mpi: str) -> None:
         for old in ("outcome.json", LAST_MEASURED):
             (folder / old).unlink(missing_ok=True)  # damaged, or of another scenario or deck
         render(run, folder)
-        if ranks == 1:
-            compute_forked(run, folder, log)
-        else:
-            launch(folder, log, ranks, mpi)
+        simulate_run(run, folder, log, ranks, mpi, and_measure=True)
     else:
         print(f"{folder.name}: computed already", file=sys.stderr)
     if lack_of(run, folder).need is not Need.NOTHING:
         measure_forked(run, folder, log)
+
+
+def simulate_run(
+    run: Run, folder: Path, log: Path, ranks: int, mpi: str, and_measure: bool = False
+) -> None:
+    """Compute a run whose deck is there, in a process of its own or in several.
+
+    Raises
+    ------
+    SystemExit
+        When it stopped early and the same command continues it.
+    """
+    if ranks > 1:
+        launch(folder, log, ranks, mpi)
+        return
+    load(run.scenario, ahead=False)
+    compute_forked(run, folder, log, and_measure)

@@ -52,7 +52,7 @@ from sandmould.statistics.agreement import (
 from sandmould.study.definition.study import Study
 from sandmould.study.fill_costs import shares_of_fills
 from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
-from sandmould.study.plan.plan_files import STUDY_FILE
+from sandmould.study.plan.plan_files import CHECKS, CURVES, STUDY_FILE, SUMMARY
 from sandmould.study.run_tables import (
     PLACE,
     UNREADABLE,
@@ -63,9 +63,6 @@ from sandmould.study.run_tables import (
 )
 
 NO_OUTCOME = "no outcome written"
-SUMMARY, CURVES = "summary.tsv", "curves.tsv"
-CHECKS = ("summary_checks.tsv", "curves_checks.tsv")
-"""Tables of the runs that are no part of the sweep; only studies that have such runs."""
 _PARAMETER_FREE = (RUN, REPLICATE, SEED, PART)
 # The summary has these of the run; those of the snapshot get a prefix there.
 _OF_SNAPSHOT = (*CLOCK, GRAINS, LARGEST_OVERLAP_FRACTION)

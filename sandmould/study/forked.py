@@ -17,13 +17,42 @@ PROCESS_NAME = "sandmould-run"
 """What lists of processes call it, where Linux takes a name of fifteen letters."""
 BROKEN = 1
 """Exit status of work that raised."""
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def fork(work: Work, begin: Callable[[], None]) -> int:
+    """Start a process with all that is loaded here; gives its number.
+
+    What may not be forked once it has begun, such as MPI or threads, must begin in the work.
+
+    Parameters
+    ----------
+    work : callable
+        Gives the exit status; None for 0.
+    begin : callable
+        Lets the child go of what is its parent's alone: handlers of signals, files. Until then
+        no request to end reaches it.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()  # what lies in a buffer would be written by both
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, END_SIGNALS)
+    parent = os.getpid()
+    pid = os.fork()
+    if pid == 0:
+        _work_on(work, begin, before, parent)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return pid
+
+
+def print_to(out: int, err: int) -> None:
+    """Have this process print to two open files."""
+    os.dup2(out, 1)
+    os.dup2(err, 2)
+    sys.stdout, sys.stderr = (os.fdopen(n, "w", 1, closefd=False) for n in (1, 2))
 
 
 class ForkedProcess:
-    """Acts as a ``subprocess.Popen`` whose output is read as lines.
-
-    What may not be forked once it has begun, such as MPI or threads, must begin in the work.
-    """
+    """Acts as a ``subprocess.Popen`` whose output is read as lines."""
 
     def __init__(self, work: Work) -> None:
         """Begin.
@@ -33,17 +62,17 @@ class ForkedProcess:
         work : callable
             Gives the exit status; None for 0.
         """
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()  # what lies in a buffer would be written by both
         read, write = os.pipe()
-        # A request to end waits until the child has let go of the handlers of its parent.
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
-        parent = os.getpid()
-        self.pid = os.fork()
-        if self.pid == 0:
+
+        def begin() -> None:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            end_with_parent()
+            call_process(PROCESS_NAME)
+            print_to(write, write)
             os.close(read)
-            _work_on(work, write, parent)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+            os.close(write)
+
+        self.pid = fork(work, begin)
         os.close(write)
         self.stdout: TextIO = os.fdopen(read, encoding="utf-8", errors="replace")
         self._status: int | None = None
@@ -62,18 +91,14 @@ class ForkedProcess:
         return self._status
 
 
-def _work_on(work: Work, write: int, parent: int) -> NoReturn:
+def _work_on(
+    work: Work, begin: Callable[[], None], mask: set[signal.Signals], parent: int
+) -> NoReturn:
     """Do the work in the child; nothing of the parent's own end is done here."""
     status = BROKEN
     try:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-        end_with_parent()
-        call_process(PROCESS_NAME)
-        for number in (1, 2):
-            os.dup2(write, number)
-        os.close(write)
-        sys.stdout, sys.stderr = (os.fdopen(n, "w", 1, closefd=False) for n in (1, 2))
+        begin()
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         if os.getppid() == parent:
             status = work() or 0
     except SystemExit as end:

@@ -1,7 +1,4 @@
-"""Start a run as a process of its own and watch it, so that an outcome is written whatever happens.
-
-Nothing but the standard library is loaded here: every run pays for this process once more.
-"""
+"""Start a run as a process of its own and watch it; an outcome is written whatever happens."""
 
 from __future__ import annotations
 

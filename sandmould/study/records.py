@@ -26,7 +26,7 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.module_main import run_main
-from sandmould.study.collect import CHECKS, read_summary
+from sandmould.study.collect import read_summary
 from sandmould.study.definition.run import Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import kind_of
@@ -35,7 +35,7 @@ from sandmould.study.packs.recorded import RECORDS, record_part
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
-from sandmould.study.plan.plan_files import FIGURES
+from sandmould.study.plan.plan_files import CHECKS, FIGURES
 from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
 
 COPIED = ("runs.tsv", "summary.tsv")

@@ -7,6 +7,7 @@ go on to Snakemake.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import sys
@@ -14,17 +15,17 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+import sandmould.runs.one_blas_thread  # noqa: F401
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BAD_INPUT_EXIT
-from sandmould.statistics.agreement import sweep_part
-from sandmould.study.collect import read_summary, swept_keys
-from sandmould.study.plan.build_plan import RESULTS, open_plan, starts_jobs, writing
-from sandmould.study.plan.trust import check_letters, check_places, check_trust
-from sandmould.study.rounds.decide import decision_text, next_runs
-from sandmould.study.rounds.round_log import read_rounds, write_rounds
+from sandmould.study.plan.batches import is_done
+from sandmould.study.plan.build_plan import RESULTS, Plan, starts_jobs, writing
+from sandmould.study.plan.handover import checked_plan, hand_over
+from sandmould.study.plan.plan_files import SUMMARY
 from sandmould.study.screen.ending import last_line, trouble
 from sandmould.study.screen.screen import Screen
-from sandmould.study.stopping import run_snakemake, until_stopped
+from sandmould.study.standby import standing_by
+from sandmould.study.stopping import run_in_group, until_stopped
 
 
 def run_study(path: Path, options: Sequence[str]) -> int:
@@ -52,43 +53,53 @@ def run_study(path: Path, options: Sequence[str]) -> int:
 
 
 def _run_study(path: Path, options: Sequence[str]) -> int:
-    plan = open_plan(path)
-    check_places(plan.study)
-    check_letters(plan.runs)
-    check_trust(plan.study, plan.runs)
+    plan = checked_plan(path)
     folder, study = RESULTS / plan.study.name, plan.study.study
-    while study.refine.rounds or study.certificate.controls:
-        if _snakemake(path, options, [str(folder / "summary.tsv")]):
-            # Stopped, or broken outside the runs: a run that fails by itself leaves its outcome.
-            return 1
-        summary = sweep_part(read_summary(folder))
-        log = next_runs(read_rounds(folder, study), study, summary, list(swept_keys(summary)))
-        write_rounds(log, folder)
-        print(f"\n{decision_text(log, study)}", file=sys.stderr, flush=True)
-        if log.ended:
-            break
-    status = _snakemake(path, options, [])
+    with _standing_by(plan, options):
+        while study.refine.rounds or study.certificate.controls:
+            if _snakemake(plan, options, [str(folder / SUMMARY)]):
+                # Stopped, or broken outside the runs: a run that fails leaves its outcome.
+                return 1
+            from sandmould.study.rounds.next_round import decide_next  # statistics: slow to import
+
+            log, decision = decide_next(study, folder)
+            print(f"\n{decision}", file=sys.stderr, flush=True)
+            plan = checked_plan(path)
+            if log.ended:
+                break
+        status = _snakemake(plan, options, [])
     if starts_jobs(options) and (said := last_line(folder)):
         print(said)
     return status
 
 
-def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> int:
-    """Call Snakemake with a study that is shown while it is computed."""
+def _standing_by(plan: Plan, options: Sequence[str]) -> contextlib.AbstractContextManager[None]:
+    """Have what runs need loaded beforehand, where jobs are on this machine and any is left."""
+    left = any(not is_done(RESULTS / plan.study.name / run.place) for run in plan.runs)
+    if left and starts_jobs(options) and not _may_be_elsewhere(options):
+        return standing_by(plan.classes.values())
+    return contextlib.nullcontext()
+
+
+def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> int:
+    """Have Snakemake compute a study that is shown meanwhile."""
     stated = stated_cores(options)
     cores = [] if stated is not None else ["--cores", str(_all_cores())]
-    workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(path.absolute())]
-    command = [sys.executable, "-m", "snakemake", *cores, *workflow, *options]
-    command += ["--", *targets] if targets else []
+    file = str(plan.study.path.absolute())
+    workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", file]
+    arguments = [*cores, *workflow, *options]
+    arguments += ["--", *targets] if targets else []
+    hand_over(plan)
+    work = partial(_be_snakemake, arguments)
     if not starts_jobs(options):
-        return run_snakemake(command)
-    plan = open_plan(path)
+        return run_in_group(work)
     with writing(RESULTS / plan.study.name):
         screen = Screen(plan, RESULTS, stated or _all_cores())
         log = screen.log.open("w", encoding="utf-8")
     with log:
         with screen:
-            status = run_snakemake(command, log, screen.environment(), screen.look)
+            elsewhere = _may_be_elsewhere(options)
+            status = run_in_group(work, log, screen.environment(), screen.look, elsewhere)
         if status == BAD_INPUT_EXIT:
             return status
         screen.tell_failures()
@@ -96,6 +107,22 @@ def _snakemake(path: Path, options: Sequence[str], targets: Sequence[str]) -> in
             for line in (*found, f"All that Snakemake said: {screen.log}"):
                 print(line, file=sys.stderr)
     return status
+
+
+def _be_snakemake(arguments: Sequence[str]) -> None:
+    """Do what ``python -m snakemake`` does, in this process, which has the plan."""
+    from snakemake.cli import main
+
+    sys.argv = ["snakemake", *arguments]
+    main()
+
+
+def _may_be_elsewhere(options: Sequence[str]) -> bool:
+    """Whether options of Snakemake may send jobs to other machines."""
+    return any(option.split("=")[0] in _ELSEWHERE for option in options)
+
+
+_ELSEWHERE = ("--executor", "-e", "--profile", "--workflow-profile")
 
 
 def stated_cores(options: Sequence[str]) -> int | None:

@@ -58,8 +58,14 @@ def provenance(scenario: Any, *arguments: str) -> dict[str, Any]:
     return provenance_of(scenario, scenario.seed, template_hash, command)
 
 
-def simulate(folder: Path) -> int:
+def simulate(folder: Path, run: Run | None = None) -> int:
     """Compute a run in this process, or as one rank of several.
+
+    Parameters
+    ----------
+    folder : Path
+    run : Run, optional
+        Read from its folder unless given.
 
     Returns
     -------
@@ -67,7 +73,7 @@ def simulate(folder: Path) -> int:
         Exit status: 0 when the outcome is written, ``RESTARTABLE_EXIT`` when the run stopped
         early with a checkpoint.
     """
-    run = read_run(folder / "scenario.yaml")
+    run = run or read_run(folder / "scenario.yaml")
     computed = kind_of(run.scenario).execution.compute(run, folder)
     if not computed.is_root:
         return 0

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import select
 import signal
-import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import FrameType
 from typing import IO
 
 from sandmould.runs.parent import end_with_parent
+from sandmould.study.forked import END_SIGNALS, Work, fork, print_to
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-_ELSEWHERE = ("--executor", "-e", "--profile", "--workflow-profile")
-"""Options of Snakemake that may send jobs to other machines."""
 GRACE_S = 30.0
 """For Snakemake to cancel its jobs there."""
 
@@ -57,10 +55,10 @@ def until_stopped(work: Callable[[], int], name: str) -> int:
 @contextlib.contextmanager
 def _stopping() -> Iterator[None]:
     """Raise ``Stopped`` at signals that ask to end; ignored ones, as under nohup, stay so."""
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    before = {number: signal.getsignal(number) for number in END_SIGNALS}
 
     def stop(number: int, frame: FrameType | None) -> None:
-        for each in _SIGNALS:  # a second Ctrl-C must not break off the end
+        for each in END_SIGNALS:  # a second Ctrl-C must not break off the end
             signal.signal(each, signal.SIG_IGN)
         raise Stopped(number)
 
@@ -74,26 +72,29 @@ def _stopping() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def run_snakemake(
-    command: Sequence[str],
+def run_in_group(
+    work: Work,
     log: IO[str] | None = None,
     environment: Mapping[str, str] | None = None,
     look: Callable[[], float] | None = None,
+    asked_first: bool = False,
 ) -> int:
-    """Run Snakemake in a group of processes of its own, which ends as a whole.
+    """Do work in a group of processes of its own, which ends as a whole.
 
     A signal of the terminal would reach every job by itself, and each would say so. Jobs on this
-    machine are killed: a run goes on from its last checkpoint, bit for bit. Where jobs may be
-    elsewhere Snakemake is asked first, which cancels them.
+    machine are killed: a run goes on from its last checkpoint, bit for bit.
 
     Parameters
     ----------
-    command : sequence of str
+    work : callable
+        What the process does that is forked from this one; gives its exit status.
     log : file, optional
         Takes all that it and its jobs print; the terminal unless given.
     environment : mapping of str to str, optional
     look : callable, optional
         Called while it runs; gives the seconds until the next call.
+    asked_first : bool
+        Whether it is first asked to end, as Snakemake must be to cancel jobs elsewhere.
 
     Returns
     -------
@@ -105,40 +106,55 @@ def run_snakemake(
     Stopped
         When a signal asked to end, after all processes ended.
     """
-    process = subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=log,
-        stderr=log,
-        env=environment,
-        process_group=0,
-        preexec_fn=partial(end_with_parent, signal.SIGKILL),
-    )
+    pid = fork(partial(_do, work, environment), partial(_begin, log))
+    with contextlib.suppress(OSError):  # it does so itself, maybe later than a signal comes
+        os.setpgid(pid, pid)
     try:
-        while not _has_ended(process, look() if look is not None else None):
+        while not _has_ended(pid, look() if look is not None else None):
             pass
-        return process.wait()
+        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     except Stopped:
-        if any(option.split("=")[0] in _ELSEWHERE for option in command):
-            _signal(process, signal.SIGINT)
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(GRACE_S)
-        _signal(process, signal.SIGKILL)
-        # Not its wait(): the signal may have come while that held a lock, which it never got free.
+        if asked_first:
+            _signal(pid, signal.SIGINT)
+            _has_ended(pid, GRACE_S)
+        _signal(pid, signal.SIGKILL)
         with contextlib.suppress(ChildProcessError):
-            os.waitpid(process.pid, 0)
+            os.waitpid(pid, 0)
         raise
 
 
-def _has_ended(process: subprocess.Popen[bytes], wait_s: float | None) -> bool:
+def _begin(log: IO[str] | None) -> None:
+    """Let a forked process be one of its own, as if a command had started it."""
+    for number in END_SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            python = number is signal.SIGINT
+            signal.signal(number, signal.default_int_handler if python else signal.SIG_DFL)
+    os.setpgid(0, 0)
+    end_with_parent(signal.SIGKILL)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    print_to(*((1, 2) if log is None else (log.fileno(), log.fileno())))
+    atexit._clear()
+
+
+def _do(work: Work, environment: Mapping[str, str] | None) -> int | None:
+    os.environ.update(environment or {})
+    try:
+        return work()
+    finally:
+        atexit._run_exitfuncs()  # a forked process ends without, and the work may have left some
+
+
+def _has_ended(pid: int, wait_s: float | None) -> bool:
     """Whether a process ends within some seconds; waits for it without a limit for None."""
-    end = os.pidfd_open(process.pid)
+    end = os.pidfd_open(pid)
     try:
         return bool(select.select([end], [], [], wait_s)[0])
     finally:
         os.close(end)
 
 
-def _signal(process: subprocess.Popen[bytes], number: signal.Signals) -> None:
+def _signal(group: int, number: signal.Signals) -> None:
     with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, number)
+        os.killpg(group, number)

@@ -12,7 +12,6 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.plan.price import END_S, Piece, Prices, ratios_of, spread_s
-from sandmould.study.run_tables import read_costs
 
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
 
@@ -84,6 +83,8 @@ class TimeLeft:
 
 def computed_wall_s(folder: Path) -> float:
     """Wall time that a finished run's computation took; NaN where it failed or none is written."""
+    from sandmould.study.run_tables import read_costs  # pandas: no start waits for it
+
     with contextlib.suppress(*_DAMAGED):
         if RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED:
             return float(read_costs([folder]).rows[WALL_S].iloc[-1])

@@ -73,7 +73,7 @@ def test_lammps_is_not_started_where_it_cannot_read_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     started: list[object] = []
-    monkeypatch.setattr(run_study, "run_snakemake", lambda command, *_: started.append(command))
+    monkeypatch.setattr(run_study, "run_in_group", lambda work, *_: started.append(work))
     folder = tmp_path / "\u00fcbung"
     folder.mkdir()
     monkeypatch.chdir(folder)

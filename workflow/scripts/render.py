@@ -1,10 +1,6 @@
 """Render the deck of one run."""
 
-from pathlib import Path
-
 import sandmould.runs.silent_interrupt  # noqa: F401
-from sandmould.study.job_log import to_log
-from sandmould.study.simulate import render_run
+from sandmould.study.standby import do_job
 
-with to_log(snakemake.log[0]):
-    render_run(Path(snakemake.input.scenario).parent)
+do_job("render_run", snakemake.input.scenario, snakemake.log[0])

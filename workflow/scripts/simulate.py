@@ -1,13 +1,12 @@
 """Compute one run in a process of its own."""
 
-from pathlib import Path
-
 import sandmould.runs.silent_interrupt  # noqa: F401
-from sandmould.study.process import launch
+from sandmould.study.standby import do_job
 
-launch(
-    Path(snakemake.input.scenario).parent,
-    Path(snakemake.log[0]),
+do_job(
+    "simulate_run",
+    snakemake.input.scenario,
+    snakemake.log[0],
     snakemake.resources.tasks,
     snakemake.resources.mpi,
 )

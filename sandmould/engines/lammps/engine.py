@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from importlib import metadata
 from pathlib import Path
 
@@ -58,6 +59,12 @@ def session_sources(scenario: Scenario) -> list[Path]:
         return session
     callback = [here / name for name in ("bridge.py", "callback.py", "surface_kernel.py")]
     return [*source_files(), *session, *callback, here.parent / "solid_surfaces.py"]
+
+
+def load_session(scenario: Scenario) -> None:
+    """Import the kernels that LAMMPS calls; itself it begins in a run's own process."""
+    if needs_callback(scenario):
+        importlib.import_module("sandmould.engines.lammps.surface_kernel")
 
 
 def open_session(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
@@ -35,6 +34,8 @@ class _Solid:
 
 
 def _solid(block: Block) -> _Solid:
+    from scipy.spatial.transform import Rotation  # no plan needs it
+
     d = len(block.centre_m)
     low, high = block.centre_m - block.half_size_m, block.centre_m + block.half_size_m
     bounds = " ".join(f"{exact(a)} {exact(b)}" for a, b in zip(low, high, strict=True))

@@ -56,6 +56,10 @@ def session_sources(scenario: Scenario) -> list[Path]:
     return [Path(__file__).with_name(name) for name in names]
 
 
+def load_session(scenario: Scenario) -> None:
+    """Import nothing more: LIGGGHTS is a program of its own."""
+
+
 def open_session(
     program: Program, folder: Path, log: Path, checkpoint: Path | None = None
 ) -> LiggghtsSession:

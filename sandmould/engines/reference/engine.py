@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sandmould.dem import source_files, source_hash
 from sandmould.engines.capabilities import Capabilities
@@ -12,12 +14,13 @@ from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
 from sandmould.engines.ranks import Ranks
-from sandmould.engines.reference.model import surfaces_of
-from sandmould.engines.reference.session import ReferenceSession
 from sandmould.scenario.contact import SYMBOLS
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
+
+if TYPE_CHECKING:
+    from sandmould.engines.reference.session import ReferenceSession
 
 GRAIN_STEPS_PER_S = 1.5e7
 RANKS = Ranks.THREADS
@@ -58,6 +61,8 @@ def session_sources(scenario: Scenario) -> list[Path]:
 
 def render_deck(program: Program, sources: Mapping[str, str], run: str, study: str) -> Deck:
     """Render the list of what the solver is given."""
+    from sandmould.engines.reference.model import surfaces_of  # numba: no plan waits for it
+
     scenario = program.scenario
     d = scenario.dimension
     keys = [("gravity", "gravity_m_s2"), ("density", "sand.density_kg_m3")]
@@ -109,9 +114,16 @@ def _write_layer(layer: PlannedLayer, path: Path, d: int) -> None:
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
 
 
+def load_session(scenario: Scenario) -> None:
+    """Import the solver."""
+    importlib.import_module("sandmould.engines.reference.session")
+
+
 def open_session(
     program: Program, folder: Path, log: Path, checkpoint: Path | None = None
 ) -> ReferenceSession:
     """Open a session, afresh or from a checkpoint; the deck is for people alone."""
+    from sandmould.engines.reference.session import ReferenceSession
+
     log.unlink(missing_ok=True)  # the solver says nothing; a pattern in its steps begins a log
     return ReferenceSession(program, checkpoint)

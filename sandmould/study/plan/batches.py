@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,11 +44,14 @@ def planned_wall_s(run: Run) -> float:
     return START_S + predicted_s(run)
 
 
-def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Batch]:
+def plan_batches(
+    runs: Sequence[Run], wall_s: float, cores: int = 1, free_cores: int = 0, least: int = 1
+) -> list[Batch]:
     """Share runs out among jobs.
 
     A batch is closed once it is predicted to last long enough. Its name is that of its first run,
-    so that runs that are appended later move nothing but the last batch.
+    so that runs that are appended later move nothing but the last batch. Where it is known how many
+    cores are free, batches are made so much shorter that all cores end together.
 
     Parameters
     ----------
@@ -56,30 +60,62 @@ def plan_batches(runs: Sequence[Run], wall_s: float, cores: int = 1) -> list[Bat
     cores : int
         That a job should have; runs that leave some of them free are computed side by side. One
         run under MPI has a job's cores for itself.
+    free_cores : int
+        That jobs find free; 0 where that is not known, as on a cluster.
+    least : int
+        Runs that a batch should have, where it is made shorter.
     """
-    batches: list[Batch] = []
-    waiting: dict[_Alike, list[Run]] = {}
-    filled: dict[_Alike, float] = {}
-
-    def beside(alike: _Alike) -> int:
-        return 1 if alike.ranks > 1 else max(1, cores // alike.threads)
-
-    def close(alike: _Alike) -> None:
-        chosen = waiting.pop(alike)
-        filled.pop(alike)
-        batches.append(Batch(chosen[0].run, tuple(chosen), min(beside(alike), len(chosen))))
-
+    alike: dict[_Alike, list[Run]] = {}
     for run in runs:
         planning, scenario = kind_of(run.scenario).planning, run.scenario
         engine, _ = planning.speed_class(scenario)
-        alike = _Alike(engine, planning.threads(scenario), planning.ranks(scenario))
-        waiting.setdefault(alike, []).append(run)
-        filled[alike] = filled.get(alike, 0.0) + planned_wall_s(run)
-        if filled[alike] >= wall_s * beside(alike):
-            close(alike)
-    for alike in list(waiting):
-        close(alike)
+        key = _Alike(engine, planning.threads(scenario), planning.ranks(scenario))
+        alike.setdefault(key, []).append(run)
+    batches = []
+    for key, chosen in alike.items():
+        beside = 1 if key.ranks > 1 else max(1, cores // key.threads)
+        at_once = free_cores // (key.threads * beside)
+        parts = _filled(chosen, wall_s * beside)
+        if at_once:
+            long, short = _apart(chosen, wall_s * beside)
+            parts = [*([run] for run in long), *_even(short, len(parts), at_once, least)]
+        batches += [Batch(part[0].run, tuple(part), min(beside, len(part))) for part in parts]
     return batches
+
+
+def _filled(runs: Sequence[Run], wall_s: float) -> list[list[Run]]:
+    """Parts that last long enough, but for the last one."""
+    parts: list[list[Run]] = []
+    filled_s = math.inf
+    for run in runs:
+        if filled_s >= wall_s:
+            parts.append([])
+            filled_s = 0.0
+        parts[-1].append(run)
+        filled_s += planned_wall_s(run)
+    return parts
+
+
+def _apart(runs: Sequence[Run], wall_s: float) -> tuple[list[Run], list[Run]]:
+    """Runs that last long enough by themselves, and the others."""
+    long = [run for run in runs if planned_wall_s(run) >= wall_s]
+    return long, [run for run in runs if planned_wall_s(run) < wall_s]
+
+
+def _even(runs: Sequence[Run], parts: int, at_once: int, least: int) -> list[list[Run]]:
+    """Parts that last equally long, at least so many, each core as many as every other."""
+    if not runs:
+        return []
+    wanted = at_once * math.ceil(parts / at_once)
+    number = max(1, min(wanted, len(runs) // least))
+    whole_s = sum(planned_wall_s(run) for run in runs)
+    even: list[list[Run]] = [[] for _ in range(number)]
+    passed_s = 0.0
+    for run in runs:
+        lasts_s = planned_wall_s(run)
+        even[int((passed_s + lasts_s / 2) / whole_s * number)].append(run)
+        passed_s += lasts_s
+    return [part for part in even if part]
 
 
 def mark_done(batches: Iterable[Batch], lacking: Container[str], folder: Path) -> None:

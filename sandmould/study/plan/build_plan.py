@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -59,15 +59,27 @@ class Plan:
     def _by_name(self) -> dict[str, Run]:
         return {run.run: run for run in (*self.runs, *self.fills)}
 
-    def batches(self, wall_s: float, least: int = 1, cores: int = 1) -> list[Batch]:
+    def batches(
+        self,
+        wall_s: float,
+        least: int = 1,
+        cores: int = 1,
+        free_cores: int = 0,
+        lacking: Container[str] = (),
+    ) -> list[Batch]:
         """Runs that share a job of so many cores until it lasts so long; none for 0.
 
-        Batches of fewer than ``least`` runs are left out: those runs have jobs of their own.
+        Batches of fewer than ``least`` runs are left out: those runs have jobs of their own. Runs
+        that lack something are ``lacking``; they are shared out by themselves, and evenly among
+        ``free_cores`` where there are any.
         """
         if wall_s <= 0:
             return []
-        apart = self.fills, self.runs
-        batches = (batch for runs in apart for batch in plan_batches(runs, wall_s, cores))
+        left = [run for run in self.runs if run.run in lacking]
+        whole = [run for run in self.runs if run.run not in lacking]
+        batches = plan_batches(whole, wall_s, cores)
+        for runs in (self.fills, left):
+            batches += plan_batches(runs, wall_s, cores, free_cores, least)
         return [batch for batch in batches if len(batch.runs) >= least]
 
     def threads(self, name: str) -> int:
@@ -241,8 +253,21 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
     return f"\n{title}\n{price(plan, results, cores)}"
 
 
-def prepare(plan: Plan, results: Path, batches: Sequence[Batch] = ()) -> str:
+def prepare(
+    plan: Plan,
+    results: Path,
+    batches: Sequence[Batch] = (),
+    found: dict[str, Lack] | None = None,
+) -> str:
     """Note for Snakemake what each run lacks, and which batches lack nothing.
+
+    Parameters
+    ----------
+    plan : Plan
+    results : Path
+    batches : sequence of Batch
+    found : dict, optional
+        What runs lack; ``plan.lacks`` says so unless it is given.
 
     Returns
     -------
@@ -256,7 +281,7 @@ def prepare(plan: Plan, results: Path, batches: Sequence[Batch] = ()) -> str:
     """
     folder = results / plan.study.name
     with writing(folder):
-        found = plan.lacks(results)
+        found = plan.lacks(results) if found is None else found
         said = note_lacks([*plan.fills, *plan.runs], found, folder)
         mark_done(batches, found, folder)
         return said

@@ -26,6 +26,9 @@ from sandmould.study.plan.price import Prices, study_s
 
 STUDY_FILE = "study.yaml"
 """The study as planned, with all that it rests on."""
+SUMMARY, CURVES = "summary.tsv", "curves.tsv"
+CHECKS = ("summary_checks.tsv", "curves_checks.tsv")
+"""Tables of the runs that are no part of the sweep; only studies that have such runs."""
 REPORT_FILE = "report.html"
 VERDICT_FILE = "verdict.txt"
 """The first sentence of the report, for the terminal and for programs."""

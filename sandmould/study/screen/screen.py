@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.live import Live
@@ -15,10 +16,12 @@ from sandmould.runs.progress import duration_text
 from sandmould.runs.words import Words
 from sandmould.study.plan.build_plan import Plan, stored_speeds
 from sandmould.study.screen.run_watch import Ended, Running, RunWatch, failure, file_time_s
-from sandmould.study.screen.so_far import SoFar
 from sandmould.study.screen.table import counts_text, study_table, times_text
 from sandmould.study.screen.view import RunView, StudyView
 from sandmould.study.time_left import TimeLeft, computed_wall_s
+
+if TYPE_CHECKING:
+    from sandmould.study.screen.so_far import SoFar
 
 LOOK_EVERY_S = 1.0
 SHARE_OF_TIME = 0.02
@@ -70,8 +73,7 @@ class Screen:
         self._told: set[str] = set()
         self._done = len(whole) - len(self.failures)
         self._ended: list[Ended] = []
-        self._so_far = SoFar(plan.study.study, self._folder)
-        self._so_far.add(whole)
+        self._so_far: SoFar | None = None
         self._time_left: TimeLeft | None = None
         self._whole = whole
         self._begun_s = time.monotonic()
@@ -147,7 +149,7 @@ class Screen:
         self._time_left_known().learn(run, computed_wall_s(self._folders[run]))
 
     def _end(self, run: Ended) -> None:
-        self._so_far.add([run.run])
+        self._so_far_known().add([run.run])
         if run.said:
             self.failures.append(run)
         else:
@@ -162,6 +164,15 @@ class Screen:
             for run in self._whole:
                 self._learn(run)
         return self._time_left
+
+    def _so_far_known(self) -> SoFar:
+        """What judges the runs: made once one has ended, since it waits for a library of tables."""
+        if self._so_far is None:
+            from sandmould.study.screen.so_far import SoFar
+
+            self._so_far = SoFar(self._plan.study.study, self._folder)
+            self._so_far.add(self._whole)
+        return self._so_far
 
     def _view(self) -> StudyView:
         time_left, running = self._time_left_known(), self._watch.running
@@ -185,7 +196,7 @@ class Screen:
             passed_s=passed_s,
             left_s=left_s,
             share=passed_s / (passed_s + left_s) if passed_s + left_s else 0.0,
-            so_far=self._so_far.sentence(),
+            so_far=self._so_far_known().sentence() if self._done or self.failures else "",
             ended=tuple(self._ended),
             failures=tuple(self.failures),
         )
@@ -201,11 +212,11 @@ class Screen:
     def _lines(self, ended: list[Ended]) -> None:
         """Plain lines: each run that has ended, and now and then the whole study."""
         if ended:
-            self._so_far.sentence(force=True)
+            self._so_far_known().sentence(force=True)
         total = len(self._plan.runs)
         before = self._done + len(self.failures) - len(ended)
         for number, run in enumerate(ended, before + 1):
-            value = self._so_far.value_text(run.run)
+            value = self._so_far_known().value_text(run.run)
             how = f"failed: {run.said}" if run.said else ", ".join(filter(None, ["done", value]))
             self._print(f"[{number}/{total}] {run.run} {how}")
             self._told.add(run.run)

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from sandmould.scenario import mesh_file
+from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.limits import TRIANGLES
 from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.mesh_file import MeshFileError, read_surface
+from sandmould.scenario.mesh_file import read_surface
 from tests.bracket import BRACKET
 from tests.fuzz.readers import CORPUS
 from tests.unit.meshes import CORNERS, CUBE, FACETS, SHIPPED

@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from analysis.mesh_parts import sphere_mesh_m3
 from sandmould.casting.arpm.raster import painted
+from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.geometry import Block
 from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.mesh_file import MeshFileError, filled_shells, read_surface
+from sandmould.scenario.mesh_file import filled_shells, read_surface
 from tests.unit.meshes import CORNERS, FACETS
 from tests.unit.scenario.test_mesh_file import write_stl
 

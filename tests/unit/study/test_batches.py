@@ -106,7 +106,7 @@ class Jobs:
     def render(self, run: Run, folder: Path) -> None:
         (folder / "deck.in").write_text("run 1\n")
 
-    def compute(self, run: Run, folder: Path, log: Path) -> None:
+    def compute(self, run: Run, folder: Path, log: Path, and_measure: bool) -> None:
         if folder.name == self.stops:
             raise SystemExit(f"{folder} stopped early: the same command continues it.")
         self.computed.append(folder.name)

@@ -18,7 +18,7 @@ from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import NEAR, propose
 from sandmould.study import run_study
 from sandmould.study.collect import collect
-from sandmould.study.plan.build_plan import announce, open_plan
+from sandmould.study.plan.build_plan import Plan, announce
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.rounds.decide import decision_text, next_round, why_enough
@@ -232,9 +232,8 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
     calls: list[list[str]] = []
     computed: list[str] = []
 
-    def snakemake(path: Path, options: list[str], targets: list[str]) -> int:
+    def snakemake(plan: Plan, options: list[str], targets: list[str]) -> int:
         calls.append(targets)
-        plan = open_plan(path)
         announce(plan, Path("results"), 1)
         for run in plan.runs:
             folder = Path("results/trial/runs") / run.run

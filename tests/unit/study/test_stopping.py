@@ -22,8 +22,8 @@ except KeyboardInterrupt:
 """
 COMMAND = f"""
 import sys
-from sandmould.study.stopping import run_snakemake, until_stopped
-sys.exit(until_stopped(lambda: run_snakemake([sys.executable, "-c", {STARTED!r}]), "mine"))
+from sandmould.study.stopping import run_in_group, until_stopped
+sys.exit(until_stopped(lambda: run_in_group(lambda: exec({STARTED!r})), "mine"))
 """
 
 

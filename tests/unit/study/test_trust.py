@@ -14,6 +14,7 @@ from sandmould.cli.commands import app
 from sandmould.engines.own_deck.scan import findings, to_read
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study import run_study
+from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.trust import check_trust, reading_help
@@ -114,7 +115,12 @@ def test_a_deck_below_the_study_s_folder_needs_no_key(folder: Path) -> None:
 def test_a_foreign_deck_does_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     started: list[Path] = []
-    monkeypatch.setattr(run_study, "_snakemake", lambda path, *_: started.append(path) or 0)
+
+    def snakemake(plan: Plan, *_: object) -> int:
+        started.append(plan.study.path)
+        return 0
+
+    monkeypatch.setattr(run_study, "_snakemake", snakemake)
     path = study_file(tmp_path)
     said = CliRunner().invoke(app, ["run", str(path)])
     assert said.exit_code == 1

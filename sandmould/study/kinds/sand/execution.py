@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import tempfile
 from pathlib import Path
 
 from sandmould.engines import recording, registry
@@ -64,7 +65,7 @@ def measure(run: Run, folder: Path) -> None:
 
 def load_computing(scenario: Scenario) -> None:
     """Import the engine's side of the house, and the pattern's where there is one."""
-    registry.engine_of(scenario)
+    registry.engine_of(scenario).load_session(scenario)
     if scenario.time_step.bed_fraction is not None:
         importlib.import_module("sandmould.engines.reference.exact_limit")
     if scenario.pattern is not None:
@@ -73,7 +74,11 @@ def load_computing(scenario: Scenario) -> None:
 
 def load_measuring(scenario: Scenario) -> None:
     """Import what measures and draws."""
-    importlib.import_module("sandmould.study.kinds.sand.measure")
+    from sandmould.study.kinds.sand.measure import write_picture
+
+    # The first picture loads fonts, which every forked process would do again.
+    with tempfile.TemporaryDirectory() as name:
+        write_picture(scenario, Path(name), Path(name) / "first.png")
     if scenario.pattern is not None:
         importlib.import_module("sandmould.study.kinds.sand.bent_files")
 

@@ -30,7 +30,8 @@ def stored_rate(scenario: Scenario, results: Path) -> float | None:
     results : Path
         Folder of all results, which holds what was measured.
     """
-    return _rates(results).get(_machine(scenario))
+    rates = _rates(results)
+    return rates.get(_machine(scenario)) if rates else None
 
 
 def measured_rate(scenario: Scenario, results: Path) -> float | None:
