@@ -172,7 +172,7 @@ def _render(
         verdict,
         film_budget_bytes,
         page.href,
-        page.by_setting,
+        {label: scenario for label, (scenario, _) in page.by_setting.items()},
     )
     method: tuple[Row, ...] = (
         *of_kind.method,
