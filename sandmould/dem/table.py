@@ -24,7 +24,7 @@ from sandmould.dem.steps import DONE, DemScene, Moving, Team, advance
 from sandmould.dem.vectors import OPTIONS, dot, load
 
 
-class Table(NamedTuple):
+class MountedTable(NamedTuple):
     """What the motion of a table depends on, beside its drive."""
 
     mass_kg: float
@@ -57,13 +57,19 @@ def sand_force(dim: Any, force: Floats, direction: Any) -> float:
 
 @njit(**OPTIONS)
 def next_place(
-    table: Table, before: float, now: float, push: float, damping: float, sand: float, dt: float
+    table: MountedTable,
+    before: float,
+    now: float,
+    push: float,
+    damping: float,
+    sand: float,
+    dt: float,
 ) -> float:
     """Place of the table one step on.
 
     Parameters
     ----------
-    table : Table
+    table : MountedTable
     before, now : float, m
         Its places one step ago and now.
     push, sand : float, N
@@ -84,7 +90,7 @@ def _advance(
     drifted: bool,
     scene: DemScene,
     moving: Moving,
-    table: Table,
+    table: MountedTable,
     drive: TableDrive,
     place: Floats,
     half_skin: float,
@@ -119,18 +125,18 @@ def _advance(
 class TableSolver(Solver):
     """A solver whose box may stand on a table that the grains push."""
 
-    _table: tuple[Table, TableDrive] | None = None
+    _table: tuple[MountedTable, TableDrive] | None = None
     """While the table moves."""
     table_places_m: Floats = np.zeros(2)
     """(2,) float64, m: of the table one step ago and now, along its direction; 0 where it stands
     with the resting grains on it."""
 
-    def advance_on_table(self, table: Table, drive: TableDrive) -> Floats:
+    def advance_on_table(self, table: MountedTable, drive: TableDrive) -> Floats:
         """Compute steps in which the table moves freely.
 
         Parameters
         ----------
-        table : Table
+        table : MountedTable
         drive : TableDrive
             Its length is the number of steps.
 
@@ -153,7 +159,7 @@ class TableSolver(Solver):
         self.table_places_m = places[-2:].copy()
         return places
 
-    def next_table_place_m(self, table: Table, push_n: float, damping_kg_s: float) -> float:
+    def next_table_place_m(self, table: MountedTable, push_n: float, damping_kg_s: float) -> float:
         """Where the table will be one step on, m."""
         before, now = self.table_places_m
         sand = sand_force(self._dim, self.grains.force, self.scene.direction)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sandmould.dem.table import Table, TableDrive
+from sandmould.dem.table import MountedTable, TableDrive
 from sandmould.engines.program import Program, Stage
 from sandmould.scenario.geometry import Array
 from sandmould.scenario.scenario import Scenario
@@ -26,15 +26,15 @@ class TableMotion:
 
     @property
     def unbalance(self) -> Unbalance:
-        """Table and rotating masses."""
+        """MountedTable and rotating masses."""
         assert self.vibration.unbalance is not None
         return self.vibration.unbalance
 
-    def table(self, scenario: Scenario, weight_n: float) -> Table:
+    def table(self, scenario: Scenario, weight_n: float) -> MountedTable:
         """The table under sand of a weight."""
         direction = self.vibration.unit_direction(scenario.dimension)
         unbalance = self.unbalance
-        return Table(
+        return MountedTable(
             unbalance.moving_mass_kg,
             unbalance.stiffness_n_m,
             scenario.sand_share(unbalance),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandmould.dem.table import Table, TableDrive
+from sandmould.dem.table import MountedTable, TableDrive
 from sandmould.scenario.geometry import Array
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 
@@ -59,13 +59,13 @@ class Window(NamedTuple):
 
 
 def window_of(
-    table: Table, drive: TableDrive, places_m: Array, times_s: Array, step_s: float
+    table: MountedTable, drive: TableDrive, places_m: Array, times_s: Array, step_s: float
 ) -> Window:
     """Accelerations and works of every step, which sum to the change of energy but for round-off.
 
     Parameters
     ----------
-    table : Table
+    table : MountedTable
     drive : TableDrive
     places_m : (steps + 2,) float64, m
     times_s : (steps,) float64, s

@@ -14,7 +14,7 @@ from sandmould.scenario.drive import (
     ACCELERATION,
     DISPLACEMENT,
     VELOCITY,
-    Drive,
+    BoxDrive,
     laid_down_drive,
 )
 from sandmould.scenario.scenario import Scenario
@@ -22,7 +22,7 @@ from sandmould.scenario.scenario import Scenario
 _COLUMNS = (DISPLACEMENT, VELOCITY, ACCELERATION)
 
 
-def drive_of(scenario: Scenario, runs: pd.DataFrame) -> Drive | None:
+def drive_of(scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
     """Drive of the first vibration of a setting; None where there is none, or none was measured.
 
     Parameters
@@ -39,7 +39,7 @@ def drive_of(scenario: Scenario, runs: pd.DataFrame) -> Drive | None:
         return laid_down_drive(stage)
     measured = runs.loc[finished(runs), DISPLACEMENT] if DISPLACEMENT in runs else pd.Series()
     displacement_m = float(pd.to_numeric(measured).mean())
-    return Drive(stage.frequency_hz, displacement_m) if math.isfinite(displacement_m) else None
+    return BoxDrive(stage.frequency_hz, displacement_m) if math.isfinite(displacement_m) else None
 
 
 def drive_at(

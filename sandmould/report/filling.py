@@ -16,7 +16,7 @@ from sandmould.report.curves import reported_lines, runs_by_setting, runs_of
 from sandmould.report.drive import drive_of
 from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
-from sandmould.scenario.drive import Drive
+from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred
 from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
@@ -86,7 +86,7 @@ def _shaken(collected: Collected, measure: str) -> pd.DataFrame:
     return during_vibration(curves[curves[RUN].isin(used)])
 
 
-def _drive(drive: Drive, best: Setting) -> str:
+def _drive(drive: BoxDrive, best: Setting) -> str:
     return (
         f"At {best.label} the box moves {number(1e3 * drive.displacement_m)} mm to either side at "
         f"{number(drive.frequency_hz)} Hz: {number(1e3 * drive.velocity_m_s)} mm/s and "

@@ -37,7 +37,7 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import name_of, number, seconds, size, titled, with_margin
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.drive import Drive
+from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.evidence import NOT_FINISHED, left_out, reason_text
 from sandmould.statistics.verdict import Verdict
@@ -150,13 +150,13 @@ def _total(summary: pd.DataFrame, column: str, how: str) -> float | None:
     return value if math.isfinite(value) and value else None
 
 
-def settings_table(verdict: Verdict, drives: Mapping[str, Drive]) -> Table:
+def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
     """Every setting with its mean, and the best against it.
 
     Parameters
     ----------
     verdict : Verdict
-    drives : mapping of str to Drive
+    drives : mapping of str to BoxDrive
         That of the vibrating table at a setting, by label.
     """
     drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if drives else ()
@@ -203,7 +203,7 @@ def _p_text(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
-def _drive_cells(drive: Drive | None, shaken: bool) -> tuple[Cell, ...]:
+def _drive_cells(drive: BoxDrive | None, shaken: bool) -> tuple[Cell, ...]:
     """Amplitudes of displacement, velocity and acceleration."""
     if not shaken:
         return ()

@@ -23,7 +23,7 @@ STEADY_SHARE = 0.5
 
 
 @dataclass(frozen=True)
-class Drive:
+class BoxDrive:
     """A sinusoidal motion of the box."""
 
     frequency_hz: float
@@ -50,14 +50,14 @@ class Drive:
         }
 
 
-def laid_down_drive(stage: VibrationStage) -> Drive:
+def laid_down_drive(stage: VibrationStage) -> BoxDrive:
     """The motion at full amplitude of a stage that lays it down."""
-    return Drive(stage.frequency_hz, stage.amplitude_m)
+    return BoxDrive(stage.frequency_hz, stage.amplitude_m)
 
 
 def steady_drive(
     frequency_hz: float, displacement_m: NDArray[np.float64], phase_deg: NDArray[np.float64]
-) -> Drive:
+) -> BoxDrive:
     """The steady motion of a table on mounts.
 
     Parameters
@@ -68,10 +68,10 @@ def steady_drive(
 
     Returns
     -------
-    Drive
+    BoxDrive
         Mean over the periods of the second half, phases included: what changes its phase from
         period to period is no motion of the drive's frequency.
     """
     first = int(len(displacement_m) * (1 - STEADY_SHARE))
     waves = displacement_m[first:] * np.exp(-1j * np.radians(phase_deg[first:]))
-    return Drive(frequency_hz, float(abs(waves.mean())))
+    return BoxDrive(frequency_hz, float(abs(waves.mean())))

@@ -12,7 +12,7 @@ import numpy as np
 
 from sandmould.dem import source_hash
 from sandmould.dem.solver import NotANumberError
-from sandmould.dem.table import Table
+from sandmould.dem.table import MountedTable
 from sandmould.engines.box_motion import displacements
 from sandmould.engines.program import Program
 from sandmould.engines.reference.model import grains_of, scene_of, solver_of
@@ -115,7 +115,7 @@ class ReferenceSession(StagedSession):
         if self.steps % self._counts.check == 0:
             self._loads = self.solver.mean_loads(self._counts.check)
 
-    def _table(self) -> Table:
+    def _table(self) -> MountedTable:
         assert self._motion is not None
         return self._motion.table(self._scenario, self._weight_n())
 

@@ -17,7 +17,7 @@ from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.kinds.sand import SAND_REPORT
 from sandmould.report.kinds.solidification import SOLIDIFICATION_REPORT
 from sandmould.report.robustness import RobustnessPages
-from sandmould.scenario.drive import Drive
+from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
@@ -68,7 +68,7 @@ def kind_pages(
 
 def drives_of(
     by_setting: Mapping[str, tuple[AnyScenario, pd.DataFrame]],
-) -> dict[str, Drive]:
+) -> dict[str, BoxDrive]:
     """Drives of the settings that have a vibrating table, by label.
 
     Parameters

@@ -10,7 +10,7 @@ import pytest
 from sandmould.dem import pairs as pairs_module
 from sandmould.dem.motion import NONE, Damping
 from sandmould.dem.steps import DemScene
-from sandmould.dem.table import Table, TableDrive, TableSolver, sand_force
+from sandmould.dem.table import MountedTable, TableDrive, TableSolver, sand_force
 from sandmould.dem.vectors import dim_of
 from tests.unit.dem.test_solver import LAW, STEP_S, box, cloud
 
@@ -28,7 +28,7 @@ def table_solver(dimension: int, box_frame: bool, threads: int = 1) -> TableSolv
     return made
 
 
-def drive(first: int, steps: int, table: Table) -> TableDrive:
+def drive(first: int, steps: int, table: MountedTable) -> TableDrive:
     """A push of 100 Hz that throws the grains, and a brake that comes on."""
     n = np.arange(first, first + steps)
     return TableDrive(
@@ -36,9 +36,9 @@ def drive(first: int, steps: int, table: Table) -> TableDrive:
     )
 
 
-def table_of(solver: TableSolver) -> Table:
+def table_of(solver: TableSolver) -> MountedTable:
     mass_kg = float(solver.grains.mass.sum())
-    return Table(2.0 * mass_kg, 2.0 * mass_kg * 100.0**2, 1.5, -9.81 * mass_kg)
+    return MountedTable(2.0 * mass_kg, 2.0 * mass_kg * 100.0**2, 1.5, -9.81 * mass_kg)
 
 
 def shaken(solver: TableSolver, *windows: int) -> np.ndarray:

@@ -8,7 +8,7 @@ import pytest
 
 from sandmould.report.drive import amplitudes_text, drive_at, drive_of
 from sandmould.runs.columns import OUTCOME_CODE
-from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY, Drive
+from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY, BoxDrive
 from sandmould.scenario.scenario import Scenario
 
 KEY = "vibration.0.frequency_hz"
@@ -20,7 +20,7 @@ def runs(frequencies_hz: list[float], power: float = -2.0) -> pd.DataFrame:
     rows = []
     for frequency_hz in frequencies_hz:
         for share in (0.8, 1.2):
-            drive = Drive(frequency_hz, share * 1e-3 * (frequency_hz / 50.0) ** power)
+            drive = BoxDrive(frequency_hz, share * 1e-3 * (frequency_hz / 50.0) ** power)
             rows.append({KEY: frequency_hz, OUTCOME_CODE: 0, **drive.columns()})
     return pd.DataFrame(rows)
 
@@ -28,7 +28,7 @@ def runs(frequencies_hz: list[float], power: float = -2.0) -> pd.DataFrame:
 def test_between_settings_a_held_acceleration_stays_held() -> None:
     found = drive_at(runs([20.0, 40.0, 80.0]), [KEY], {KEY: 57.0})
     assert found is not None
-    exact = Drive(57.0, 1e-3 * (57.0 / 50.0) ** -2)
+    exact = BoxDrive(57.0, 1e-3 * (57.0 / 50.0) ** -2)
     assert found == pytest.approx(exact.columns())
     assert amplitudes_text(found) == "0.769 mm to either side, 276 mm/s and 10.1 g"
 
@@ -60,4 +60,4 @@ def test_a_table_on_mounts_is_shown_as_measured() -> None:
     assert drive_of(scenario, runs([50.0]).drop(columns=DISPLACEMENT)) is None
     assert drive_of(Scenario(), runs([50.0])) is None
     laid_down = Scenario.model_validate({"vibration": [{"acceleration_g": 1.5}]})
-    assert drive_of(laid_down, runs([50.0])) == Drive(50.0, laid_down.vibrations[0].amplitude_m)
+    assert drive_of(laid_down, runs([50.0])) == BoxDrive(50.0, laid_down.vibrations[0].amplitude_m)

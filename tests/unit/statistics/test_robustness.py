@@ -71,6 +71,24 @@ def test_what_is_held_changes_nothing_at_the_best_frequency(tmp_path: Path) -> N
             assert ratio == pytest.approx((f / BEST_HZ) ** power)
 
 
+def test_a_sweep_with_an_unbalance_is_compared_with_motions_laid_down(tmp_path: Path) -> None:
+    table = {
+        "moment_kg_m": 0.006, "moving_mass_kg": 30, "mount_frequency_hz": 6, "flask_depth_m": 0.5,
+    }  # fmt: skip
+    stage = {"hold": "unbalance", "unbalance": table, "duration_s": 1}
+    study = opened(tmp_path, scenario={"engine": {"name": "reference"}, "vibration": [stage]})
+    found = {part: case for part, case in by_part(study).items() if "hold" in part}
+    assert len(found) == 3
+    swept = study.study.scenario.vibrations[0].model_copy(update={"frequency_hz": BEST_HZ})
+    for case in found.values():
+        (new,) = case.change(study.study.scenario).vibrations
+        at_best = new.model_copy(update={"frequency_hz": BEST_HZ})
+        assert new.unbalance is None
+        assert at_best.amplitude_m == pytest.approx(swept.amplitude_m)
+        # sand on a table changes its amplitude, so that the middle frequency differs too
+        assert case.places == (0, 1, 2)
+
+
 def test_each_control_changes_what_it_is_named_after(tmp_path: Path) -> None:
     study = opened(tmp_path)
     old = study.study.scenario

@@ -9,12 +9,12 @@ import pandas as pd
 
 from sandmould.runs.columns import STAGE, VIBRATION_TIME_S
 from sandmould.runs.products import TABLE_PERIODS
-from sandmould.scenario.drive import Drive, laid_down_drive, steady_drive
+from sandmould.scenario.drive import BoxDrive, laid_down_drive, steady_drive
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 from sandmould.scenario.vibration import VibrationStage
 
-_NO_DRIVE = Drive(np.nan, np.nan)
+_NO_DRIVE = BoxDrive(np.nan, np.nan)
 
 
 def add_drive(scenario: Scenario, table: pd.DataFrame, folder: Path) -> pd.DataFrame:
@@ -51,7 +51,9 @@ def add_drive(scenario: Scenario, table: pd.DataFrame, folder: Path) -> pd.DataF
     return pd.concat([table, columns], axis=1)
 
 
-def _drive(name: str, stage: VibrationStage, time_s: float, periods: pd.DataFrame | None) -> Drive:
+def _drive(
+    name: str, stage: VibrationStage, time_s: float, periods: pd.DataFrame | None
+) -> BoxDrive:
     """Amplitudes of a stage up to a time of vibration."""
     if stage.unbalance is None:
         return laid_down_drive(stage)
