@@ -13,7 +13,7 @@ AGREES, DIFFERS, UNRESOLVED = "agrees", "differs", "not resolved"
 POSSIBLE = "not ruled out"
 NO_INTERVAL = "no interval"
 TAKEN = "taken over"
-NOT_COMPUTED = "not computed"
+NOT_COMPUTED, NOT_COMPARED = "not computed", "not compared"
 PICTURE = "picture"
 WORDS = "in words"
 TESTED = "tested"
@@ -33,6 +33,7 @@ STATES = {
     DEFINED: "a drawing that defines something, with the tests that check it",
     MEASURED: "what they measured or photographed; nothing to compute",
     NOT_COMPUTED: "nothing of ours",
+    NOT_COMPARED: "a record is there by now, and no number of it is in this list",
 }
 """What each state means."""
 _CLOSE = 1e-9

@@ -32,14 +32,13 @@ from sandmould import ROOT
 from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed, number, seconds
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
-from sandmould.study.records import OLD_DEFAULTS
+from sandmould.study.records import OLD_DEFAULTS, OLDER_SOLVER
 
 PAPERS = ("rojek_2004", "hirata_2019", "hirata_2017")
 VERIFICATION = ROOT / "docs" / "verification.md"
 COMMANDS = {"arpm": "make solidification", "mps": "make flow"}
 HEAD = ("where", "what", "theirs", "ours", "ours less theirs", "why", "command", "cost", "state")
 STAND_IN = "stand-in"
-OLDER_SOLVER = "older solver"
 STALE = "stale"
 
 
@@ -102,6 +101,8 @@ class LedgerPage:
         ]
         one = found[0] if len(found) == 1 else None
         state = judge.state_of(row, one)
+        if state == judge.NOT_COMPUTED and self._has_record(row.price_of):
+            state = judge.NOT_COMPARED
         if row.kind == "input" and state == judge.DIFFERS and not row.why:
             raise _bad(file, f"{key}.why", "", "why our study puts in another number")
         # What is put in is no result: how old its record is does not matter.
@@ -129,7 +130,7 @@ class LedgerPage:
         for source in _with_second(sources):
             if source.record:
                 if stale := self.numbers.record_of(source.record, file, key).stale:
-                    marks.append(stale if stale == OLD_DEFAULTS else STALE)
+                    marks.append(stale if stale in (OLD_DEFAULTS, OLDER_SOLVER) else STALE)
             elif source.results and self._solver(source) != SOLVERS[source.results]():
                 marks.append(OLDER_SOLVER)
         return list(dict.fromkeys(marks))
@@ -155,10 +156,16 @@ class LedgerPage:
         return ", ".join(dict.fromkeys(commands)), seconds(total_s) if total_s else ""
 
     def _price(self, row: LedgerRow, file: str, key: str) -> tuple[str, str]:
-        """Command and price of what is not computed."""
-        if row.price_of:
-            return _planned(row.price_of, file, f"{key}.price_of")
-        return "", row.price
+        """Command and price of what is not computed, or what it took if it is by now."""
+        if not row.price_of:
+            return "", row.price
+        command, price = _planned(row.price_of, file, f"{key}.price_of")
+        if self._has_record(row.price_of):
+            price = seconds(self.numbers.record_of(row.price_of, file, key).took_s)
+        return command, price
+
+    def _has_record(self, study: str) -> bool:
+        return bool(study) and (self.numbers.records / study / "record.json").is_file()
 
     def equations(self, paper: Paper, file: str) -> str:
         """Table of a paper's equations; empty where it lists none."""
@@ -185,7 +192,7 @@ class LedgerPage:
         """What a shipped study took, or what it is planned to take."""
         file = display_path(path)
         command, price = _planned(study, file, key)
-        if (self.numbers.records / study / "record.json").is_file():
+        if self._has_record(study):
             price = f"{seconds(self.numbers.record_of(study, file, key).took_s)} of all runs"
         return f"{command}: {price}"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -204,10 +205,23 @@ def test_what_is_not_computed_says_its_price(numbers: RecordedNumbers) -> None:
     assert theirs_text(row({"picture": True}).theirs) == "in a picture, not in text"
 
 
+def test_what_was_computed_meanwhile_is_not_called_missing(numbers: RecordedNumbers) -> None:
+    missing = row({"value": 65.0}, price="x").model_copy(
+        update={"price": "", "price_of": "planted"}
+    )
+    with pytest.raises(BadInputError, match="a study of config/studies"):
+        LedgerPage(numbers).row(missing, "a.yaml", "rows.0")
+    shutil.copytree(numbers.records / "planted", numbers.records / "tube_demo")
+    known = missing.model_copy(update={"price_of": "tube_demo"})
+    cells = LedgerPage(numbers).row(known, "a.yaml", "rows.0")
+    assert cells[-3:] == ["`sandmould run tube_demo`", "90 s", "not compared"]
+
+
 @pytest.mark.parametrize(
     ("why", "mark"),
-    [("", ""), ("old defaults", "; old defaults"), ("the study has changed", "; stale")],
-)
+    [("", ""), ("old defaults", "; old defaults"), ("older solver", "; older solver"),
+     ("the study has changed", "; stale")],
+)  # fmt: skip
 def test_a_record_that_no_longer_stands_is_marked(
     why: str, mark: str, numbers: RecordedNumbers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
