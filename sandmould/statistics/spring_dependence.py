@@ -68,8 +68,6 @@ class SpringCurve:
     hold: str
     factor: float
     """Of the springs of bed and walls."""
-    low_hz: float
-    high_hz: float
     limbs: CurveLimbs
     optimum: Optimum | None
     """None where too few runs can be used."""
@@ -202,13 +200,13 @@ def _curve(rows: pd.DataFrame, key: str, objective: Objective, case: ControlCase
     if len(np.unique(hz)) < fewest_points(1):
         none = (math.nan, math.nan)
         limbs = CurveLimbs("no result", math.nan, none, none, math.nan)
-        return SpringCurve(case.hold, factor, math.nan, math.nan, limbs, None)
+        return SpringCurve(case.hold, factor, limbs, None)
     worth = np.asarray(sign * values, dtype=np.float64)
     limbs = find_limbs(hz, used["_block"].to_numpy(), worth)
     # Draws of two curves must not share their random numbers, or their ratio is too certain.
     seed = round(1000 * factor)
     optimum = find_optimum(used, [key], objective.measure, better, seed)
-    return SpringCurve(case.hold, factor, float(hz.min()), float(hz.max()), limbs, optimum)
+    return SpringCurve(case.hold, factor, limbs, optimum)
 
 
 def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> CurveLimbs:
