@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from sandmould.runs.formatting import number
 from sandmould.statistics.config import SandWaveSpeed
 from sandmould.statistics.robustness import Robustness
-from sandmould.statistics.spring_dependence import FOLLOWS, STAYS
+from sandmould.statistics.spring_dependence import FOLLOWS, STAYS, held_text
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def recommend(
     if robustness.springs is None:
         return None
     own = robustness.springs.own
-    held = f"with the {own.hold} held"
+    held = held_text(own.hold)
     if robustness.cause == "artefact of the numerics":
         return _none("the optimum moves with the numerics")
     if own.dependence == STAYS:

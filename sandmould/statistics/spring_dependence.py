@@ -68,8 +68,6 @@ class SpringCurve:
     hold: str
     factor: float
     """Of the springs of bed and walls."""
-    low_hz: float
-    high_hz: float
     limbs: CurveLimbs
     optimum: Optimum | None
     """None where too few runs can be used."""
@@ -130,7 +128,8 @@ def assess_springs(
     key : str
         The swept frequency.
     best_hz : float
-        Frequency at which all holds are one motion: run once a stiffness.
+        Frequency at which all holds are one motion, run once a stiffness; those of a study with an
+        unbalance are not.
     objective : Objective
     cases : sequence of ControlCase
         Of all controls.
@@ -179,9 +178,12 @@ def _rows(
     own_hold: str,
     cases: Sequence[ControlCase],
 ) -> pd.DataFrame:
-    """Runs of a curve, with those at the best frequency that all holds have in common."""
+    """Runs of a curve, with those at the best frequency that stand for all holds.
+
+    They do where this hold was not run there: the motion of an unbalance is another one.
+    """
     is_mine = table[PART] == case.part
-    if case.hold != own_hold:
+    if case.hold != own_hold and not (is_mine & (table[key] == best_hz)).any():
         twins = [c.part for c in cases if c.hold == own_hold and c.factor == case.factor]
         is_mine |= table[PART].isin(twins) & (table[key] == best_hz)
     return table[is_mine]
@@ -202,13 +204,13 @@ def _curve(rows: pd.DataFrame, key: str, objective: Objective, case: ControlCase
     if len(np.unique(hz)) < fewest_points(1):
         none = (math.nan, math.nan)
         limbs = CurveLimbs("no result", math.nan, none, none, math.nan)
-        return SpringCurve(case.hold, factor, math.nan, math.nan, limbs, None)
+        return SpringCurve(case.hold, factor, limbs, None)
     worth = np.asarray(sign * values, dtype=np.float64)
     limbs = find_limbs(hz, used["_block"].to_numpy(), worth)
     # Draws of two curves must not share their random numbers, or their ratio is too certain.
     seed = round(1000 * factor)
     optimum = find_optimum(used, [key], objective.measure, better, seed)
-    return SpringCurve(case.hold, factor, float(hz.min()), float(hz.max()), limbs, optimum)
+    return SpringCurve(case.hold, factor, limbs, optimum)
 
 
 def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> CurveLimbs:
@@ -301,7 +303,7 @@ def _judge(hold: str, curves: Sequence[SpringCurve], blind: float) -> HoldVerdic
         told = [curve for curve in without if curve.limbs.seen <= blind]
         dependence: Dependence = "none" if told else "unresolved"
         what = "there is no inner optimum" if told else "nothing can be told"
-        said = f"With the {hold} held {what}: {'; '.join(_lacking(told or without))}."
+        said = f"{held_text(hold).capitalize()} {what}: {'; '.join(_lacking(told or without))}."
         unknown = (math.nan, math.nan)
         return HoldVerdict(hold, dependence, tuple(curves), math.nan, unknown, said)
     soft, stiff = curves[0], curves[-1]
@@ -315,7 +317,7 @@ def _judge(hold: str, curves: Sequence[SpringCurve], blind: float) -> HoldVerdic
     verdict = FOLLOWS if follows else STAYS if stays else "unresolved"
     so = _FOLLOWING.get(verdict, "whether it follows them is not resolved")
     said = (
-        f"With the {hold} held the optimum goes from {_at(soft)} to {_at(stiff)}, "
+        f"{held_text(hold).capitalize()} the optimum goes from {_at(soft)} to {_at(stiff)}, "
         f"{number(ratio, 2)} times ({number(low, 2)} to {number(high, 2)}) as high: {so}, whose "
         f"root is {number(root, 2)} times as large."
     )
@@ -329,6 +331,11 @@ def _lacking(curves: Sequence[SpringCurve]) -> Iterator[str]:
         said = f"{_SHAPES[shape]} with springs {listed([f'x{c.factor:g}' for c in some])}"
         seen = [c.limbs.seen for c in some if math.isfinite(c.limbs.seen)]
         yield f"{said} (a drop below {number(max(seen), 2)} is not told)" if seen else said
+
+
+def held_text(hold: str) -> str:
+    """Say what a study holds."""
+    return f"with the {'moment of the ' if hold == 'unbalance' else ''}{hold} held"
 
 
 def _drawn(curve: SpringCurve) -> Array:

@@ -22,6 +22,7 @@ from sandmould.statistics.spring_dependence import (
     SpringCheck,
     assess_springs,
     find_limbs,
+    held_text,
 )
 from sandmould.study.definition.certificate import round_best_hz, spanned_hz
 
@@ -214,6 +215,24 @@ def test_holds_are_told_apart() -> None:
     table = table[~shared]
     verdicts = {v.hold: v.dependence for v in check(table).holds}
     assert verdicts == {"acceleration": FOLLOWS, "displacement": FOLLOWS, "velocity": STAYS}
+
+
+def test_an_unbalance_has_a_motion_of_its_own_at_the_best_frequency_too() -> None:
+    """Other holds are then run there as well, and no run of the unbalance is taken for theirs."""
+    table = planted(follows)
+    own = (table[KEY] == 40.0) & (table["part"] != "sweep")
+    extra = []
+    for case in CASES:
+        if case.hold != "acceleration":
+            twin = table[own & (table["part"] == f"control: springs x{case.factor:g} acceleration")]
+            extra.append(twin.assign(part=case.part))
+    whole = pd.concat([table, *extra], ignore_index=True)
+    # Runs of the unbalance at the best frequency that would spoil every other curve.
+    at_best = (whole[KEY] == 40.0) & whole["part"].str.endswith(" acceleration")
+    whole.loc[at_best, FILL] += 0.5
+    verdicts = {v.hold: v for v in check(whole).others}
+    assert {v.dependence for v in verdicts.values()} == {FOLLOWS}
+    assert held_text("unbalance") == "with the moment of the unbalance held"
 
 
 def test_fewer_is_better_where_the_study_says_so() -> None:
