@@ -137,6 +137,10 @@ class DelegatingSession:
         """Compute on from what ``save_checkpoint`` gave."""
         self.sand.restore_checkpoint(checkpoint)
 
+    def exact_limit_s(self) -> float:
+        """Limit of the sand's contacts."""
+        return self.sand.exact_limit_s()
+
     def attach_mover(self, name: str, mover: StepMover) -> None:
         """Let a surface be moved in every step."""
         self.sand.attach_mover(name, mover)

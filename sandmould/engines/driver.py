@@ -210,7 +210,7 @@ class Driver:
             self._check_rest(session, stage)
             finds_limit = number + 1 == self._program.fill_stages and self._lacks_bed_limit
             if finds_limit:
-                self.cost.bed_limit_s = self._bed_limit_s = self._limit_s(session)
+                self.cost.bed_limit_s = self._bed_limit_s = session.exact_limit_s()
             if self._keeps_end and stage is self._program.stages[-1]:
                 self._write_end(session)
             elif finds_limit:
@@ -225,13 +225,6 @@ class Driver:
     def _lacks_bed_limit(self) -> bool:
         """Whether the run takes its step from the filled bed and has not found its limit yet."""
         return self._scenario.time_step.bed_fraction is not None and self._bed_limit_s is None
-
-    def _limit_s(self, session: Session) -> float:
-        """Exact critical step of the bed as it is now."""
-        # Compiled and slow to load: only runs that take their step from the bed wait for it.
-        from sandmould.engines.reference.exact_limit import exact_limit_s
-
-        return exact_limit_s(self._program, session.snapshot())
 
     def _check_rest(self, session: Session, stage: Stage) -> None:
         """Stop where the sand did not come to rest, or came to rest before it had flowed out."""
@@ -301,7 +294,7 @@ class Driver:
             if moment > now:
                 self._advance(session, (moment - now) * step_s)
                 now = moment
-            limit_s, least_s = self._limit_s(session), cost.least_limit_s
+            limit_s, least_s = session.exact_limit_s(), cost.least_limit_s
             cost.least_limit_s = limit_s if least_s is None else min(limit_s, least_s)
             cost.limit_moments += 1
 

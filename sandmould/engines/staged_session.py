@@ -291,6 +291,11 @@ class StagedSession(ABC):
         self._watch = replace(state.watch)
         self._last_sums = dict(state.last_sums)
 
+    def exact_limit_s(self) -> float:
+        """Refuse: this engine does not show its contacts."""
+        fraction = self._scenario.time_step.bed_fraction
+        raise RefusedError("time_step.bed_fraction", fraction, "absent on this engine")
+
     def attach_mover(self, name: str, mover: StepMover) -> None:
         """Refuse: this engine calls nobody in its steps."""
         raise RefusedError("surface", name, self._valid_surface)

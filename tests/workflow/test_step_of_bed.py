@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from sandmould.engines.driver import Driver
+from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import Session
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.build_plan import open_plan
@@ -127,13 +128,12 @@ def test_a_killed_run_goes_on_with_the_same_step(
 def test_a_step_above_the_limit_of_the_shaken_bed_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = Driver._limit_s
+    found = ReferenceSession.exact_limit_s
 
-    def shrinks(driver: Driver, session: Session) -> float:
-        share = 0.6 if session.stage.counts_as_vibration else 1.0
-        return share * found(driver, session)
+    def shrinks(session: ReferenceSession) -> float:
+        return found(session) * (0.6 if session.stage.counts_as_vibration else 1.0)
 
-    monkeypatch.setattr(Driver, "_limit_s", shrinks)
+    monkeypatch.setattr(ReferenceSession, "exact_limit_s", shrinks)
     folder = run_folder(tube_scene(**OF_BED), tmp_path)
     assert compute(folder) is Outcome.FINISHED
     detail = RunOutcome.read(folder / "outcome.json").detail

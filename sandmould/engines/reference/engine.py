@@ -53,8 +53,7 @@ def refuse(scenario: Scenario) -> None:
 def session_sources(scenario: Scenario) -> list[Path]:
     """The solver, and how it is given a scene."""
     here = Path(__file__).parent
-    names = ("model.py", "moved_solver.py", "session.py", "exact_limit.py")
-    session = [here / name for name in names]
+    session = [here / name for name in ("model.py", "moved_solver.py", "session.py")]
     shared = [here.parent / name for name in ("solid_surfaces.py", "table_drive.py")]
     return [*source_files(), *session, *shared]
 

@@ -237,6 +237,12 @@ class ReferenceSession(StagedSession):
         self._loads = dict(means)
         self._restore_stage(stage)
 
+    def exact_limit_s(self) -> float:
+        """Limit of all contacts; sparse matrices are loaded for runs that ask for it alone."""
+        from sandmould.dem.critical_step import active_contacts, whole_step
+
+        return whole_step(active_contacts(self.solver)).damped_s
+
     def _save(self, folder: Path) -> None:
         """Write the solver's state, of which nothing is lost."""
         arrays: dict[str, Any] = self.solver.state() | {"table_steps": self._periods.steps}

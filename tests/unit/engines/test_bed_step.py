@@ -10,9 +10,8 @@ import pytest
 
 from sandmould.engines.bed_step import MOMENTS, limit_moments, limit_warning, with_bed_step
 from sandmould.engines.program import build_program
-from sandmould.engines.reference.exact_limit import exact_limit_s
+from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_problem
-from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import damped_step
 from tests.liggghts_scenes import liggghts_scene
@@ -25,63 +24,44 @@ OVERLAP = 1e-6
 """Over the radius: the springs of smooth grains do not depend on it."""
 
 
-def smooth_scene(damping_ratio: float, **changes: Any) -> Scenario:
-    law = {**SMOOTH, "damping_ratio": damping_ratio}
-    contact = {"grain_grain": law, "grain_wall": law}
-    return tube_scene(**OF_BED, obstacles=[], contact=contact, **changes)
-
-
-def grains_at(scene: Scenario, place: list[list[float]], stage: str = "vibrate_1") -> Snapshot:
-    """Grains of the smallest class, places in radii from the middle of the floor."""
-    d = scene.dimension
-    radius = 0.5 * scene.sand.classes(d)[0].diameter_m
-    position = np.array(place, dtype=float) * radius * (1 - OVERLAP)
+def limit_s(zeta: float, place: list[list[float]]) -> float:
+    """Limit of equal smooth grains at places in radii, in units of sqrt(m/k)."""
+    d, law = len(place[0]), {**SMOOTH, "damping_ratio": zeta}
+    scene = tube_scene(
+        **OF_BED,
+        dimension=d,
+        box={"depth_m": 0.08},
+        obstacles=[],
+        sand={"size_classes": 1},
+        fill={"layers": [{"count": len(place)}]},
+        contact={"grain_grain": law, "grain_wall": law},
+    )
+    session = ReferenceSession(build_program(scene))
+    session.insert_layer(1)
+    radius = session.snapshot().radius_m[0]
+    position = np.array(place) * radius * (1 - OVERLAP)
     position[:, :-1] += 0.04
-    n = len(position)
-    return Snapshot(1.0, 0.0, stage, np.arange(1, n + 1), np.ones(n, dtype=np.int64), position,
-                    np.zeros((n, d)), np.zeros((n, 3)), np.full(n, radius))  # fmt: skip
-
-
-def unit_rad_s(scene: Scenario) -> float:
-    smallest = scene.sand.classes(scene.dimension)[0].diameter_m
-    stiffness_n_m = scene.laws.grain_grain.normal_stiffness_n_m
-    return math.sqrt(stiffness_n_m / scene.sand.grain_mass_kg(smallest, scene.dimension))
+    session.set_state(position, np.zeros_like(position), np.zeros((len(place), 3)))
+    spring = scene.laws.grain_grain.normal_stiffness_n_m
+    mass = scene.sand.grain_mass_kg(2 * radius, d)
+    return session.exact_limit_s() * math.sqrt(spring / mass)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("zeta", [0.0, 0.4, 1.0])
 def test_a_grain_on_the_floor_has_the_limit_of_its_oscillator(zeta: float, dimension: int) -> None:
-    scene = smooth_scene(zeta, dimension=dimension, box={"depth_m": 0.08})
-    place = [[0] * (dimension - 1) + [1]]
-    omega = unit_rad_s(scene)
+    place = [[0.0] * (dimension - 1) + [1.0]]
     # c / (4 m) of a contact with a wall is zeta omega / 2; the corrected limit by Newton's way
-    exact = damped_step(omega, zeta, 0.5 * zeta * omega)
-    assert exact_limit_s(build_program(scene), grains_at(scene, place)) == pytest.approx(exact)
+    assert limit_s(zeta, place) == pytest.approx(damped_step(1.0, zeta, 0.5 * zeta))
 
 
 @pytest.mark.parametrize("columns", [1, 3])
 def test_a_square_lattice_on_the_floor_has_its_exact_limit(columns: int) -> None:
     # Smooth rows and columns move apart; a column held at the floor is stiffer than a free row.
-    scene, n = smooth_scene(0.0), 5
+    n = 5
     place = [[2.0 * i, 2.0 * k + 1.0] for i in range(columns) for k in range(n)]
-    omega = 2 * math.sin((2 * n - 1) / (2 * n + 1) * math.pi / 2) * unit_rad_s(scene)
-    found = exact_limit_s(build_program(scene), grains_at(scene, place))
-    assert found == pytest.approx(2.0 / omega, rel=1e-6)
-
-
-def test_an_opened_gate_bears_nothing() -> None:
-    gate = {"kind": "plate", "name": "gate", "size_m": [0.07, 0.004], "centre_m": [0.04, 0.02]}
-    scene = smooth_scene(0.0)
-    tree = {**scene.model_dump(), "obstacles": [gate], "discharge": {"gate": "gate"}}
-    scene = Scenario.model_validate(tree)
-    top = 0.022 / (0.5 * scene.sand.classes(2)[0].diameter_m)
-    program, place = build_program(scene), [[0.0, top + 1 - 1e-4]]
-    closed, opened = (
-        exact_limit_s(program, grains_at(scene, place, stage))
-        for stage in ("settle_1", "discharge")
-    )
-    assert closed == pytest.approx(2.0 / unit_rad_s(scene))
-    assert opened == math.inf
+    omega = 2 * math.sin((2 * n - 1) / (2 * n + 1) * math.pi / 2)
+    assert limit_s(0.0, place) == pytest.approx(2.0 / omega, rel=1e-6)
 
 
 def test_the_step_is_rounded_down_and_only_the_step_changes() -> None:

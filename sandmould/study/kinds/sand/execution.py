@@ -67,7 +67,7 @@ def load_computing(scenario: Scenario) -> None:
     """Import the engine's side of the house, and the pattern's where there is one."""
     registry.engine_of(scenario).load_session(scenario)
     if scenario.time_step.bed_fraction is not None:
-        importlib.import_module("sandmould.engines.reference.exact_limit")
+        importlib.import_module("sandmould.dem.critical_step")
     if scenario.pattern is not None:
         importlib.import_module("pattern_fe.coupling.opening")
 
