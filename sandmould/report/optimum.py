@@ -89,7 +89,7 @@ def optimum_pages(
     said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
     drive = drive_at(summary, keys, optimum.setting)
     if drive is not None:
-        said.insert(1, f"There the box moves {amplitudes_text(drive)}.")
+        said.insert(1, f"At this setting the box moves {amplitudes_text(drive)}.")
     if mode and (key := frequency_key(study.sweep)):
         said.insert(1, mode.beside(optimum.setting[key]))
     said += _beside(optimum, study)

@@ -19,7 +19,7 @@ DISPLACEMENT, VELOCITY, ACCELERATION = (
 )  # fmt: skip
 """Columns of the amplitudes in tables."""
 STEADY_SHARE = 0.5
-"""Of a vibration, its end, that counts as steady."""
+"""Of a vibration between its ramps, its end, that counts as steady."""
 
 
 @dataclass(frozen=True)
@@ -56,22 +56,30 @@ def laid_down_drive(stage: VibrationStage) -> BoxDrive:
 
 
 def steady_drive(
-    frequency_hz: float, displacement_m: NDArray[np.float64], phase_deg: NDArray[np.float64]
-) -> BoxDrive:
+    stage: VibrationStage, displacement_m: NDArray[np.float64], phase_deg: NDArray[np.float64]
+) -> BoxDrive | None:
     """The steady motion of a table on mounts.
 
     Parameters
     ----------
-    frequency_hz : float
+    stage : VibrationStage
     displacement_m, phase_deg : (p,) float64, m and degrees
-        Amplitude and lag of each period, at least one, in order.
+        Amplitude and lag of each period of the stage so far, from its first on.
 
     Returns
     -------
-    BoxDrive
-        Mean over the periods of the second half, phases included: what changes its phase from
-        period to period is no motion of the drive's frequency.
+    BoxDrive or None
+        Mean over the second half of the periods between the ramps, phases included: what changes
+        its phase from period to period is no motion of the drive's frequency. None where no period
+        so far had the full moment.
     """
-    first = int(len(displacement_m) * (1 - STEADY_SHARE))
-    waves = displacement_m[first:] * np.exp(-1j * np.radians(phase_deg[first:]))
-    return BoxDrive(frequency_hz, float(abs(waves.mean())))
+    ramp = stage.ramp_s * stage.frequency_hz
+    begin = np.arange(len(displacement_m))
+    # a ramp may end with a period but for round-off
+    last = stage.whole_duration_s * stage.frequency_hz - ramp - 1 + 1e-9
+    full = np.flatnonzero((begin >= ramp - 1e-9) & (begin <= last))
+    if not len(full):
+        return None
+    steady = full[int(len(full) * (1 - STEADY_SHARE)) :]
+    waves = displacement_m[steady] * np.exp(-1j * np.radians(phase_deg[steady]))
+    return BoxDrive(stage.frequency_hz, float(abs(waves.mean())))

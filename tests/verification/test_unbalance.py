@@ -39,10 +39,6 @@ class Shaken:
     energy_j: tuple[float, float]
     """Of one grain in the laboratory before and after, with its spring to the floor."""
 
-    def steady(self) -> list[TablePeriod]:
-        """Periods of the second half."""
-        return self.periods[len(self.periods) // 2 :]
-
 
 def table_scene(
     dimension: int, table_kg: float, frequency_hz: float, moment_kg_m: float, **changes: Any
@@ -113,14 +109,15 @@ def response(
 
 def measured(shaken: Shaken) -> complex:
     """Steady amplitude and phase as a report takes them, as a complex amplitude."""
-    steady = shaken.steady()
     drive = steady_drive(
-        shaken.scenario.vibrations[0].frequency_hz,
-        np.array([p.displacement_m for p in steady]),
-        np.array([p.phase_deg for p in steady]),
+        shaken.scenario.vibrations[0],
+        np.array([p.displacement_m for p in shaken.periods]),
+        np.array([p.phase_deg for p in shaken.periods]),
     )
-    assert steady[-1].displacement_m == pytest.approx(drive.displacement_m, rel=2e-3)
-    return cmath.rect(drive.displacement_m, -math.radians(steady[-1].phase_deg))
+    assert drive is not None
+    last = shaken.periods[-1]
+    assert last.displacement_m == pytest.approx(drive.displacement_m, rel=2e-3)
+    return cmath.rect(drive.displacement_m, -math.radians(last.phase_deg))
 
 
 @pytest.mark.parametrize("frequency_hz", [10.0, 16.0, 20.0, 25.0, 40.0, 80.0])

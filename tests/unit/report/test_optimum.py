@@ -12,6 +12,7 @@ import pytest
 from sandmould.report.chart import Chart
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.page import write_report
+from sandmould.scenario.drive import BoxDrive
 from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.kinds.sand.kind import SandStudy
 from sandmould.study.rounds.decide import next_round
@@ -90,6 +91,24 @@ def test_an_interval_at_the_end_of_the_sweep_is_not_resolved(tmp_path: Path) -> 
     assert "reaches the highest frequency swept, so" in pages.sentences[0]
     assert pages.sentences[-1].startswith("No round added any runs to the 21 of the sweep")
     assert "Rounds go on" in pages.sentences[-1]
+
+
+def test_the_drive_at_the_optimum_is_told_in_mm_and_g(tmp_path: Path) -> None:
+    folder = write_refined(tmp_path / "driven")
+    summary = gather(folder).summary
+    # a tenth of a millimetre at every speed, as a table with an unbalance moves
+    drives = [BoxDrive(f, 1e-4).columns() for f in summary[KEY]]
+    for name in drives[0]:
+        summary[name] = [drive[name] for drive in drives]
+    pages = optimum_pages(folder, read_study(folder), summary)
+    assert pages is not None
+    assert pages.optimum is not None
+    at_best = BoxDrive(pages.optimum.setting[KEY], 1e-4)
+    said = next(text for text in pages.sentences if "mm to either side" in text)
+    found = re.search(r"moves 0\.100 mm to either side, (\S+) mm/s and (\S+) g\.$", said)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(1e3 * at_best.velocity_m_s, rel=5e-3)
+    assert float(found[2]) == pytest.approx(at_best.acceleration_g, rel=5e-3)
 
 
 def test_wider_than_asked_is_not_sound_and_the_cost_is_told(tmp_path: Path) -> None:

@@ -21,13 +21,31 @@ def test_one_amplitude_gives_the_others() -> None:
     assert drive.columns()[DISPLACEMENT] == drive.displacement_m
 
 
+def steady_m(
+    periods: list[float], phase_deg: list[float] | None = None, **stage: float
+) -> float | None:
+    given = {"frequency_hz": 50.0, "acceleration_g": 1.0, "duration_s": 0.12} | stage
+    lags = np.array(phase_deg or [77.0] * len(periods))
+    drive = steady_drive(VibrationStage(**given), np.array(periods), lags)
+    return None if drive is None else drive.displacement_m
+
+
 def test_the_second_half_of_a_vibration_is_steady() -> None:
-    amplitude_m = np.array([9.0, 9.0, 9.0, 1.0, 1.0, 1.0])
-    assert steady_drive(50.0, amplitude_m, np.zeros(6)).displacement_m == 1.0
+    periods = [9.0, 9.0, 9.0, 1.0, 1.0, 1.0]
+    assert steady_m(periods) == pytest.approx(1.0)
     # what turns its phase round in every period has not the drive's frequency
-    turning = np.array([0.0, 0.0, 0.0, 30.0, 150.0, 270.0])
-    assert steady_drive(50.0, amplitude_m, turning).displacement_m < 1e-15
-    assert steady_drive(50.0, np.array([2.0]), np.array([77.0])).displacement_m == pytest.approx(2)
+    assert steady_m(periods, [0.0, 0.0, 0.0, 30.0, 150.0, 270.0]) == pytest.approx(0.0, abs=1e-15)
+    assert steady_m(periods[:1]) == pytest.approx(9.0)
+    assert steady_m([]) is None
+
+
+def test_ramps_are_not_steady() -> None:
+    # two periods of ramp at either end of eight
+    periods = [2.0, 4.0, 9.0, 9.0, 5.0, 5.0, 4.0, 2.0]
+    ramped = {"duration_s": 0.16, "ramp_s": 0.04}
+    assert steady_m(periods, **ramped) == pytest.approx(5.0)
+    assert steady_m(periods[:3], **ramped) == pytest.approx(9.0)
+    assert steady_m(periods[:2], **ramped) is None
 
 
 def test_the_empty_table_in_closed_form() -> None:

@@ -62,7 +62,5 @@ def _drive(
     # Half a period: the clock of a snapshot and the end of a period differ by round-off.
     until_s = time_s + 0.5 / stage.frequency_hz
     ended = periods[(periods[STAGE] == name) & (periods[VIBRATION_TIME_S] <= until_s)]
-    if ended.empty:
-        return _NO_DRIVE
     values = (ended[c].to_numpy(dtype=np.float64) for c in ("displacement_m", "phase_deg"))
-    return steady_drive(stage.frequency_hz, *values)
+    return steady_drive(stage, *values) or _NO_DRIVE

@@ -90,7 +90,7 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
             Measure(
                 DISPLACEMENT,
                 "Amplitude of the box's motion at the frequency of its drive: as laid down, or "
-                "measured over the second half of the vibration so far with hold unbalance.",
+                "measured between its ramps, in the second half so far, with hold unbalance.",
             ),
             Measure(VELOCITY, "The same of its velocity."),
             Measure(ACCELERATION, "The same of its acceleration."),
