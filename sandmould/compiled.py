@@ -10,8 +10,6 @@ write to; without such a folder nothing is kept.
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import re
 import stat
@@ -22,9 +20,7 @@ from typing import Any, TypeVar
 
 import llvmlite
 import numba
-import numpy as np
 from llvmlite import binding
-from numba import types
 
 from sandmould.digest import SHORT, digest
 
@@ -128,24 +124,24 @@ def is_own(folder: Path) -> bool:
 
 
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-_FOLDER = cache_folder()
-KEEPS = is_own(_FOLDER)
+FOLDER = cache_folder()
+KEEPS = is_own(FOLDER)
 """Whether machine code is kept for the next process."""
 if not KEEPS:
     print(
-        f"kernels are compiled anew in every process: {_FOLDER} cannot be made, or others can "
+        f"kernels are compiled anew in every process: {FOLDER} cannot be made, or others can "
         "write to it; XDG_CACHE_HOME names a folder of your own",
         file=sys.stderr,
     )
 # Numba reads it where a function is decorated: nothing else may set it.
-numba.config.CACHE_DIR = str(_FOLDER)  # type: ignore[attr-defined]
+numba.config.CACHE_DIR = str(FOLDER)  # type: ignore[attr-defined]
 # Functions begin lines of the processor's cache, 64 bytes: taken from the disk they lie elsewhere
 # than freshly compiled, and the same instructions were a quarter slower where they began in the
 # middle of a line.
 binding.set_option("sandmould", "-align-all-functions=6")
 
 
-_DISPATCHERS: dict[str, Any] = {}
+DISPATCHERS: dict[str, Any] = {}
 """Functions that this process may call on one thread, by module and name."""
 
 
@@ -155,78 +151,10 @@ def njit(**options: Any) -> Callable[[_Function], _Function]:
     def compiled(function: _Function) -> _Function:
         dispatcher: Any = numba.njit(cache=KEEPS, **options)(function)
         if not options.get("parallel"):  # loading one of these may start threads
-            _DISPATCHERS[f"{function.__module__}.{function.__qualname__}"] = dispatcher
+            DISPATCHERS[f"{function.__module__}.{function.__qualname__}"] = dispatcher
         return dispatcher
 
     return compiled
-
-
-def loaded_kernels() -> set[str]:
-    """Functions that Python has called in this process, each with the types of its arguments.
-
-    Each is a line of JSON. Those with types of other sorts than the house's own are left out.
-    """
-    kernels = set()
-    for name, dispatcher in _DISPATCHERS.items():
-        for signature in dispatcher.signatures:
-            with contextlib.suppress(TypeError):
-                kernels.add(json.dumps([name, [_described(each) for each in signature]]))
-    return kernels
-
-
-def load_kernels(kernels: Iterable[str]) -> None:
-    """Load functions before they are called, as another process had them; none is called."""
-    for kernel in kernels:
-        name, described = json.loads(kernel)
-        if name in _DISPATCHERS:
-            _DISPATCHERS[name].compile(tuple(_type_of(each) for each in described))
-
-
-def keep_kernels(of: str, kernels: Iterable[str]) -> None:
-    """Note for later processes what some sort of runs has called, beside its machine code."""
-    if KEEPS:
-        path = _kept_file(of)
-        partial = path.with_suffix(f".{os.getpid()}")
-        partial.write_text("\n".join(sorted({*kept_kernels(of), *kernels})), encoding="utf-8")
-        partial.replace(path)
-
-
-def kept_kernels(of: str) -> set[str]:
-    """What runs of a sort have called until now, on this machine with this state of the house."""
-    try:
-        return set(_kept_file(of).read_text(encoding="utf-8").splitlines()) if KEEPS else set()
-    except OSError:
-        return set()
-
-
-def _kept_file(of: str) -> Path:
-    return _FOLDER / f"called_{of}.txt"
-
-
-def _described(kind: Any) -> Any:
-    """A type of numba's as JSON; a TypeError for one of a sort that no kernel of ours has."""
-    if isinstance(kind, types.Array):
-        return ["array", str(kind.dtype), kind.ndim, kind.layout, kind.mutable]
-    if isinstance(kind, types.Tuple | types.UniTuple | types.NamedTuple | types.NamedUniTuple):
-        of = getattr(kind, "instance_class", tuple)
-        return ["tuple", of.__module__, of.__qualname__, [_described(each) for each in kind.types]]
-    if type(kind) in (types.Integer, types.Float, types.Boolean):
-        return str(kind)
-    raise TypeError(kind)
-
-
-def _type_of(described: Any) -> Any:
-    """The type that ``_described`` gave; classes are those of modules that are loaded already."""
-    if isinstance(described, str):
-        return numba.from_dtype(np.dtype(described))
-    if described[0] == "array":
-        _, dtype, dimensions, layout, mutable = described
-        return types.Array(_type_of(dtype), dimensions, layout, readonly=not mutable)
-    _, module, name, parts = described
-    of = getattr(sys.modules[module], name)
-    return types.BaseTuple.from_types(
-        [_type_of(each) for each in parts], None if of is tuple else of
-    )
 
 
 def cfunc(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:

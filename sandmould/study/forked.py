@@ -92,7 +92,7 @@ class ForkedProcess:
 
 
 def _work_on(
-    work: Work, begin: Callable[[], None], mask: set[signal.Signals], parent: int
+    work: Work, begin: Callable[[], None], mask: set[int | signal.Signals], parent: int
 ) -> NoReturn:
     """Do the work in the child; nothing of the parent's own end is done here."""
     status = BROKEN

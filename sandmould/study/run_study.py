@@ -60,7 +60,7 @@ def _run_study(path: Path, options: Sequence[str]) -> int:
             if _snakemake(plan, options, [str(folder / SUMMARY)]):
                 # Stopped, or broken outside the runs: a run that fails leaves its outcome.
                 return 1
-            from sandmould.study.rounds.next_round import decide_next  # statistics: slow to import
+            from sandmould.study.next_round import decide_next  # statistics: slow to import
 
             log, decision = decide_next(study, folder)
             print(f"\n{decision}", file=sys.stderr, flush=True)

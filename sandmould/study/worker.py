@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
-from sandmould.compiled import keep_kernels, kept_kernels, load_kernels, loaded_kernels
+from sandmould.called_kernels import keep_kernels, kept_kernels, load_kernels, loaded_kernels
 from sandmould.runs.provenance import commit, processor, versions
 from sandmould.scenario.module_main import in_a_sentence
 from sandmould.study.definition.run import FILL, Run
@@ -45,7 +45,8 @@ def load(scenario: Any, ahead: bool = True) -> None:
 
 def load_kept(scenario: Any) -> None:
     """Load compiled code that runs like this one have needed: it takes longer than a short run."""
-    load_kernels(kept_kernels(_class_of(scenario)) - loaded_kernels())
+    with contextlib.suppress(ValueError, LookupError, TypeError, AttributeError):  # a damaged file
+        load_kernels(kept_kernels(_class_of(scenario)) - loaded_kernels())
 
 
 def _load_rest(scenario: Any) -> None:

@@ -91,6 +91,32 @@ def test_batches_of_too_few_runs_are_left_to_jobs_of_their_own(tmp_path: Path) -
     assert plan.batches(0.5 * planned_wall_s(runs[0]), least=2) == []
 
 
+def test_where_cores_are_free_all_end_together(tmp_path: Path) -> None:
+    runs = runs_of(tmp_path)
+    one_s = planned_wall_s(runs[0])
+    found = plan_batches(runs, 3.5 * one_s, free_cores=2)
+    # Three jobs would leave one core idle while the other has two.
+    assert [len(batch.runs) for batch in found] == [2, 2, 3, 2]
+    assert [run for batch in found for run in batch.runs] == runs
+    # Fewer runs than would fill one job are shared out as well, but not into jobs of their own.
+    assert [len(b.runs) for b in plan_batches(runs[:4], 100 * one_s, free_cores=2)] == [2, 2]
+    few = plan_batches(runs[:5], 100 * one_s, free_cores=4, least=2)
+    assert [len(batch.runs) for batch in few] == [2, 3]
+    # Long runs have jobs of their own, and runs of two threads take two cores.
+    assert len(plan_batches(runs, 0.5 * one_s, free_cores=2)) == 9
+    wide = runs_of(tmp_path, scenario={"engine": {"name": "reference", "ranks": 2}})
+    assert len(plan_batches(wide, 1e9, free_cores=4)) == 2
+
+
+def test_what_is_left_of_a_study_is_shared_out_by_itself(tmp_path: Path) -> None:
+    runs = tuple(runs_of(tmp_path))
+    plan = Plan(open_study(tmp_path / "trial.yaml"), runs)
+    lacking = {run.run for run in runs[2:6]}
+    batches = plan.batches(100 * planned_wall_s(runs[0]), 2, free_cores=2, lacking=lacking)
+    names = [[runs.index(run) for run in batch.runs] for batch in batches]
+    assert names == [[0, 1, 6, 7, 8], [2, 3], [4, 5]]
+
+
 class Jobs:
     """What a batch did, in place of an engine."""
 

@@ -1,0 +1,133 @@
+"""Jobs of runs in a process that stands by: it does the same, and ends with whom it serves."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.study import standby
+from sandmould.study.plan.batches import is_done
+from sandmould.study.process import is_locked
+from tests.scenes import tube_scene
+from tests.workflow.runs import SOON
+from tests.workflow.test_worker import runs_in
+
+FEW = {"engine": {"name": "reference"}, "fill": {"layers": [{"count": 20}]}, "rest": SOON}
+LONG = {
+    "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 3.0}],
+    "record": {"checkpoint_every_s": 0.1},
+}
+JOB = """
+import sys
+from sandmould.study.standby import do_job
+do_job("compute_batch", sys.argv[2:], sys.argv[1], 1, "mpiexec", 1)
+"""
+"""As workflow/scripts/batch.py."""
+
+
+@pytest.fixture
+def standing() -> Iterator[None]:
+    with standby.standing_by([tube_scene(**FEW)]):
+        yield
+
+
+def job(folder: Path, runs: list[Path]) -> subprocess.Popen[str]:
+    scenarios = [f"{run.relative_to(folder)}/scenario.yaml" for run in runs]
+    return subprocess.Popen(
+        [sys.executable, "-c", JOB, "log", *scenarios],
+        cwd=folder, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def wait_for(happened: object) -> None:
+    deadline = time.monotonic() + 60.0
+    while not happened():  # type: ignore[operator]
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+@pytest.mark.usefixtures("standing")
+def test_a_job_loads_nothing_and_passes_on_folder_and_words(tmp_path: Path) -> None:
+    runs = runs_in(tmp_path, 2)
+    started = job(tmp_path, runs)
+    said = started.communicate(timeout=120)[1]
+    assert started.returncode == 0
+    assert all(is_done(run) for run in runs)
+    assert "one_0: finished." in said
+    assert "one_1: finished." in (tmp_path / "log").read_text()
+    # all that takes time to import is left to the other process
+    heavy = "import sys; import sandmould.study.standby; print({'numpy', 'yaml'} & {*sys.modules})"
+    ran = subprocess.run([sys.executable, "-c", heavy], capture_output=True, text=True)
+    assert ran.stdout == "set()\n"
+
+
+@pytest.mark.usefixtures("standing")
+def test_a_job_that_fails_says_why_and_has_its_status(tmp_path: Path) -> None:
+    (run,) = runs_in(tmp_path, 1)
+    (run / "scenario.yaml").write_text("kind: sand\n")
+    started = job(tmp_path, [run])
+    said = started.communicate(timeout=120)[1]
+    assert started.returncode == 1
+    assert "1 of 1 stopped or broke: one_0" in said
+
+
+@pytest.mark.usefixtures("standing")
+def test_a_killed_job_stops_its_run_which_the_next_one_continues(tmp_path: Path) -> None:
+    (run,) = runs_in(tmp_path, 1, **LONG)
+    first = job(tmp_path, [run])
+    wait_for(lambda: list(run.glob("work/checkpoint_*/mark.json")))
+    first.kill()
+    first.communicate()
+    wait_for(lambda: not is_locked(run))
+    assert not (run / "outcome.json").exists()
+    stopped = RunOutcome.read(run / "work" / "outcome.json")
+    assert stopped.outcome is Outcome.OUT_OF_WALL_TIME
+    second = job(tmp_path, [run])
+    second.communicate(timeout=120)
+    assert second.returncode == 0
+    assert RunOutcome.read(run / "outcome.json").outcome is Outcome.FINISHED
+
+
+@pytest.mark.usefixtures("standing")
+def test_a_job_outlives_the_killed_process_and_is_done_again(tmp_path: Path) -> None:
+    (run,) = runs_in(tmp_path, 1, **LONG)
+    first = job(tmp_path, [run])
+    wait_for(lambda: list(run.glob("work/checkpoint_*/mark.json")))
+    (ready,) = [pid for pid in children(os.getpid()) if pid != first.pid]
+    os.kill(ready, signal.SIGKILL)
+    said = first.communicate(timeout=60)[1]
+    assert first.returncode == 1
+    assert "the process that loads what runs need was killed" in said
+    wait_for(lambda: not is_locked(run))
+    # Nobody stands by any more: the next job loads by itself.
+    second = job(tmp_path, [run])
+    second.communicate(timeout=120)
+    assert second.returncode == 0
+    assert is_done(run)
+
+
+def children(pid: int) -> list[int]:
+    """Processes that one has started and that have not ended."""
+    lists = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for each in lists for child in each.read_text().split()]
+
+
+def test_at_the_end_nothing_of_it_is_left(tmp_path: Path) -> None:
+    (run,) = runs_in(tmp_path, 1, **LONG)
+    with standby.standing_by([tube_scene(**FEW)]):
+        place = Path(os.environ[standby.PLACE])
+        started = job(tmp_path, [run])
+        wait_for(lambda: list(run.glob("work/checkpoint_*/mark.json")))
+    started.communicate(timeout=60)
+    assert started.returncode == 1
+    assert not is_locked(run)  # it was killed with all that it had started
+    assert not place.parent.exists()
+    assert standby.PLACE not in os.environ
