@@ -42,7 +42,7 @@ def test_classes_keep_the_mass_of_the_sieve_curve() -> None:
 def test_one_class_stands_at_the_geometric_mean() -> None:
     (only,) = EQUAL.classes(2)
     assert only.diameter_m == pytest.approx(1.1e-3)
-    assert EQUAL.grain_mass_kg(2e-3, 2) == pytest.approx(2400 * math.pi * 1e-6 * 1.1e-3)
+    assert EQUAL.grain_mass_kg(2e-3, 2) == pytest.approx(2400 * math.pi * 1e-6 * EQUAL.thickness_m)
     assert EQUAL.grain_mass_kg(2e-3, 3) == pytest.approx(2400 * math.pi / 6 * 8e-9)
 
 

@@ -30,14 +30,14 @@ CASES: dict[str, tuple[str, str]] = {
     "misspelt": (
         "based_on: tube\nobjective: {measure: tube_fil_fraction}",
         "trial.yaml: objective.measure = 'tube_fil_fraction' cannot be used: valid is a measure "
-        "that this scene will have: nearest are tube_fill_fraction, bearing_fraction, "
-        "solid_fraction; sandmould measures lists all.",
+        "that this scene will have: nearest are tube_fill_fraction, "
+        "tube_fill_of_bed_fraction, bearing_fraction; sandmould measures lists all.",
     ),
     "of a tube that was replaced, by default": (
         f"based_on: tube\nscenario: {{obstacles: [{POLYGON}]}}",
         "trial.yaml: objective.measure = 'tube_fill_fraction' cannot be used: valid is a measure "
         "that this scene will have (none is stated: tube_fill_fraction is the default): "
-        "nearest are bearing_fraction, solid_fraction, largest_overlap_fraction; sandmould "
+        "nearest are bearing_fraction, solid_fraction, overlap_p99_fraction; sandmould "
         "measures lists all.",
     ),
     "of a tube that was replaced": (
@@ -68,7 +68,7 @@ CASES: dict[str, tuple[str, str]] = {
     "margin": (
         "based_on: tube\nequivalence: {margins: {solid_fractn: 0.01}}",
         "trial.yaml: equivalence.margins = 'solid_fractn' cannot be used: valid is a measure that "
-        "this scene will have: nearest are solid_fraction, bearing_fraction, tube_fill_fraction; "
+        "this scene will have: nearest are solid_fraction, bearing_fraction, overlap_p99_fraction; "
         "sandmould measures lists all.",
     ),
     "target of a calibration": (
