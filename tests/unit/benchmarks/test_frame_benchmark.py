@@ -12,7 +12,10 @@ import pytest
 from benchmarks.frame import Benchmark, BenchmarkRun, Parts, benchmark, table
 from sandmould import ROOT
 
-PAGED = ("agreement", "arpm", "at_rest", "calibration", "engines", "mps", "scaling", "stability")
+PAGED = (
+    "agreement", "arpm", "at_rest", "calibration", "engines", "frequency_law", "mps", "scaling",
+    "stability",
+)  # fmt: skip
 ORIGIN = {"commit": "abc", "machine": {"processor": "a core"}, "versions": {}}
 
 

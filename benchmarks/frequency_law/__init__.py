@@ -1,0 +1,1 @@
+"""What the frequency that fills a tube best goes with, from committed studies."""

@@ -1,0 +1,19 @@
+"""What the frequency that fills a tube best goes with.
+
+``python -m benchmarks.frequency_law`` computes nothing: it writes docs/frequency_law.md from the
+records of the studies ``tube_law_*``, those that are there.
+"""
+
+from __future__ import annotations
+
+from benchmarks.frame import Benchmark
+from benchmarks.frequency_law import page
+
+BENCHMARK = Benchmark(
+    __file__,
+    __doc__,
+    pages={"frequency_law.md": lambda results: page.page()},
+)
+
+if __name__ == "__main__":
+    BENCHMARK.command()

@@ -1,0 +1,145 @@
+"""Curves of one measure over frequency, each of one scene, and where they have their optimum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sandmould.scenario.hardness import bed_hardness, column_mode_hz
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.evidence import usable_values
+from sandmould.statistics.optimum import Optimum, find_optimum
+from sandmould.statistics.settings import CONFIDENCE, number_blocks
+from sandmould.statistics.spring_dependence import CurveLimbs, find_limbs
+
+Array = NDArray[np.float64]
+FREQUENCY = "vibration.0.frequency_hz"
+MEASURE = "tube_fill_fraction"
+BED_HEIGHT = "bed_height_m"
+
+
+@dataclass(frozen=True)
+class Series:
+    """One curve over frequency."""
+
+    study: str
+    label: str
+    """What is special in it."""
+    scenario: Scenario
+    fillings: int
+    depth_m: float
+    """Of the bed at rest, mean over its runs."""
+    limbs: CurveLimbs
+    optimum: Optimum
+
+    @property
+    def wave_speed_m_s(self) -> float:
+        """Along a row of grains."""
+        hardness = bed_hardness(self.scenario)
+        assert hardness is not None
+        return hardness.wave_speed_m_s
+
+    @property
+    def column_hz(self) -> float:
+        """First mode of a column of rows as deep as the bed, c/(4 H)."""
+        return column_mode_hz(self.wave_speed_m_s, self.depth_m)
+
+    @property
+    def best_hz(self) -> float:
+        """Where the fitted mean is best."""
+        return self.optimum.setting[FREQUENCY]
+
+    @property
+    def interval_hz(self) -> tuple[float, float]:
+        """Where the optimum lies with 95 % probability."""
+        return self.optimum.interval(FREQUENCY)
+
+    @property
+    def is_inner(self) -> bool:
+        """Whether a frequency inside the range beats both of its ends at 95 %."""
+        return self.limbs.shape == "inner"
+
+    @property
+    def drawn_hz(self) -> Array:
+        """Where surfaces drawn from all that the runs leave possible are best, (n,) float64."""
+        return self.optimum.points[self.optimum.picks, 0]
+
+
+def series_of(
+    study: str, summary: pd.DataFrame, keys: Sequence[str], scenarios: Mapping[Any, Scenario]
+) -> list[Series]:
+    """Curves of a study over frequency and at most one other key.
+
+    Parameters
+    ----------
+    study : str
+    summary : DataFrame
+        One row a run.
+    keys : sequence of str
+        Swept keys, ``FREQUENCY`` among them.
+    scenarios : mapping
+        A scenario of each value of the other key; of None where there is none.
+
+    Returns
+    -------
+    list of Series
+        In the order of ``scenarios``.
+    """
+    other = next((key for key in keys if key != FREQUENCY), None)
+    found = []
+    for seed, (value, scenario) in enumerate(scenarios.items()):
+        mine = summary if other is None else summary[summary[other] == value]
+        used = mine.loc[usable_values(mine, MEASURE).dropna().index]
+        values = used[MEASURE].to_numpy(dtype=np.float64)
+        hz = used[FREQUENCY].to_numpy(dtype=np.float64)
+        found.append(
+            Series(
+                study,
+                "" if other is None else f"{other} = {value}",
+                scenario,
+                int(used.groupby(FREQUENCY).size().median()),
+                float(used[BED_HEIGHT].mean()),
+                find_limbs(hz, np.asarray(number_blocks(used)), values),
+                # Draws of two curves must not share their random numbers.
+                find_optimum(used, [FREQUENCY], MEASURE, "larger", seed),
+            )
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class Power:
+    """f in proportion to a power of what changes between curves."""
+
+    exponent: float
+    ci: tuple[float, float]
+    """95 % interval."""
+
+
+def power_of(series: Sequence[Series], changed: Sequence[float]) -> Power | None:
+    """Fit log f over the logarithm of what changes, over all drawn optima.
+
+    Parameters
+    ----------
+    series : sequence of Series
+    changed : sequence of float
+        As many, such as wave speeds.
+
+    Returns
+    -------
+    Power or None
+        None of fewer than two curves with an inner optimum.
+    """
+    inner = [(s, x) for s, x in zip(series, changed, strict=True) if s.is_inner]
+    if len(inner) < 2:
+        return None
+    x = np.log([value for _, value in inner])
+    y = np.log(np.array([s.drawn_hz for s, _ in inner]))
+    slopes = (x - x.mean()) @ (y - y.mean(axis=0)) / ((x - x.mean()) ** 2).sum()
+    low, high = np.quantile(slopes, (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
+    return Power(float(np.median(slopes)), (float(low), float(high)))

@@ -1,0 +1,57 @@
+"""Which power of what a best frequency goes with, on planted curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from benchmarks.frequency_law.series import FREQUENCY, MEASURE, power_of, series_of
+from sandmould.runs.columns import OUTCOME_CODE, REPLICATE, SEED
+from sandmould.scenario.scenario import Scenario
+
+SPEED = "contact.wave_speed_m_s"
+SPEEDS_M_S = (64.0, 128.0, 256.0)
+FREQUENCIES_HZ = (15.0, 21.0, 30.0, 42.0, 60.0, 85.0, 120.0, 170.0, 240.0)
+
+
+def planted(exponent: float, drop: float) -> pd.DataFrame:
+    """Curves with their tops at 60 Hz (c / 128 m/s)^exponent and so much lower a decade away."""
+    noise = np.random.default_rng(4)
+    rows = []
+    for speed in SPEEDS_M_S:
+        top_hz = 60.0 * (speed / 128.0) ** exponent
+        for replicate in range(1, 5):
+            filling = noise.normal(0.0, 0.02)
+            for hz in FREQUENCIES_HZ:
+                away = np.log10(hz / top_hz)
+                value = 0.5 - drop * away**2 + filling + noise.normal(0.0, 0.01)
+                rows.append(
+                    {SPEED: speed, FREQUENCY: hz, REPLICATE: replicate, SEED: replicate,
+                     MEASURE: value, "bed_height_m": 0.08, OUTCOME_CODE: 0}
+                )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def scenes() -> dict[float, Scenario]:
+    return {speed: Scenario.model_validate({"contact": {"wave_speed_m_s": speed}})
+            for speed in SPEEDS_M_S}  # fmt: skip
+
+
+@pytest.mark.parametrize("exponent", [0.0, 1.0])
+def test_the_power_of_planted_curves_is_found(exponent: float) -> None:
+    curves = series_of("planted", planted(exponent, 0.6), (SPEED, FREQUENCY), scenes())
+    assert [s.wave_speed_m_s for s in curves] == pytest.approx(list(SPEEDS_M_S))
+    assert curves[1].column_hz == pytest.approx(128.0 / (4 * 0.08))
+    assert all(s.is_inner for s in curves)
+    power = power_of(curves, [s.wave_speed_m_s for s in curves])
+    assert power is not None
+    assert power.ci[0] < exponent < power.ci[1]
+    # A place is known within a step of the frequencies, a factor of 1.4, over a factor of 4 in c.
+    assert power.ci[1] - power.ci[0] < 2 * np.log(1.41) / np.log(4.0)
+
+
+def test_flat_curves_have_no_power() -> None:
+    curves = series_of("flat", planted(1.0, 0.0), (SPEED, FREQUENCY), scenes())
+    assert not any(s.is_inner for s in curves)
+    assert power_of(curves, [s.wave_speed_m_s for s in curves]) is None
