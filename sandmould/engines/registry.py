@@ -184,6 +184,14 @@ def engine_problem(scenario: Scenario) -> Problem | None:
             f"mounts moves on engine {able} alone, whose runs say with what amplitude"
         )
         return Problem(f"{key}.hold", "unbalance", valid)
+    fraction = scenario.time_step.bed_fraction
+    if not engine.CAPABILITIES.changes_step and fraction is not None:
+        able = " or ".join(engines_that(lambda can: can.changes_step))
+        valid = (
+            f"absent on engine {scenario.engine.name}, which has one time step from the first line "
+            f"of its deck to the last; engine {able} takes one from the bed"
+        )
+        return Problem("time_step.bed_fraction", fraction, valid)
     try:
         engine.refuse(scenario)
     except RefusedError as refusal:

@@ -19,9 +19,6 @@ def refuse(scenario: Scenario) -> None:
         raise RefusedError("contact.rolling_axes", "all", "tangent on engine lammps in 3D")
     if scenario.time_step.rotational_inertia == "scaled":
         raise RefusedError("time_step.rotational_inertia", "scaled", "physical on engine lammps")
-    if scenario.time_step.bed_fraction is not None:
-        bed_fraction = scenario.time_step.bed_fraction
-        raise RefusedError("time_step.bed_fraction", bed_fraction, "absent on engine lammps")
     if scenario.record.orientation:
         raise RefusedError("record.orientation", True, "false on engine lammps")
     if scenario.engine.ranks > 1 and needs_callback(scenario):

@@ -24,9 +24,6 @@ def refuse(scenario: Scenario) -> None:
         raise RefusedError("sand.disc_inertia", "disc", f"sphere {_HERE}")
     if scenario.time_step.rotational_inertia == "scaled":
         raise RefusedError("time_step.rotational_inertia", "scaled", f"physical {_HERE}")
-    if scenario.time_step.bed_fraction is not None:
-        bed_fraction = scenario.time_step.bed_fraction
-        raise RefusedError("time_step.bed_fraction", bed_fraction, f"absent {_HERE}")
     if scenario.record.orientation:
         raise RefusedError("record.orientation", True, f"false {_HERE}")
     _refuse_round_solids(scenario)
