@@ -81,12 +81,14 @@ WHOLE: dict[str, Any] = {
     "sweep": _sweep(6, 2.0, 2),
     "certified": _certified(8, 1.0, 3),
     "short_runs": _stand_in(100),
+    "thousand_runs": _stand_in(1000),
 }
 LITTLE: dict[str, Any] = {
     "turns": 1,
     "sweep": _sweep(12, 0.1, 1),
     "certified": _certified(12, 0.1, 2),
     "short_runs": _stand_in(10),
+    "thousand_runs": _stand_in(20),
 }
 
 
@@ -113,6 +115,7 @@ def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
         "wall_s": wall_s,
         "runs": sum(1 for _ in folder.glob("runs/*")),
         "grain_steps": float(costs["grain_steps"].sum()),
+        "loop_wall_s": float(costs["engine_wall_s"].sum()),
         "files": sum(path.is_file() for path in folder.rglob("*")),
         "bytes": sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()),
     }
@@ -136,6 +139,20 @@ def _in_turns(name: str, run: BenchmarkRun) -> dict[str, Any]:
             rows[version].append(_measured(_python(root), root, study))
             print(name, number, version, rows[version][-1], flush=True)
     return {"study": run.extent[name], "rows": rows, "commits": _commits(versions)}
+
+
+def _alone(name: str, run: BenchmarkRun) -> dict[str, Any]:
+    """A study too long for turns, with this version alone; kernels are compiled before."""
+    folder = SCRATCH / "sweeps"
+    for turn, study in (("warm_up", LITTLE["short_runs"]), ("study", run.extent[name])):
+        place = folder / f"{name}_{turn}"
+        place.mkdir(parents=True, exist_ok=True)
+        (place / f"{name}.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
+    _measured(_python(ROOT), ROOT, folder / f"{name}_warm_up" / f"{name}.yaml")
+    load_before = os.getloadavg()[0]
+    row = _measured(_python(ROOT), ROOT, folder / f"{name}_study" / f"{name}.yaml")
+    load = [round(load_before, 1), round(os.getloadavg()[0], 1)]
+    return {"row": row, "load": load, "commit": _commits({"new": ROOT})["new"]}
 
 
 def _python(root: Path) -> Path:
@@ -162,6 +179,7 @@ def page(results: dict[str, Any]) -> str:
         }
         studies[name] = {**medians, "turns": len(rows["new"]), "rows": rows}
     values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
+    values["thousand"] = results["thousand_runs"]
     values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)
 
@@ -176,6 +194,7 @@ BENCHMARK = Benchmark(
     __doc__,
     parts={
         **{name: partial(_in_turns, name) for name in STUDIES},
+        "thousand_runs": partial(_alone, "thousand_runs"),
         "origin": lambda run: run.origin,
     },
     pages={"sweep_cost.md": page},
