@@ -81,12 +81,14 @@ WHOLE: dict[str, Any] = {
     "sweep": _sweep(6, 2.0, 2),
     "certified": _certified(8, 1.0, 3),
     "short_runs": _stand_in(100),
+    "thousand_runs": _stand_in(1000),
 }
 LITTLE: dict[str, Any] = {
     "turns": 1,
     "sweep": _sweep(12, 0.1, 1),
     "certified": _certified(12, 0.1, 2),
     "short_runs": _stand_in(10),
+    "thousand_runs": _stand_in(20),
 }
 
 
@@ -113,6 +115,7 @@ def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
         "wall_s": wall_s,
         "runs": sum(1 for _ in folder.glob("runs/*")),
         "grain_steps": float(costs["grain_steps"].sum()),
+        "loop_wall_s": float(costs["engine_wall_s"].sum()),
         "files": sum(path.is_file() for path in folder.rglob("*")),
         "bytes": sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()),
     }
@@ -120,7 +123,7 @@ def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
 
 def _in_turns(name: str, run: BenchmarkRun) -> dict[str, Any]:
     """Rows of the old and the new version, turn by turn; kernels are compiled before."""
-    versions = {"old": Path(run.options.old).resolve(), "new": ROOT}
+    versions = _versions(run)
     rows: dict[str, list[dict[str, float]]] = {version: [] for version in versions}
     folder = SCRATCH / "sweeps"
     for version, root in versions.items():
@@ -136,6 +139,58 @@ def _in_turns(name: str, run: BenchmarkRun) -> dict[str, Any]:
             rows[version].append(_measured(_python(root), root, study))
             print(name, number, version, rows[version][-1], flush=True)
     return {"study": run.extent[name], "rows": rows, "commits": _commits(versions)}
+
+
+def _versions(run: BenchmarkRun) -> dict[str, Path]:
+    return {"old": Path(run.options.old).resolve(), "new": ROOT}
+
+
+def _first_step(run: BenchmarkRun) -> dict[str, Any]:
+    """Wall time from the command to the first step of the first short run, in turns.
+
+    The first turn, which compiles and measures the machine, does not count.
+    """
+    versions = _versions(run)
+    rows: dict[str, list[float]] = {version: [] for version in versions}
+    study = SCRATCH / "sweeps" / "first_step" / "first_step.yaml"
+    study.parent.mkdir(parents=True, exist_ok=True)
+    study.write_text(yaml.safe_dump(LITTLE["short_runs"]), encoding="utf-8")
+    for number in range(4):
+        for version, root in versions.items():
+            wall_s = _begun_s(_python(root), root, study)
+            rows[version] += [wall_s] if number else []
+    return {"wall_s": rows, "load": round(os.getloadavg()[0], 1), "commits": _commits(versions)}
+
+
+def _begun_s(python: Path, root: Path, study: Path) -> float:
+    folder = study.parent / "results" / study.stem
+    shutil.rmtree(folder, ignore_errors=True)
+    begun = time.perf_counter()
+    started = subprocess.Popen(
+        [python, "-m", "sandmould.cli", "run", study.name, "--cores", str(CORES)],
+        cwd=study.parent, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": str(root)},
+    )  # fmt: skip
+    while not any(folder.glob("*/*/work/series.tsv")):
+        time.sleep(0.003)
+    wall_s = time.perf_counter() - begun
+    started.terminate()
+    started.wait()
+    return round(wall_s, 2)
+
+
+def _alone(name: str, run: BenchmarkRun) -> dict[str, Any]:
+    """A study too long for turns, with this version alone; kernels are compiled before."""
+    folder = SCRATCH / "sweeps"
+    for turn, study in (("warm_up", LITTLE["short_runs"]), ("study", run.extent[name])):
+        place = folder / f"{name}_{turn}"
+        place.mkdir(parents=True, exist_ok=True)
+        (place / f"{name}.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
+    _measured(_python(ROOT), ROOT, folder / f"{name}_warm_up" / f"{name}.yaml")
+    load_before = os.getloadavg()[0]
+    row = _measured(_python(ROOT), ROOT, folder / f"{name}_study" / f"{name}.yaml")
+    load = [round(load_before, 1), round(os.getloadavg()[0], 1)]
+    return {"row": row, "load": load, "commit": _commits({"new": ROOT})["new"]}
 
 
 def _python(root: Path) -> Path:
@@ -163,6 +218,8 @@ def page(results: dict[str, Any]) -> str:
         studies[name] = {**medians, "turns": len(rows["new"]), "rows": rows,
                          "study": results[name]["study"]}  # fmt: skip
     values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
+    values["first"] = results["first_step"]
+    values["thousand"] = results["thousand_runs"]
     values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)
 
@@ -177,6 +234,8 @@ BENCHMARK = Benchmark(
     __doc__,
     parts={
         **{name: partial(_in_turns, name) for name in STUDIES},
+        "first_step": _first_step,
+        "thousand_runs": partial(_alone, "thousand_runs"),
         "origin": lambda run: run.origin,
     },
     pages={"sweep_cost.md": page},

@@ -28,10 +28,8 @@ def loaded(code: str, folder: Path) -> str:
 def test_a_sweep_of_sand_is_planned_without_what_computes_or_draws(
     engine: str, tmp_path: Path
 ) -> None:
-    text = (
-        "based_on: tube\nscenario: {engine: {name: %s}}\n"
-        "sweep: {keys: {vibration.0.frequency_hz: [20, 40]}}\n"
-    )
+    text = "based_on: tube\nscenario: {engine: {name: %s}}\n"
+    text += "sweep: {keys: {vibration.0.frequency_hz: [20, 40]}}\n"
     (tmp_path / "trial.yaml").write_text(text % engine)
     code = (
         "from pathlib import Path\n"
