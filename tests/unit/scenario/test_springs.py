@@ -93,9 +93,7 @@ def test_four_times_the_springs_are_twice_the_speed() -> None:
 
 
 def test_a_deck_prints_the_springs_of_both_sizes() -> None:
-    hard = tube_scene(
-        sand={"disc_thickness_m": "grain"}, contact={"springs_at_size_scale": 4.0}
-    )
+    hard = tube_scene(sand={"disc_thickness_m": "grain"}, contact={"springs_at_size_scale": 4.0})
     text = render_deck(build_program(hard), {}).text
     (line,) = [x for x in text.splitlines() if x.startswith("variable grain_k_n ")]
     assert line.startswith("variable grain_k_n index 140000  # N/m, ")
