@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
@@ -20,7 +21,7 @@ BROKEN = 1
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def fork(work: Work, begin: Callable[[], None]) -> int:
+def fork(work: Work, begin: Callable[[], None], group: bool = False) -> int:
     """Start a process with all that is loaded here; gives its number.
 
     What may not be forked once it has begun, such as MPI or threads, must begin in the work.
@@ -32,6 +33,8 @@ def fork(work: Work, begin: Callable[[], None]) -> int:
     begin : callable
         Lets the child go of what is its parent's alone: handlers of signals, files. Until then
         no request to end reaches it.
+    group : bool
+        Whether it begins a group of processes, which can be ended as a whole.
     """
     for stream in (sys.stdout, sys.stderr):
         stream.flush()  # what lies in a buffer would be written by both
@@ -39,7 +42,12 @@ def fork(work: Work, begin: Callable[[], None]) -> int:
     parent = os.getpid()
     pid = os.fork()
     if pid == 0:
+        if group:
+            os.setpgid(0, 0)
         _work_on(work, begin, before, parent)
+    if group:  # it does so itself, maybe later than a signal is sent to the group
+        with contextlib.suppress(OSError):
+            os.setpgid(pid, pid)
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return pid
 

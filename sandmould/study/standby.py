@@ -9,6 +9,7 @@ standard library is loaded here until that is asked for: every job pays for it.
 from __future__ import annotations
 
 import contextlib
+import importlib
 import json
 import os
 import select
@@ -69,9 +70,11 @@ def _done_elsewhere(work: str, given: Collection[Any]) -> int | None:
         except OSError:  # it has ended
             return None
         job = {"work": work, "given": given, "folder": os.getcwd(), "environment": {**os.environ}}
-        socket.send_fds(line, [b"\n"], [1, 2])
-        line.sendall(json.dumps(job).encode() + b"\n")
-        status = line.makefile().readline()
+        status = ""
+        with contextlib.suppress(OSError):
+            socket.send_fds(line, [b"\n"], [1, 2])
+            line.sendall(json.dumps(job).encode() + b"\n")
+            status = line.makefile().readline()
     if not status:
         raise SystemExit("the process that loads what runs need was killed")
     return int(status)
@@ -96,7 +99,7 @@ def standing_by(scenarios: Collection[Any]) -> Iterator[None]:
             shutil.rmtree(folder)
             yield
             return
-        pid = fork(partial(_stand_by, listener, scenarios), _begin)
+        pid = fork(partial(_stand_by, listener, scenarios), _begin, group=True)
     os.environ[PLACE] = place
     try:
         yield
@@ -112,7 +115,6 @@ def _begin() -> None:
     """Be a process of its own, which no signal of the terminal reaches."""
     for number in END_SIGNALS:
         signal.signal(number, signal.SIG_DFL)
-    os.setpgid(0, 0)
     end_with_parent(signal.SIGKILL)
     call_process("sandmould-ready")
     nothing = os.open(os.devnull, os.O_RDWR)
@@ -183,6 +185,7 @@ def _stand_by(listener: socket.socket, scenarios: Iterable[Any]) -> None:
     """Load what runs need, then fork for each job that asks."""
     from sandmould.study.worker import load, load_kept
 
+    importlib.import_module("sandmould.study.run_jobs")
     for scenario in scenarios:
         load(scenario)
     jobs = _Jobs(listener)

@@ -106,9 +106,7 @@ def run_in_group(
     Stopped
         When a signal asked to end, after all processes ended.
     """
-    pid = fork(partial(_do, work, environment), partial(_begin, log))
-    with contextlib.suppress(OSError):  # it does so itself, maybe later than a signal comes
-        os.setpgid(pid, pid)
+    pid = fork(partial(_do, work, environment), partial(_begin, log), group=True)
     try:
         while not _has_ended(pid, look() if look is not None else None):
             pass
@@ -129,7 +127,6 @@ def _begin(log: IO[str] | None) -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:
             python = number is signal.SIGINT
             signal.signal(number, signal.default_int_handler if python else signal.SIG_DFL)
-    os.setpgid(0, 0)
     end_with_parent(signal.SIGKILL)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
