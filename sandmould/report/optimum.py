@@ -137,8 +137,11 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
 def _advised(optimum: Optimum, study: Study, robustness: RobustnessPages) -> Recommendation | None:
     """A frequency for the table, where the springs allow one."""
     key = frequency_key(study.sweep)
-    if robustness.mode is None or not key:
+    if robustness.mode is None or robustness.assessment.springs is None or not key:
         return None
+    if optimum.at_end(key):
+        why = "the interval of the optimum reaches the end of what was swept"
+        return Recommendation(None, f"No frequency in Hz is recommended: {why}.")
     sand = study.certificate.sand_wave_speed
     return recommend(robustness.assessment, optimum.interval(key), robustness.mode.wave_speed, sand)
 

@@ -165,6 +165,12 @@ def test_without_a_source_of_the_wave_speed_no_frequency_is_named_first(tmp_path
     assert advised.sentences[0] == third
     assert advised.sentences[2].startswith("Recommended with the acceleration held: ")
     assert "30 to 40 m/s (Somebody 2020)" in advised.sentences[2]
+    # An optimum at the end of what was swept is no frequency to set.
+    swept = collected.of_sweep.summary
+    cut = optimum_pages(folder, sourced, swept[swept[KEY] <= 50.0], pages, pages.mode)
+    assert cut is not None
+    assert not cut.sound
+    assert cut.sentences[1].startswith("No frequency in Hz is recommended: the interval of the op")
 
 
 def test_there_is_no_certificate_before_its_frequencies_are_chosen(tmp_path: Path) -> None:
