@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sandmould.dem.table import MountedTable, TableDrive
 from sandmould.scenario.geometry import Array
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:  # compiled: no plan waits for it
+    from sandmould.dem.table import MountedTable, TableDrive
 
 
 @dataclass(frozen=True)

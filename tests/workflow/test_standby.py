@@ -34,9 +34,11 @@ do_job("compute_batch", sys.argv[2:], sys.argv[1], 1, "mpiexec", 1)
 
 
 @pytest.fixture
-def standing() -> Iterator[None]:
+def standing() -> Iterator[set[int]]:
+    """Processes that stand by, by their numbers: other tests may have left children too."""
+    before = set(children(os.getpid()))
     with standby.standing_by([tube_scene(**FEW)]):
-        yield
+        yield set(children(os.getpid())) - before
 
 
 def job(folder: Path, runs: list[Path]) -> subprocess.Popen[str]:
@@ -96,12 +98,13 @@ def test_a_killed_job_stops_its_run_which_the_next_one_continues(tmp_path: Path)
     assert RunOutcome.read(run / "outcome.json").outcome is Outcome.FINISHED
 
 
-@pytest.mark.usefixtures("standing")
-def test_a_job_outlives_the_killed_process_and_is_done_again(tmp_path: Path) -> None:
+def test_a_job_outlives_the_killed_process_and_is_done_again(
+    standing: set[int], tmp_path: Path
+) -> None:
     (run,) = runs_in(tmp_path, 1, **LONG)
     first = job(tmp_path, [run])
     wait_for(lambda: list(run.glob("work/checkpoint_*/mark.json")))
-    (ready,) = [pid for pid in children(os.getpid()) if pid != first.pid]
+    (ready,) = standing
     os.kill(ready, signal.SIGKILL)
     said = first.communicate(timeout=60)[1]
     assert first.returncode == 1

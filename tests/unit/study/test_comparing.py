@@ -139,7 +139,7 @@ def test_price_is_that_of_each_engine(planned: Planned) -> None:
     ]  # fmt: skip
     assert "an estimate" not in "".join(rows)
     half = Prices({("lammps", 2): 2e6})
-    assert plan_table(planned(**CHECKED).runs, half, 1).endswith("an estimate\n")
+    assert ", an estimate\n" in plan_table(planned(**CHECKED).runs, half, 1)
 
 
 @pytest.mark.parametrize(
