@@ -18,6 +18,7 @@ from pathlib import Path
 import sandmould.runs.one_blas_thread  # noqa: F401
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BAD_INPUT_EXIT
+from sandmould.study.cluster.settings import may_be_elsewhere
 from sandmould.study.plan.batches import is_done
 from sandmould.study.plan.build_plan import RESULTS, Plan, starts_jobs, writing
 from sandmould.study.plan.handover import checked_plan, hand_over
@@ -76,7 +77,7 @@ def _run_study(path: Path, options: Sequence[str]) -> int:
 def _standing_by(plan: Plan, options: Sequence[str]) -> contextlib.AbstractContextManager[None]:
     """Have what runs need loaded beforehand, where jobs are on this machine and any is left."""
     left = any(not is_done(RESULTS / plan.study.name / run.place) for run in plan.runs)
-    if left and starts_jobs(options) and not _may_be_elsewhere(options):
+    if left and starts_jobs(options) and not may_be_elsewhere(options):
         return standing_by(plan.classes.values())
     return contextlib.nullcontext()
 
@@ -98,7 +99,7 @@ def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> in
         log = screen.log.open("w", encoding="utf-8")
     with log:
         with screen:
-            elsewhere = _may_be_elsewhere(options)
+            elsewhere = may_be_elsewhere(options)
             status = run_in_group(work, log, screen.environment(), screen.look, elsewhere)
         if status == BAD_INPUT_EXIT:
             return status
@@ -115,14 +116,6 @@ def _be_snakemake(arguments: Sequence[str]) -> None:
 
     sys.argv = ["snakemake", *arguments]
     main()
-
-
-def _may_be_elsewhere(options: Sequence[str]) -> bool:
-    """Whether options of Snakemake may send jobs to other machines."""
-    return any(option.split("=")[0] in _ELSEWHERE for option in options)
-
-
-_ELSEWHERE = ("--executor", "-e", "--profile", "--workflow-profile")
 
 
 def stated_cores(options: Sequence[str]) -> int | None:

@@ -8,7 +8,7 @@ from sandmould import ROOT
 from sandmould.runs.columns import SWEEP
 from sandmould.runs.words import say
 from sandmould.scenario.bad_input import BAD_INPUT_EXIT, BadInputError
-from sandmould.study.cluster.settings import goes_to_slurm
+from sandmould.study.cluster.settings import goes_to_slurm, may_be_elsewhere
 from sandmould.study.cluster.submission import open_submission
 from sandmould.study.packs.recorded import take_up
 from sandmould.study.plan.batches import alone
@@ -47,7 +47,8 @@ try:
             say(taken)
     LACKING = PLAN.lacks(RESULTS) if workflow.is_main_process else {}
     # Jobs elsewhere plan the study again and must find the same batches there.
-    FREE_CORES = CORES if workflow.is_main_process and workflow.local_exec else 0
+    is_here = workflow.is_main_process and not may_be_elsewhere(sys.argv)
+    FREE_CORES = CORES if is_here else 0
     BATCHED = PLAN.batches(
         BATCH_WALL_S,
         BATCH_LEAST,

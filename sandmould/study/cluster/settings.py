@@ -74,6 +74,11 @@ def read_cluster(path: Path = CLUSTER_FILE) -> Cluster:
     return validated(Cluster, read_yaml(path, str(path)), Origin({"": str(path)}))
 
 
+def may_be_elsewhere(arguments: Sequence[str]) -> bool:
+    """Whether Snakemake called with these arguments may send jobs to other machines."""
+    return any(argument.split("=")[0] in _CHOOSES for argument in arguments)
+
+
 def goes_to_slurm(arguments: Sequence[str]) -> bool:
     """Whether Snakemake called with these arguments submits jobs to Slurm, as its profile says.
 
