@@ -13,10 +13,8 @@ from scipy.special import stdtrit
 from analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.report.chart import Chart, Line, tints
 from sandmould.report.curves import reported_lines, runs_by_setting, runs_of
-from sandmould.report.drive import drive_of
 from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
-from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred
 from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
@@ -37,7 +35,7 @@ class FillingPages:
     """What the report says of the filling of a cavity."""
 
     advice: tuple[str, ...]
-    """Drive of the best setting, and the time it takes."""
+    """The time that the best setting takes."""
     chart: Chart | None
     """Fill over the swept key at several times, as figure 16 of the paper."""
     limbs: str
@@ -68,9 +66,7 @@ def filling_pages(
         isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
     )
     settings = [s for s in verdict.settings if s.n]
-    drive = drive_of(scenario, runs_of(collected.summary, best))
-    filled = _time_to_fill(collected.summary, shaken, best, measure)
-    advice = (filled,) if drive is None else (_drive(drive, best), filled)
+    advice = (_time_to_fill(collected.summary, shaken, best, measure),)
     if not is_on_a_scale or len(settings) < 3:
         return FillingPages(advice, None, "")
     table = _fill_at_times(collected.summary, shaken, settings, keys[0], measure)
@@ -84,14 +80,6 @@ def _shaken(collected: Collected, measure: str) -> pd.DataFrame:
     summary, curves = collected.summary, collected.curves
     used = summary.loc[barred(summary, measure) == "", RUN]
     return during_vibration(curves[curves[RUN].isin(used)])
-
-
-def _drive(drive: BoxDrive, best: Setting) -> str:
-    return (
-        f"At {best.label} the box moves {number(1e3 * drive.displacement_m)} mm to either side at "
-        f"{number(drive.frequency_hz)} Hz: {number(1e3 * drive.velocity_m_s)} mm/s and "
-        f"{number(drive.acceleration_g)} g at most."
-    )
 
 
 def _time_to_fill(summary: pd.DataFrame, shaken: pd.DataFrame, best: Setting, measure: str) -> str:

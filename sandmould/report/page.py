@@ -20,6 +20,7 @@ from sandmould.report.animation import BUDGET_BYTES
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.report.curves import objective_charts
+from sandmould.report.drive import with_amplitudes
 from sandmould.report.estimate_section import estimate_figures, estimate_pages
 from sandmould.report.figure_files import numbered, write_figures
 from sandmould.report.kinds.registry import (
@@ -121,6 +122,8 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
             own = _scenario_of(study_folder, summary[RUN].iloc[rows])
             if own is not None:
                 by_setting[label] = own, summary.iloc[rows]
+    if seeks_best:
+        verdict = with_amplitudes(verdict, drives_of(by_setting))
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario

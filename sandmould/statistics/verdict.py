@@ -280,8 +280,9 @@ def _sentences(
     return (
         f"Not resolved: no setting can be recommended for its {what}. The {most} mean, "
         f"{mean}, is that of {best.label}, but it cannot be told apart from "
-        f"{listed(like)} at 95 % confidence.{ruled_out}",
-        again + _more_sentence(comparisons, best),
+        f"{listed(like)} at 95 % confidence.{ruled_out}"
+        f"{_more_sentence(comparisons, best)}",
+        again,
     )
 
 

@@ -54,17 +54,14 @@ def test_limbs_and_time_are_found_again(tmp_path: Path) -> None:
     end = 1 - math.exp(-2 * DURATION_S)
     level = 0.95 * (0.78 + 0.04 * end)
     reached_s = -math.log(1 - level * end / 0.9) / 2
-    told = float(re.search(r"at 40 Hz after (\S+)", found.advice[1]).group(1))  # type: ignore[union-attr]
+    told = float(re.search(r"at 40 Hz after (\S+)", found.advice[0]).group(1))  # type: ignore[union-attr]
     assert told == pytest.approx(reached_s, abs=0.05)
-    assert found.advice[0] == (
-        "At 40 Hz the box moves 0.233 mm to either side at 40 Hz: 58.5 mm/s and 1.50 g at most."
-    )
 
 
 def test_a_cavity_that_does_not_fill_is_told(tmp_path: Path) -> None:
     found = pages(tmp_path / "slow", 0.5, 0.002)
-    assert found.advice[1].startswith("0 of 3 runs at 40 Hz reach 95 % of what the cavity holds")
-    assert "after 2 s it holds 61 % of it" in found.advice[1]
+    assert found.advice[0].startswith("0 of 3 runs at 40 Hz reach 95 % of what the cavity holds")
+    assert "after 2 s it holds 61 % of it" in found.advice[0]
 
 
 def test_the_chart_has_a_curve_a_time_and_what_others_found(tmp_path: Path) -> None:
