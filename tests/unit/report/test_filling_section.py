@@ -88,7 +88,7 @@ def test_the_page_shows_it(tmp_path: Path) -> None:
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text()
     assert "Filling over what is swept" in page
-    assert "the box moves" in page
+    assert "mm to either side" in page
 
 
 @pytest.mark.slow
