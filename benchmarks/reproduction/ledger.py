@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from sandmould.scenario.bad_input import display_path
 from sandmould.scenario.quantity import Section
-from sandmould.scenario.reading import Origin, merge, read_yaml, validated
+from sandmould.scenario.reading import ModelT, Origin, merge, read_yaml, validated
 
 CLAIMS = Path(__file__).with_name("claims")
 """One file a paper, and one of what others measured."""
@@ -170,9 +170,7 @@ def read_paper(path: Path) -> Paper:
     BadInputError
         With file, key, value and what is valid.
     """
-    name = display_path(path)
-    origin = Origin(file={"": name})
-    return validated(Paper, merge({}, read_yaml(path, name), origin, name), origin)
+    return _read(Paper, path)
 
 
 def read_elsewhere(path: Path = CLAIMS / "measured_elsewhere.yaml") -> Elsewhere:
@@ -183,6 +181,10 @@ def read_elsewhere(path: Path = CLAIMS / "measured_elsewhere.yaml") -> Elsewhere
     BadInputError
         With file, key, value and what is valid.
     """
+    return _read(Elsewhere, path)
+
+
+def _read(model: type[ModelT], path: Path) -> ModelT:
     name = display_path(path)
     origin = Origin(file={"": name})
-    return validated(Elsewhere, merge({}, read_yaml(path, name), origin, name), origin)
+    return validated(model, merge({}, read_yaml(path, name), origin, name), origin)
