@@ -134,6 +134,11 @@ def test_a_run_of_two_ranks_gets_two_cores_and_the_time_that_its_partition_allow
         "--job-name=sandmould_1", f"--comment=rule_batch_wildcards_{run}", f"--chdir={folder}",
         "--partition=short", "--time=60",
     )  # fmt: skip
+    # Slurm gives another reason until its scheduler has looked at the job.
+    deadline = time.monotonic() + LIMIT_S
+    while slurm.told("%r") != {stuck: "PartitionTimeLimit"}:
+        assert time.monotonic() < deadline, slurm.told("%r")
+        time.sleep(0.2)
     said = call(slurm, folder, *SANDMOULD, "status", "small.yaml").stdout.splitlines()
     assert "jobs on the cluster: 1 pending (1 PartitionTimeLimit)" in said
     assert (
