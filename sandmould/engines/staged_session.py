@@ -302,10 +302,8 @@ class StagedSession(ABC):
 
     def _take_step_over(self, earlier_s: float) -> None:
         """Go on from the end of a stage with another step, at the next step that ends a check."""
-        time_s, lasted_s = (
-            self._time_at_0_s + self.steps * earlier_s,
-            (self.steps - self._stage_start) * earlier_s,
-        )
+        time_s = self._time_at_0_s + self.steps * earlier_s
+        lasted_s = (self.steps - self._stage_start) * earlier_s
         self._change_step(earlier_s, -(-self.steps // self._counts.check) * self._counts.check)
         self._time_at_0_s = time_s - self.steps * self.step_s
         self._stage_start = self.steps - self._counts.steps(lasted_s)

@@ -26,7 +26,7 @@ class TableMotion:
 
     @property
     def unbalance(self) -> Unbalance:
-        """MountedTable and rotating masses."""
+        """Table, mounts and rotating masses."""
         assert self.vibration.unbalance is not None
         return self.vibration.unbalance
 

@@ -45,4 +45,6 @@ def springs_in_use(sand: Sand, contact: Contact, dimension: int) -> Contact:
     so does the wave speed: springs grow with the grains. A wave speed that is given settles them.
     """
     factor = spring_factor(sand, contact, dimension)
-    return contact.stiffer(factor) if factor != 1.0 else contact
+    if factor == 1.0:
+        return contact
+    return contact.stiffer(factor).model_copy(update={"wave_speed_m_s": contact.wave_speed_m_s})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from sandmould.arrays import Floats, Ints
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import COMPONENTWISE, ISOTROPIC, NONE, VISCOUS, Damping
@@ -12,7 +11,6 @@ from sandmould.dem.steps import DemScene
 from sandmould.dem.surfaces import Surfaces
 from sandmould.engines.program import Stage
 from sandmould.engines.reference.moved_solver import MovedSolver
-from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.solid_surfaces import add_solids
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.placement import PlannedLayer
@@ -82,31 +80,19 @@ def solver_of(scenario: Scenario, stage: Stage, step_s: float) -> MovedSolver:
 def grains_of(scenario: Scenario, layer: PlannedLayer, base_m: float, first_id: int) -> Grains:
     """Grains of a planned layer at rest, its lowest point at a height."""
     d, n = scenario.dimension, len(layer.radius_m)
+    radius, spins = layer.radius_m, 1 if d == 2 else 3
     position = layer.position_m.copy()
     position[:, -1] += base_m
-    spin = np.zeros((n, 1 if d == 2 else 3))
-    ids = first_id + np.arange(n)
-    return _grains(scenario, ids, position, np.zeros((n, d)), spin, layer.radius_m.copy())
-
-
-def grains_at(scenario: Scenario, snapshot: Snapshot) -> Grains:
-    """Grains as a snapshot has them, in the frame of the box and without forces."""
-    spin = snapshot.spin_rad_s[:, 2:] if scenario.dimension == 2 else snapshot.spin_rad_s
-    moving = (snapshot.position_m, snapshot.velocity_m_s, spin, snapshot.radius_m)
-    return _grains(scenario, snapshot.id, *(values.copy() for values in moving))
-
-
-def _grains(
-    scenario: Scenario,
-    ids: Ints,
-    position: Floats,
-    velocity: Floats,
-    spin: Floats,
-    radius: Floats,
-) -> Grains:
-    d = scenario.dimension
     mass = scenario.sand.grain_mass_kg(1.0, d) * (2 * radius) ** d
     factor = inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d)
-    inertia = factor * mass * radius**2
-    forces = np.zeros_like(velocity), np.zeros_like(spin)
-    return Grains(ids, position, velocity, spin, radius, mass, inertia, *forces)
+    return Grains(
+        first_id + np.arange(n),
+        position,
+        np.zeros((n, d)),
+        np.zeros((n, spins)),
+        radius.copy(),
+        mass,
+        factor * mass * radius**2,
+        np.zeros((n, d)),
+        np.zeros((n, spins)),
+    )

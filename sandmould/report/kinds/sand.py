@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from sandmould.report.bed_mode import BedMode, bed_mode
+from sandmould.report.bed_mode import bed_mode
 from sandmould.report.chart import Chart
 from sandmould.report.figure_files import pictures, strip
 from sandmould.report.filling import FillingPages, filling_pages
@@ -58,10 +58,6 @@ def _softness(scenario: Scenario, summary: pd.DataFrame) -> str:
         measured = pd.to_numeric(summary[OVERLAP_P99_FRACTION], errors="coerce")
         deepest = float(measured[finished(summary)].max())
     return softness_warning(bed_hardness(scenario), deepest)
-
-
-def _mode(scenario: Scenario, summary: pd.DataFrame) -> BedMode | None:
-    return bed_mode(scenario, summary)
 
 
 def _sand_pages(findings: Findings[Scenario]) -> KindPages:
@@ -117,6 +113,6 @@ SAND_REPORT = KindReport(
     _sand_pages,
     shows_drives=True,
     robustness=robustness_pages,
-    mode=_mode,
+    mode=bed_mode,
     heaps=steepest_heaps,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -75,8 +76,12 @@ def read_cluster(path: Path = CLUSTER_FILE) -> Cluster:
 
 
 def may_be_elsewhere(arguments: Sequence[str]) -> bool:
-    """Whether Snakemake called with these arguments may send jobs to other machines."""
-    return any(argument.split("=")[0] in _CHOOSES for argument in arguments)
+    """Whether Snakemake called with these arguments may send jobs to other machines.
+
+    A profile can come from the environment, too.
+    """
+    named = any(argument.split("=")[0] in _CHOOSES for argument in arguments)
+    return named or "SNAKEMAKE_PROFILE" in os.environ
 
 
 def goes_to_slurm(arguments: Sequence[str]) -> bool:

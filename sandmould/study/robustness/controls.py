@@ -50,9 +50,9 @@ def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Itera
     for control in checks.controls:
         if control == "hold":
             # At the middle frequency nothing differs from a sweep whose motion is laid down.
-            places = (-1, 0, 1) if scenario.vibrations[0].hold == "unbalance" else (-1, 1)
+            steps = (-1, 0, 1) if scenario.vibrations[0].hold == "unbalance" else (-1, 1)
             for hold in _other_holds(scenario):
-                yield Case(control, hold, None, _holding(hold, best_hz), places)
+                yield Case(control, hold, None, _holding(hold, best_hz), steps)
         elif control == SPRINGS:
             yield from _of_springs(scenario, best_hz)
         elif control in BY_FACTOR:

@@ -47,4 +47,6 @@ def test_what_was_called_is_kept_and_loaded(kept: Path) -> None:
 def test_a_damaged_list_stops_no_run(kept: Path) -> None:
     scenario = tube_scene(engine={"name": "reference"})
     (kept / "called_reference_2.txt").write_text("[torn")
+    before = loaded_kernels()
     worker.load_kept(scenario)
+    assert loaded_kernels() == before
