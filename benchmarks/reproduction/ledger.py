@@ -50,7 +50,9 @@ class OurSource(Section):
     """Where a number of ours is recorded, and what is taken of it."""
 
     record: str = Field("", description="Folder of docs/results; its summary.tsv is read.")
-    told: bool = Field(False, description="Read the tables of the record in docs/results/README.")
+    in_readme: bool = Field(
+        False, description="Read the tables of the record in docs/results/README."
+    )
     results: Literal["", "arpm", "mps"] = Field(
         "", description="Theme of benchmarks; its results.json is read."
     )

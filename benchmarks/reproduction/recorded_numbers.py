@@ -59,7 +59,7 @@ class StudyRecord:
         return why_stale(self.folder)
 
     @cached_property
-    def told(self) -> pd.DataFrame:
+    def readme_tables(self) -> pd.DataFrame:
         """Tables of its section in the README of all records, one row a line."""
         text = "\n" + (self.folder.parent / "README.md").read_text(encoding="utf-8")
         section = text.partition(f"\n## {self.name}\n")[2].partition("\n## ")[0]
@@ -158,8 +158,8 @@ class RecordedNumbers:
             table = self._part(source, file, key)
         else:
             record = self.record_of(source.record, file, f"{key}.record")
-            table = record.told if source.told else record.summary
-            if source.told and not len(table):
+            table = record.readme_tables if source.in_readme else record.summary
+            if source.in_readme and not len(table):
                 raise _bad(file, f"{key}.record", source.record, "a record with a table in README")
         for column in (*source.where, source.column, *([source.of] if source.of else [])):
             if column not in table:
@@ -173,7 +173,7 @@ class RecordedNumbers:
             if not len(table):
                 valid = f"a value of {column} in that table"
                 raise _bad(file, f"{key}.where.{column}", value, valid)
-        if source.told:
+        if source.in_readme:
             numbers = [_first_number(cell) for cell in table[source.column]]
             table = table.assign(**{source.column: numbers})
         elif source.record:
@@ -257,7 +257,7 @@ def planned_core_s(study: OpenStudy) -> float:
 
 def _one_setting(rows: pd.DataFrame, source: OurSource, file: str, key: str) -> None:
     """Refuse a mean over rows that differ in more than chance."""
-    if source.record and not source.told:
+    if source.record and not source.in_readme:
         several = [name for name in swept_keys(rows) if rows[name].astype(str).nunique() > 1]
     else:
         several = [str(name) for name in rows] if len(rows) > 1 else []

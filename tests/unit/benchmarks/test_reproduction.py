@@ -84,7 +84,7 @@ def test_best_setting_with_those_not_told_apart(numbers: RecordedNumbers) -> Non
 
 def test_tables_of_the_readme_are_read_section_by_section(numbers: RecordedNumbers) -> None:
     where = {"vibrated": "fill (sand)"}
-    found = taken(numbers, record="planted", told=True, where=where, column="5 s")
+    found = taken(numbers, record="planted", in_readme=True, where=where, column="5 s")
     assert (found.low, found.best, found.n) == (0.52, 0.52, 1)
 
 
@@ -118,7 +118,7 @@ SCENE = {"scenario": "tube_demo", "column": "sand.densty"}
         (FILL, f"where = {{}}: rows of one setting, by {HZ} as well."),
         (FILL | {"column": "run", "where": {HZ: 20}}, "column = 'run': a column with numbers in"),
         (
-            FILL | {"column": "6 s", "told": True},
+            FILL | {"column": "6 s", "in_readme": True},
             "column = '6 s': a column of planted, nearest 5 s",
         ),
         (ROWS | {"part": "way.rows"}, "part = 'way.rows': a path into the results, nearest ways."),

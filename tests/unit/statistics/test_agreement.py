@@ -13,6 +13,7 @@ import pytest
 
 from benchmarks.agreement import engine_twins
 from sandmould.report.agreement import row_name
+from sandmould.runs.columns import CROSS_CHECK, CROSS_CHECK_OWN, PART
 from sandmould.statistics.agreement import (
     COLUMNS,
     agreement_sentences,
@@ -140,6 +141,23 @@ def test_cross_check_is_compared_at_its_point_alone(tmp_path: Path) -> None:
     assert fill.agreement.n == packing.agreement.n == 3
     assert fill.agreement.means == pytest.approx((0.55, 0.85), abs=0.02)
     assert fill.agreement.verdict == "different"
+
+
+def test_a_shorter_cross_check_compares_the_runs_of_both_engines_that_are_as_short(
+    tmp_path: Path,
+) -> None:
+    folder = write_cross_check(tmp_path / "demo")
+    study = read_study(folder)
+    check = study.cross_check.model_copy(update={"vibration_s": 0.5})  # type: ignore[union-attr]
+    summary = gather(folder).summary
+    # The shorter runs of the study's own engine: as filled as those of the other, less 0.1.
+    own = summary[summary[PART] == CROSS_CHECK].copy()
+    own[PART] = CROSS_CHECK_OWN
+    own["tube_fill_fraction"] -= 0.1
+    summary = pd.concat([summary, own], ignore_index=True)
+    shorter = study.model_copy(update={"cross_check": check})
+    _, fill = compare_study(summary, (KEY,), shorter)
+    assert fill.agreement.means[1] - fill.agreement.means[0] == pytest.approx(0.1)
 
 
 def test_table_is_written_and_reads_back(tmp_path: Path) -> None:

@@ -53,6 +53,8 @@ def test_measures_have_a_row_a_snapshot_and_gaps_for_broken_ones(folder: Path) -
     grain = np.pi * R**2
     fill = list(table.tube_fill_fraction)
     assert fill[:3] == pytest.approx([0, grain / 2 / bore, grain / bore])
+    of_bed = list(table.tube_fill_of_bed_fraction * table.solid_fraction)
+    assert of_bed[:3] == pytest.approx(fill[:3])
     assert np.isnan(fill[3])
     assert "000003.npz" in table.stage[3]
 
