@@ -24,7 +24,7 @@ from sandmould.runs.formatting import (
 )
 from sandmould.statistics.evidence import barred, left_out, reason_text, usable_values
 from sandmould.statistics.settings import Setting, group_settings
-from sandmould.statistics.verdict import Verdict
+from sandmould.statistics.verdict import FEW, Verdict
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
 
@@ -46,10 +46,13 @@ def setting_tints(verdict: Verdict, keys: Sequence[str]) -> dict[str, Tint]:
 
 
 def reported_lines(study: Study, key: str, low: float, high: float) -> list[Line]:
-    """Upright lines where others found the best value of the swept key."""
+    """Upright lines where others found the best value of the swept key; labels at their foot.
+
+    There is room: under a best value the chart is empty.
+    """
     return [
         Line(
-            np.array([[reported.value, low], [reported.value, high]]), PLAIN,
+            np.array([[reported.value, high], [reported.value, low]]), PLAIN,
             label=value_text(key, reported.value), title=f"best by {reported.by}",
         )
         for reported in study.objective.reported_best
@@ -290,7 +293,9 @@ def _mean_mark(setting: Setting, x: float, y: float, tint: Tint, factor: float) 
     reach = setting.ci_half_width
     mean = with_margin(setting.mean, reach)
     title = f"{setting.label}: mean {mean}, {setting.n} runs"
-    return Mark(x, y, "mean", tint, factor * reach, title)
+    # Student's t of two runs is 13 standard errors: the bar would tell of the test, not of the sand.
+    drawn = factor * reach if setting.n >= FEW else math.nan
+    return Mark(x, y, "mean", tint, drawn, title)
 
 
 def _settings_alt(verdict: Verdict) -> str:

@@ -24,7 +24,8 @@ from sandmould.statistics.settings import (
 )
 
 Better = Literal["larger", "smaller", "neither"]
-_FEW = 3
+FEW = 3
+"""Replicates from which on a setting's own interval tells something."""
 NOT_TESTED = (
     "Whether the optimum belongs to the sand or to the model's springs is not tested here: its "
     "robustness checks (springs, bed depth, grain size, time step) have not been run."
@@ -218,9 +219,9 @@ def _run_caveats(
     if empty and used:
         so = ": the best may lie there" if seeks_best else ""
         caveats.append(f"No run can be used at {listed(empty)}{so}.")
-    few = [s.label for s in settings if 0 < s.n < _FEW]
+    few = [s.label for s in settings if 0 < s.n < FEW]
     if few:
-        caveats.append(f"Fewer than {_FEW} usable replicates at {listed(few)}.")
+        caveats.append(f"Fewer than {FEW} usable replicates at {listed(few)}.")
     return [*caveats, *filter(None, [one_way_caveat(summary)])]
 
 
