@@ -24,6 +24,9 @@ import yaml
 
 from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, render
 from sandmould import ROOT
+from sandmould.statistics.agreement import sweep_part
+from sandmould.statistics.verdict import compare_settings
+from sandmould.study.collect import read_summary
 from sandmould.study.run_tables import read_costs
 
 CORES = 2
@@ -76,8 +79,20 @@ def _certified(scale: float, duration_s: float, replicates: int) -> dict[str, An
     )  # fmt: skip
 
 
+def _until_known(
+    scale: float, duration_s: float, half_width: float, **time_step: float
+) -> dict[str, Any]:
+    """Two fillings of each frequency, then more where none is ruled out."""
+    study = _sweep(scale, duration_s, 2)
+    study["scenario"]["time_step"] = {"fraction": 0.8, **time_step}
+    return study | {
+        "refine": {"adds": "replicates", "rounds": 20, "runs": 8, "half_width": half_width}
+    }
+
+
 WHOLE: dict[str, Any] = {
     "turns": 2,
+    "same_answer": {"scale": 6.0, "duration_s": 2.0, "replicates": 5},
     "sweep": _sweep(6, 2.0, 2),
     "certified": _certified(8, 1.0, 3),
     "short_runs": _stand_in(100),
@@ -85,6 +100,7 @@ WHOLE: dict[str, Any] = {
 }
 LITTLE: dict[str, Any] = {
     "turns": 1,
+    "same_answer": {"scale": 12.0, "duration_s": 0.1, "replicates": 3},
     "sweep": _sweep(12, 0.1, 1),
     "certified": _certified(12, 0.1, 2),
     "short_runs": _stand_in(10),
@@ -139,6 +155,38 @@ def _in_turns(name: str, run: BenchmarkRun) -> dict[str, Any]:
             rows[version].append(_measured(_python(root), root, study))
             print(name, number, version, rows[version][-1], flush=True)
     return {"study": run.extent[name], "rows": rows, "commits": _commits(versions)}
+
+
+def _same_answer(run: BenchmarkRun) -> dict[str, Any]:
+    """What the same half width between the two best settings costs, old and new."""
+    versions, extent = _versions(run), run.extent["same_answer"]
+    size = extent["scale"], extent["duration_s"]
+    rows: dict[str, dict[str, Any]] = {}
+    for name, time_step in (("old", {}), ("new", {}), ("new_step", {"bed_fraction": 0.7})):
+        root = versions["old" if name == "old" else "new"]
+        study = _sweep(*size, extent["replicates"])
+        if name != "old":
+            study = _until_known(*size, rows["old"]["half_width"], **time_step)
+        file = SCRATCH / "sweeps" / f"same_{name}" / "same.yaml"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(yaml.safe_dump(study), encoding="utf-8")
+        rows[name] = _measured(_python(root), root, file)
+        rows[name] |= _answer(file.parent / "results" / file.stem, pools_spread=name != "old")
+        print(name, rows[name], flush=True)
+    return {"rows": rows, **extent, "commits": _commits(versions)}
+
+
+def _answer(folder: Path, pools_spread: bool) -> dict[str, Any]:
+    """The best setting, and how well its difference from the next is known."""
+    verdict = compare_settings(
+        sweep_part(read_summary(folder)), [FREQUENCY], "tube_fill_fraction",
+        pools_spread=pools_spread,
+    )  # fmt: skip
+    assert verdict.best is not None
+    assert verdict.runner_up is not None
+    low, high = verdict.ci
+    return {"best": verdict.best.label, "next": verdict.runner_up.label,
+            "difference": verdict.difference, "half_width": (high - low) / 2}  # fmt: skip
 
 
 def _versions(run: BenchmarkRun) -> dict[str, Path]:
@@ -218,6 +266,7 @@ def page(results: dict[str, Any]) -> str:
         studies[name] = {**medians, "turns": len(rows["new"]), "rows": rows,
                          "study": results[name]["study"]}  # fmt: skip
     values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
+    values["same"] = results["same_answer"]
     values["first"] = results["first_step"]
     values["thousand"] = results["thousand_runs"]
     values["remark"] = results.get("remark", "")
@@ -234,6 +283,7 @@ BENCHMARK = Benchmark(
     __doc__,
     parts={
         **{name: partial(_in_turns, name) for name in STUDIES},
+        "same_answer": _same_answer,
         "first_step": _first_step,
         "thousand_runs": partial(_alone, "thousand_runs"),
         "origin": lambda run: run.origin,

@@ -293,7 +293,7 @@ def _mean_mark(setting: Setting, x: float, y: float, tint: Tint, factor: float) 
     reach = setting.ci_half_width
     mean = with_margin(setting.mean, reach)
     title = f"{setting.label}: mean {mean}, {setting.n} runs"
-    # Student's t of two runs is 13 standard errors: the bar would tell of the test, not of the sand.
+    # Student's t of two runs is 13 standard errors: a bar that tells nothing of the sand.
     drawn = factor * reach if setting.n >= FEW else math.nan
     return Mark(x, y, "mean", tint, drawn, title)
 

@@ -72,7 +72,7 @@ def optimum_pages(
     mode : BedMode, optional
         First mode of the bed, told beside a frequency.
     """
-    if not (study.refine.rounds or study.certificate.controls):
+    if not (study.refine.adds_points or study.certificate.controls):
         return None
     log, objective = read_rounds(study_folder, study), study.objective
     keys = study.sweep.swept
@@ -94,7 +94,7 @@ def optimum_pages(
         said.insert(1, mode.beside(optimum.setting[key]))
     said += _beside(optimum, study)
     if study.refine.rounds:
-        said.append(_effort(log, study, summary))
+        said.append(effort_sentence(log, study, summary))
     sound = not ends and not wide
     if robustness is not None:
         opening = opening_sentences(robustness, objective.measure)
@@ -186,7 +186,8 @@ def _beside(optimum: Optimum, study: Study) -> list[str]:
     ]
 
 
-def _effort(log: RoundLog, study: Study, summary: pd.DataFrame) -> str:
+def effort_sentence(log: RoundLog, study: Study, summary: pd.DataFrame) -> str:
+    """What the rounds added to the sweep, and why they ended."""
     added, swept = len(log.runs), study.sweep.number_of_points * study.replicates
     rounds = len(log.rounds)
     spent_h = total_s(summary, CPU_S) / 3600

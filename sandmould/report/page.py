@@ -31,7 +31,7 @@ from sandmould.report.kinds.registry import (
     robustness_of,
 )
 from sandmould.report.method import Row, provenance_rows, statistics_method
-from sandmould.report.optimum import optimum_pages, with_surface
+from sandmould.report.optimum import effort_sentence, optimum_pages, with_surface
 from sandmould.report.sand import pictured_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
@@ -112,7 +112,7 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
     verdict = compare_settings(
-        summary, keys, objective.measure, objective.better, notes, seeks_best
+        summary, keys, objective.measure, objective.better, notes, seeks_best, study.pools_spread
     )
     pictured_run = next(iter(pictured_runs(study_folder, summary, verdict).values()), "")
     listed = {setting.label for setting in listed_settings(verdict)}
@@ -124,6 +124,9 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
                 by_setting[label] = own, summary.iloc[rows]
     if seeks_best:
         verdict = with_amplitudes(verdict, drives_of(by_setting))
+    if study.pools_spread:
+        effort = effort_sentence(read_rounds(study_folder, study), study, summary)
+        verdict = replace(verdict, sentences=(*verdict.sentences, effort))
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario

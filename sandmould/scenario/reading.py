@@ -230,6 +230,7 @@ def _valid(model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: l
     kinds = standing_kinds(model, tree, parts) if kind == "union_tag_not_found" else []
     limit = next((context[k] for k in ("gt", "ge", "lt", "le") if k in context), None)
     limit = f"{limit:g}" if isinstance(limit, float) else limit
+    expected = str(context.get("expected"))
     words = {
         "missing": "a value: this key must be given",
         "greater_than": f"a number greater than {limit}",
@@ -252,7 +253,7 @@ def _valid(model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: l
         "model_attributes_type": "a mapping of keys to values",
         "too_short": f"a list of at least {context.get('min_length')} entries",
         "too_long": f"a list of at most {context.get('max_length')} entries",
-        "literal_error": f"one of {context.get('expected')}",
+        "literal_error": f"one of {expected}" if " or " in expected else expected,
         "union_tag_invalid": f"a kind among {context.get('expected_tags')}",
         "union_tag_not_found": f"a mapping with a kind: {', '.join(kinds)}",
         "string_pattern_mismatch": f"text of the pattern {context.get('pattern')}",

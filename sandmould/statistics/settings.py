@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,8 +109,37 @@ def by_block(
     return pd.Series(values.to_numpy(), index=[tuple(r) for r in rows.to_numpy().tolist()])
 
 
+@dataclass(frozen=True)
+class Spread:
+    """Standard deviation that all settings share."""
+
+    sd: float
+    df: int
+    """Degrees of freedom: runs less settings."""
+
+    @staticmethod
+    def of(values: Iterable[pd.Series[float]]) -> Spread:
+        """Pool the spread within the settings; NaN where none has two values."""
+        several = [v for v in values if len(v) > 1]
+        df = sum(len(v) - 1 for v in several)
+        squares = sum(float(v.var(ddof=1)) * (len(v) - 1) for v in several)
+        return Spread(math.sqrt(squares / df) if df else math.nan, df)
+
+    def test(
+        self, first: pd.Series[float], second: pd.Series[float]
+    ) -> tuple[MeanTest, bool] | None:
+        """Test the difference of two means by this spread; as ``compare_means``, never in pairs."""
+        error = self.sd * math.sqrt(1.0 / len(first) + 1.0 / len(second))
+        if not error > 1e-12 * max(float(np.abs(first).max()), float(np.abs(second).max())):
+            return None
+        return MeanTest(float(first.mean() - second.mean()), error, self.df), False
+
+
 def compare(
-    best: Setting, others: Sequence[Setting], values: Mapping[str, pd.Series[float]]
+    best: Setting,
+    others: Sequence[Setting],
+    values: Mapping[str, pd.Series[float]],
+    spread: Spread | None = None,
 ) -> tuple[Comparison, ...]:
     """The best minus each other setting, nearest first.
 
@@ -120,8 +149,11 @@ def compare(
     others : sequence of Setting
     values : mapping of label to Series of float
         Of each setting, by block.
+    spread : Spread, optional
+        By which all are compared; that of the two settings, or of their pairs, unless given.
     """
-    tests = {o.label: compare_means(values[best.label], values[o.label]) for o in others}
+    test_of = spread.test if spread else compare_means
+    tests = {o.label: test_of(values[best.label], values[o.label]) for o in others}
     factor = max(1, sum(test is not None for test in tests.values()))
     comparisons = []
     for other in others:

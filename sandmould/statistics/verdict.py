@@ -17,6 +17,7 @@ from sandmould.statistics.evidence import one_way_caveat, reasons_sentence, usab
 from sandmould.statistics.settings import (
     Comparison,
     Setting,
+    Spread,
     compare,
     number_blocks,
     setting_of,
@@ -64,6 +65,7 @@ def compare_settings(
     better: Better = "larger",
     notes: Sequence[str] = (),
     seeks_best: bool = True,
+    pools_spread: bool = False,
 ) -> Verdict:
     """Compare the settings of a study by the mean of the objective.
 
@@ -87,6 +89,10 @@ def compare_settings(
         Caveats that the caller knows of, put after those found here.
     seeks_best : bool
         Whether the study looks for the best setting, so that its place in the sweep matters.
+    pools_spread : bool
+        Compare by one spread that all settings share, instead of by each pair's own: settings of
+        two replicates can then be told apart. For studies that give more replicates to the
+        settings that may be the best.
 
     Returns
     -------
@@ -101,7 +107,8 @@ def compare_settings(
     sign = -1 if better == "larger" else 1
     ranked = sorted((s for s in settings if s.n), key=lambda s: sign * s.mean)
     best = ranked[0] if ranked else None
-    comparisons = compare(best, ranked[1:], of_setting) if best else ()
+    spread = Spread.of(of_setting.values()) if pools_spread else None
+    comparisons = compare(best, ranked[1:], of_setting, spread) if best else ()
     first = comparisons[0] if comparisons else None
     resolved = first is not None and first.separated
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
@@ -109,6 +116,7 @@ def compare_settings(
         *_run_caveats(settings, summary, measure, seeks_best),
         *(_edge_caveats(best, settings, keys) if seeks_best else ()),
         *_identical([c.other for c in comparisons if _is_identical(c, of_setting, best)]),
+        *(_spread_caveat(spread, settings) if spread else ()),
         *notes,
     ]
     return Verdict(
@@ -304,6 +312,17 @@ def _more_sentence(comparisons: Sequence[Comparison], best: Setting) -> str:
         f" If the differences are as large as they seem, about {more} more replicates of each "
         "of these settings decide."
     )
+
+
+def _spread_caveat(spread: Spread, settings: Sequence[Setting]) -> list[str]:
+    sds = [s.sd for s in settings if s.n >= FEW]
+    if not spread.df or not sds:
+        return []
+    return [
+        f"All settings are taken to scatter alike, by {number(spread.sd, 2)} (all replicates "
+        f"together). Alone, those of {FEW} runs or more scatter by {number(min(sds), 2)} to "
+        f"{number(max(sds), 2)}."
+    ]
 
 
 def _without_value(summary: pd.DataFrame, measure: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -12,7 +12,7 @@ from sandmould.scenario.limits import RUNS
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.config import fewest_points
-from sandmould.study.definition.sweep import Range, Sweep, points
+from sandmould.study.definition.sweep import Point, Range, Sweep, points
 
 
 class Refinement(Section):
@@ -32,6 +32,19 @@ class Refinement(Section):
         ge=1,
         le=1000,
     )
+    adds: Literal["points", "replicates"] = quantity(
+        "points",
+        "What rounds add: points where the optimum may lie, with replicates where the spread hides "
+        "it; or replicates alone, for the settings that are not ruled out yet.",
+        source=ARGUED,
+    )
+    half_width: float | None = quantity(
+        None,
+        "Half width of the 95 % interval of the difference between the two best settings, in the "
+        "unit of the objective, that is small enough: rounds of replicates end there.",
+        source=ARGUED,
+        gt=0,
+    )
     interval: dict[str, Annotated[float, Field(gt=0)]] = Field(
         {},
         description="Swept keys and the width, in the unit of the key, of the optimum's 95 % "
@@ -45,20 +58,51 @@ class Refinement(Section):
         gt=0,
     )
 
+    @property
+    def adds_points(self) -> bool:
+        """Whether there are rounds that look for the optimum between the points of the sweep."""
+        return self.rounds > 0 and self.adds == "points"
 
-def problems(refine: Refinement, sweep: Sweep, scenario: Section, better: str) -> Iterator[Problem]:
+
+def problems(
+    refine: Refinement, sweep: Sweep, scenario: Section, better: str, replicates: int
+) -> Iterator[Problem]:
     """List what is wrong with the rounds of a study whose sweep has no problems."""
     if not refine.rounds:
-        if refine.interval or refine.budget_core_h is not None:
+        if refine.interval or refine.budget_core_h is not None or refine.half_width is not None:
             yield Problem("refine.rounds", 0, "at least 1 where refine says when rounds end")
         return
     if better == "neither":
         yield Problem("refine.rounds", refine.rounds, "0 where objective.better is neither")
-    keys = sweep.swept
-    if not keys:
+    if not sweep.swept:
         yield Problem("refine.rounds", refine.rounds, "0 in a study that sweeps nothing")
         return
     swept = points(sweep, scenario)
+    yield from RUNS.problems("refine.rounds", len(swept) + refine.rounds * refine.runs)
+    if refine.adds == "replicates":
+        yield from _problems_of_replicates(refine, len(swept), replicates)
+    else:
+        yield from _problems_of_points(refine, sweep, swept)
+
+
+def _problems_of_replicates(
+    refine: Refinement, number_of_points: int, replicates: int
+) -> Iterator[Problem]:
+    if refine.interval:
+        valid = "absent where refine.adds is replicates: refine.half_width says when those end"
+        yield Problem("refine.interval", refine.interval, valid)
+    if replicates < 2:
+        valid = "at least 2 where refine.adds is replicates: one tells nothing of the spread"
+        yield Problem("replicates", replicates, valid)
+    if number_of_points < 2:
+        yield Problem("sweep", "1 point", "two points or more where refine.adds is replicates")
+
+
+def _problems_of_points(refine: Refinement, sweep: Sweep, swept: list[Point]) -> Iterator[Problem]:
+    if refine.half_width is not None:
+        valid = "absent unless refine.adds is replicates: refine.interval says when rounds end"
+        yield Problem("refine.half_width", refine.half_width, valid)
+    keys = sweep.swept
     for key in keys:
         values = [p[key] for p in swept]
         if isinstance(sweep.keys.get(key), Range) or all(
@@ -71,7 +115,6 @@ def problems(refine: Refinement, sweep: Sweep, scenario: Section, better: str) -
     for key in refine.interval:
         if key not in keys:
             yield Problem("refine.interval", key, f"a swept key, {' or '.join(keys)}")
-    yield from RUNS.problems("refine.rounds", len(swept) + refine.rounds * refine.runs)
     fewest = fewest_points(len(keys))
     if len(swept) < fewest:
         valid = f"at least {fewest} points for rounds to begin with"

@@ -102,6 +102,11 @@ class Study(Section):
         return not self.equivalence.keys and self.objective.better != "neither"
 
     @property
+    def pools_spread(self) -> bool:
+        """Whether settings are compared by one spread, since some have few replicates."""
+        return self.refine.rounds > 0 and self.refine.adds == "replicates"
+
+    @property
     def trusts_program(self) -> bool:
         """Whether the user lets its runs execute a program that is not shipped."""
         return False

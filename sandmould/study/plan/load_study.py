@@ -105,7 +105,9 @@ def open_study(path: Path) -> OpenStudy:
         *_reported(study),
         *study.problems(),
         *calibration.problems(study.calibration, study.sweep),
-        *refinement.problems(study.refine, study.sweep, study.scenario, study.objective.better),
+        *refinement.problems(
+            study.refine, study.sweep, study.scenario, study.objective.better, study.replicates
+        ),
         *certificate.problems(
             study.certificate, study.sweep, study.scenario, study.objective.better
         ),

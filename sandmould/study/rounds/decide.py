@@ -7,7 +7,7 @@ from dataclasses import replace
 import pandas as pd
 
 from sandmould.runs.columns import CPU_S, total_s
-from sandmould.runs.formatting import listed, name_of, number, unit_of
+from sandmould.runs.formatting import listed, name_of, number, setting_text, unit_of
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
@@ -15,6 +15,7 @@ from sandmould.study.definition.certificate import round_best_hz
 from sandmould.study.definition.refinement import Refinement
 from sandmould.study.definition.study import Study
 from sandmould.study.definition.sweep import is_whole
+from sandmould.study.rounds.contenders import find_contenders, why_decided
 from sandmould.study.rounds.round_log import Round, RoundLog
 
 
@@ -31,7 +32,8 @@ def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str
         Swept keys.
     """
     if study.refine.rounds:
-        log = next_round(log, study, summary, keys)
+        of_kind = next_round if study.refine.adds == "points" else next_replicates
+        log = of_kind(log, study, summary, keys)
     else:
         log = replace(log, ended="The sweep is done.")
     if not log.ended or not study.certificate.controls or log.certified_hz:
@@ -44,15 +46,15 @@ def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str
 
 def next_round(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> RoundLog:
     """Add a round, or the reason why there is none; parameters as in ``next_runs``."""
-    refine, done = study.refine, len(log.rounds)
-    spent_h = total_s(summary, CPU_S) / 3600 if CPU_S in summary else 0.0
+    refine, done, spent_h = study.refine, len(log.rounds), _spent_h(summary)
     try:
         optimum = find_optimum(
             summary, keys, study.objective.measure, study.objective.better, seed=done
         )
     except TooFewRunsError as error:
         return replace(log, ended=f"Too few runs finished: {error}.")
-    ended = why_enough(refine, optimum, done, spent_h, spent_h / max(len(summary), 1))
+    run_h = spent_h / max(len(summary), 1)
+    ended = why_narrow(refine, optimum) or why_over(refine, done, spent_h, refine.runs * run_h)
     if ended:
         return replace(log, ended=ended)
     whole = [key for key in keys if is_whole(type(study.scenario), key)]
@@ -81,29 +83,52 @@ def choose_controls(
     return replace(log, certified_hz=round_best_hz(best_hz, study.certificate.ratio))
 
 
-def why_enough(
-    refine: Refinement, optimum: Optimum, done: int, spent_h: float, run_h: float
-) -> str:
-    """Say why rounds end; empty where one more is due.
+def next_replicates(
+    log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]
+) -> RoundLog:
+    """Add replicates of the settings that may be the best; parameters as in ``next_runs``."""
+    refine, done, spent_h = study.refine, len(log.rounds), _spent_h(summary)
+    contenders = find_contenders(summary, study, keys)
+    if contenders is None:
+        return replace(log, ended="Too few runs finished to compare two settings.")
+    runs = contenders.more(refine.runs)
+    ended = why_decided(contenders, refine.half_width)
+    ended = ended or why_over(refine, done, spent_h, len(runs) * spent_h / max(len(summary), 1))
+    if ended:
+        return replace(log, ended=ended)
+    added = Round(runs, contenders.points[0], {}, spent_h)
+    return replace(log, rounds=(*log.rounds, added), ended="", certified_hz=())
+
+
+def _spent_h(summary: pd.DataFrame) -> float:
+    return total_s(summary, CPU_S) / 3600 if CPU_S in summary else 0.0
+
+
+def why_narrow(refine: Refinement, optimum: Optimum) -> str:
+    """Say that the optimum is as narrow as asked; empty where it is not."""
+    wide = [key for key, width in refine.interval.items() if _width(optimum, key) > width]
+    if not refine.interval or wide:
+        return ""
+    return f"The optimum is as narrow as asked: {_intervals(optimum, list(refine.interval))}."
+
+
+def why_over(refine: Refinement, done: int, spent_h: float, round_h: float) -> str:
+    """Say that no further round is allowed; empty where one is.
 
     Parameters
     ----------
     refine : Refinement
-    optimum : Optimum
     done : int
         Rounds so far.
-    spent_h, run_h : float, h
-        Processor time of all runs so far, and of one on average.
+    spent_h, round_h : float, h
+        Processor time of all runs so far, and of the next round.
     """
-    wide = [key for key, width in refine.interval.items() if _width(optimum, key) > width]
-    if refine.interval and not wide:
-        return f"The optimum is as narrow as asked: {_intervals(optimum, list(refine.interval))}."
     if done >= refine.rounds:
         return "The one round is done." if refine.rounds == 1 else f"All {done} rounds are done."
-    if refine.budget_core_h is not None and spent_h + refine.runs * run_h > refine.budget_core_h:
+    if refine.budget_core_h is not None and spent_h + round_h > refine.budget_core_h:
         return (
             f"Of {refine.budget_core_h:g} h of processor time {number(spent_h, 2)} h are spent, "
-            f"and a round takes {number(refine.runs * run_h, 2)} h."
+            f"and a round takes {number(round_h, 2)} h."
         )
     return ""
 
@@ -130,6 +155,10 @@ def decision_text(log: RoundLog, study: Study) -> str:
     if log.ended:
         return log.ended
     last = log.rounds[-1]
+    of = f"Round {len(log.rounds)} of at most {study.refine.rounds}"
+    if study.refine.adds == "replicates":
+        best = setting_text(last.setting)
+        return f"{of}: best so far is {best}; {len(last.runs)} more runs of settings that are not ruled out."
     where = listed(
         [
             f"{name_of(key)} {number(value)} ({number(last.interval[key][0])} to "
@@ -138,7 +167,5 @@ def decision_text(log: RoundLog, study: Study) -> str:
         ]
     )
     fresh = sum(replicate == 1 for _, replicate in last.runs)
-    return (
-        f"Round {len(log.rounds)} of at most {study.refine.rounds}: best so far is {where}; "
-        f"{fresh} new points and {len(last.runs) - fresh} more replicates."
-    )
+    more = len(last.runs) - fresh
+    return f"{of}: best so far is {where}; {fresh} new points and {more} more replicates."

@@ -99,7 +99,7 @@ def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
     if swept.empty:
         return ""
     keys = swept_keys(swept)
-    verdict = compare_settings(swept, keys, measure, better)
+    verdict = compare_settings(swept, keys, measure, better, pools_spread=study.pools_spread)
     used = [setting for setting in verdict.settings if setting.n]
     if not used or verdict.best is None:
         return ""

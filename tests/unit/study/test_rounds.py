@@ -21,7 +21,7 @@ from sandmould.study.collect import collect
 from sandmould.study.plan.build_plan import Plan, announce
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.rounds.decide import decision_text, next_round, why_enough
+from sandmould.study.rounds.decide import decision_text, next_round, why_narrow, why_over
 from sandmould.study.rounds.round_log import (
     ROUNDS_FILE,
     RoundLog,
@@ -145,7 +145,7 @@ def test_rounds_end_by_width_by_count_and_by_budget(tmp_path: Path) -> None:
 
     def why(done: int = 0, spent_h: float = 0.0, **changes: Any) -> str:
         refine = study.refine.model_copy(update=changes)
-        return why_enough(refine, optimum, done, spent_h, run_h=0.5)
+        return why_narrow(refine, optimum) or why_over(refine, done, spent_h, round_h=2.0)
 
     assert why() == ""
     enough = f"as narrow as asked: frequency {low:.3g} to {high:.3g} Hz."
