@@ -12,7 +12,7 @@ TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
-.PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock results-check clean
+.PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check clean
 .PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow \
   reproduction
 
@@ -23,7 +23,7 @@ help:
 	  $(firstword $(MAKEFILE_LIST))
 	@echo 'The command itself: $(BIN)/sandmould --help'
 
-## the main job on real input: sand flows into a tube at six frequencies
+## the main job on real input: sand flows into a tube at four frequencies
 demo: $(INSTALLED)
 	@$(MAKE) --no-print-directory study
 
@@ -167,11 +167,14 @@ schema: $(INSTALLED)
 	$(BIN)/python -m sandmould.study.schema
 	$(BIN)/python -m sandmould.study.reference
 
-## pin all dependencies in requirements.lock
+## pin all dependencies in requirements.lock, for every Python and platform that is supported
 lock:
-	$(BIN)/pip-compile --quiet --extra dev --generate-hashes --allow-unsafe --strip-extras \
-	  --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-header \
-	  --output-file requirements.lock pyproject.toml
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --extra dev --generate-hashes --no-strip-markers \
+	  --no-header --output-file requirements.lock pyproject.toml
+
+## look for wheels of all locked packages for the newest supported Python
+lock-check: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.house.newest_python
 
 ## list stale results of docs/results and compute the smallest again
 results-check: $(INSTALLED)

@@ -123,6 +123,20 @@ def run(
 
 
 @app.command()
+def demo(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A coarse one of a minute, to try the installation.")
+    ] = False,
+    cores: Cores = None,
+) -> None:
+    """Compute the demonstration: at which frequency sand fills a blind tube best."""
+    from sandmould.study.run_study import run_study
+
+    study = study_file("tube_quick" if quick else "tube_demo")
+    raise typer.Exit(run_study(study, _cores_option(cores)))
+
+
+@app.command()
 def again(
     runs: Annotated[
         list[str],
@@ -236,6 +250,25 @@ def measures(study: StudyFile) -> None:
     from sandmould.study.reference import measures_text
 
     typer.echo(measures_text(open_study(study)))
+
+
+@app.command()
+def keys(
+    path: Annotated[str, typer.Argument(metavar="[PATH]", help="Such as scenario.vibration.")] = "",
+) -> None:
+    """Explain the keys of a study's file: unit, default, meaning."""
+    from sandmould.study.keys import keys_text
+
+    typer.echo(keys_text(path))
+
+
+@app.command()
+def doctor() -> None:
+    """Say which engines, cluster and disk there are, and what is missing."""
+    from sandmould.study.installation import doctor_text, findings
+    from sandmould.study.plan.build_plan import RESULTS
+
+    typer.echo(doctor_text(findings(RESULTS)))
 
 
 @app.command()

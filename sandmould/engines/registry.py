@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from sandmould import ROOT
+from sandmould import PACKAGE, ROOT
 from sandmould.digest import code_digest, digest
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
@@ -167,7 +167,7 @@ def _code_hash(scenario: Scenario) -> str:
 
 def _code_files(scenario: Scenario) -> list[Path]:
     """Files that decide what is computed on any engine, and those of the scenario's engine."""
-    return [*(ROOT / "sandmould" / name for name in _OF_EVERY_ENGINE),
+    return [*(PACKAGE / name for name in _OF_EVERY_ENGINE),
             *engine_of(scenario).session_sources(scenario)]  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from sandmould import ROOT
+from sandmould import IS_CHECKOUT, ROOT
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.quantity import Section
 
@@ -54,7 +54,12 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 @cache
 def commit() -> str:
-    """Commit of the checkout, marked where anything but its records differs from it."""
+    """Commit of the checkout, marked where anything but its records differs from it.
+
+    Of an installed package its version.
+    """
+    if not IS_CHECKOUT:  # it may lie in the checkout of something else
+        return f"sandmould {metadata.version('sandmould')}"
     name = _git("describe", "--always") or "not a git checkout"
     changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/results")
     return f"{name}-dirty" if changed else name
