@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterable
+import shutil
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,7 @@ from sandmould.study.collect import Collected, read_collected, read_provenance, 
 from sandmould.study.definition.certificate import frequency_among
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, VERDICT_FILE, read_run
+from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
 
 TEMPLATES = ROOT / "templates" / "report"
@@ -55,8 +56,8 @@ LIMIT_BYTES = 15_000_000
 def write_report(study_folder: Path, out: Path) -> None:
     """Write the report of a study, under 15 MB and without a single outside address.
 
-    Its main figures are written as files too, into ``figures`` of the study's folder, and its first
-    sentence into ``VERDICT_FILE``.
+    Its main figures are written as files too, into ``figures`` of the study's folder, its first
+    sentence into ``VERDICT_FILE``, and films of more spheres than it holds into ``SPHERES``.
 
     Parameters
     ----------
@@ -77,12 +78,13 @@ def write_report(study_folder: Path, out: Path) -> None:
     page = _page(study_folder, out.absolute().parent, study, collected)
     environment = _environment()
     for budget in (BUDGET_BYTES, BUDGET_BYTES // 4, BUDGET_BYTES // 20):
-        text, figures, first = _render(page, environment, budget)
+        text, figures, beside, first = _render(page, environment, budget)
         if len(text.encode("utf-8")) < LIMIT_BYTES:
             break
     with replaced(out) as partial:
         partial.write_text(text, encoding="utf-8")
         write_figures(study_folder / FIGURES, environment, figures)
+        _write_beside(study_folder / SPHERES, beside)
     write_text(study_folder / VERDICT_FILE, f"{first}\n")
 
 
@@ -152,8 +154,8 @@ def _environment() -> Environment:
 
 def _render(
     page: _Page, environment: Environment, film_budget_bytes: int
-) -> tuple[str, dict[str, Chart | bytes], str]:
-    """The page, its figures for files, and the sentence that it begins with."""
+) -> tuple[str, dict[str, Chart | bytes], Mapping[str, str], str]:
+    """The page, its figures for files, scripts beside it, and the sentence it begins with."""
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
     summary = page.collected.summary
     seeks_best = page.study.seeks_best
@@ -214,7 +216,15 @@ def _render(
     of_estimate = estimate_figures(estimate) if estimate else {}
     sentences = verdict.sentences if statement is None or is_verdict else statement.sentences
     figures = {**numbered("objective", charts), **of_estimate, **of_kind.figures}
-    return text, figures, sentences[0]
+    return text, figures, of_kind.beside, sentences[0]
+
+
+def _write_beside(folder: Path, scripts: Mapping[str, str]) -> None:
+    """Write the folder of scripts anew; none where there are none."""
+    shutil.rmtree(folder, ignore_errors=True)
+    for name, text in scripts.items():
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _beside_mode(page: _Page, mode: BedMode | None) -> list[str]:
