@@ -12,10 +12,8 @@ from typing import Any
 from urllib.parse import quote
 
 import pandas as pd
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from jinja2.sandbox import ImmutableSandboxedEnvironment
+from jinja2 import Environment
 
-from sandmould import ROOT
 from sandmould.report.agreement import agreement_pages
 from sandmould.report.animation import BUDGET_BYTES
 from sandmould.report.bed_mode import BedMode
@@ -35,10 +33,11 @@ from sandmould.report.method import Row, provenance_rows, statistics_method
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.sand import pictured_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
+from sandmould.report.templates import page_environment
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
 from sandmould.runs.columns import RUN
 from sandmould.runs.files import replaced, write_text
-from sandmould.runs.formatting import name_of, number, setting_text
+from sandmould.runs.formatting import name_of, setting_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings
@@ -49,7 +48,6 @@ from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
 
-TEMPLATES = ROOT / "templates" / "report"
 LIMIT_BYTES = 15_000_000
 
 
@@ -76,7 +74,7 @@ def write_report(study_folder: Path, out: Path) -> None:
     # made first: the page lists it
     (study_folder / FIGURES).mkdir(exist_ok=True)
     page = _page(study_folder, out.absolute().parent, study, collected)
-    environment = _environment()
+    environment = page_environment()
     for budget in (BUDGET_BYTES, BUDGET_BYTES // 4, BUDGET_BYTES // 20):
         text, figures, beside, first = _render(page, environment, budget)
         if len(text.encode("utf-8")) < LIMIT_BYTES:
@@ -138,18 +136,6 @@ def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
         with contextlib.suppress(BadInputError, OSError):
             return read_run(study_folder / "runs" / str(run) / "scenario.yaml").scenario
     return None
-
-
-def _environment() -> Environment:
-    environment = ImmutableSandboxedEnvironment(
-        loader=FileSystemLoader(TEMPLATES),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = number
-    return environment
 
 
 def _render(

@@ -126,6 +126,10 @@ class SphereFrames:
         """All grains at all frames, packed."""
         return self.packed(np.arange(len(self.radius_m)), np.arange(self.place.shape[1]))
 
+    def planned(self, of_grains: int, slice_m: tuple[float, float] | None) -> SphereFilm:
+        """All that was drawn of a scene, perhaps a slice of it only."""
+        return replace(self.whole, of_grains=of_grains, slice_m=slice_m)
+
     def light(self, cut_m: float, budget_bytes: int) -> SphereFilm:
         """Pack what a page can hold: frames are left out, and grains far behind the cut.
 

@@ -73,7 +73,7 @@
 
     function pxPerM() {
       const across = Math.hypot(width, depth), upright = Math.hypot(height, 0.6 * across);
-      return 0.94 * camera.zoom * Math.min(canvas.clientWidth / across, canvas.clientHeight / upright);
+      return (scene.marks ? 0.8 : 0.94) * camera.zoom * Math.min(canvas.clientWidth / across, canvas.clientHeight / upright);
     }
 
     function tellLook() {
