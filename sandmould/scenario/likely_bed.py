@@ -98,8 +98,8 @@ def _lattice(
 
     steps = np.maximum(1, np.rint((high - low) / spacing_m)).astype(int)
     levels = int(s.scene.top_m / spacing_m) + -(-count // int(steps.prod())) + 2
-    cells = np.stack(np.meshgrid(np.arange(levels), *map(np.arange, steps), indexing="ij"), -1)
-    cells = cells.reshape(-1, len(steps) + 1) + 0.5
+    numbers = np.meshgrid(np.arange(levels), *map(np.arange, steps), indexing="ij")
+    cells = np.stack(numbers, -1).reshape(-1, len(steps) + 1) + 0.5
     point_m = np.column_stack([low + (high - low) * cells[:, 1:] / steps, spacing_m * cells[:, 0]])
     room_m = s.scene.clearance_m(point_m, s.largest_diameter_m)
     free = room_m > 0.25 * spacing_m
