@@ -24,11 +24,11 @@
   async function unpack(packed) {
     const raw = await inflate(packed.data);
     const n = packed.grains, frames = packed.time_s.length, points = n + packed.vertices;
-    const start = 6 * frames * points, shades = start + 3 * n;
-    const size = Uint16Array.from({ length: n }, (_, i) => raw[start + i] | (raw[start + n + i] << 8));
+    const radii = 6 * frames * points, shades = radii + 3 * n;
+    const size = Uint16Array.from({ length: n }, (_, i) => raw[radii + i] | (raw[radii + n + i] << 8));
     const at = (from) => raw.subarray(from, from + n);
     return {
-      ...packed, data: null, frames, size, at: unfold(raw, 3, frames, points), layer: at(start + 2 * n),
+      ...packed, data: null, frames, size, at: unfold(raw, 3, frames, points), layer: at(radii + 2 * n),
       shade: (kind, frame) => at(shades + (kind * frames + frame) * n),
     };
   }
