@@ -272,6 +272,35 @@ def doctor() -> None:
 
 
 @app.command()
+def show(
+    study: StudyFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE",
+            show_default="STUDY_scene.png, or STUDY_scene.html in 3D",
+            help="A picture (.png, .svg) or a page (.html).",
+        ),
+    ] = None,
+    run: Annotated[
+        str | None,
+        typer.Option(
+            "--run", metavar="RUN", show_default="the first", help="Of runs that differ, which."
+        ),
+    ] = None,
+) -> None:  # fmt: skip
+    """Draw a scene of sand to scale before anything runs."""
+    from sandmould.report.scene_page import draw_scene_file
+    from sandmould.study.plan.drawn_run import drawn_run
+
+    opened, shown = drawn_run(study, run)
+    ending = "png" if shown.scenario.dimension == 2 else "html"
+    out = output or Path(f"{opened.name}_scene.{ending}")
+    draw_scene_file(shown.scenario, opened.study.title or opened.name, shown.run, out)
+    typer.echo(out)
+
+
+@app.command()
 def report(study: StudyFile) -> None:
     """Write the report of a study again from its results."""
     from sandmould.report.page import write_report

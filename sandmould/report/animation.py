@@ -1,4 +1,4 @@
-"""Films of runs, packed small enough to lie inside one HTML page.
+"""Films of discs, packed small enough to lie inside one HTML page.
 
 Positions are whole numbers of a quantum, too small to see; what is stored is their change from
 frame to frame, low bytes before high bytes, deflated: still grains cost next to nothing then.
@@ -35,7 +35,6 @@ class Film:
 
     run: str
     label: str
-    dimension: int
     grains: int
     time_s: tuple[float, ...]
     vibration_time_s: tuple[float, ...]
@@ -89,16 +88,16 @@ def make_film(
     raw_frame = max(1, 2 * last.position_m.size)
     count = min(len(moments), _MOST_FRAMES, max(2, 8 * budget_bytes // raw_frame))
     while True:
-        film = _pack(_evenly(moments, count), run_folder.name, label, reading)
+        chosen = [moments[i] for i in evenly(len(moments), count).tolist()]
+        film = _pack(chosen, run_folder.name, label, reading)
         if len(film.data) <= budget_bytes or count <= 2:
             return film
         count = max(2, min(count - 1, int(0.95 * count * budget_bytes / len(film.data))))
 
 
-def _evenly(moments: Sequence[Moment], count: int) -> list[Moment]:
-    """First, last and evenly spread moments between."""
-    places = np.unique(np.linspace(0, len(moments) - 1, count).round().astype(np.int64))
-    return [moments[i] for i in places.tolist()]
+def evenly(number: int, count: int) -> NDArray[np.int64]:
+    """Places of the first, the last and evenly spread ones between, at most all."""
+    return np.unique(np.linspace(0, number - 1, min(count, number)).round().astype(np.int64))
 
 
 def _pack(
@@ -109,12 +108,11 @@ def _pack(
 ) -> Film:
     frames = [m.load() for m in moments]
     ids = np.unique(np.concatenate([f.id for f in frames]))
-    dimension = frames[0].position_m.shape[1]
     every = np.concatenate([f.position_m for f in frames])
-    origin_m = every.min(axis=0) if len(every) else np.zeros(dimension)
+    origin_m = every.min(axis=0) if len(every) else np.zeros(2)
     extent_m = float(np.ptp(every, axis=0).max()) if len(every) else 1.0
     quantum_m = extent_m / _LEVELS or 1e-6
-    place = np.full((dimension, len(frames), len(ids)), ABSENT, dtype=np.uint16)
+    place = np.full((2, len(frames), len(ids)), ABSENT, dtype=np.uint16)
     radius_m, layer = np.zeros(len(ids)), np.zeros(len(ids), dtype=np.uint8)
     for number, frame in enumerate(frames):
         row = np.searchsorted(ids, frame.id)
@@ -127,16 +125,15 @@ def _pack(
     return Film(
         run=run,
         label=label,
-        dimension=dimension,
         grains=len(ids),
         time_s=tuple(time_s.round(6).tolist()),
         vibration_time_s=tuple(round(f.vibration_time_s, 6) for f in frames),
         stage=tuple(f.stage for f in frames),
-        reading=_readings(time_s, reading),
+        reading=readings_at(time_s, reading),
         origin_m=tuple(origin_m.tolist()),
         quantum_m=quantum_m,
         largest_radius_m=largest_m,
-        bent=tuple(_outline(f) for f in frames if dimension == 2 and f.pattern_m is not None),
+        bent=tuple(_outline(f) for f in frames if f.pattern_m is not None),
         data=base64.b64encode(zlib.compress(raw, 6)).decode("ascii"),
     )
 
@@ -160,10 +157,17 @@ def split_bytes(values: NDArray[np.uint16]) -> bytes:
     return (values & 0xFF).astype(np.uint8).tobytes() + (values >> 8).astype(np.uint8).tobytes()
 
 
-def _readings(
+def readings_at(
     time_s: NDArray[np.float64],
     reading: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
 ) -> tuple[float | None, ...]:
+    """Values at each frame, from those that are known; None outside them.
+
+    Parameters
+    ----------
+    time_s : (frames,) float64, s
+    reading : ((k,) float64 s, (k,) float64) or None
+    """
     if reading is None or not len(reading[0]):
         return (None,) * len(time_s)
     values = np.interp(time_s, *reading, left=np.nan, right=np.nan)

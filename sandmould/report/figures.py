@@ -31,6 +31,7 @@ from sandmould.scenario.stages import StageKind
 Array = NDArray[np.float64]
 _MM = 1e3
 _INK = "#222222"
+_UNDER_TEXT = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.75}
 _PANEL_PX = 760
 _COLOURS = 128
 """Colours of a picture's palette: a third of the bytes, and no difference to the eye."""
@@ -79,6 +80,31 @@ def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
     str
         SVG as a ``data:`` address.
     """
+    return _address("image/svg+xml", svg_bytes(dimensioned(scenario, bed_height_m)))
+
+
+def svg_bytes(figure: Figure) -> bytes:
+    """A figure as SVG, the same bytes for the same figure."""
+    buffer = io.BytesIO()
+    # a fixed salt, or the same study would never give the same page twice
+    with rc_context({"svg.hashsalt": "sandmould"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return buffer.getvalue()
+
+
+def dimensioned(
+    scenario: Scenario, bed_height_m: float | None, grains: Snapshot | None = None
+) -> Figure:
+    """The scene to scale with its dimensions in mm.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    bed_height_m : float, m, optional
+        Height of the filled bed, shown as a line where there are no grains.
+    grains : Snapshot, optional
+        Drawn in the colours of their layers, in 3D where the plane shown cuts them.
+    """
     width, height = scenario.box.width_m * _MM, scenario.box.height_m * _MM
     across = 5.6 * min(1.0, 1.4 * width / height)
     far = 0.055 * max(width, height)
@@ -86,7 +112,9 @@ def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
     span = (right - left, height + 0.4 * far - foot)
     figure = Figure(figsize=(across * span[0] / width, across * span[1] / width))
     ax = figure.add_axes((0, 0, 1, 1))
-    if bed_height_m is not None:
+    if grains is not None:
+        draw_by_layer(grains, ax, cut_m(scenario))
+    elif bed_height_m is not None:
         _draw_bed(scenario, ax, bed_height_m * _MM)
     _draw_scene(scenario, ax, scenario.box.height_m, StageKind.SETTLE.value)
     _dimension(ax, (0, -far), (width, -far), f"{width:g}")
@@ -99,11 +127,7 @@ def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
     ax.set_xlim(left, right)
     ax.set_ylim(foot, height + 0.4 * far)
     ax.set_axis_off()
-    buffer = io.BytesIO()
-    # a fixed salt, or the same study would never give the same page twice
-    with rc_context({"svg.hashsalt": "sandmould"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return _address("image/svg+xml", buffer.getvalue())
+    return figure
 
 
 def _draw_bed(scenario: Scenario, ax: Axes, bed: float) -> None:
@@ -126,7 +150,10 @@ def _draw_vibration(
     style = {"arrowstyle": "<|-|>", "color": "#0b5cad", "lw": 2.0, "mutation_scale": 16}
     middle = np.array(centre)
     ax.annotate("", xy=tuple(middle + along), xytext=tuple(middle - along), arrowprops=style)
-    ax.text(centre[0], centre[1] - 1.25 * reach, "vibration", color="#0b5cad", fontsize=11,
+    said, stage = "vibration", scenario.vibrations[0]
+    if stage.unbalance is None:  # sand slows a table with one
+        said += f"\n±{_MM * stage.amplitude_m:.3g} mm"
+    ax.text(centre[0], centre[1] - 1.25 * reach, said, color="#0b5cad", fontsize=11,
             ha="center", va="top", rotation=90)  # fmt: skip
 
 
@@ -145,7 +172,7 @@ def _tube_dimensions(tube: Tube, ax: Axes, width: float, far: float) -> None:
     _dimension(ax, (mouth, 0), (mouth, axis), f"{axis:g}")
     if under > far:
         ax.text((left + right) / 2, under - 0.3 * far, tube.name.replace("_", " "), ha="center",
-                va="top", fontsize=11, color=_INK)  # fmt: skip
+                va="top", fontsize=11, color=_INK, bbox=_UNDER_TEXT)  # fmt: skip
 
 
 def _dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], text: str) -> None:
@@ -163,7 +190,7 @@ def _dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], text: s
         fontsize=11,
         color=_INK,
         zorder=7,
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.75},
+        bbox=_UNDER_TEXT,
     )
 
 
@@ -286,7 +313,12 @@ def _scale_bar(ax: Axes, width: float, height: float) -> None:
 
 def png(figure: Figure) -> str:
     """A figure as a PNG of few colours, a ``data:`` address."""
-    return _address("image/png", png_bytes(figure))
+    return picture_address(png_bytes(figure))
+
+
+def picture_address(content: bytes) -> str:
+    """A PNG as a ``data:`` address."""
+    return _address("image/png", content)
 
 
 def png_bytes(figure: Figure) -> bytes:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterable
+import shutil
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import pandas as pd
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from jinja2.sandbox import ImmutableSandboxedEnvironment
+from jinja2 import Environment
 
-from sandmould import ROOT
 from sandmould.report.agreement import agreement_pages
 from sandmould.report.animation import BUDGET_BYTES
 from sandmould.report.bed_mode import BedMode
@@ -34,10 +33,11 @@ from sandmould.report.method import Row, provenance_rows, statistics_method
 from sandmould.report.optimum import effort_sentence, optimum_pages, with_surface
 from sandmould.report.sand import pictured_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
+from sandmould.report.templates import page_environment
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
 from sandmould.runs.columns import RUN
 from sandmould.runs.files import replaced, write_text
-from sandmould.runs.formatting import name_of, number, setting_text
+from sandmould.runs.formatting import name_of, setting_text
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings
@@ -45,18 +45,17 @@ from sandmould.study.collect import Collected, read_collected, read_provenance, 
 from sandmould.study.definition.certificate import frequency_among
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.plan.plan_files import FIGURES, STUDY_FILE, VERDICT_FILE, read_run
+from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
 
-TEMPLATES = ROOT / "templates" / "report"
 LIMIT_BYTES = 15_000_000
 
 
 def write_report(study_folder: Path, out: Path) -> None:
     """Write the report of a study, under 15 MB and without a single outside address.
 
-    Its main figures are written as files too, into ``figures`` of the study's folder, and its first
-    sentence into ``VERDICT_FILE``.
+    Its main figures are written as files too, into ``figures`` of the study's folder, its first
+    sentence into ``VERDICT_FILE``, and films of more spheres than it holds into ``SPHERES``.
 
     Parameters
     ----------
@@ -75,14 +74,15 @@ def write_report(study_folder: Path, out: Path) -> None:
     # made first: the page lists it
     (study_folder / FIGURES).mkdir(exist_ok=True)
     page = _page(study_folder, out.absolute().parent, study, collected)
-    environment = _environment()
+    environment = page_environment()
     for budget in (BUDGET_BYTES, BUDGET_BYTES // 4, BUDGET_BYTES // 20):
-        text, figures, first = _render(page, environment, budget)
+        text, figures, beside, first = _render(page, environment, budget)
         if len(text.encode("utf-8")) < LIMIT_BYTES:
             break
     with replaced(out) as partial:
         partial.write_text(text, encoding="utf-8")
         write_figures(study_folder / FIGURES, environment, figures)
+        _write_beside(study_folder / SPHERES, beside)
     write_text(study_folder / VERDICT_FILE, f"{first}\n")
 
 
@@ -141,22 +141,10 @@ def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
     return None
 
 
-def _environment() -> Environment:
-    environment = ImmutableSandboxedEnvironment(
-        loader=FileSystemLoader(TEMPLATES),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = number
-    return environment
-
-
 def _render(
     page: _Page, environment: Environment, film_budget_bytes: int
-) -> tuple[str, dict[str, Chart | bytes], str]:
-    """The page, its figures for files, and the sentence that it begins with."""
+) -> tuple[str, dict[str, Chart | bytes], Mapping[str, str], str]:
+    """The page, its figures for files, scripts beside it, and the sentence it begins with."""
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
     summary = page.collected.summary
     seeks_best = page.study.seeks_best
@@ -217,7 +205,15 @@ def _render(
     of_estimate = estimate_figures(estimate) if estimate else {}
     sentences = verdict.sentences if statement is None or is_verdict else statement.sentences
     figures = {**numbered("objective", charts), **of_estimate, **of_kind.figures}
-    return text, figures, sentences[0]
+    return text, figures, of_kind.beside, sentences[0]
+
+
+def _write_beside(folder: Path, scripts: Mapping[str, str]) -> None:
+    """Write the folder of scripts anew; none where there are none."""
+    shutil.rmtree(folder, ignore_errors=True)
+    for name, text in scripts.items():
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _beside_mode(page: _Page, mode: BedMode | None) -> list[str]:

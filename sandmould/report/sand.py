@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple, cast
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from analysis.layers import layer_table
 from analysis.plots import LAYER_COLOURS
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report import figures
 from sandmould.report.animation import BENT_M, Film, make_film
+from sandmould.report.sphere_film import SphereFilm, sphere_frames
+from sandmould.report.sphere_scene import sphere_scene
 from sandmould.report.time_series import (
     Curve,
     late_conclusion,
@@ -30,11 +35,12 @@ from sandmould.runs.columns import (
     finished,
 )
 from sandmould.runs.formatting import listed, name_of, number, setting_text
-from sandmould.scenario.geometry import Bore
+from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict, rank_runs
 from sandmould.study.collect import Collected
 from sandmould.study.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
+from sandmould.study.plan.plan_files import SPHERES, read_run
 
 _SECONDARY = (
     SOLID_FRACTION, "apparent_density_corrected_kg_m3", "coordination", BED_HEIGHT_M,
@@ -64,10 +70,12 @@ class SandPages:
     density_conclusion: str
     layer_colours: tuple[tuple[int, str], ...]
     layer_conclusion: str
-    films: tuple[Film, ...]
+    films: tuple[Film, ...] | tuple[SphereFilm, ...]
     film_scene: Mapping[str, object]
     tubes: tuple[Curve, ...]
     others: tuple[Curve, ...]
+    beside: Mapping[str, str]
+    """Scripts that lie beside the page, by file name: films of all grains."""
 
 
 def sand_pages(
@@ -76,6 +84,7 @@ def sand_pages(
     collected: Collected,
     verdict: Verdict,
     film_budget_bytes: int,
+    href: str,
 ) -> SandPages:
     """Draw everything that a study of sand shows.
 
@@ -88,6 +97,8 @@ def sand_pages(
     verdict : Verdict
     film_budget_bytes : int
         Most that the film of one run may weigh.
+    href : str
+        Address of the study's folder, seen from the report.
 
     Returns
     -------
@@ -102,7 +113,14 @@ def sand_pages(
     height_m = _picture_height_m(snapshots, scenario)
     layers = figures.draw_layers(snapshots, scenario, height_m)
     densities, scale, median_kg_m3 = figures.draw_densities(snapshots, scenario, height_m)
-    films = _films(study_folder, roles, collected, verdict, film_budget_bytes)
+    shown = _shown_runs(study_folder, roles, collected, verdict, scenario)
+    films: tuple[Film, ...] | tuple[SphereFilm, ...]
+    beside: dict[str, str] = {}
+    if scenario.dimension == 2:
+        made = (make_film(s.folder, s.label, s.reading, film_budget_bytes) for s in shown)
+        films = tuple(film for film in made if film is not None)
+    else:
+        films, beside = _sphere_films(shown, scale, film_budget_bytes, f"{href}{SPHERES}/")
     bed_m = _bed_height_m(collected.curves, run)
     number_of_layers = max((int(s.layer.max(initial=1)) for s in snapshots), default=1)
     return SandPages(
@@ -129,6 +147,7 @@ def sand_pages(
         layer_conclusion=_layer_conclusion(snapshots, scenario),
         films=films,
         film_scene=_film_scene(scenario, height_m),
+        beside=beside,
         tubes=measure_curves(
             collected,
             verdict,
@@ -207,14 +226,25 @@ def _bed_height_m(curves: pd.DataFrame, run: str) -> float | None:
     return float(height_m.iloc[0]) if len(height_m) else None
 
 
-def _films(
+class _Shown(NamedTuple):
+    """A run that a film is made of."""
+
+    folder: Path
+    scenario: Scenario
+    label: str
+    reading: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    """Times and values of the objective."""
+
+
+def _shown_runs(
     study_folder: Path,
     roles: Mapping[str, str],
     collected: Collected,
     verdict: Verdict,
-    budget_bytes: int,
-) -> tuple[Film, ...]:
-    films = []
+    scenario: Scenario,
+) -> list[_Shown]:
+    """Runs that films are made of: those of the scene's dimension."""
+    shown = []
     for role, run in roles.items():
         row = collected.summary[collected.summary[RUN] == run].iloc[0]
         setting = setting_text({key: row[key] for key in collected.keys})
@@ -223,44 +253,46 @@ def _films(
         if verdict.measure in curve:
             readings = curve[[TIME_S, verdict.measure]].dropna().to_numpy(dtype=np.float64)
             reading = (readings[:, 0], readings[:, 1])
-        label = f"{role}: {setting}"
-        film = make_film(study_folder / "runs" / run, label, reading, budget_bytes)
-        if film is not None:
+        folder, own = study_folder / "runs" / run, scenario
+        with contextlib.suppress(BadInputError, OSError):
+            own = cast(Scenario, read_run(folder / "scenario.yaml").scenario)
+        if own.dimension == scenario.dimension:
+            shown.append(_Shown(folder, own, f"{role}: {setting}", reading))
+    return shown
+
+
+def _sphere_films(
+    shown: Sequence[_Shown], scale: figures.DensityScale, budget_bytes: int, folder_href: str
+) -> tuple[tuple[SphereFilm, ...], dict[str, str]]:
+    """Films of spheres for the page, and the scripts beside it."""
+    films = []
+    beside: dict[str, str] = {}
+    for folder, scenario, label, reading in shown:
+        if moments := list_moments(folder):
+            frames = sphere_frames(moments, scenario, folder.name, label, scale, reading)
+            cut_m = figures.cut_m(scenario) or 0.0
+            film, script = frames.inside_and_beside(cut_m, budget_bytes, folder_href)
             films.append(film)
-    return tuple(films)
+            beside |= script
+    return tuple(films), beside
 
 
 def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
     """The scene for the page's canvas, in m; a pattern is drawn as it bends, with the film."""
-    obstacles = [o for o in scenario.obstacles if o.name != _bending_name(scenario)]
+    if scenario.dimension == 3:
+        return sphere_scene(scenario, min(height_m, scenario.box.height_m))
+    pattern = scenario.pattern.name if scenario.pattern is not None else ""
+    obstacles = [o for o in scenario.obstacles if o.name != pattern]
     still = scenario.model_copy(update={"obstacles": tuple(obstacles), "pattern": None})
     section = figures.section_of(still, height_m)
     return {
         "width_m": scenario.box.width_m,
         "height_m": height_m,
-        "cut_m": figures.cut_m(scenario),
         "walls": [np.round(w, 6).tolist() for w in section.walls_m],
         "solids": [np.round(s, 6).tolist() for s in section.solids_m],
         "bores": [np.round(b, 6).tolist() for b in section.bores_m],
-        "tubes": [_round(bore) for bore in scenario.scene.bores] if scenario.dimension == 3 else [],
         "layer_colours": list(LAYER_COLOURS),
         "bent_m": BENT_M,
-    }
-
-
-def _bending_name(scenario: Scenario) -> str:
-    """The pattern that the film shows as it bends; in 3D it stands as drawn."""
-    bends = scenario.pattern is not None and scenario.dimension == 2
-    return scenario.pattern.name if scenario.pattern is not None and bends else ""
-
-
-def _round(bore: Bore) -> dict[str, object]:
-    """A bore of a 3D scene as the cylinder round it, in m: what a cut shows grains inside of."""
-    end_m = bore.mouth_m + bore.length_m * bore.axis
-    return {
-        "x_m": sorted([float(bore.mouth_m[0]), float(end_m[0])]),
-        "axis_m": bore.mouth_m[1:].tolist(),
-        "radius_m": float(np.linalg.norm(bore.section_m, axis=1).max()),
     }
 
 

@@ -5,7 +5,7 @@
   const time = byId("flow-time"), choice = byId("flow-run"), shown = byId("flow-colour");
   const stored = [...document.querySelectorAll("script.flow-film")];
   const scale = JSON.parse(byId("flow-scale").textContent);
-  const ABSENT = 65535, FRAMES_PER_S = 15, HIGHEST_PX = 640;
+  const ABSENT = 65535, FRAMES_PER_S = 15;
 
   async function unpack(packed) {
     const raw = await inflate(packed.data);
@@ -16,18 +16,10 @@
   }
 
   function draw(film, frame) {
-    const up = film.dimension - 1, ratio = window.devicePixelRatio || 1;
+    const up = film.dimension - 1;
     const wide_m = film.high_m[0] - film.low_m[0], high_m = film.high_m[up] - film.low_m[up];
-    const pxPerM = Math.min(canvas.parentElement.clientWidth / wide_m, HIGHEST_PX / high_m);
-    const width = pxPerM * wide_m, height = pxPerM * high_m;
-    canvas.style.width = `${width}px`;
-    canvas.style.height = `${height}px`;
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-    const pen = canvas.getContext("2d"), r = 0.5 * pxPerM * film.particle_m;
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.fillStyle = "#fff";
-    pen.fillRect(0, 0, width, height);
+    const { pen, scale: pxPerM, height } = fittedPen(canvas, wide_m, high_m, 0);
+    const r = 0.5 * pxPerM * film.particle_m;
     const disc = (x, y, colour) => {
       pen.fillStyle = colour;
       pen.beginPath();
@@ -53,7 +45,7 @@
     slider.setAttribute("aria-valuetext", time.textContent);
   }
 
-  const redraw = playFilms({
+  const { redraw } = playFilms({
     page: { slider, play, choice, time, canvas }, stored, framesPerS: FRAMES_PER_S, unpack, draw,
     frameFor: (next, before, frame) =>
       next.time_s.filter((t) => t <= (before ? before.time_s[frame] : Infinity)).length - 1,

@@ -35,6 +35,8 @@ class KindPages:
     """What the template is given beside what all are given."""
     figures: Mapping[str, Chart | bytes] = field(default_factory=dict)
     """What is written as files too, by name."""
+    beside: Mapping[str, str] = field(default_factory=dict)
+    """Scripts for the folder ``SPHERES`` beside the page, by file name."""
     warning: str = ""
     """Why the verdict is to be doubted, beside it; empty where there is no reason."""
 

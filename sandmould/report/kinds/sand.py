@@ -65,14 +65,13 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
     collected, verdict = findings.collected, findings.verdict
     of_sweep = collected.of_sweep
     filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
-    pages = sand_pages(folder, scenario, of_sweep, verdict, findings.film_budget_bytes)
+    budget_bytes, href = findings.film_budget_bytes, findings.href
+    pages = sand_pages(folder, scenario, of_sweep, verdict, budget_bytes, href)
     bending = None
     if scenario.pattern is not None:
         from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
 
-        bending = bending_pages(
-            folder, findings.href, scenario, of_sweep, verdict, pages.pictured_run
-        )
+        bending = bending_pages(folder, href, scenario, of_sweep, verdict, pages.pictured_run)
     limit = hard_limit_text(verdict, collected.keys, findings.by_setting)
     return KindPages(
         "sand.html",
@@ -88,6 +87,7 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
             "filling": filling,
         },
         _sand_figures(pages, filling, bending),
+        pages.beside,
         _softness(scenario, of_sweep.summary),
     )
 

@@ -34,6 +34,8 @@ VERDICT_FILE = "verdict.txt"
 """The first sentence of the report, for the terminal and for programs."""
 FIGURES = "figures"
 """Folder of a study that its report's main figures lie in."""
+SPHERES = "spheres"
+"""Folder of a study that the films of all spheres lie in, which its report loads when asked."""
 LISTED_POINTS = 20
 # libyaml writes a thousand scenarios in seconds where pure Python takes half a minute.
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from typer.testing import CliRunner, Result
 
 from sandmould.cli.commands import app
@@ -33,7 +34,7 @@ def sandmould(*arguments: str) -> Result:
 @pytest.mark.parametrize("arguments", [[], ["--help"]])
 def test_help_lists_the_verbs(arguments: list[str]) -> None:
     said = sandmould(*arguments)
-    for verb in ("plan", "run", "status", "report"):
+    for verb in ("plan", "run", "status", "show", "report"):
         assert f"\n  {verb} " in said.output
     # Every verb's sentence fits its line.
     assert "..." not in said.output.partition("Commands:")[2]
@@ -166,3 +167,44 @@ def test_a_measure_that_no_run_will_have_starts_nothing(elsewhere: Path) -> None
         assert said.exit_code == 1
         assert "objective.measure = 'tube_fil' cannot be used: valid is a measure" in said.stderr
     assert not (elsewhere / "results").exists()
+
+
+SMALL_TUBE = """\
+based_on: tube_demo
+scenario:
+  fill: {layers: [{count: 40, repeat: 2}]}
+"""
+
+
+def test_a_scene_is_drawn_and_nothing_starts(elsewhere: Path) -> None:
+    (elsewhere / "small.yaml").write_text(SMALL_TUBE)
+    said = sandmould("show", "small.yaml")
+    assert (said.exit_code, said.stdout) == (0, "small_scene.png\n"), said.output
+    assert Image.open("small_scene.png").width > 500
+    said = sandmould("show", "small.yaml", "-o", "small.html")
+    assert (said.exit_code, said.stdout) == (0, "small.html\n")
+    page = Path("small.html").read_text()
+    assert "±0.596 mm" in page  # 1.5 g at 25 Hz: 1.5 * 9.80665 / (2 pi 25)^2 m
+    assert "80 in layers of 40 and 40" in page
+    assert {p.name for p in elsewhere.iterdir()} == {
+        "small.yaml", "small.html", "small_scene.png",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("plates",), "STUDY = 'plates' cannot be used: valid is a study of kind sand: one of"),
+        (("tube_demo", "-o", "a.pdf"), "--output = 'a.pdf' cannot be used: valid is a file that"),
+        (("tube_demo", "-o", "no/a.png"), "--output = 'no/a.png' cannot be used: valid is a file"),
+        (("tube_demo", "--run", "x"), "--run = 'x' cannot be used: valid is a run of tube_demo: f"),
+    ],
+)
+def test_what_cannot_be_drawn_is_one_sentence(
+    arguments: tuple[str, ...], sentence: str, elsewhere: Path
+) -> None:
+    said = sandmould("show", *arguments)
+    assert said.exit_code == 1
+    (line,) = said.stderr.splitlines()
+    assert line.startswith(sentence)
+    assert not list(elsewhere.iterdir())

@@ -63,7 +63,7 @@ def said(*arguments: str) -> tuple[int, list[str]]:
     return ran.exit_code, ran.stderr.splitlines()
 
 
-@pytest.mark.parametrize("verb", ["plan", "run", "status", "measures", "report"])
+@pytest.mark.parametrize("verb", ["plan", "run", "status", "measures", "show", "report"])
 def test_a_file_that_is_no_study(verb: str, elsewhere: Path) -> None:
     Path("folder.yaml").mkdir()
     for name, content in JUNK.items():

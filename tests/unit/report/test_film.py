@@ -21,13 +21,13 @@ from tests.unit.report_study import write_study
 
 
 def unpack(film: Film) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions (d, frames, grains) in m with NaN for absent grains, radii and layers."""
+    """Positions (2, frames, grains) in m with NaN for absent grains, radii and layers."""
     raw = np.frombuffer(zlib.decompress(base64.b64decode(film.data)), dtype=np.uint8)
-    frames, n, d = len(film.time_s), film.grains, film.dimension
-    whole = d * frames * n
+    frames, n = len(film.time_s), film.grains
+    whole = 2 * frames * n
     folded = raw[:whole].astype(np.int64) | raw[whole : 2 * whole].astype(np.int64) << 8
     change = (folded >> 1) ^ -(folded & 1)
-    place = np.cumsum(change.reshape(d, frames, n), axis=1) & 0xFFFF
+    place = np.cumsum(change.reshape(2, frames, n), axis=1) & 0xFFFF
     metres = np.array(film.origin_m)[:, None, None] + film.quantum_m * place
     metres = np.where(place == ABSENT, np.nan, metres)
     rest = raw[2 * whole :].astype(np.int64)
@@ -45,9 +45,8 @@ def test_page_shows_the_section_of_a_mesh_where_it_is_cut_open() -> None:
     assert section.bores_m == ()
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_film_holds_the_snapshots(tmp_path: Path, dimension: int) -> None:
-    study = write_study(tmp_path / "tube", {50.0: 0.5}, 1, (), grains=300, dimension=dimension)
+def test_film_holds_the_snapshots(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "tube", {50.0: 0.5}, 1, (), grains=300)
     folder = study / "runs" / "f50_r1"
     film = make_film(folder, "best")
     assert film is not None

@@ -12,9 +12,10 @@ from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.interface import with_surface
 from pattern_fe.scene import pattern_of
 from sandmould.engines.snapshot import Snapshot
-from sandmould.report.animation import make_film
 from sandmould.report.bending_figure import _lines_m, draw_outlines
-from sandmould.report.sand import _bending_name
+from sandmould.report.figures import DensityScale
+from sandmould.report.sphere_film import sphere_frames
+from sandmould.report.sphere_scene import sphere_scene
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand.bending import BentPattern
 from sandmould.study.kinds.sand.bent_files import write_bent
@@ -65,7 +66,7 @@ def test_a_bar_in_space_is_measured_and_written(tmp_path: Path) -> None:
     np.testing.assert_allclose(surface.points, snapshot.pattern_m)
 
 
-def test_its_cut_is_drawn_and_the_film_shows_it_as_drawn(tmp_path: Path) -> None:
+def test_its_cut_is_drawn_and_the_film_shows_it_bent(tmp_path: Path) -> None:
     scenario, snapshot = bar_run(tmp_path)
     (solid,) = scenario.scene.meshes
     (line_m,) = _lines_m(solid, snapshot.pattern_m)
@@ -75,7 +76,11 @@ def test_its_cut_is_drawn_and_the_film_shows_it_as_drawn(tmp_path: Path) -> None
     picture, said = draw_outlines(tmp_path, scenario)
     assert picture.startswith("data:image/png")
     assert said.endswith("at the end")
-    film = make_film(tmp_path, "best")
-    assert film is not None
-    assert film.bent == ()
-    assert _bending_name(scenario) == ""
+    frames = sphere_frames([snapshot], scenario, "bar", "best", DensityScale(0.0, 1.0))
+    film, n = frames.whole, len(snapshot.id)
+    assert (film.grains, film.vertices) == (n, len(snapshot.pattern_m))
+    bent_m = np.array(film.origin_m) + film.quantum_m * frames.place[:, 0, n:].T
+    assert np.abs(bent_m - snapshot.pattern_m).max() <= 0.5 * film.quantum_m * (1 + 1e-9)
+    (drawn,) = sphere_scene(scenario, 0.05)["solids"]
+    assert drawn["bends"]
+    assert drawn["vertices"] == film.vertices

@@ -1,0 +1,190 @@
+"""A scene of sand to scale before anything runs: as a picture, or as a page with a 3D view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from analysis.plots import LAYER_COLOURS
+from sandmould.engines.snapshot import Snapshot
+from sandmould.report.figures import (
+    DensityScale,
+    cut_m,
+    dimensioned,
+    picture_address,
+    png_bytes,
+    svg_bytes,
+)
+from sandmould.report.method import Row
+from sandmould.report.sphere_film import SphereFilm, sphere_frames
+from sandmould.report.sphere_scene import sphere_scene
+from sandmould.report.templates import page_environment
+from sandmould.runs.files import replaced
+from sandmould.runs.formatting import listed, number
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.likely_bed import LikelyBed, likely_bed
+from sandmould.scenario.placement import plan_counts
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind
+
+ENDINGS = (".html", ".png", ".svg")
+_DPI = 160
+
+
+def draw_scene_file(scenario: Scenario, title: str, run: str, out: Path) -> None:
+    """Draw box, solids, cavities, likely grains and vibration to scale.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    title, run : str
+        What the page is headed with.
+    out : Path
+        A page (``.html``) or a picture (``.png``, ``.svg``).
+
+    Raises
+    ------
+    BadInputError
+        When the file has another ending.
+    OSError
+        When it cannot be written.
+    """
+    if out.suffix.lower() not in ENDINGS:
+        valid = f"a file that ends in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}"
+        raise BadInputError([Problem("--output", str(out), valid)])
+    if not out.absolute().parent.is_dir():
+        raise BadInputError([Problem("--output", str(out), "a file in a folder that is there")])
+    # opened before a minute of drawing, and not after it
+    with replaced(out) as partial, partial.open("wb") as file:
+        bed = likely_bed(scenario, cut_m(scenario))
+        grains = _as_snapshot(bed)
+        figure = dimensioned(scenario, None, grains)
+        _key(figure, bed)
+        figure.set_dpi(_DPI)
+        if out.suffix.lower() == ".svg":
+            file.write(svg_bytes(figure))
+        elif out.suffix.lower() == ".png":
+            file.write(png_bytes(figure))
+        else:
+            file.write(_page(scenario, title, run, figure, bed, grains).encode())
+
+
+def _as_snapshot(bed: LikelyBed) -> Snapshot:
+    n = len(bed.radius_m)
+    return Snapshot(
+        time_s=0.0,
+        vibration_time_s=-1.0,
+        stage=StageKind.SETTLE.value,
+        id=np.arange(1, n + 1),
+        layer=bed.layer,
+        position_m=bed.position_m,
+        velocity_m_s=np.zeros_like(bed.position_m),
+        spin_rad_s=np.zeros((n, 3)),
+        radius_m=bed.radius_m,
+    )
+
+
+def _key(figure: Figure, bed: LikelyBed) -> None:
+    """The layers' colours over the sand, or none where there is one layer."""
+    (ax,) = figure.axes
+    key = ax.get_legend()
+    if key is None:
+        return
+    if bed.layer.max(initial=1) == 1:
+        key.remove()
+        return
+    key.set_loc("upper right")
+    key.set_bbox_to_anchor((1.0, 1.0))
+
+
+def _page(
+    scenario: Scenario, title: str, run: str, figure: Figure, bed: LikelyBed, grains: Snapshot
+) -> str:
+    films: tuple[SphereFilm, ...] = ()
+    scene: dict[str, object] = {}
+    if scenario.dimension == 3:
+        frames = sphere_frames([grains], scenario, run, "planned", DensityScale(0.0, 1.0))
+        films = (frames.planned(bed.of_grains, bed.slice_m),)
+        scene = sphere_scene(scenario, scenario.box.height_m)
+        scene["marks"] = _arrow(scenario)
+    layers = range(1, int(bed.layer.max(initial=1)) + 1)
+    return (
+        page_environment()
+        .get_template("scene.html")
+        .render(
+            title=title,
+            run=run,
+            dimension=scenario.dimension,
+            picture=picture_address(png_bytes(figure)),
+            facts=_facts(scenario),
+            slice_note=_slice_note(bed, scenario.dimension),
+            vibrates=bool(scenario.vibrations),
+            films=films,
+            scene=scene,
+            layer_colours=[(n, LAYER_COLOURS[(n - 1) % len(LAYER_COLOURS)]) for n in layers],
+        )
+    )
+
+
+def _slice_note(bed: LikelyBed, dimension: int) -> str:
+    """Which part of the sand is drawn; empty where all of it is."""
+    if bed.slice_m is None:
+        return ""
+    low, high = (f"{1e3 * place_m:.0f}" for place_m in bed.slice_m)
+    axis = "y" if dimension == 3 else "x"
+    drawn = f"{_count(len(bed.radius_m))} of {_count(bed.of_grains)} grains"
+    return f"Drawn are {drawn}, those from {axis} = {low} to {high} mm."
+
+
+def _count(number: int) -> str:
+    return f"{number:,}".replace(",", "\u00a0")
+
+
+def _facts(s: Scenario) -> tuple[Row, ...]:
+    """What is drawn, in numbers."""
+    d, counts = s.dimension, plan_counts(s)
+    sizes = [f"{1e3 * c.diameter_m:.3g} mm" for c in s.sand.classes(d)]
+    box = (
+        (s.box.width_m, s.box.height_m)
+        if d == 2
+        else (s.box.width_m, s.box.depth_m, s.box.height_m)
+    )
+    rows = [
+        Row("box", " × ".join(f"{1e3 * side:g}" for side in box) + " mm"),
+        Row("grains", f"{_count(sum(counts))} in layers of {listed([_count(n) for n in counts])}"),
+        Row("diameters", listed(sizes, most=len(sizes))),
+    ]
+    if s.obstacles:
+        names = [o.name.replace("_", " ") for o in s.obstacles]
+        rows.append(Row("in the box", listed(list(dict.fromkeys(names)), most=8)))
+    for bore in s.scene.bores:
+        rows.append(
+            Row(f"cavity {bore.name.replace('_', ' ')}", f"{1e3 * bore.length_m:g} mm deep")
+        )
+    for stage in s.vibrations:
+        along = ", ".join(f"{x:.3g}" for x in stage.unit_direction(d))
+        moves = f"{number(stage.frequency_hz)} Hz along ({along}), {number(stage.duration_s)} s"
+        if stage.unbalance is None:
+            moves += f", ±{1e3 * stage.amplitude_m:.3g} mm, {stage.peak_acceleration_g:.3g} g"
+        rows.append(Row("vibration", moves))
+    return tuple(rows)
+
+
+def _arrow(s: Scenario) -> list[list[float]]:
+    """Lines of an arrow both ways beside the box along the first vibration, m; not to scale."""
+    if not s.vibrations:
+        return []
+    size_m = np.array([s.box.width_m, s.box.depth_m, s.box.height_m])
+    along = np.array(s.vibrations[0].unit_direction(3))
+    reach_m = 0.12 * float(size_m.max())
+    middle_m = np.array([size_m[0] + 1.5 * reach_m, size_m[1], 0.5 * size_m[2]])
+    across = np.cross(along, [0.0, 1.0, 0.0] if abs(along[1]) < 0.9 else [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    lines = [middle_m - reach_m * along, middle_m + reach_m * along]
+    for way in (-1.0, 1.0):
+        tip_m = middle_m + way * reach_m * along
+        for side in (-1.0, 1.0):
+            lines += [tip_m, tip_m - reach_m * (0.3 * way * along + 0.15 * side * across)]
+    return [np.round(np.concatenate(lines), 6).tolist()]

@@ -1,0 +1,24 @@
+"""The templates of pages."""
+
+from __future__ import annotations
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2.sandbox import ImmutableSandboxedEnvironment
+
+from sandmould import ROOT
+from sandmould.runs.formatting import number
+
+TEMPLATES = ROOT / "templates" / "report"
+
+
+def page_environment() -> Environment:
+    """Templates of pages: names are escaped, and a missing value is an error."""
+    environment = ImmutableSandboxedEnvironment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number
+    return environment

@@ -1,0 +1,40 @@
+"""Which run of a study is drawn before anything is computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sandmould.runs.formatting import listed
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.definition.run import Run
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import OpenStudy, open_study
+
+
+def drawn_run(path: Path, name: str | None = None) -> tuple[OpenStudy, Run]:
+    """Open a study and choose a run of a scene of sand; no engine is asked for.
+
+    Parameters
+    ----------
+    path : Path
+    name : str, optional
+        Of the run; the first unless given.
+
+    Raises
+    ------
+    BadInputError
+        When the study is bad, has no grains, or no run of the name.
+    """
+    study = open_study(path)
+    if not isinstance(study.study.scenario, Scenario):
+        valid = f"a study of kind sand: one of kind {study.study.kind} has no grains to draw"
+        raise BadInputError([Problem("STUDY", study.name, valid)])
+    runs = {run.run: run for run in expand(study)}
+    if name is None:
+        return study, next(iter(runs.values()))
+    if name not in runs:
+        raise BadInputError(
+            [Problem("--run", name, f"a run of {study.name}: {listed(list(runs))}")]
+        )
+    return study, runs[name]
