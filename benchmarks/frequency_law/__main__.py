@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from benchmarks.frame import Benchmark
 from benchmarks.frequency_law import page
+from sandmould import ROOT
 
 BENCHMARK = Benchmark(
     __file__,
     __doc__,
-    pages={"frequency_law.md": lambda results: page.page()},
+    pages={
+        "frequency_law.md": lambda results: page.page(picture=ROOT / "docs" / "frequency_law.png")
+    },
 )
 
 if __name__ == "__main__":

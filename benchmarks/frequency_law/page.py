@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.frame import render
+from benchmarks.frequency_law.chart import draw
 from benchmarks.frequency_law.series import FREQUENCY, Power, Series, power_of, series_of
 from sandmould import ROOT
 from sandmould.runs.formatting import number, seconds
@@ -32,8 +33,8 @@ POWERS: dict[str, tuple[str, str, Callable[[Series], float]]] = {
 """What changes between the curves of a study, and its exponent were f in proportion to c/(4 H)."""
 
 
-def page(records: Path = RECORDS) -> str:
-    """Write the page from the records that are there."""
+def page(records: Path = RECORDS, picture: Path | None = None) -> str:
+    """Write the page from the records that are there, and its picture where it is given a place."""
     studies, missing = [], []
     for name in STUDIES:
         folder = records / name
@@ -41,6 +42,8 @@ def page(records: Path = RECORDS) -> str:
             studies.append(_study(folder))
         else:
             missing.append(name)
+    if studies and picture is not None:
+        draw(studies, picture)
     values = {"studies": studies, "missing": missing, "number": number, "seconds": seconds}
     return render(Path(__file__).with_name("page.md.j2"), values)
 

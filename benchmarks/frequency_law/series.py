@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
+from sandmould.runs.formatting import setting_text
 from sandmould.scenario.hardness import bed_hardness, column_mode_hz
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import usable_values
@@ -21,6 +23,17 @@ Array = NDArray[np.float64]
 FREQUENCY = "vibration.0.frequency_hz"
 MEASURE = "tube_fill_fraction"
 BED_HEIGHT = "bed_height_m"
+
+
+@dataclass(frozen=True)
+class Rise:
+    """What the mean fill gains between two frequencies."""
+
+    from_hz: float
+    to_hz: float
+    gain: float
+    half_width: float
+    """Of its 95 % interval, in pairs. The two were picked after seeing, so it is too narrow."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +49,25 @@ class Series:
     """Of the bed at rest, mean over its runs."""
     limbs: CurveLimbs
     optimum: Optimum
+    fills: pd.DataFrame
+    """A row a filling, a column a frequency in rising order; NaN where a run failed."""
+
+    @property
+    def largest_rise(self) -> Rise:
+        """Where the mean fill gains most towards higher frequencies.
+
+        Beside a curve that falls from its lowest frequency it shows a second top.
+        """
+        means = self.fills.mean().to_numpy(dtype=np.float64)
+        gains = np.array([means[j] - means[:j].min() for j in range(1, len(means))])
+        top = 1 + int(gains.argmax())
+        valley = int(means[:top].argmin())
+        pairs = (self.fills.iloc[:, top] - self.fills.iloc[:, valley]).dropna().to_numpy()
+        half = float(stdtrit(len(pairs) - 1, 0.5 + CONFIDENCE / 2)) * float(pairs.std(ddof=1))
+        hz = self.fills.columns
+        return Rise(
+            float(hz[valley]), float(hz[top]), float(pairs.mean()), half / len(pairs) ** 0.5
+        )
 
     @property
     def wave_speed_m_s(self) -> float:
@@ -100,13 +132,16 @@ def series_of(
         found.append(
             Series(
                 study,
-                "" if other is None else f"{other} = {value}",
+                "" if other is None else setting_text({other: value}),
                 scenario,
                 int(used.groupby(FREQUENCY).size().median()),
                 float(used[BED_HEIGHT].mean()),
                 find_limbs(hz, np.asarray(number_blocks(used)), values),
                 # Draws of two curves must not share their random numbers.
                 find_optimum(used, [FREQUENCY], MEASURE, "larger", seed),
+                pd.DataFrame({"hz": hz, "filling": number_blocks(used), "fill": values}).pivot(
+                    index="filling", columns="hz", values="fill"
+                ),
             )
         )
     return found

@@ -22,10 +22,8 @@ SOURCE_ALONE = {"connection-pool"}
 
 def pins(lock: str, python: str) -> Iterator[str]:
     """Pinned packages of a lock file that this machine needs with a Python, ``name==version``."""
-    environment = dict(default_environment()) | {
-        "python_version": python,
-        "python_full_version": f"{python}.0",
-    }
+    environment = {str(key): str(value) for key, value in default_environment().items()}
+    environment |= {"python_version": python, "python_full_version": f"{python}.0"}
     for name, version, marker in re.findall(
         r"^([\w.-]+)==(\S+)(?: ; (.*?))? \\$", lock, re.MULTILINE
     ):

@@ -129,7 +129,7 @@ def demo(
     ] = False,
     cores: Cores = None,
 ) -> None:
-    """Compute the demonstration: at which frequency sand fills a blind tube best."""
+    """Compute the demonstration: a tube at four frequencies."""
     from sandmould.study.run_study import run_study
 
     study = study_file("tube_quick" if quick else "tube_demo")
@@ -264,7 +264,7 @@ def keys(
 
 @app.command()
 def doctor() -> None:
-    """Say which engines, cluster and disk there are, and what is missing."""
+    """Say what the installation has, and what is missing."""
     from sandmould.study.installation import doctor_text, findings
     from sandmould.study.plan.build_plan import RESULTS
 
