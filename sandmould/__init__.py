@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parent
-"""The package's own files."""
-IS_CHECKOUT = (PACKAGE.parent / "Snakefile").is_file()
-"""Whether it runs from a clone. An installation has what lies beside it in ``shipped``."""
-ROOT = PACKAGE.parent if IS_CHECKOUT else PACKAGE / "shipped"
+ROOT = Path(__file__).resolve().parents[1]
+"""Where the packages lie: the repository, or the folder of an installed wheel."""
+IS_CHECKOUT = (ROOT / "Snakefile").is_file()
+SHIPPED = ROOT if IS_CHECKOUT else ROOT / "sandmould" / "shipped"
 """Where ``config/``, ``templates/``, ``workflow/`` and ``profiles/`` lie."""

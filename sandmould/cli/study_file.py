@@ -5,10 +5,10 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from sandmould import ROOT
+from sandmould import SHIPPED
 from sandmould.scenario.bad_input import BadInputError, Problem
 
-SHIPPED = ROOT / "config" / "studies"
+STUDIES = SHIPPED / "config" / "studies"
 
 
 def study_file(text: str) -> Path:
@@ -24,7 +24,7 @@ def study_file(text: str) -> Path:
     BadInputError
         When there is no such file; it gives the nearest names.
     """
-    shipped = SHIPPED / f"{text}.yaml"
+    shipped = STUDIES / f"{text}.yaml"
     if text in shipped_studies():
         return shipped
     path = Path(text)
@@ -38,4 +38,4 @@ def study_file(text: str) -> Path:
 
 def shipped_studies(start: str = "") -> list[str]:
     """Names of the studies of ``config/studies``, those that begin so."""
-    return sorted(p.stem for p in SHIPPED.glob("*.yaml") if p.stem.startswith(start))
+    return sorted(p.stem for p in STUDIES.glob("*.yaml") if p.stem.startswith(start))

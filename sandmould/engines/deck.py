@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sandmould import ROOT
+from sandmould import SHIPPED
 from sandmould.digest import sources_digest
 from sandmould.runs.files import write_text
 
 if TYPE_CHECKING:
     import jinja2
 
-TEMPLATES = ROOT / "templates"
+TEMPLATES = SHIPPED / "templates"
 _LONGEST_REMARK = 200
 """Characters; LIGGGHTS reads lines of 2048."""
 _BLOCK = re.compile(r"^#--- block: (\w+) ---.*?\n(.*?)^#--- end: \1 ---$", re.M | re.S)

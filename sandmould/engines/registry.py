@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from sandmould import PACKAGE, ROOT
+from sandmould import ROOT, SHIPPED
 from sandmould.digest import code_digest, digest
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
@@ -148,7 +148,7 @@ def deck_hash(scenario: Scenario) -> str:
 
 def deck_sources(scenario: Scenario) -> list[Path]:
     """Files of the repository that ``deck_hash`` is made from."""
-    templates = (ROOT / "templates" / scenario.engine.name).glob("*.j2")
+    templates = (SHIPPED / "templates" / scenario.engine.name).glob("*.j2")
     return sorted([*templates, *_code_files(scenario)])
 
 
@@ -167,7 +167,7 @@ def _code_hash(scenario: Scenario) -> str:
 
 def _code_files(scenario: Scenario) -> list[Path]:
     """Files that decide what is computed on any engine, and those of the scenario's engine."""
-    return [*(PACKAGE / name for name in _OF_EVERY_ENGINE),
+    return [*(ROOT / "sandmould" / name for name in _OF_EVERY_ENGINE),
             *engine_of(scenario).session_sources(scenario)]  # fmt: skip
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-from sandmould import ROOT
+from sandmould import SHIPPED
 from sandmould.runs.formatting import number
 
-TEMPLATES = ROOT / "templates" / "report"
+TEMPLATES = SHIPPED / "templates" / "report"
 
 
 def page_environment() -> Environment:

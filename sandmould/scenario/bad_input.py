@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sandmould import ROOT
+from sandmould import SHIPPED
 
 BAD_INPUT_EXIT = 78
 """Exit status of a workflow that has said what is wrong with its input (EX_CONFIG, sysexits.h)."""
@@ -44,7 +44,7 @@ class BadInputError(Exception):
 
 def display_path(path: Path) -> str:
     """A file's name in messages: seen from here, else from the repository, else as given."""
-    for folder in (Path.cwd(), ROOT):
+    for folder in (Path.cwd(), SHIPPED):
         if path.is_absolute() and path.is_relative_to(folder):
             return str(path.relative_to(folder))
     return str(path)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from sandmould.scenario.geometry import Array
 from sandmould.scenario.placement import (
-    drawn_classes,
     filled_measure,
     nominal_fraction,
     plan_counts,
@@ -73,17 +72,20 @@ def likely_bed(s: Scenario, cut_m: float | None = None) -> LikelyBed:
         high[across] = low[across] + width
         counts = [max(1, round(n * MOST_DRAWN[d] / total)) for n in counts]
         slice_m = (float(low[across]), float(high[across]))
-    diameter = {c.number: c.diameter_m for c in s.sand.classes(d)}
-    drawn = [drawn_classes(s, n, rng) for n in counts]
+    classes = s.sand.classes(d)
+    diameter_m = np.array([c.diameter_m for c in classes])
+    share = np.array([c.count_fraction for c in classes])
+    upto = np.cumsum(share / share.sum())[:-1]
+    drawn_m = [
+        rng.permutation(diameter_m[np.searchsorted(upto, (np.arange(n) + 0.5) / n)]) for n in counts
+    ]
     space = filled_measure(s) / nominal_fraction(s) / total
     start_m, room_m = _lattice(s, low, high, space ** (1.0 / d), sum(counts), rng)
     ends = np.cumsum(counts)
     radius_m = np.concatenate(
         [
-            _sized(
-                np.array([diameter[n] for n in numbers.tolist()]) / 2.0, room_m[end - n : end], rng
-            )
-            for numbers, n, end in zip(drawn, counts, ends.tolist(), strict=True)
+            _sized(diameters_m / 2.0, room_m[end - n : end], rng)
+            for diameters_m, n, end in zip(drawn_m, counts, ends.tolist(), strict=True)
         ]
     )
     layer = np.repeat(np.arange(1, len(counts) + 1), counts)

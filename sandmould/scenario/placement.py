@@ -118,7 +118,7 @@ def loose_height_m(s: Scenario, count: int) -> float:
     return count * _mean_grain_measure(s) / s.floor_measure / LOOSE_FRACTION[s.dimension]
 
 
-def drawn_classes(s: Scenario, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+def _draw_classes(s: Scenario, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
     """Draw size classes so that each has its exact share, rounded, in random order."""
     classes = s.sand.classes(s.dimension)
     share = np.cumsum([c.count_fraction for c in classes])
@@ -142,7 +142,7 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     PlannedLayer
     """
     rng = np.random.default_rng([s.seed, number])
-    drawn = np.sort(drawn_classes(s, count, rng))[::-1]
+    drawn = np.sort(_draw_classes(s, count, rng))[::-1]
     diameters = {c.number: c.diameter_m for c in s.sand.classes(s.dimension)}
     radius = np.array([diameters[c] for c in drawn]) / 2
     low, high = np.array(s.pouring_m).T

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 
 import sandmould.runs.one_blas_thread  # noqa: F401
-from sandmould import ROOT
+from sandmould import SHIPPED
 from sandmould.scenario.bad_input import BAD_INPUT_EXIT
 from sandmould.study.cluster.settings import may_be_elsewhere
 from sandmould.study.plan.batches import is_done
@@ -87,7 +87,7 @@ def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> in
     stated = stated_cores(options)
     cores = [] if stated is not None else ["--cores", str(_all_cores())]
     file = str(plan.study.path.absolute())
-    workflow = ["--snakefile", str(ROOT / "Snakefile"), "--configfile", file]
+    workflow = ["--snakefile", str(SHIPPED / "Snakefile"), "--configfile", file]
     arguments = [*cores, *workflow, *options]
     arguments += ["--", *targets] if targets else []
     hand_over(plan)

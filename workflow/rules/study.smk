@@ -4,7 +4,7 @@ import atexit
 import os
 import sys
 
-from sandmould import ROOT
+from sandmould import SHIPPED
 from sandmould.runs.columns import SWEEP
 from sandmould.runs.words import say
 from sandmould.scenario.bad_input import BAD_INPUT_EXIT, BadInputError
@@ -98,7 +98,7 @@ FILL_MARKS = {
     if fill in {fill.run for fill in PLAN.fills}
 }
 # As seen from here, wherever that is.
-TEMPLATES = ROOT / "templates" / "report"
+TEMPLATES = SHIPPED / "templates" / "report"
 REPORT_TEMPLATES = sorted(os.path.relpath(path) for path in TEMPLATES.iterdir())
 
 

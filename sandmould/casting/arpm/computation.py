@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from sandmould import PACKAGE
+from sandmould import ROOT
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.estimates import least_sand_share
@@ -55,7 +55,7 @@ class ElementCost(Cost):
 def source_files() -> list[Path]:
     """Files of the solver, and those of the scenario that compute for it."""
     shared = (
-        PACKAGE / "scenario" / name
+        ROOT / "sandmould" / "scenario" / name
         for name in (
             "casting_shapes.py",
             "geometry.py",

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sandmould import PACKAGE
+from sandmould import ROOT
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.flow import EscapedError, Flow, FlowProgress
 from sandmould.casting.mps.pressure import ClosedRegionError
@@ -51,7 +51,7 @@ class FlowCost(Cost):
 
 def source_files() -> list[Path]:
     """Files of the solver, and those of the scenario that compute for it."""
-    shared = (PACKAGE / "scenario" / name for name in ("flow.py",))
+    shared = (ROOT / "sandmould" / "scenario" / name for name in ("flow.py",))
     return sorted([*Path(__file__).parent.glob("*.py"), *shared])
 
 

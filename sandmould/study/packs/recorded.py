@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sandmould import ROOT
+from sandmould import ROOT, SHIPPED
 from sandmould.runs.hashing import scenario_hash
 from sandmould.study.packs.index import PackedRun
 from sandmould.study.packs.pack import SUFFIX, Packed, pack
@@ -52,7 +52,7 @@ def take_up(plan: Plan, results: Path) -> tuple[Plan, str]:
     BadInputError
         Where a pack cannot be read.
     """
-    shipped = plan.study.path.resolve().parent == (ROOT / "config" / "studies").resolve()
+    shipped = plan.study.path.resolve().parent == (SHIPPED / "config" / "studies").resolve()
     packs = sorted((RECORDS / plan.study.name).glob(f"*{SUFFIX}")) if shipped else []
     taken = 0
     folder = results / plan.study.name

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sandmould import ROOT
+from sandmould import SHIPPED
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.definition.certificate import provisional_hz
 from sandmould.study.definition.comparing import ENGINE
@@ -31,7 +31,7 @@ from sandmould.study.plan.trust import may_run
 from sandmould.study.rounds.round_log import read_rounds
 
 RESULTS = Path("results")
-DEFAULT_STUDY = ROOT / "config" / "studies" / "tube_demo.yaml"
+DEFAULT_STUDY = SHIPPED / "config" / "studies" / "tube_demo.yaml"
 
 
 @dataclass(frozen=True)

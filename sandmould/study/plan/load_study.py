@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from sandmould import ROOT
+from sandmould import ROOT, SHIPPED
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.quantity import NAME, fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
@@ -21,10 +21,10 @@ from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import Kind
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named
 
-STUDIES = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
+STUDIES = (SHIPPED / "config" / "studies", SHIPPED / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
 """Where studies write the sands that they calibrate."""
-MATERIALS = (ROOT / "config" / "materials", CALIBRATED)
+MATERIALS = (SHIPPED / "config" / "materials", CALIBRATED)
 _OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
 _FILE_KEY = (
     r"(\b(obstacles|shapes)(\.\d+)+\.file|\bpattern(\.\d+)*\.shape(\.\d+)*\.file"

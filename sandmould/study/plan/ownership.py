@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from sandmould import ROOT
+from sandmould import SHIPPED
 from sandmould.runs.files import write_text
 from sandmould.scenario.bad_input import BadInputError, Problem
 
 OWNER_FILE = "study_file.txt"
 """In the folder of a study's results: the study's file as seen from the working folder."""
-_SHIPPED = ROOT / "config" / "studies"
+_STUDIES = SHIPPED / "config" / "studies"
 _SHIPPED_TEXT = "shipped study "
 
 
@@ -22,7 +22,7 @@ def owner_text(path: Path) -> str:
     without its place, which differs from installation to installation.
     """
     real = path.resolve()
-    if real.parent == _SHIPPED.resolve():
+    if real.parent == _STUDIES.resolve():
         return f"{_SHIPPED_TEXT}{real.stem}"
     return Path(os.path.relpath(real, Path.cwd().resolve())).as_posix()
 
@@ -41,7 +41,7 @@ def owner_path(folder: Path) -> Path | None:
     if text is None:
         return None
     name = text.removeprefix(_SHIPPED_TEXT)
-    path = Path(name) if name == text else _SHIPPED / f"{name}.yaml"
+    path = Path(name) if name == text else _STUDIES / f"{name}.yaml"
     return path if path.is_file() else None
 
 

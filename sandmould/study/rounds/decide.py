@@ -158,8 +158,8 @@ def decision_text(log: RoundLog, study: Study) -> str:
     of = f"Round {len(log.rounds)} of at most {study.refine.rounds}"
     if study.refine.adds == "replicates":
         best = setting_text(last.setting)
-        more = f"{len(last.runs)} more runs of settings that are not ruled out"
-        return f"{of}: best so far is {best}; {more}."
+        what = f"{len(last.runs)} more runs of settings that are not ruled out"
+        return f"{of}: best so far is {best}; {what}."
     where = listed(
         [
             f"{name_of(key)} {number(value)} ({number(last.interval[key][0])} to "

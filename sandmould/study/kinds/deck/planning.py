@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sandmould import ROOT
+from sandmould import SHIPPED
 from sandmould.digest import SHORT, digest
 from sandmould.engines.own_deck import deck as own_deck
 from sandmould.engines.registry import engine_module
@@ -16,7 +16,7 @@ from sandmould.study.kinds.deck import speed
 from sandmould.study.kinds.deck.measures import MEASURES
 from sandmould.study.kinds.kind import MachineSpeed, Planning, SpeedClass, UserProgram
 
-SHIPPED = ROOT / "config" / "decks"
+DECKS = SHIPPED / "config" / "decks"
 """Decks that come with us."""
 _ALLOWED = 3.0
 """Wall time to ask for over what the user expects."""
@@ -105,7 +105,7 @@ def files(scenario: OwnDeck) -> Mapping[str, Path]:
 def foreign(scenario: OwnDeck) -> str:
     """Say what of a deck is not shipped: a file, or text that would stand among its commands."""
     for path in scenario.paths.values():
-        if not path.resolve().is_relative_to(SHIPPED.resolve()):
+        if not path.resolve().is_relative_to(DECKS.resolve()):
             return f"{path.name} is not shipped"
     for name, value in scenario.values.items():
         if not _is_numbers(value):
@@ -146,5 +146,5 @@ PLANNING = Planning[OwnDeck](
     speed_class=speed_class,
     plan_cells=plan_cells,
     speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
-    program=UserProgram[OwnDeck](shipped=SHIPPED, files=files, foreign=foreign, to_read=to_read),
+    program=UserProgram[OwnDeck](shipped=DECKS, files=files, foreign=foreign, to_read=to_read),
 )
