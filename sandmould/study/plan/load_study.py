@@ -27,7 +27,7 @@ CALIBRATED = Path("results") / "materials"
 MATERIALS = (ROOT / "config" / "materials", CALIBRATED)
 _OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
 _FILE_KEY = (
-    r"(\b(obstacles|shapes)(\.\d+)+\.file|\bpattern(\.\d+)*\.shape(\.\d+)*\.file"
+    r"(\b(obstacles|cavities|shapes)(\.\d+)+\.file|\bpattern(\.\d+)*\.shape(\.\d+)*\.file"
     r"|\b(scenario|sweep\.keys|sweep\.points\.\d+)\.template"
     r"|\bscenario\.files\.\d+|\ballowed_folders\.\d+)(\.value)?$"
 )
