@@ -26,7 +26,6 @@ from analysis.mesh_parts import mesh_below_m3, sphere_mesh_m3
 from sandmould.scenario.geometry import Array, Block, Scene, Solid, Wall
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.outline import Outline
-from sandmould.scenario.revolved import Revolved
 
 _UPRIGHT = 1e-9
 """Largest slope at which a wall or a block counts as upright or level."""
@@ -116,7 +115,8 @@ def part_in_solid(
         return disc_polygon_m2(position_m, radius_m, _block_polygon(solid, walls))
     if isinstance(solid, Block):
         return _block_prism(solid, walls).part_m3(position_m, radius_m)
-    return sphere_mesh_m3(position_m, radius_m, _as_mesh(solid))
+    mesh = solid if isinstance(solid, TriangleMesh) else solid.mesh()
+    return sphere_mesh_m3(position_m, radius_m, mesh)
 
 
 def free_measure_between(scene: Scene, edges_m: Array) -> Array:
@@ -159,11 +159,7 @@ def free_measure_between(scene: Scene, edges_m: Array) -> Array:
 
 def _meshes(scene: Scene) -> tuple[TriangleMesh, ...]:
     """Meshes, and round solids as such."""
-    return tuple(_as_mesh(solid) for solid in (*scene.meshes, *scene.revolved))
-
-
-def _as_mesh(solid: TriangleMesh | Revolved) -> TriangleMesh:
-    return solid if isinstance(solid, TriangleMesh) else solid.mesh()
+    return (*scene.meshes, *(solid.mesh() for solid in scene.revolved))
 
 
 def box_section(scene: Scene, low_m: float = 0.0, high_m: float = 0.0) -> Array:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.ndimage import label
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.box import AnyObstacle, Box, Tube, build_scene
@@ -130,6 +129,8 @@ def _tried(
     grain_m: float,
 ) -> _Trial:
     """Try a cavity on a grid, once for all points of a sweep that have it."""
+    from scipy.ndimage import label  # slow to import, and few scenes have cavities
+
     scene = build_scene(box, obstacles, dimension).without(gate)
     space = cavity_space(cavity, dimension, "cavities")
     grid = cavity_grid(space, grain_m / _CELLS, _MOST_POINTS, margin_m=grain_m)

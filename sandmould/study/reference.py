@@ -35,7 +35,7 @@ def measures_text(study: OpenStudy) -> str:
         When a point of its sweep has a value of a wrong type.
     """
     kind = kind_named(study.study.kind)
-    every = [measured_in(kind, scene) for scene in scenes(study)]
+    every = [measured_in(study.study, kind, scene) for scene in scenes(study)]
     count = Counter(measure for measures in every for measure in measures)
     rows = [("measure", "unit", "meaning")]
     for measure, points in count.items():

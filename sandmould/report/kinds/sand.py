@@ -65,7 +65,9 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
     collected, verdict = findings.collected, findings.verdict
     of_sweep = collected.of_sweep
     filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
-    pages = sand_pages(folder, scenario, of_sweep, verdict, findings.film_budget_bytes)
+    pages = sand_pages(
+        folder, scenario, of_sweep, verdict, findings.film_budget_bytes, study.own_measures
+    )
     bending = None
     if scenario.pattern is not None:
         from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
