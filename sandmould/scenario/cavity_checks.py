@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -95,7 +94,7 @@ def _of_place(s: Scenario, cavity: AnyCavity, space: Cavity, key: str) -> Iterat
         valid = f"a cavity wider than the largest grain, {grain_m:.6g} m"
         yield Problem(f"{key}.kind", f"{cavity.kind} {cavity.name}", valid)
     elif found.solid_share > _MOST_SOLID:
-        share = f"{100 * found.solid_share:.2g} %"
+        share = f"about {100 * found.solid_share:.0f} %"
         valid = f"a cavity in free space; {share} of this one lies in obstacles"
         yield Problem(f"{key}.{place}", cavity.name, valid)
     elif found.is_shut:
@@ -135,7 +134,7 @@ def _tried(
     space = cavity_space(cavity, dimension, "cavities")
     grid = cavity_grid(space, grain_m / _CELLS, _MOST_POINTS, margin_m=grain_m)
     # no place is farther than this from a point of the grid
-    slack_m = 0.5 * grid.spacing_m * math.sqrt(dimension)
+    slack_m = 0.5 * float(np.linalg.norm(grid.spacing_m))
     points_m = grid.points_m.reshape(-1, dimension)
     clear_m = scene.clearance_m(points_m, grain_m).reshape(grid.inside_m.shape)
     depth_m = space.depth_m(points_m).reshape(grid.inside_m.shape)

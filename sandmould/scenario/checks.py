@@ -46,12 +46,10 @@ def problems(scenario: Scenario) -> list[Problem]:
         *_vibration(scenario),
         *unbalance_problems(scenario),
     ]
-    # The bed can only be predicted for a scene that is otherwise sound, and cavities lie in it.
-    return faults or [
-        *cavity_problems(scenario),
-        *_fill(scenario),
-        *table_mass_problem(scenario),
-    ]
+    # Cavities lie among obstacles, and the bed can only be predicted for a scene that is sound.
+    return (
+        faults or [*cavity_problems(scenario)] or [*_fill(scenario), *table_mass_problem(scenario)]
+    )
 
 
 def _obstacles(s: Scenario) -> Iterator[Problem]:

@@ -166,7 +166,7 @@ def problems(own: Mapping[str, str], swept: Collection[str]) -> Iterator[Problem
     try:
         _in_order(trees)
     except CycleError as fault:
-        circle = fault.args[1]
+        circle = fault.args[1][::-1]  # each names the next
         valid = f"a formula that does not lead back to itself ({' over '.join(circle)})"
         yield Problem(f"{KEY}.{circle[0]}", own[circle[0]], valid)
 
@@ -218,6 +218,8 @@ def with_own_measures(table: pd.DataFrame, own: Mapping[str, str]) -> pd.DataFra
         A value that cannot be computed is NaN: of a missing column, a division by zero, the root
         of a negative number, or one beyond all floating-point numbers.
     """
+    if not own:
+        return table
     import pandas as pd  # slow to import, and no plan needs it
 
     trees = {name: parsed(formula) for name, formula in own.items()}
@@ -243,7 +245,8 @@ def with_own_measures(table: pd.DataFrame, own: Mapping[str, str]) -> pd.DataFra
     with np.errstate(all="ignore"):
         for name in _in_order(trees):
             values[name] = computed(trees[name])
-    return table.assign(**{name: values[name] for name in trees})
+    own_columns = pd.DataFrame({name: values[name] for name in trees}, index=table.index)
+    return pd.concat([table, own_columns], axis=1)
 
 
 def _finite_values(values: Array) -> Array:
