@@ -20,14 +20,13 @@ from sandmould.scenario.cavities import (
     cavity_space,
     outward,
 )
-from sandmould.scenario.cavity_grid import cavity_grid
+from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, cavity_grid
 from sandmould.scenario.geometry import Cavity
 from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.scenario import Scenario
 
-_CELLS = 4
-"""Of the grid that a mouth is tried on, along the largest grain."""
-_MOST_POINTS = 60_000
+_MOST_POINTS = 200_000
+"""Of the grid that a mouth is tried on."""
 _MOST_SOLID = 0.01
 """Share of a cavity that may lie in obstacles: drawings need not agree to the last digit."""
 
@@ -132,13 +131,15 @@ def _tried(
 
     scene = build_scene(box, obstacles, dimension).without(gate)
     space = cavity_space(cavity, dimension, "cavities")
-    grid = cavity_grid(space, grain_m / _CELLS, _MOST_POINTS, margin_m=grain_m)
+    grid = cavity_grid(space, grain_m / CELLS_A_GRAIN[dimension], _MOST_POINTS, margin_m=grain_m)
     # no place is farther than this from a point of the grid
     slack_m = 0.5 * float(np.linalg.norm(grid.spacing_m))
     points_m = grid.points_m.reshape(-1, dimension)
-    clear_m = scene.clearance_m(points_m, grain_m).reshape(grid.inside_m.shape)
     depth_m = space.depth_m(points_m).reshape(grid.inside_m.shape)
     inside, before = grid.inside_m > 0.0, (depth_m < 0.0) & (depth_m > -grain_m)
+    asked = inside | before
+    clear_m = np.full(asked.shape, -np.inf)
+    clear_m[asked] = scene.clearance_m(grid.points_m[asked], grain_m)
     if isinstance(cavity, BoxCavity):
         widest_m = min(cavity.size_m)
     elif isinstance(cavity, CylinderCavity):
@@ -146,7 +147,7 @@ def _tried(
     else:
         widest_m = 2.0 * (float(grid.inside_m.max()) + slack_m)
     # where the middle of a grain may come
-    free = (clear_m >= 0.5 * grain_m - slack_m) & (inside | before)
+    free = clear_m >= 0.5 * grain_m - slack_m
     way, _ = label(free, structure=np.ones((3,) * dimension))
     leads_in = np.intersect1d(way[free & inside], way[free & before])
     return _Trial(

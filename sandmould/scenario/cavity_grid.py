@@ -8,6 +8,9 @@ import numpy as np
 
 from sandmould.scenario.geometry import Array, Cavity
 
+CELLS_A_GRAIN = {2: 16, 3: 8}
+"""Cells along a grain's diameter, by dimension."""
+
 
 @dataclass(frozen=True)
 class CavityGrid:

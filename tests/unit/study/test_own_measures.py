@@ -83,7 +83,7 @@ WHAT = "numbers, names of measures, + - * / **, brackets, min, max, abs and sqrt
         ("a = 1", f"one line of {WHAT}"),
         ("a\nb", f"one line of {WHAT}"),
         ("(" * 250 + "a" + ")" * 100, f"one line of {WHAT}"),
-        ("__import__('os').system('ls')", f"{WHAT}; __import__('os').system('ls') is none of these"),
+        ("open('a').read()", f"{WHAT}; open('a').read() is none of these"),
         ("__import__('os')", f"{WHAT}; __import__ is no function of these"),
         ("a.real", f"{WHAT}; a.real is none of these"),
         ("a[0]", f"{WHAT}; a[0] is none of these"),
