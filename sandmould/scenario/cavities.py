@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.box import Plate, Polygon, plate_blocks, polygon_outline
 from sandmould.scenario.geometry import Array, Cavity
 from sandmould.scenario.quantity import NAME, Section, quantity
@@ -84,17 +85,37 @@ CAVITY_KINDS = {2: ("box", "polygon"), 3: ("box", "cylinder", "mesh")}
 """Kinds of cavities that a dimension has."""
 
 
-def outward(opens: str | tuple[float, ...], dimension: int) -> Array | None:
-    """Unit vector out of a cavity, (d,) float64; None where a direction has no such vector."""
-    if isinstance(opens, str):
-        if opens in ("front", "back") and dimension == 2:
-            return None
+def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
+    """Unit vector from the side that a cavity opens to into it, before its turn.
+
+    Parameters
+    ----------
+    cavity : cavity of any kind
+    dimension : int
+    key : str
+        Key path of the cavity, for messages.
+
+    Returns
+    -------
+    (d,) float64
+
+    Raises
+    ------
+    BadInputError
+        When the dimension has no such side, or the numbers are no direction.
+    """
+    opens = cavity.opens
+    if isinstance(opens, str) and (dimension == 3 or opens not in ("front", "back")):
         axis, sign = _SIDES[opens]
         vector = np.zeros(dimension)
-        vector[axis] = sign
+        vector[axis] = -sign
         return vector
-    length = math.hypot(*opens)
-    return None if length == 0.0 else np.array(opens) / length
+    if not isinstance(opens, str) and any(opens):
+        return -np.array(opens) / math.hypot(*opens)
+    sides = "up, down, left or right" if dimension == 2 else "a side"
+    numbers = "" if isinstance(cavity, BoxCavity) else ", or numbers that are not all 0"
+    stated = opens if isinstance(opens, str) else list(opens)
+    raise BadInputError([Problem(f"{key}.opens", stated, f"{sides}{numbers}")])
 
 
 def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
@@ -110,19 +131,18 @@ def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
     Raises
     ------
     BadInputError
-        When the file of a mesh bounds no space.
+        When it opens to no side, or the file of a mesh bounds no space.
     """
-    out = outward(cavity.opens, dimension)
-    assert out is not None
+    into = inward(cavity, dimension, key)
     if isinstance(cavity, BoxCavity):
         plate = Plate(kind="plate", **cavity.model_dump(exclude={"kind", "opens"}))
         (block,) = plate_blocks(plate, dimension)
-        return Cavity(cavity.name, block, -out @ block.axes)
+        return Cavity(cavity.name, block, into @ block.axes)
     if isinstance(cavity, PolygonCavity):
         polygon = Polygon(kind="polygon", name=cavity.name, vertices_m=cavity.vertices_m)
-        return Cavity(cavity.name, polygon_outline(polygon), -out)
+        return Cavity(cavity.name, polygon_outline(polygon), into)
     if isinstance(cavity, CylinderCavity):
         size_m = (cavity.diameter_m, cavity.length_m)
-        rod = cylinder_along(cavity.name, np.array(cavity.centre_m), -out, *size_m)
-        return Cavity(cavity.name, rod, -out)
-    return Cavity(cavity.name, mesh_solid(cavity, key), -out)
+        rod = cylinder_along(cavity.name, np.array(cavity.centre_m), into, *size_m)
+        return Cavity(cavity.name, rod, into)
+    return Cavity(cavity.name, mesh_solid(cavity, key), into)

@@ -18,7 +18,7 @@ from sandmould.scenario.cavities import (
     MeshCavity,
     PolygonCavity,
     cavity_space,
-    outward,
+    inward,
 )
 from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, cavity_grid
 from sandmould.scenario.geometry import Cavity
@@ -54,11 +54,6 @@ def _of_keys(s: Scenario, cavity: AnyCavity, key: str) -> Iterator[Problem]:
         valid = f"{', '.join(kinds[:-1])} or {kinds[-1]} in {s.dimension}D"
         yield Problem(f"{key}.kind", cavity.kind, valid)
         return
-    if outward(cavity.opens, s.dimension) is None:
-        stated = cavity.opens if isinstance(cavity.opens, str) else list(cavity.opens)
-        sides = "up, down, left or right" if s.dimension == 2 else "a side"
-        numbers = "" if isinstance(cavity, BoxCavity) else ", or numbers that are not all 0"
-        yield Problem(f"{key}.opens", stated, f"{sides}{numbers}")
     if isinstance(cavity, BoxCavity):
         for name, value in (("centre_m", cavity.centre_m), ("size_m", cavity.size_m)):
             if len(value) != s.dimension:
@@ -69,11 +64,13 @@ def _of_keys(s: Scenario, cavity: AnyCavity, key: str) -> Iterator[Problem]:
         if valid_outline is not None:
             vertices = [list(v) for v in cavity.vertices_m]
             yield Problem(f"{key}.vertices_m", vertices, valid_outline)
-    elif isinstance(cavity, MeshCavity):
-        try:
+    try:
+        if isinstance(cavity, MeshCavity):
             cavity_space(cavity, s.dimension, key)
-        except BadInputError as error:
-            yield from error.problems
+        else:
+            inward(cavity, s.dimension, key)
+    except BadInputError as error:
+        yield from error.problems
 
 
 def _of_place(s: Scenario, cavity: AnyCavity, space: Cavity, key: str) -> Iterator[Problem]:

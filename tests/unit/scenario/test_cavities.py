@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 from sandmould.runs.hashing import present, scenario_hash
 from sandmould.runs.measures import measures_of
+from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.cavities import (
     BoxCavity,
     CylinderCavity,
@@ -21,6 +22,8 @@ from sandmould.scenario.cavities import (
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand.measures import MEASURES
 from sandmould.study.kinds.sand.planning import resolved
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.reference import measures_text
 from tests.unit.meshes import CORNERS, FACETS
 from tests.unit.refusing import refused
 
@@ -216,3 +219,10 @@ def test_a_lid_shuts_a_hole_and_an_obstacle_fills_it(
         "trial.yaml: scenario.cavities.0.centre_m = 'hole' cannot be used: valid is a cavity in "
         "free space; about 49 % of this one lies in obstacles."
     )
+
+
+def test_a_bad_side_is_told_by_whatever_asks_for_the_scene(tmp_path: Path) -> None:
+    path = tmp_path / "trial.yaml"
+    path.write_text(f"based_on: tube\nscenario: {{cavities: [{HOLE % ', opens: back'}]}}")
+    with pytest.raises(BadInputError, match="valid is up, down, left or right"):
+        measures_text(open_study(path))
