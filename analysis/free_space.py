@@ -23,8 +23,9 @@ from analysis.intersections import (
     sphere_prism_m3,
 )
 from analysis.mesh_parts import mesh_below_m3, sphere_mesh_m3
-from sandmould.scenario.geometry import Array, Block, Scene, Wall
+from sandmould.scenario.geometry import Array, Block, Scene, Solid, Wall
 from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.outline import Outline
 
 _UPRIGHT = 1e-9
 """Largest slope at which a wall or a block counts as upright or level."""
@@ -83,19 +84,39 @@ def free_part(position_m: Array, radius_m: Array, scene: Scene) -> Array:
     if scene.dimension == 2:
         box_m = _box_polygon(scene.walls, low_m, high_m)
         part = disc_polygon_m2(position_m, radius_m, box_m)
-        for block in scene.blocks:
-            part -= disc_polygon_m2(position_m, radius_m, _block_polygon(block, scene.walls))
-        for outline in scene.outlines:
-            inside_m = _within(outline.vertices_m, scene.walls)
-            part -= disc_outline_m2(position_m, radius_m, inside_m)
     else:
-        box = _box_prism(scene.walls, low_m, high_m)
-        part = box.part_m3(position_m, radius_m)
-        for block in scene.blocks:
-            part -= _block_prism(block, scene.walls).part_m3(position_m, radius_m)
-        for mesh in _meshes(scene):
-            part -= sphere_mesh_m3(position_m, radius_m, mesh)
+        part = _box_prism(scene.walls, low_m, high_m).part_m3(position_m, radius_m)
+    for solid in scene.solids:
+        part -= part_in_solid(position_m, radius_m, solid, scene.walls)
     return np.maximum(part, 0.0)
+
+
+def part_in_solid(
+    position_m: Array, radius_m: Array, solid: Solid, walls: tuple[Wall, ...] = ()
+) -> Array:
+    """Measure of the part of each disc or sphere that lies in a solid, or in a space of its shape.
+
+    Parameters
+    ----------
+    position_m : (n, d) float64, m
+    radius_m : (n,) float64, m
+    solid : Solid
+    walls : tuple of Wall, optional
+        What of a 2D solid or an upright block lies behind them does not count.
+
+    Returns
+    -------
+    (n,) float64, m2 in 2D or m3 in 3D
+        Exact but for round solids, as the head of this file says.
+    """
+    if isinstance(solid, Outline):
+        return disc_outline_m2(position_m, radius_m, _within(solid.vertices_m, walls))
+    if isinstance(solid, Block) and len(solid.centre_m) == 2:
+        return disc_polygon_m2(position_m, radius_m, _block_polygon(solid, walls))
+    if isinstance(solid, Block):
+        return _block_prism(solid, walls).part_m3(position_m, radius_m)
+    mesh = solid if isinstance(solid, TriangleMesh) else solid.mesh()
+    return sphere_mesh_m3(position_m, radius_m, mesh)
 
 
 def free_measure_between(scene: Scene, edges_m: Array) -> Array:
@@ -121,11 +142,11 @@ def free_measure_between(scene: Scene, edges_m: Array) -> Array:
     """
     if scene.dimension == 2:
         box_m = box_section(scene, float(edges_m[0]), float(edges_m[-1]))
-        below = _polygon_below_m2(box_m, edges_m)
+        below = polygon_below_m2(box_m, edges_m)
         for block in scene.blocks:
-            below = below - _polygon_below_m2(_block_polygon(block, scene.walls), edges_m)
+            below = below - polygon_below_m2(_block_polygon(block, scene.walls), edges_m)
         for outline in scene.outlines:
-            below = below - _polygon_below_m2(_within(outline.vertices_m, scene.walls), edges_m)
+            below = below - polygon_below_m2(_within(outline.vertices_m, scene.walls), edges_m)
     else:
         level = np.clip(edges_m, *box_levels_m(scene.walls))
         below = abs(polygon_area_m2(box_section(scene))) * (level - level[0])
@@ -253,8 +274,18 @@ def _block_prism(block: Block, walls: tuple[Wall, ...]) -> _Prism:
     return _Prism(block.centre_m, block.axes, section_m, -float(c), float(c))
 
 
-def _polygon_below_m2(polygon_m: Array, height_m: Array) -> Array:
-    """Area of a polygon under each height."""
+def polygon_below_m2(polygon_m: Array, height_m: Array) -> Array:
+    """Area of a polygon under each height.
+
+    Parameters
+    ----------
+    polygon_m : (k, 2) float64, m
+    height_m : (m,) float64, m
+
+    Returns
+    -------
+    (m,) float64, m2
+    """
     down = np.array([0.0, -1.0])
     cut = [cut_polygon(polygon_m, np.array([0.0, h]), down) for h in height_m]
     return np.array([abs(polygon_area_m2(part)) for part in cut])

@@ -42,10 +42,11 @@ class SceneSection:
     """(2, 2) each; the box is open at the top."""
     solids_m: tuple[Array, ...]
     bores_m: tuple[Array, ...]
+    cavities_m: tuple[Array, ...]
 
 
 def scene_section(scene: Scene, height_m: float, cut_m: float | None = None) -> SceneSection:
-    """Outlines of box, solids and bores in the plane shown.
+    """Outlines of box, solids, bores and cavities in the plane shown.
 
     Parameters
     ----------
@@ -75,11 +76,12 @@ def scene_section(scene: Scene, height_m: float, cut_m: float | None = None) -> 
         tuple(sides_m[~open_top]),
         tuple(section for solid in scene.solids for section in solid_sections(solid, plane_m)),
         tuple(bore_m for bore_m in bores_m if len(bore_m)),
+        tuple(part for cavity in scene.cavities for part in solid_sections(cavity.space, plane_m)),
     )
 
 
 def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = None) -> Axes:
-    """Draw the box, open at the top, its solids, and the bores as broken lines.
+    """Draw the box, open at the top, its solids, and bores and cavities as broken lines.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = No
     ax.add_collection(walls)
     for solid_m in section.solids_m:
         ax.add_patch(Polygon(solid_m * _MM, facecolor="0.8", edgecolor="0.25", zorder=2.5))
-    for bore_m in section.bores_m:
+    for bore_m in (*section.bores_m, *section.cavities_m):
         ax.add_patch(Polygon(bore_m * _MM, fill=False, edgecolor="0.1", linestyle="--", zorder=4))
     _frame(ax, scene.dimension, section.box_m)
     return ax

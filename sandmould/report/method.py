@@ -119,6 +119,12 @@ def statistics_method(objective: Objective, ends: str) -> Row:
     )
 
 
+def own_measures_method(own_measures: Mapping[str, str]) -> tuple[Row, ...]:
+    """Formulas of the user's own measures; no row without any."""
+    formulas = [f"{name} = {formula}" for name, formula in own_measures.items()]
+    return (Row("Own measures", "; ".join(formulas)),) if formulas else ()
+
+
 def _engines(summary: pd.DataFrame) -> str:
     if ENGINE not in summary or not summary[ENGINE].notna().any():
         return "no run says which"

@@ -29,7 +29,12 @@ from sandmould.report.kinds.registry import (
     notes_of,
     robustness_of,
 )
-from sandmould.report.method import Row, provenance_rows, statistics_method
+from sandmould.report.method import (
+    Row,
+    own_measures_method,
+    provenance_rows,
+    statistics_method,
+)
 from sandmould.report.optimum import effort_sentence, optimum_pages, with_surface
 from sandmould.report.sand import pictured_runs
 from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
@@ -170,6 +175,7 @@ def _render(
     )
     method: tuple[Row, ...] = (
         *of_kind.method,
+        *own_measures_method(page.study.own_measures),
         statistics_method(page.study.objective, of_kind.ends),
     )
     statement = optimum or (agreement if agreement and agreement.is_question else estimate)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, cast
@@ -85,6 +85,7 @@ def sand_pages(
     verdict: Verdict,
     film_budget_bytes: int,
     href: str,
+    own_measures: Iterable[str] = (),
 ) -> SandPages:
     """Draw everything that a study of sand shows.
 
@@ -99,6 +100,8 @@ def sand_pages(
         Most that the film of one run may weigh.
     href : str
         Address of the study's folder, seen from the report.
+    own_measures : iterable of str, optional
+        Names of the user's own measures.
 
     Returns
     -------
@@ -155,7 +158,7 @@ def sand_pages(
             late_conclusion,
         ),
         others=measure_curves(
-            collected, verdict, _other_measures(scenario, verdict), whole_conclusion
+            collected, verdict, _other_measures(scenario, verdict, own_measures), whole_conclusion
         ),
     )
 
@@ -291,21 +294,25 @@ def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
         "walls": [np.round(w, 6).tolist() for w in section.walls_m],
         "solids": [np.round(s, 6).tolist() for s in section.solids_m],
         "bores": [np.round(b, 6).tolist() for b in section.bores_m],
+        "cavities": [np.round(c, 6).tolist() for c in section.cavities_m],
         "layer_colours": list(LAYER_COLOURS),
         "bent_m": BENT_M,
     }
 
 
 def _tube_measures(curves: pd.DataFrame, scenario: Scenario, verdict: Verdict) -> list[str]:
-    """The objective first, then the filling of every tube."""
-    fills = [f"{bore.name}_fill_fraction" for bore in scenario.scene.bores]
+    """The objective first, then the filling of every tube and cavity."""
+    names = [*(b.name for b in scenario.scene.bores), *(c.name for c in scenario.cavities)]
+    fills = [f"{name}_fill_fraction" for name in names]
     return list(dict.fromkeys([verdict.measure, *(f for f in fills if f in curves)]))
 
 
-def _other_measures(scenario: Scenario, verdict: Verdict) -> list[str]:
-    """How deep the sand has come into every tube, and what the bed does."""
+def _other_measures(scenario: Scenario, verdict: Verdict, own: Iterable[str]) -> list[str]:
+    """How deep the sand has come, which voids it leaves, the user's own, and what the bed does."""
     fronts = [f"{bore.name}_front_depth_m" for bore in scenario.scene.bores]
-    return [m for m in (*fronts, *_SECONDARY) if m != verdict.measure]
+    for cavity in scenario.cavities:
+        fronts += [f"{cavity.name}_filled_depth_m", f"{cavity.name}_void_fraction"]
+    return [m for m in (*fronts, *own, *_SECONDARY) if m != verdict.measure]
 
 
 def _density_conclusion(median_kg_m3: Sequence[float]) -> str:

@@ -83,8 +83,9 @@ class Table:
 
 
 def _of_what_fits(summary: pd.DataFrame, verdict: Verdict) -> list[KeyNumber]:
-    """How much of what the tube could hold is in it at the best setting."""
-    column = verdict.measure.removesuffix("_fill_fraction") + "_fill_of_bed_fraction"
+    """How much of what a tube or cavity could hold is in it at the best setting."""
+    space = verdict.measure.removesuffix("_fill_fraction")
+    column = space + "_fill_of_bed_fraction"
     if verdict.best is None or column not in summary:
         return []
     at_best = sweep_part(summary[finished(summary)])
@@ -93,7 +94,8 @@ def _of_what_fits(summary: pd.DataFrame, verdict: Verdict) -> list[KeyNumber]:
     share = at_best[column].mean()
     if not math.isfinite(share):
         return []
-    what = f"of what fits in, {verdict.best.label}: the tube as dense as the bed is 100 %"
+    name = space.replace("_", " ")
+    what = f"of what fits in, {verdict.best.label}: the {name} as dense as the bed is 100 %"
     return [KeyNumber(f"{100 * share:.0f} %", what)]
 
 

@@ -78,6 +78,17 @@ SOLIDIFICATION_TIME_S: Final = "solidification_time_s"
 
 OF_OUTCOME: Final = (OUTCOME_CODE, OUTCOME, DETAIL, SIMULATED_S, PLANNED_S)
 CLOCK: Final = (TIME_S, VIBRATION_TIME_S, STAGE)
+OF_RUN: Final = frozenset({
+    RUN, REPLICATE, SEED, PART, *OF_OUTCOME, ENGINE, VERSION, RANKS, WALL_S, CPU_S, FILL,
+    FILL_WALL_S, FILL_CPU_S, GRAIN_STEPS_PER_S, PEAK_MEMORY_BYTES, TIME_STEP_S, TIME_STEP_FRACTION,
+    BED_LIMIT_S, LEAST_LIMIT_S, LIMIT_MOMENTS, LARGEST_OVERLAP_FRACTION, *CLOCK, GRAINS,
+    "steps", "grain_steps", "engine_wall_s", "elements", "element_steps", "particles",
+    "particle_solves", "poisson_iterations", "solver_fraction", "measured_time_s",
+    "measured_vibration_time_s", "measured_stage", "measured_grains",
+    "measured_largest_overlap_fraction",
+})  # fmt: skip
+"""Columns that runs of some kind have whatever is measured: no measure of a user's has their
+names."""
 
 
 def during_vibration(curves: pd.DataFrame) -> pd.DataFrame:

@@ -46,6 +46,14 @@ _OF_PROBE = {
     "_error_pa": "error of the mean pressure",
 }
 """Measures at a probe of a flow."""
+_OF_CAVITY = {
+    "_filled_depth_m": "filled depth of the",
+    "_void_fraction": "share of voids in the",
+    "_largest_void_m2": "largest void in the",
+    "_largest_void_m3": "largest void in the",
+    "_voids": "number of voids in the",
+}
+"""Measures of a cavity."""
 _PREFIXES = ((1e9, "G"), (1e6, "M"))
 _PREFIXED = ("Pa", "N/m")
 """Units in which moduli and stiffnesses of millions are common."""
@@ -83,6 +91,9 @@ def name_of(key: str) -> str:
     for ending, what in _OF_PROBE.items():
         if last.endswith(ending):
             return f"{what} at {last.removesuffix(ending).replace('_', ' ')}"
+    for ending, what in _OF_CAVITY.items():
+        if last.endswith(ending):
+            return f"{what} {last.removesuffix(ending).replace('_', ' ')}"
     suffix = next((s for s, _ in _UNITS if last.endswith(s)), "")
     if suffix == "_fraction":
         suffix = ""

@@ -26,6 +26,28 @@ class Box(Section):
     )
     height_m: float = quantity(0.1, "Inner height.", unit="m", source=ARGUED, gt=0, le=100)
 
+    def size_m(self, dimension: int) -> tuple[float, ...]:
+        """Width and height in 2D; width, depth and height in 3D."""
+        middle = (self.depth_m,) if dimension == 3 else ()
+        return (self.width_m, *middle, self.height_m)
+
+    def size_text(self, dimension: int) -> str:
+        """The same in words, for messages."""
+        return f"{' x '.join(f'{size:g}' for size in self.size_m(dimension))} m"
+
+    def holds(self, points_m: Array, dimension: int, slack: float = 1e-9) -> bool:
+        """Whether points lie in the box, or out of it by no more than a share of its size.
+
+        Parameters
+        ----------
+        points_m : (n, d) float64, m
+        dimension : int
+        slack : float, optional
+        """
+        size_m = np.array(self.size_m(dimension))
+        slack_m = slack * size_m.max()
+        return bool((points_m >= -slack_m).all() and (points_m <= size_m + slack_m).all())
+
 
 class Plate(Section):
     """A solid rectangle (2D) or cuboid (3D)."""

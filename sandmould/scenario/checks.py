@@ -8,6 +8,7 @@ import numpy as np
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_blocks, tube_wall
+from sandmould.scenario.cavity_checks import cavity_problems
 from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.limits import GRAINS
 from sandmould.scenario.outline import outline_fault
@@ -45,8 +46,10 @@ def problems(scenario: Scenario) -> list[Problem]:
         *_vibration(scenario),
         *unbalance_problems(scenario),
     ]
-    # The bed can only be predicted for a scene that is otherwise sound.
-    return faults or [*_fill(scenario), *table_mass_problem(scenario)]
+    # Cavities lie among obstacles, and the bed can only be predicted for a scene that is sound.
+    return (
+        faults or [*cavity_problems(scenario)] or [*_fill(scenario), *table_mass_problem(scenario)]
+    )
 
 
 def _obstacles(s: Scenario) -> Iterator[Problem]:
@@ -66,7 +69,7 @@ def _obstacles(s: Scenario) -> Iterator[Problem]:
         elif isinstance(obstacle, Polygon):
             yield from _polygon(s, obstacle, key)
         elif isinstance(obstacle, Cylinder):
-            if not _in_box(s, cylinder_solid(obstacle).corners()):
+            if not s.box.holds(cylinder_solid(obstacle).corners(), s.dimension):
                 valid = f"a cylinder inside the box, {_size(s)}"
                 yield Problem(f"{key}.centre_m", list(obstacle.centre_m), valid)
         elif isinstance(obstacle, Triangles):
@@ -81,7 +84,7 @@ def _plate(s: Scenario, plate: Plate, key: str) -> Iterator[Problem]:
         if len(value) != s.dimension:
             yield Problem(f"{key}.{part}", list(value), f"{s.dimension} numbers, one a dimension")
             return
-    if not _in_box(s, plate_blocks(plate, s.dimension)[0].corners()):
+    if not s.box.holds(plate_blocks(plate, s.dimension)[0].corners(), s.dimension):
         yield Problem(
             f"{key}.centre_m", list(plate.centre_m), f"a plate inside the box, {_size(s)}"
         )
@@ -100,7 +103,7 @@ def _tube(s: Scenario, tube: Tube, key: str) -> Iterator[Problem]:
             tube.length_m,
             f"at most {s.box.width_m - tube.left_end_x_m:.6g}, so that the tube ends in the box",
         )
-    elif not _in_box(s, _tube_corners(s, tube)):
+    elif not s.box.holds(_tube_corners(s, tube), s.dimension):
         yield Problem(
             f"{key}.axis_height_m", tube.axis_height_m, f"a tube inside the box, {_size(s)}"
         )
@@ -122,7 +125,7 @@ def _tube_corners(s: Scenario, tube: Tube) -> np.ndarray:
 def _polygon(s: Scenario, polygon: Polygon, key: str) -> Iterator[Problem]:
     vertices_m = np.array(polygon.vertices_m)
     valid = outline_fault(vertices_m)
-    if valid is None and not _in_box(s, vertices_m):
+    if valid is None and not s.box.holds(vertices_m, s.dimension):
         valid = f"a polygon inside the box, {_size(s)}"
     if valid is not None:
         yield Problem(f"{key}.vertices_m", [list(v) for v in polygon.vertices_m], valid)
@@ -135,7 +138,7 @@ def _mesh(s: Scenario, solid: SolidMesh, key: str) -> Iterator[Problem]:
         yield from error.problems
         return
     # a face on the wall may stand out by the round-off of its file's seven digits
-    if not _in_box(s, corners_m, slack=1e-6):
+    if not s.box.holds(corners_m, s.dimension, slack=1e-6):
         ends_m = (corners_m.min(axis=0).tolist(), corners_m.max(axis=0).tolist())
         low, high = (f"({', '.join(f'{x:.4g}' for x in end)})" for end in ends_m)
         valid = f"one that puts the mesh, now from {low} to {high} m, inside the box, {_size(s)}"
@@ -151,20 +154,12 @@ def _triangles(s: Scenario, solid: Triangles, key: str) -> Iterator[Problem]:
     except MeshFileError as fault:
         yield Problem(f"{key}.triangles", size, str(fault))
         return
-    if not _in_box(s, solid.solid.corners()):
+    if not s.box.holds(solid.solid.corners(), s.dimension):
         yield Problem(f"{key}.vertices_m", size, f"a solid inside the box, {_size(s)}")
 
 
-def _in_box(s: Scenario, corners: np.ndarray, slack: float = 1e-9) -> bool:
-    size = [s.box.width_m, s.box.depth_m, s.box.height_m] if s.dimension == 3 else [
-        s.box.width_m, s.box.height_m]  # fmt: skip
-    slack_m = slack * max(size)
-    return bool((corners >= -slack_m).all() and (corners <= np.array(size) + slack_m).all())
-
-
 def _size(s: Scenario) -> str:
-    depth = f" x {s.box.depth_m:g}" if s.dimension == 3 else ""
-    return f"{s.box.width_m:g}{depth} x {s.box.height_m:g} m"
+    return s.box.size_text(s.dimension)
 
 
 def _discharge(s: Scenario) -> Iterator[Problem]:

@@ -160,6 +160,41 @@ class Bore:
         return relative @ self.axis, relative @ self.basis.T
 
 
+@dataclass(frozen=True, eq=False)
+class Cavity:
+    """A space that the sand should fill; what is round it does not belong to it."""
+
+    name: str
+    space: Solid
+    """The space itself, as a solid would fill it."""
+    inward: Array
+    """(d,) float64: unit vector from the side it is open at into it; the axis of a round one."""
+
+    def depth_m(self, position_m: Array) -> Array:
+        """Depth of points behind the mouth, the plane across ``inward`` where the space begins.
+
+        Parameters
+        ----------
+        position_m : (n, d) float64, m
+
+        Returns
+        -------
+        (n,) float64, m
+            Negative before the mouth.
+        """
+        return position_m @ self.inward - self._ends_m[0]
+
+    @property
+    def length_m(self) -> float:
+        """Depth of its farthest point."""
+        return self._ends_m[1] - self._ends_m[0]
+
+    @property
+    def _ends_m(self) -> tuple[float, float]:
+        along_m = self.space.corners() @ self.inward
+        return float(along_m.min()), float(along_m.max())
+
+
 def distance_within(surface: Wall | Solid, position_m: Array, reach_m: float) -> Array:
     """Signed distance of points, (n,) float64, m; beyond a reach no more than the true one."""
     if isinstance(surface, Outline | TriangleMesh):
@@ -181,6 +216,8 @@ class Scene:
     """Solids of 3D given by triangles."""
     revolved: tuple[Revolved, ...] = ()
     """Round solids of 3D."""
+    cavities: tuple[Cavity, ...] = ()
+    """Spaces other than bores that the sand should fill; they bound nothing."""
 
     @property
     def solids(self) -> tuple[Solid, ...]:

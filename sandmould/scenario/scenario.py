@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal, Self
 
@@ -11,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from sandmould.scenario.box import Box, Obstacle, Plate, build_scene
+from sandmould.scenario.cavities import CavityKey, cavity_space
 from sandmould.scenario.contact import BackgroundDamping, Contact
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.engine import Engine
@@ -97,6 +99,9 @@ class Scenario(Section):
     obstacles: tuple[Obstacle, ...] = Field(
         (), description="Plates, tubes, polygons, cylinders and meshes in the box."
     )
+    cavities: tuple[CavityKey, ...] = Field(
+        (), description="Spaces that the sand should fill, of which each is measured by its name."
+    )
     pattern: PatternConfig | None = Field(
         None, description="A foam pattern that bends under the sand, coupled with it."
     )
@@ -133,8 +138,13 @@ class Scenario(Section):
 
     @cached_property
     def scene(self) -> Scene:
-        """Geometry of the box and the obstacles."""
-        return build_scene(self.box, self.obstacles, self.dimension)
+        """Geometry of the box, the obstacles and the cavities."""
+        scene = build_scene(self.box, self.obstacles, self.dimension)
+        spaces = (
+            cavity_space(cavity, self.dimension, f"cavities.{i}")
+            for i, cavity in enumerate(self.cavities)
+        )
+        return replace(scene, cavities=tuple(spaces))
 
     def scene_in(self, stage: str = "") -> Scene:
         """Geometry in a stage, the last where none is named: from the discharge on without gate."""
@@ -178,7 +188,9 @@ class Scenario(Section):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Copy the scenario with some sections replaced, and the geometry that goes with them."""
         copied = super().model_copy(update=update, deep=deep)
-        if update is not None and not {"dimension", "box", "obstacles"}.isdisjoint(update):
+        if update is not None and not {"dimension", "box", "obstacles", "cavities"}.isdisjoint(
+            update
+        ):
             # pydantic copies cached properties as they are
             copied.__dict__.pop("scene", None)
         return copied

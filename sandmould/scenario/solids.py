@@ -15,7 +15,7 @@ from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.drawing_file import MeshFileError, file_hash
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.quantity import Section, quantity
-from sandmould.scenario.revolved import Revolved
+from sandmould.scenario.revolved import Array, Revolved
 
 
 class Cylinder(Section):
@@ -112,9 +112,26 @@ class Triangles(Section):
 def cylinder_solid(cylinder: Cylinder) -> Revolved:
     """Geometry of a cylinder."""
     axis = np.eye(3)["xyz".index(cylinder.axis)]
-    half_m, radius_m = cylinder.length_m / 2, cylinder.diameter_m / 2
+    return cylinder_along(
+        cylinder.name, np.array(cylinder.centre_m), axis, cylinder.diameter_m, cylinder.length_m
+    )
+
+
+def cylinder_along(
+    name: str, centre_m: Array, axis: Array, diameter_m: float, length_m: float
+) -> Revolved:
+    """Geometry of a cylinder about any axis.
+
+    Parameters
+    ----------
+    name : str
+    centre_m, axis : (3,) float64
+        Centre, m, and unit vector along the axis.
+    diameter_m, length_m : float, m
+    """
+    half_m, radius_m = length_m / 2, diameter_m / 2
     profile_m = np.array([[-half_m, 0.0], [half_m, 0.0], [half_m, radius_m], [-half_m, radius_m]])
-    return Revolved(cylinder.name, np.array(cylinder.centre_m), axis, profile_m)
+    return Revolved(name, centre_m, axis, profile_m)
 
 
 def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:

@@ -8,9 +8,10 @@ of their own, ``summary_checks.tsv`` and ``curves_checks.tsv``.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,7 @@ from sandmould.statistics.agreement import (
     compare_pair,
     sweep_part,
 )
+from sandmould.study.definition.own_measures import with_own_measures
 from sandmould.study.definition.study import Study
 from sandmould.study.fill_costs import shares_of_fills
 from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
@@ -106,7 +108,7 @@ def collect(study_folder: Path) -> None:
         When ``runs.tsv`` itself cannot be read; a broken run is told in its row instead.
     """
     study = read_study(study_folder)
-    gathered = gather(study_folder, study.objective.at_vibration_s)
+    gathered = gather(study_folder, study.objective.at_vibration_s, study.own_measures)
     compared = compare_study(gathered.summary, gathered.keys, study)
     sweep = gathered.of_sweep
     tables = {
@@ -209,7 +211,11 @@ def read_study(study_folder: Path) -> Study:
     return validated(kind.study, tree, Origin({"": str(path)}))
 
 
-def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected:
+def gather(
+    study_folder: Path,
+    at_vibration_s: float | None = None,
+    own_measures: Mapping[str, str] = MappingProxyType({}),
+) -> Collected:
     """Read every run of a study; what is missing becomes NaN, what is broken is told in ``detail``.
 
     Parameters
@@ -219,6 +225,8 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
     at_vibration_s : float, s, optional
         Time of vibration at which the measures of the summary are taken; the last snapshot of
         each run unless given.
+    own_measures : mapping of str to str, optional
+        Formulas of the study's own measures, by name.
 
     Returns
     -------
@@ -229,7 +237,7 @@ def gather(study_folder: Path, at_vibration_s: float | None = None) -> Collected
     OSError, ValueError
         When ``runs.tsv`` itself cannot be read.
     """
-    return gather_runs(read_runs(study_folder), study_folder, at_vibration_s)
+    return gather_runs(read_runs(study_folder), study_folder, at_vibration_s, own_measures)
 
 
 def read_runs(study_folder: Path) -> pd.DataFrame:
@@ -241,13 +249,21 @@ def read_runs(study_folder: Path) -> pd.DataFrame:
 
 
 def gather_runs(
-    runs: pd.DataFrame, study_folder: Path, at_vibration_s: float | None = None
+    runs: pd.DataFrame,
+    study_folder: Path,
+    at_vibration_s: float | None = None,
+    own_measures: Mapping[str, str] = MappingProxyType({}),
 ) -> Collected:
     """The same of some of the runs: rows of ``read_runs``, numbered from 0."""
     folders = [study_folder / "runs" / str(run) for run in runs[RUN]]
     outcomes, problems = _read_outcomes(folders)
     costs = read_costs(folders)
-    measures = _in_order(read_tables([folder / "measures.tsv" for folder in folders], _with_clock))
+    measures = _in_order(
+        read_tables(
+            [folder / "measures.tsv" for folder in folders],
+            lambda table: with_own_measures(_with_clock(table), own_measures),
+        )
+    )
     bounds = measures.bounds(len(folders))
     details = []
     for place, outcome in enumerate(outcomes):

@@ -35,7 +35,7 @@ def measures_text(study: OpenStudy) -> str:
         When a point of its sweep has a value of a wrong type.
     """
     kind = kind_named(study.study.kind)
-    every = [measured_in(kind, scene) for scene in scenes(study)]
+    every = [measured_in(study.study, kind, scene) for scene in scenes(study)]
     count = Counter(measure for measures in every for measure in measures)
     rows = [("measure", "unit", "meaning")]
     for measure, points in count.items():
@@ -54,7 +54,16 @@ def measures_page() -> str:
         "`objective.measure`, `equivalence.margins` and the targets of a calibration name "
         "measures; a name that the scene will not have is refused before anything starts. "
         "`sandmould measures STUDY` lists those of a study. A unit of 1 is a pure number; those "
-        "without a unit are words and cannot be compared.",
+        "without a unit are words and cannot be compared.", "",
+        "A study can state measures of its own, in any kind of study:", "",
+        "```yaml", "own_measures:", "  empty_fraction: 1 - tube_fill_fraction",
+        "  missing_sand_m2: 0.0012 - tube_sand_m2", "```", "",
+        "A formula has numbers, names of measures (own ones too), `+ - * / **`, brackets, `min`, "
+        "`max`, `abs` and `sqrt`; nothing else is taken, and no formula is run as a program. The "
+        "name ends in the unit, as all names do; nobody checks that it is right. A value is absent "
+        "where it cannot be computed: after a division by zero, the root of a negative number, or "
+        "where a part of it is absent. An own measure is a column of `summary.tsv` and "
+        "`curves.tsv`, and what holds for other measures holds for it.",
     ]  # fmt: skip
     for kind in KINDS.values():
         lines += ["", f"## Studies of kind {kind.name}"]

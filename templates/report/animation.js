@@ -50,7 +50,7 @@
     for (const wall of scene.walls) { trace(v, wall); v.pen.stroke(); }
     v.pen.lineWidth = 1;
     v.pen.setLineDash([5, 4]);
-    for (const bore of scene.bores) { trace(v, bore); v.pen.closePath(); v.pen.stroke(); }
+    for (const space of [...scene.bores, ...scene.cavities]) { trace(v, space); v.pen.closePath(); v.pen.stroke(); }
     v.pen.setLineDash([]);
   }
 

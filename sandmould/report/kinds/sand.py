@@ -66,7 +66,7 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
     of_sweep = collected.of_sweep
     filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
     budget_bytes, href = findings.film_budget_bytes, findings.href
-    pages = sand_pages(folder, scenario, of_sweep, verdict, budget_bytes, href)
+    pages = sand_pages(folder, scenario, of_sweep, verdict, budget_bytes, href, study.own_measures)
     bending = None
     if scenario.pattern is not None:
         from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it

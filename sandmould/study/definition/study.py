@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -76,6 +76,11 @@ class Study(Section):
         source=ARGUED,
         ge=1,
         le=REPLICATES.most,
+    )
+    own_measures: dict[Annotated[str, Field(pattern=NAME)], str] = Field(
+        {},
+        description="Measures of your own by name, its unit as its ending: each a formula of "
+        "other measures with numbers, + - * / **, brackets, min, max, abs and sqrt.",
     )
     objective: Objective = Field(Objective(), description="What makes a setting the best.")
     equivalence: Equivalence = Field(

@@ -16,7 +16,14 @@ from sandmould import ROOT, SHIPPED
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.quantity import NAME, fields_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
-from sandmould.study.definition import calibration, certificate, comparing, refinement, sweep
+from sandmould.study.definition import (
+    calibration,
+    certificate,
+    comparing,
+    own_measures,
+    refinement,
+    sweep,
+)
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import Kind
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named
@@ -27,7 +34,7 @@ CALIBRATED = Path("results") / "materials"
 MATERIALS = (SHIPPED / "config" / "materials", CALIBRATED)
 _OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
 _FILE_KEY = (
-    r"(\b(obstacles|shapes)(\.\d+)+\.file|\bpattern(\.\d+)*\.shape(\.\d+)*\.file"
+    r"(\b(obstacles|cavities|shapes)(\.\d+)+\.file|\bpattern(\.\d+)*\.shape(\.\d+)*\.file"
     r"|\b(scenario|sweep\.keys|sweep\.points\.\d+)\.template"
     r"|\bscenario\.files\.\d+|\ballowed_folders\.\d+)(\.value)?$"
 )
@@ -101,6 +108,7 @@ def open_study(path: Path) -> OpenStudy:
         raise BadInputError(problems)
     study = validated(kind.study, tree, origin)
     problems = sweep.problems(study.sweep, study.scenario, study.replicates) or [
+        *own_measures.problems(study.own_measures, study.sweep.swept),
         *comparing.problems(study),
         *_reported(study),
         *study.problems(),

@@ -11,15 +11,17 @@ from typing import Any
 from sandmould.runs.measures import Measure, measures_of
 from sandmould.scenario.bad_input import Problem
 from sandmould.statistics.config import Objective
+from sandmould.study.definition import own_measures
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario, Kind
 
 NEAREST = 3
 
 
-def measured_in(kind: Kind[Any], scenario: AnyScenario) -> list[Measure]:
-    """Measures that the runs of a scenario will have."""
-    return measures_of(kind.planning.measures, scenario)
+def measured_in(study: Study, kind: Kind[Any], scenario: AnyScenario) -> list[Measure]:
+    """Measures that the runs of a scenario will have, those of the user's own last."""
+    own = [Measure(name, f"Own: {formula}.") for name, formula in study.own_measures.items()]
+    return [*measures_of(kind.planning.measures, scenario), *own]
 
 
 def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[Problem]:
@@ -32,7 +34,10 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
     scenario : scenario of any kind
         At one point of the sweep.
     """
-    has = [measure.name for measure in measured_in(kind, scenario) if measure.is_number]
+    has = [measure.name for measure in measured_in(study, kind, scenario) if measure.is_number]
+    yield from own_measures.problems_in_scene(
+        study.own_measures, has[: len(has) - len(study.own_measures)]
+    )
     # A deck that nothing is read from is run for the files that it writes.
     nothing_asked = not has and study.objective == Objective()
     for key, name in _asked(study):

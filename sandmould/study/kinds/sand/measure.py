@@ -1,4 +1,4 @@
-"""Measure every snapshot of a run: tube fill, density, contacts, bed, layers."""
+"""Measure every snapshot of a run: fill of tubes and cavities, density, contacts, bed, layers."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from analysis.cavity_fill import cavity_fill, cavity_voids
 from analysis.coordination import contacts
 from analysis.deflection import fill_under
 from analysis.density import apparent_density
@@ -29,6 +30,7 @@ from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.runs.columns import OVERLAP_P99_FRACTION
 from sandmould.runs.files import replaced
+from sandmould.scenario.geometry import Cavity, Scene
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import LAST_MEASURED
 from sandmould.study.kinds.sand.drive import add_drive
@@ -72,12 +74,36 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         OVERLAP_P99_FRACTION: touching.overlap_p99_fraction,
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
+    packed = row["solid_fraction"]
+    for cavity in scene.cavities:
+        row |= _measure_cavity(scenario, snapshot, scene, cavity, packed)
     for bore in scenario.scene.bores:
-        filled, packed = row[f"{bore.name}_fill_fraction"], row["solid_fraction"]
+        filled = row[f"{bore.name}_fill_fraction"]
         row[f"{bore.name}_fill_of_bed_fraction"] = filled / packed if packed else math.nan
     if snapshot.pattern_m is not None and scenario.dimension == 2:
         row["pattern_under_fraction"] = fill_under(snapshot.pattern_m, position, radius)
     return row | measure_outflow(scenario, snapshot)
+
+
+def _measure_cavity(
+    scenario: Scenario, snapshot: Snapshot, scene: Scene, cavity: Cavity, packed: float
+) -> dict[str, float]:
+    """Columns of one cavity, beside sand of a bed's solid fraction."""
+    position, radius, name = snapshot.position_m, snapshot.radius_m, cavity.name
+    grain_m = scenario.sand.mass_median_diameter_m
+    unit = "m2" if scenario.dimension == 2 else "m3"
+    fill = cavity_fill(position, radius, cavity, grain_m, packed)
+    voids = cavity_voids(position, radius, cavity, scene, grain_m)
+    return {
+        f"{name}_fill_fraction": fill.fill_fraction,
+        f"{name}_fill_of_bed_fraction": fill.fill_fraction / packed if packed else math.nan,
+        f"{name}_sand_{unit}": fill.sand_measure,
+        f"{name}_grains": fill.grains_inside,
+        f"{name}_filled_depth_m": fill.filled_depth_m,
+        f"{name}_voids": voids.count,
+        f"{name}_void_fraction": voids.void_fraction,
+        f"{name}_largest_void_{unit}": voids.largest_measure,
+    }
 
 
 def measure_sand(scenario: Scenario, folder: Path) -> None:

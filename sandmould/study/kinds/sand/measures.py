@@ -12,6 +12,12 @@ def _bores(scenario: Scenario, dimension: int) -> list[str]:
     return [bore.name for bore in scenario.scene.bores] if scenario.dimension == dimension else []
 
 
+def _cavities(scenario: Scenario, dimension: int) -> list[str]:
+    """Names of the cavities of a scene of a dimension."""
+    names = [cavity.name for cavity in scenario.cavities]
+    return names if scenario.dimension == dimension else []
+
+
 def _gate(scenario: Scenario, is_level: bool) -> bool:
     return scenario.gate is not None and scenario.gate.is_level == is_level
 
@@ -82,6 +88,51 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
         "with a tube, in 3D",
         lambda scenario: _bores(scenario, 3),
         (Measure("<tube>_sand_m3", "Volume of the grains in the tube <tube>."),),
+    ),
+    MeasureGroup(
+        "with a cavity, by its name",
+        lambda scenario: [*_cavities(scenario, 2), *_cavities(scenario, 3)],
+        (
+            Measure(
+                "<cavity>_fill_fraction",
+                "Sand in the cavity <cavity> over its space: a dense bed gives its solid fraction.",
+            ),
+            Measure(
+                "<cavity>_fill_of_bed_fraction",
+                "Sand in the cavity <cavity> over what it would hold as densely filled as the bed.",
+            ),
+            Measure("<cavity>_grains", "Grains in the cavity <cavity>."),
+            Measure(
+                "<cavity>_filled_depth_m",
+                "Length of the cavity <cavity>, from its mouth inwards, that is filled: of slabs "
+                "one mass-median grain thick, those that are at least half as dense as the bed.",
+            ),
+            Measure(
+                "<cavity>_voids",
+                "Voids in the cavity <cavity> that one more mass-median grain would lie in; two "
+                "are one where such grains would overlap.",
+            ),
+            Measure(
+                "<cavity>_void_fraction",
+                "Space that such grains would cover, over the space of the cavity <cavity>.",
+            ),
+        ),
+    ),
+    MeasureGroup(
+        "with a cavity, in 2D",
+        lambda scenario: _cavities(scenario, 2),
+        (
+            Measure("<cavity>_sand_m2", "Area of the grains in the cavity <cavity>."),
+            Measure("<cavity>_largest_void_m2", "Area of the largest void in <cavity>."),
+        ),
+    ),
+    MeasureGroup(
+        "with a cavity, in 3D",
+        lambda scenario: _cavities(scenario, 3),
+        (
+            Measure("<cavity>_sand_m3", "Volume of the grains in the cavity <cavity>."),
+            Measure("<cavity>_largest_void_m3", "Volume of the largest void in <cavity>."),
+        ),
     ),
     MeasureGroup(
         "with vibration",

@@ -51,8 +51,12 @@ def resolved(scenario: Scenario) -> Scenario:
         from pattern_fe.coupling.interface import with_surface  # scikit-fem: few studies need it
 
         scenario = with_surface(scenario)
-    obstacles = tuple(with_hash(o) if isinstance(o, SolidMesh) else o for o in scenario.obstacles)
-    return scenario.model_copy(update={"obstacles": obstacles})
+    solids = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
+    hashed = {
+        key: tuple(with_hash(s) if isinstance(s, SolidMesh) else s for s in every)
+        for key, every in solids.items()
+    }
+    return scenario.model_copy(update=hashed)
 
 
 def problems(scenario: Scenario) -> list[Problem]:

@@ -1,0 +1,148 @@
+"""Cavities: spaces that the sand should fill, named by the user, open in any direction.
+
+A cavity bounds nothing: what stands round it is an obstacle of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.box import Plate, Polygon, plate_blocks, polygon_outline
+from sandmould.scenario.geometry import Array, Cavity
+from sandmould.scenario.quantity import NAME, Section, quantity
+from sandmould.scenario.sand import ARGUED
+from sandmould.scenario.solids import SolidMesh, cylinder_along, mesh_solid
+
+Side = Literal["up", "down", "left", "right", "front", "back"]
+_SIDES = {"left": (0, -1.0), "right": (0, 1.0), "front": (1, -1.0), "back": (1, 1.0),
+          "down": (-1, -1.0), "up": (-1, 1.0)}  # fmt: skip
+"""Axis and sign of each side; front and back are those of the box in 3D."""
+_NAME_MEANING = "Name in tables."
+
+
+class BoxCavity(Section):
+    """A rectangle (2D) or cuboid (3D) that the sand should fill."""
+
+    kind: Literal["box"]
+    name: str = quantity(..., _NAME_MEANING, source="user", pattern=NAME)
+    centre_m: tuple[float, ...] = quantity(
+        ..., "Centre, one number a dimension.", unit="m", source="user", min_length=2, max_length=3
+    )
+    size_m: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
+        ..., "Edge lengths, one a dimension.", unit="m", source="user", min_length=2, max_length=3
+    )
+    angle_deg: float = quantity(
+        0.0, "Turn in the plane of x and the vertical.", unit="deg", source="user", ge=-180, le=180
+    )
+    opens: Side = quantity(
+        "up", "Side that it is open at, before its turn; front and back in 3D.", source=ARGUED
+    )
+
+
+class PolygonCavity(Section):
+    """A space outlined by straight edges that the sand should fill, 2D only."""
+
+    kind: Literal["polygon"]
+    name: str = quantity(..., _NAME_MEANING, source="user", pattern=NAME)
+    vertices_m: tuple[tuple[float, float], ...] = quantity(
+        ..., "Vertices in turn, either way round.", unit="m", source="user", min_length=3
+    )
+    opens: Side | tuple[float, float] = quantity(
+        "up", "Direction that it is open to, a side or two numbers.", source=ARGUED
+    )
+
+
+class CylinderCavity(Section):
+    """A round space that the sand should fill, open at one of its flat ends, 3D only."""
+
+    kind: Literal["cylinder"]
+    name: str = quantity(..., _NAME_MEANING, source="user", pattern=NAME)
+    centre_m: tuple[float, float, float] = quantity(..., "Centre.", unit="m", source="user")
+    diameter_m: float = quantity(..., "Diameter.", unit="m", source="user", gt=0, le=100)
+    length_m: float = quantity(..., "Length.", unit="m", source="user", gt=0, le=100)
+    opens: Side | tuple[float, float, float] = quantity(
+        "up", "Direction of its axis towards the open end, a side or three numbers.", source=ARGUED
+    )
+
+
+class MeshCavity(SolidMesh):
+    """A space bounded by the triangles of a closed STL file that the sand should fill, 3D only."""
+
+    name: str = quantity(..., _NAME_MEANING, source="user", pattern=NAME)
+    opens: Side | tuple[float, float, float] = quantity(
+        "up", "Direction that it is open to in the box, a side or three numbers.", source=ARGUED
+    )
+
+
+AnyCavity = BoxCavity | PolygonCavity | CylinderCavity | MeshCavity
+CavityKey = Annotated[AnyCavity, Field(discriminator="kind")]
+CAVITY_KINDS = {2: ("box", "polygon"), 3: ("box", "cylinder", "mesh")}
+"""Kinds of cavities that a dimension has."""
+
+
+def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
+    """Unit vector from the side that a cavity opens to into it, before its turn.
+
+    Parameters
+    ----------
+    cavity : cavity of any kind
+    dimension : int
+    key : str
+        Key path of the cavity, for messages.
+
+    Returns
+    -------
+    (d,) float64
+
+    Raises
+    ------
+    BadInputError
+        When the dimension has no such side, or the numbers are no direction.
+    """
+    opens = cavity.opens
+    if isinstance(opens, str) and (dimension == 3 or opens not in ("front", "back")):
+        axis, sign = _SIDES[opens]
+        vector = np.zeros(dimension)
+        vector[axis] = -sign
+        return vector
+    if not isinstance(opens, str) and any(opens):
+        return -np.array(opens) / math.hypot(*opens)
+    sides = "up, down, left or right" if dimension == 2 else "a side"
+    numbers = "" if isinstance(cavity, BoxCavity) else ", or numbers that are not all 0"
+    stated = opens if isinstance(opens, str) else list(opens)
+    raise BadInputError([Problem(f"{key}.opens", stated, f"{sides}{numbers}")])
+
+
+def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
+    """Geometry of a cavity whose keys go together.
+
+    Parameters
+    ----------
+    cavity : cavity of any kind
+    dimension : int
+    key : str
+        Key path of the cavity, for messages.
+
+    Raises
+    ------
+    BadInputError
+        When it opens to no side, or the file of a mesh bounds no space.
+    """
+    into = inward(cavity, dimension, key)
+    if isinstance(cavity, BoxCavity):
+        plate = Plate(kind="plate", **cavity.model_dump(exclude={"kind", "opens"}))
+        (block,) = plate_blocks(plate, dimension)
+        return Cavity(cavity.name, block, into @ block.axes)
+    if isinstance(cavity, PolygonCavity):
+        polygon = Polygon(kind="polygon", name=cavity.name, vertices_m=cavity.vertices_m)
+        return Cavity(cavity.name, polygon_outline(polygon), into)
+    if isinstance(cavity, CylinderCavity):
+        size_m = (cavity.diameter_m, cavity.length_m)
+        rod = cylinder_along(cavity.name, np.array(cavity.centre_m), into, *size_m)
+        return Cavity(cavity.name, rod, into)
+    return Cavity(cavity.name, mesh_solid(cavity, key), into)

@@ -1,0 +1,158 @@
+"""What keeps cavities from being measured: their keys, their place, their mouth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.box import AnyObstacle, Box, Tube, build_scene
+from sandmould.scenario.cavities import (
+    CAVITY_KINDS,
+    AnyCavity,
+    BoxCavity,
+    CylinderCavity,
+    MeshCavity,
+    PolygonCavity,
+    cavity_space,
+    inward,
+)
+from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, cavity_grid
+from sandmould.scenario.geometry import Cavity
+from sandmould.scenario.outline import outline_fault
+from sandmould.scenario.scenario import Scenario
+
+_MOST_POINTS = 200_000
+"""Of the grid that a mouth is tried on."""
+_MOST_SOLID = 0.01
+"""Share of a cavity that may lie in obstacles: drawings need not agree to the last digit."""
+
+
+def cavity_problems(s: Scenario) -> Iterator[Problem]:
+    """List what is wrong with the cavities of a scenario whose obstacles have no problems."""
+    tubes = [o.name for o in s.obstacles if isinstance(o, Tube)]
+    names = [*tubes, *(c.name for c in s.cavities)]
+    for i, cavity in enumerate(s.cavities):
+        if cavity.name in names[: len(tubes) + i]:
+            valid = "a name that no other cavity and no tube has"
+            yield Problem(f"cavities.{i}.name", cavity.name, valid)
+    faults = [p for i, c in enumerate(s.cavities) for p in _of_keys(s, c, f"cavities.{i}")]
+    yield from faults
+    if faults:
+        return
+    for i, (cavity, space) in enumerate(zip(s.cavities, s.scene.cavities, strict=True)):
+        yield from _of_place(s, cavity, space, f"cavities.{i}")
+
+
+def _of_keys(s: Scenario, cavity: AnyCavity, key: str) -> Iterator[Problem]:
+    """What no geometry can be made of."""
+    kinds = CAVITY_KINDS[s.dimension]
+    if cavity.kind not in kinds:
+        valid = f"{', '.join(kinds[:-1])} or {kinds[-1]} in {s.dimension}D"
+        yield Problem(f"{key}.kind", cavity.kind, valid)
+        return
+    if isinstance(cavity, BoxCavity):
+        for name, value in (("centre_m", cavity.centre_m), ("size_m", cavity.size_m)):
+            if len(value) != s.dimension:
+                valid = f"{s.dimension} numbers, one a dimension"
+                yield Problem(f"{key}.{name}", list(value), valid)
+    elif isinstance(cavity, PolygonCavity):
+        valid_outline = outline_fault(np.array(cavity.vertices_m))
+        if valid_outline is not None:
+            vertices = [list(v) for v in cavity.vertices_m]
+            yield Problem(f"{key}.vertices_m", vertices, valid_outline)
+    try:
+        if isinstance(cavity, MeshCavity):
+            cavity_space(cavity, s.dimension, key)
+        else:
+            inward(cavity, s.dimension, key)
+    except BadInputError as error:
+        yield from error.problems
+
+
+def _of_place(s: Scenario, cavity: AnyCavity, space: Cavity, key: str) -> Iterator[Problem]:
+    """What is wrong with where a cavity lies, one sentence a cavity."""
+    place = {"polygon": "vertices_m", "mesh": "position_m"}.get(cavity.kind, "centre_m")
+    corners_m = space.space.corners()
+    # as far as the seven digits of a drawing's file go
+    if not s.box.holds(corners_m, s.dimension, slack=1e-6):
+        low, high = (_point(end) for end in (corners_m.min(axis=0), corners_m.max(axis=0)))
+        valid = f"a cavity inside the box, {s.box.size_text(s.dimension)}; it goes from {low} to "
+        yield Problem(f"{key}.{place}", cavity.name, f"{valid}{high} m")
+        return
+    grain_m = s.largest_diameter_m
+    gate = s.discharge.gate if s.discharge else ""
+    found = _tried(s.box, s.obstacles, gate, cavity, s.dimension, grain_m)
+    if found.widest_m < grain_m:
+        valid = f"a cavity wider than the largest grain, {grain_m:.6g} m"
+        yield Problem(f"{key}.kind", f"{cavity.kind} {cavity.name}", valid)
+    elif found.solid_share > _MOST_SOLID:
+        share = f"about {100 * found.solid_share:.0f} %"
+        valid = f"a cavity in free space; {share} of this one lies in obstacles"
+        yield Problem(f"{key}.{place}", cavity.name, valid)
+    elif found.is_shut:
+        stated = cavity.opens if isinstance(cavity.opens, str) else list(cavity.opens)
+        valid = (
+            "a side where the largest grain can come in: nothing as wide as its "
+            f"{grain_m:.6g} m leads from there into {cavity.name}"
+        )
+        yield Problem(f"{key}.opens", stated, valid)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """How a grain fares at a cavity among solids."""
+
+    widest_m: float
+    """Diameter of the largest grain that lies in the cavity; at most what it can be."""
+    solid_share: float
+    """Of the cavity, what lies in solids."""
+    is_shut: bool
+    """Whether no way leads a grain in through the mouth; never said of one that is hardly open."""
+
+
+@lru_cache(maxsize=64)
+def _tried(
+    box: Box,
+    obstacles: tuple[AnyObstacle, ...],
+    gate: str,
+    cavity: AnyCavity,
+    dimension: int,
+    grain_m: float,
+) -> _Trial:
+    """Try a cavity on a grid, once for all points of a sweep that have it."""
+    from scipy.ndimage import label  # slow to import, and few scenes have cavities
+
+    scene = build_scene(box, obstacles, dimension).without(gate)
+    space = cavity_space(cavity, dimension, "cavities")
+    grid = cavity_grid(space, grain_m / CELLS_A_GRAIN[dimension], _MOST_POINTS, margin_m=grain_m)
+    # no place is farther than this from a point of the grid
+    slack_m = 0.5 * float(np.linalg.norm(grid.spacing_m))
+    points_m = grid.points_m.reshape(-1, dimension)
+    depth_m = space.depth_m(points_m).reshape(grid.inside_m.shape)
+    inside, before = grid.inside_m > 0.0, (depth_m < 0.0) & (depth_m > -grain_m)
+    asked = inside | before
+    clear_m = np.full(asked.shape, -np.inf)
+    clear_m[asked] = scene.clearance_m(grid.points_m[asked], grain_m)
+    if isinstance(cavity, BoxCavity):
+        widest_m = min(cavity.size_m)
+    elif isinstance(cavity, CylinderCavity):
+        widest_m = min(cavity.diameter_m, cavity.length_m)
+    else:
+        widest_m = 2.0 * (float(grid.inside_m.max()) + slack_m)
+    # where the middle of a grain may come
+    free = clear_m >= 0.5 * grain_m - slack_m
+    way, _ = label(free, structure=np.ones((3,) * dimension))
+    leads_in = np.intersect1d(way[free & inside], way[free & before])
+    return _Trial(
+        widest_m=widest_m,
+        solid_share=float((inside & (clear_m < 0.0)).sum() / max(1, inside.sum())),
+        is_shut=slack_m < 0.5 * grain_m and not len(leads_in),
+    )
+
+
+def _point(place_m: np.ndarray) -> str:
+    return f"({', '.join(f'{x:.4g}' for x in place_m.tolist())})"
