@@ -1,4 +1,4 @@
-"""What stands round the spheres of a 3D view: the box, its solids and the bores of its tubes."""
+"""What stands round the spheres of a 3D view: the box, its solids, the bores of its tubes and its cavities."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def sphere_scene(scenario: Scenario, top_m: float) -> dict[str, object]:
             }
             for solid in scenario.scene.solids
         ],
-        "bores": [np.round(_bore_lines(bore), 6).ravel().tolist() for bore in scenario.scene.bores],
+        "bores": [np.round(lines_m, 6).ravel().tolist() for lines_m in _cavity_lines(scenario)],
         "layer_colours": list(LAYER_COLOURS),
         "shades": list(SHADES),
     }
@@ -129,8 +129,18 @@ def sharp_edges(vertices_m: Array, triangles: NDArray[np.int64]) -> NDArray[np.i
     return np.unique(pairs[~smooth], axis=0)
 
 
+def _cavity_lines(scenario: Scenario) -> list[Array]:
+    """Ends of the lines along the edges of each tube's bore and of each cavity."""
+    scene = scenario.scene
+    lines = [_bore_lines(bore) for bore in scene.bores]
+    for cavity in scene.cavities:
+        vertices_m, triangles = _triangles(cavity.space)
+        lines.append(vertices_m[sharp_edges(vertices_m, triangles)])
+    return lines
+
+
 def _bore_lines(bore: Bore) -> Array:
-    """Ends of the lines along the rims of a cavity, (k, 2, 3) float64, m."""
+    """Ends of the lines along the rims of a bore, (k, 2, 3) float64, m."""
     mouth_m = bore.mouth_m + bore.section_m @ bore.basis
     foot_m = mouth_m + bore.length_m * bore.axis
     rims = [np.stack([rim, np.roll(rim, -1, axis=0)], axis=1) for rim in (mouth_m, foot_m)]
