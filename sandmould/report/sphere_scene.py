@@ -1,4 +1,4 @@
-"""What stands round the spheres of a 3D view: the box, its solids, the bores of its tubes and its cavities."""
+"""What stands round the spheres of a 3D view: box, solids, bores of tubes, cavities."""
 
 from __future__ import annotations
 
