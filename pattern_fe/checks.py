@@ -51,7 +51,7 @@ def check_mesh(mesh: Any) -> None:
         )
 
 
-def check_inside(mesh: Any, low_m: Array, high_m: Array) -> None:
+def check_inside(mesh: Any, low_m: Array, high_m: Array, hint: str = "") -> None:
     """Refuse a pattern that reaches out of a box.
 
     Parameters
@@ -59,17 +59,20 @@ def check_inside(mesh: Any, low_m: Array, high_m: Array) -> None:
     mesh : skfem.Mesh
     low_m, high_m : (d,) float64, m
         Corners of the box; a pattern may touch its walls.
+    hint : str, optional
+        What else to say of one outside.
 
     Raises
     ------
     ValueError
     """
     least, most = mesh.p.min(axis=1), mesh.p.max(axis=1)
-    near_m = 1e-9 * float((most - least).max())
+    # seven digits of an STL file may put a face on a wall out of it
+    near_m = 1e-6 * float((most - least).max())
     if (least < low_m - near_m).any() or (most > high_m + near_m).any():
         raise ValueError(
             f"pattern reaches from {_place(least)} to {_place(most)} m, valid is inside the box "
-            f"from {_place(low_m)} to {_place(high_m)} m"
+            f"from {_place(low_m)} to {_place(high_m)} m{hint}"
         )
 
 

@@ -64,7 +64,7 @@ def condensed_surface(
     mass_kg : (n,) float64, kg
         Of the retained nodes.
     nodes : (n,) int64
-        Retained, all those with a support among them.
+        Retained.
     fixed : (N, d) bool
 
     Returns
@@ -74,7 +74,8 @@ def condensed_surface(
     """
     d = fixed.shape[1]
     retained = (nodes[:, None] * d + np.arange(d)).ravel()
-    inner = np.setdiff1d(np.arange(fixed.size), retained)
+    # what is held inside does not move
+    inner = np.setdiff1d(np.flatnonzero(~fixed.ravel()), retained)
     schur = stiffness[retained][:, retained].toarray()
     if len(inner):
         factor = factorised(stiffness[inner][:, inner])

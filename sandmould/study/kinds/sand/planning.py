@@ -17,9 +17,10 @@ from sandmould.scenario.hardness import Hardness, bed_hardness
 from sandmould.scenario.limits import FRAMES, RECORDS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.outline import Outline
+from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import SolidMesh, filled_note, with_hash
+from sandmould.scenario.solids import SolidMesh, drawing_notes, with_hash
 from sandmould.scenario.wall_thickness import thinnest_wall
 from sandmould.study.kinds.kind import MachineSpeed, Note, Planning, SpeedClass
 from sandmould.study.kinds.sand import speed
@@ -47,9 +48,14 @@ def resolved(scenario: Scenario) -> Scenario:
 
     So a changed mesh makes another run.
     """
-    if scenario.pattern is not None:
+    pattern = scenario.pattern
+    if pattern is not None:
         from pattern_fe.coupling.interface import with_surface  # scikit-fem: few studies need it
 
+        if isinstance(pattern.shape, PatternDrawing):
+            shape = with_hash(pattern.shape)
+            pattern = pattern.model_copy(update={"shape": shape})
+            scenario = scenario.model_copy(update={"pattern": pattern})
         scenario = with_surface(scenario)
     obstacles = tuple(with_hash(o) if isinstance(o, SolidMesh) else o for o in scenario.obstacles)
     return scenario.model_copy(update={"obstacles": obstacles})
@@ -202,9 +208,27 @@ def notes(scenario: Scenario) -> list[Note]:
             )
             told.append(Note(f"walls of {solid.name}", text))
     for i, obstacle in enumerate(scenario.obstacles):
-        if isinstance(obstacle, SolidMesh) and (text := filled_note(obstacle, f"obstacles.{i}")):
-            told.append(Note(f"filled {i}", text))
-    return told
+        if isinstance(obstacle, SolidMesh):
+            key = f"obstacles.{i}"
+            told += [
+                Note(f"drawing {key} {n}", text)
+                for n, text in enumerate(drawing_notes(obstacle, key))
+            ]
+    return [*told, *_pattern_notes(scenario)]
+
+
+def _pattern_notes(scenario: Scenario) -> list[Note]:
+    """What was repaired in the drawing of a pattern, and how good its mesh is."""
+    if scenario.pattern is None or not isinstance(scenario.pattern.shape, PatternDrawing):
+        return []
+    from pattern_fe.quality import mesh_sentence
+    from pattern_fe.scene import pattern_of
+
+    said = [
+        *drawing_notes(scenario.pattern.shape, "pattern.shape"),
+        mesh_sentence(scenario, pattern_of(scenario)),
+    ]
+    return [Note(f"mesh of the pattern {n}", text) for n, text in enumerate(said)]
 
 
 def _hardness_note(hardness: Hardness) -> Note:
