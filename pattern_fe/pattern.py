@@ -17,7 +17,6 @@ from pattern_fe.condensation import CondensedSurface, condensed_surface
 from pattern_fe.distance import Distance, distance_from_drawing
 from pattern_fe.elasticity import (
     displacement_gradient,
-    element_stiffness_n_m,
     green_strain,
     internal_force_n,
     small_strain,
@@ -31,6 +30,7 @@ from pattern_fe.perimeter import perimeter_of
 from pattern_fe.space import space_of
 from pattern_fe.supports import Supports, check_held, fixed_components
 from pattern_fe.surroundings import Surroundings
+from pattern_fe.weak_forms import element_stiffness_n_m
 from sandmould.scenario.geometry import Scene
 
 Array = NDArray[np.float64]

@@ -197,9 +197,17 @@ def test_a_mesh_file_of_tetrahedra_meets_the_sand(tmp_path: Path) -> None:
             r"element_m = 0.002 .* at most 5,000 components of a surface",
         ),
         (
-            {**SPACE, "obstacles": [
-                {"kind": "plate", "name": "post", "centre_m": [0.02, 0.04, 0.05],
-                 "size_m": [0.01, 0.01, 0.02]}]},
+            {
+                **SPACE,
+                "obstacles": [
+                    {
+                        "kind": "plate",
+                        "name": "post",
+                        "centre_m": [0.02, 0.04, 0.05],
+                        "size_m": [0.01, 0.01, 0.02],
+                    }
+                ],
+            },
             {"loop": {"scheme": "in_step"}},
             r"scheme = 'in_step' .* with windows in 3D beside the obstacle 'post'",
         ),
