@@ -28,7 +28,7 @@ from pattern_fe.material import Foam
 from pattern_fe.motion import CentralDifferences
 from pattern_fe.perimeter import perimeter_of
 from pattern_fe.space import space_of
-from pattern_fe.supports import Supports, check_held, fixed_components
+from pattern_fe.supports import Supports, check_held, fixed_components, loose_motions
 from pattern_fe.surroundings import Surroundings
 from pattern_fe.weak_forms import element_stiffness_n_m
 from sandmould.scenario.geometry import Scene
@@ -101,6 +101,17 @@ class Pattern:
     def _factor(self) -> SuperLU:
         check_held(self.space.node_m, self.fixed, self.supports)
         return factorised(self.stiffness[self._free][:, self._free])
+
+    @property
+    def factor_numbers(self) -> int:
+        """Numbers that the factorised stiffness holds; none of a free pattern."""
+        return 0 if self.is_free else int(self._factor.nnz)
+
+    @cached_property
+    def is_free(self) -> bool:
+        """Whether it can move without deforming."""
+        bedded = self.supports.bedding_n_m3 > 0.0
+        return not bedded and bool(loose_motions(self.space.node_m, self.fixed))
 
     def on_nodes(self, values: Array) -> Array:
         """Values of vertices as those of all nodes, 0 inside."""
