@@ -108,10 +108,14 @@ class Pattern:
         return 0 if self.is_free else int(self._factor.nnz)
 
     @cached_property
+    def _loose_motions(self) -> int:
+        bedded = self.supports.bedding_n_m3 > 0.0
+        return 0 if bedded else len(loose_motions(self.space.node_m, self.fixed))
+
+    @property
     def is_free(self) -> bool:
         """Whether it can move without deforming."""
-        bedded = self.supports.bedding_n_m3 > 0.0
-        return not bedded and bool(loose_motions(self.space.node_m, self.fixed))
+        return self._loose_motions > 0
 
     def on_nodes(self, values: Array) -> Array:
         """Values of vertices as those of all nodes, 0 inside."""
@@ -222,11 +226,16 @@ class Pattern:
         return np.asarray(pushed / np.linalg.det(deformation)[..., None, None])
 
     def energy_j(self, displacement_m: Array, large: bool = False) -> float:
-        """Elastic energy, the bedding's left out; arguments as ``stress_pa``."""
+        """Elastic energy, that of a bedding among it; arguments as ``stress_pa``."""
         slope = displacement_gradient(self.space, displacement_m)
         strain = green_strain(slope) if large else small_strain(slope)
         density = np.sum(strain * self.foam.stress_pa(strain), axis=(-2, -1))
-        return float(0.5 * np.sum(density * self.space.weight))
+        bedding = np.sum(self._bedding_n_m[:, None] * displacement_m**2)
+        return float(0.5 * (np.sum(density * self.space.weight) + bedding))
+
+    def bedding_force_n(self, displacement_m: Array) -> Array:
+        """Force of the bedding on the nodes, (n, d) float64, N."""
+        return -self._bedding_n_m[:, None] * displacement_m
 
     def von_mises_pa(self, displacement_m: Array, large: bool = False) -> Array:
         """Mean equivalent stress of each element, (ne,) float64, Pa; arguments as ``stress_pa``."""
@@ -264,7 +273,9 @@ class Pattern:
         """
         area = self.surface.vertex_area_m2
         mass = self.mass_kg.sum() * area / area.sum()
-        return condensed_surface(self.stiffness, mass, self.surface.nodes, self.fixed)
+        return condensed_surface(
+            self.stiffness, mass, self.surface.nodes, self.fixed, self._loose_motions
+        )
 
     def critical_step_s(self, mass_scale: float = 1.0) -> float:
         """Largest stable step of ``central_differences``, of the stiffest element and bedding."""

@@ -9,6 +9,7 @@ from pattern_fe.coupling.body import ElasticBody
 from pattern_fe.coupling.explicit_foam import ExplicitFoam
 from pattern_fe.coupling.files_body import EXCHANGE, FilesBody
 from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.free_body import FreeBody
 from pattern_fe.coupling.in_step import InStepSession
 from pattern_fe.coupling.monolithic_session import MonolithicSession
 from pattern_fe.coupling.schemes import explicit_foam, in_step_foam
@@ -46,6 +47,12 @@ def open_coupled(
     open_session = engine_of(scenario).open_session
     large = config.statics == "large"
     around = surroundings_of(scenario, pattern)
+    if loop.scheme == "in_step":
+        sand = open_session(program, folder, log, checkpoint)
+        foam = in_step_foam(scenario, pattern)
+        (work / MASSES_LOG).write_text(_selective_masses(foam.mass), encoding="utf-8")
+        held = FreeBody(pattern, foam) if pattern.is_free else FoamBody(pattern, False, around)
+        return InStepSession(sand, foam, held, name, work, checkpoint, tolerance)
     body: ElasticBody = FoamBody(pattern, large, around)
     if loop.scheme == "monolithic":
         explicit = explicit_foam(scenario, pattern)
@@ -59,10 +66,6 @@ def open_coupled(
     sand = open_session(program, folder, log, checkpoint)
     if loop.exchange == "files":
         body = FilesBody(pattern, large, folder / EXCHANGE, sand, around)
-    if loop.scheme == "in_step":
-        foam = in_step_foam(scenario, pattern)
-        (work / MASSES_LOG).write_text(_selective_masses(foam.mass), encoding="utf-8")
-        return InStepSession(sand, foam, body, name, work, checkpoint, tolerance)
     return CoupledSession(sand, body, name, loop, counts, work, checkpoint, tolerance, around)
 
 
