@@ -123,9 +123,8 @@ def _supports(config: PatternConfig) -> Supports:
     told = config.supports
     held = told.clamped or told.resting or told.hung or told.bedding_n_m3
     if told.free and held:
-        raise ValueError(
-            "a free pattern has no other support: clamped, resting, hung, bedding_n_m3"
-        )
+        others = "clamped, resting, hung and bedding_n_m3"
+        raise ValueError(f"a free pattern is held by sand alone, valid is without {others}")
     hung = tuple((box.low_m, box.high_m) for box in told.hung or ())
     return Supports(told.clamped, told.resting, told.bedding_n_m3 or 0.0, hung)
 

@@ -70,9 +70,7 @@ def _nodes_in(space: Space, low_m: tuple[float, ...], high_m: tuple[float, ...])
     """Nodes in a box, its sides among it, (n,) bool."""
     place_m, d = space.node_m, space.dimension
     if not len(low_m) == len(high_m) == d:
-        raise ValueError(
-            f"a box that hangs the pattern has corners of {d} numbers, one a dimension"
-        )
+        raise ValueError(f"a box that hangs the pattern has corners of {d} numbers each")
     near_m = 1e-9 * float(np.ptp(place_m, axis=0).max())
     inside = (place_m >= np.array(low_m) - near_m) & (place_m <= np.array(high_m) + near_m)
     found = inside.all(axis=1)
