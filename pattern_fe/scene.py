@@ -22,9 +22,10 @@ from pattern_fe.surroundings import Surroundings
 from pattern_fe.volume_mesh import drawing_mesh
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.limits import PATTERN_ELEMENTS
+from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig, PatternDrawing
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import unit_hint
+from sandmould.scenario.solids import drawn_surface, unit_hint
 
 Array = NDArray[np.float64]
 
@@ -91,10 +92,7 @@ def _computed(
     with _blaming("pattern.shape", config.shape.model_dump(mode="json")):
         mesh = _mesh(config, size_m).translated(np.array(config.position_m))
     with _blaming("pattern.position_m", list(config.position_m)):
-        hint = ""
-        if isinstance(config.shape, PatternDrawing):
-            hint = unit_hint(np.ptp(mesh.p, axis=1), np.array(size_m), config.shape.unit_m)
-        check_inside(mesh, np.zeros(len(size_m)), np.array(size_m), hint)
+        check_inside(mesh.p.T, np.zeros(len(size_m)), np.array(size_m))
     # Threads of small matrices wait for one another, longest beside other runs.
     with (
         threadpool_limits(1),
@@ -140,7 +138,13 @@ def _mesh(config: PatternConfig, size_m: tuple[float, ...]) -> Any:
     if isinstance(shape, PatternDrawing):
         if len(size_m) == 2:
             raise ValueError("a drawing is a solid, valid in 3D; draw a mesh in 2D for kind: file")
-        return drawing_mesh(shape, config.element_m)
+        vertices_m, triangles = drawn_surface(shape, "pattern.shape")
+        # before it is meshed: in the wrong unit it would have millions of elements
+        box_m = np.array(size_m)
+        hint = unit_hint(np.ptp(vertices_m, axis=0), box_m, shape.unit_m)
+        with _blaming("pattern.position_m", list(config.position_m)):
+            check_inside(vertices_m + np.array(config.position_m), np.zeros(3), box_m, hint)
+        return drawing_mesh(shape, TriangleMesh("drawing", vertices_m, triangles), config.element_m)
     depth_m = None
     if len(size_m) == 3:
         depth_m = size_m[1] - config.position_m[1] if config.depth_m is None else config.depth_m

@@ -13,7 +13,7 @@ from sandmould.scenario.limits import SOLID_ELEMENTS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.mesher import is_step, step_tetrahedra, surface_tetrahedra
 from sandmould.scenario.pattern import PatternDrawing
-from sandmould.scenario.solids import drawn_surface, turn_about_vertical
+from sandmould.scenario.solids import turn_about_vertical
 
 Array = NDArray[np.float64]
 _FILL = 5.0
@@ -23,35 +23,34 @@ _LARGEST_CHANGE = 0.1
 """Share of the drawing's volume that the mesh may lack or add: beyond it is another part."""
 
 
-def drawing_mesh(shape: PatternDrawing, size_m: float) -> Any:
+def drawing_mesh(shape: PatternDrawing, drawn: TriangleMesh, size_m: float) -> Any:
     """Fill a drawing with tetrahedra, the extreme sides named.
 
     Parameters
     ----------
     shape : PatternDrawing
+    drawn : TriangleMesh
+        Its surface, about the drawing's origin, turned.
     size_m : float, m
         Longest side of an element, about.
 
     Returns
     -------
     skfem.MeshTet
-        About the drawing's origin, turned.
 
     Raises
     ------
     BadInputError
-        When the drawing bounds no solid, or the mesh would have too many elements.
+        When the mesh would have too many elements.
     ValueError
         When it cannot be meshed, or the mesh is another part than the drawing.
     """
-    vertices_m, triangles = drawn_surface(shape, "pattern.shape")
-    drawn = TriangleMesh("pattern", vertices_m, triangles)
     SOLID_ELEMENTS.check("pattern.element_m", expected_elements(drawn.measure, size_m), size_m)
     if is_step(shape.path):
         nodes_m, tetrahedra = step_tetrahedra(shape.path, size_m)
         nodes_m = nodes_m @ turn_about_vertical(shape).T
     else:
-        nodes_m, tetrahedra = surface_tetrahedra(vertices_m, triangles, size_m)
+        nodes_m, tetrahedra = surface_tetrahedra(drawn.vertices_m, drawn.triangles, size_m)
     SOLID_ELEMENTS.check("pattern.element_m", len(tetrahedra), size_m)
     mesh = MeshTet(np.ascontiguousarray(nodes_m.T), np.ascontiguousarray(tetrahedra.T))
     edges = nodes_m[tetrahedra[:, 1:]] - nodes_m[tetrahedra[:, :1]]
