@@ -48,7 +48,7 @@ def main(kind: str, path: str, size_m: str, result: str) -> int:
 @contextlib.contextmanager
 def _opened(gmsh: Any, size_m: float) -> Iterator[None]:
     gmsh.initialize(interruptible=False)
-    options = {
+    options: dict[str, float] = {
         "General.Terminal": 0,
         "General.NumThreads": 1,
         "Mesh.MeshSizeExtendFromBoundary": 0,
