@@ -31,25 +31,31 @@ class ContactRows:
     """
 
     row_kg: tuple[Array, ...]
-    """(n, n) float64, kg: for each size the sum over a full row, components vertex by vertex."""
+    """(n, n) float64, kg: for each size the sum over a full row, components vertex by vertex; in 3D
+    of the size that weighs most."""
     one_kg: float
     """Of the heaviest contact."""
 
     @classmethod
     def of(cls, scenario: Scenario, pattern: Pattern) -> ContactRows:
         """Rows of all sizes of a scenario's sand along the surface of its pattern."""
-        rows: list[Array] = []
-        one_kg = 0.0
-        for size in scenario.sand.classes(scenario.dimension):
-            one_kg = ContactBound.of_grain(scenario, size.diameter_m).mass_kg(scenario.step_s)
-            if scenario.dimension == 2:
-                share = shares_along(pattern, size.diameter_m)
-                products = share.T @ share
-            else:
-                products = products_over(pattern.surface) * _CLOSEST / size.diameter_m**2
-            row_kg = one_kg * np.kron(products, np.eye(scenario.dimension))
-            rows.append(row_kg.astype(np.float64))
-        return cls(tuple(rows), one_kg)
+        sizes = scenario.sand.classes(scenario.dimension)
+        masses_kg = [
+            ContactBound.of_grain(scenario, size.diameter_m).mass_kg(scenario.step_s)
+            for size in sizes
+        ]
+        if scenario.dimension == 2:
+            shares = [shares_along(pattern, size.diameter_m) for size in sizes]
+            products = [kg * share.T @ share for kg, share in zip(masses_kg, shares, strict=True)]
+        else:
+            # one matrix times a number a size: the largest bears them all
+            on_area = max(
+                _CLOSEST * kg / size.diameter_m**2
+                for kg, size in zip(masses_kg, sizes, strict=True)
+            )
+            products = [on_area * products_over(pattern.surface)]
+        rows = [np.kron(row, np.eye(scenario.dimension)).astype(np.float64) for row in products]
+        return cls(tuple(rows), masses_kg[-1])
 
 
 def products_over(surface: Perimeter) -> Array:

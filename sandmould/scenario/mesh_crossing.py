@@ -15,8 +15,6 @@ Ints = NDArray[np.int64]
 _PLACES = np.array([[1.0, 1.0, 1.0], [8.0, 1.0, 1.0], [1.0, 8.0, 1.0], [1.0, 1.0, 8.0]])
 _SHARES = _PLACES / _PLACES.sum(axis=1, keepdims=True)
 """Of the corners of a triangle: its middle, and a place near each corner."""
-_MANY = 100_000
-"""Of more triangles only the middle is asked: they are small, and it takes 6 s a million."""
 _HELD = 2_000_000
 """Winding numbers held in memory together."""
 
@@ -45,14 +43,13 @@ def check_crossings(vertices: Array, triangles: Ints, shell: Ints) -> None:
     search = MeshSearch(vertices, triangles)
     crosses = np.zeros(len(triangles), dtype=np.bool_)
     off = BESIDE * extent(vertices)
-    shares = _SHARES if len(triangles) <= _MANY else _SHARES[:1]
     blocks = -(-len(triangles) * count // _HELD)
     for part in np.array_split(np.arange(len(triangles)), blocks):
         corners = vertices[triangles[part]]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         step = off * normal / np.linalg.norm(normal, axis=1, keepdims=True)
         own = shell[part]
-        for share in shares:
+        for share in _SHARES:
             place = np.einsum("k,tkd->td", share, corners)
             for beside in (place - step, place + step):
                 around = search.windings(beside, shell)[np.arange(len(part)), own] * way[own]

@@ -10,6 +10,7 @@ import pytest
 
 from pattern_fe.coupling.contact_rows import ContactRows, products_over
 from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from pattern_fe.coupling.explicit_foam import ContactBound
 from pattern_fe.coupling.loop_verdict import classify_loop
 from pattern_fe.coupling.selective_mass import selective_mass
 from pattern_fe.scene import pattern_of
@@ -120,10 +121,14 @@ def test_grains_all_round_weigh_as_many_as_lie_closest_on_its_area() -> None:
     # linear shape functions sum to 1, and to the vertices' shares of the area
     np.testing.assert_allclose(products.sum(axis=1), surface.vertex_area_m2, rtol=1e-12)
     contacts = ContactRows.of(scenario, pattern)
-    size = scenario.sand.classes(3)[-1].diameter_m
-    on_square = 2.0 / np.sqrt(3.0) / size**2
-    whole = contacts.row_kg[-1].sum() / (3.0 * contacts.one_kg)
-    assert whole == pytest.approx(on_square * surface.vertex_area_m2.sum(), rel=1e-9)
+    on_square = [
+        2.0 / np.sqrt(3.0) / size.diameter_m**2
+        * ContactBound.of_grain(scenario, size.diameter_m).mass_kg(scenario.step_s)
+        for size in scenario.sand.classes(3)
+    ]  # fmt: skip
+    (row_kg,) = contacts.row_kg
+    exact_kg = 3.0 * max(on_square) * surface.vertex_area_m2.sum()
+    assert row_kg.sum() == pytest.approx(exact_kg, rel=1e-9)
 
 
 @pytest.mark.parametrize(("lighter", "stable"), [(1.0, True), (3.0, False)])

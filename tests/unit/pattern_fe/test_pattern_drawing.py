@@ -14,6 +14,7 @@ from skfem import MeshTet
 from pattern_fe.coupling.interface import with_surface
 from pattern_fe.quality import mesh_sentence, tetrahedron_quality
 from pattern_fe.scene import pattern_of
+from sandmould.report.bending import drawing_sentences
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand import planning as sand
@@ -51,7 +52,7 @@ def test_a_drawn_bracket_is_foam_where_it_is_put(file: Path, unit_m: float) -> N
     assert scenario.pattern is not None
     assert len(getattr(scenario.pattern.shape, "sha256", "")) == 64
     (note,) = [n.text for n in sand.notes(scenario) if n.about.startswith("mesh of the pattern")]
-    assert note == mesh_sentence(scenario, pattern)
+    assert (note,) == drawing_sentences(scenario) == (mesh_sentence(scenario, pattern),)
     assert f"{pattern.space.mesh.nelements} tetrahedra of 16" in note
     assert sand.memory_mb(scenario) > sand.BASE_MEMORY_MB
 
@@ -130,3 +131,14 @@ def test_a_part_turned_inside_out_is_turned_and_that_is_told(tmp_path: Path) -> 
     assert scenario.scene.meshes[0].measure == pytest.approx(0.03**3)
     told = [note.text for note in sand.notes(scenario)]
     assert any("pattern.shape had 12 triangles turned inside out" in text for text in told)
+
+
+def test_a_report_tells_a_drawing_that_has_changed(tmp_path: Path) -> None:
+    path = tmp_path / "part.stl"
+    meshio.stl.write(str(path), meshio.Mesh(CORNERS, [("triangle", FACETS)]), binary=True)
+    scenario = sand.resolved(drawn(path, 0.03, supports={"clamped": ["bottom"]}))
+    taller = meshio.Mesh(CORNERS * [1.0, 1.0, 1.1], [("triangle", FACETS)])
+    meshio.stl.write(str(path), taller, binary=True)
+    assert drawing_sentences(scenario) == (
+        "The drawing of the pattern is gone or has changed since the study was planned.",
+    )
