@@ -31,8 +31,7 @@ class Supports:
     """Springs all over the surface, N/m per m2 of it: a plain model of sand that holds a pattern
     (Winkler), and what makes the equations of a free one regular. 0 for none."""
     hung: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...] = ()
-    """Least and greatest corner (m) of boxes, about the mesh's origin; what lies in one does not
-    move."""
+    """Least and greatest corner (m) of boxes, as the mesh lies; what is in one does not move."""
 
 
 def fixed_components(space: Space, supports: Supports) -> Mask:
@@ -45,8 +44,8 @@ def fixed_components(space: Space, supports: Supports) -> Mask:
     Raises
     ------
     ValueError
-        When a boundary is not there, a resting one is not across an axis, a box has no node of the
-        surface, or the bedding is negative.
+        When a boundary is not there, a resting one is not across an axis, a box holds no node, or
+        the bedding is negative.
     """
     if not 0.0 <= supports.bedding_n_m3 < np.inf:
         raise ValueError(f"bedding is {supports.bedding_n_m3:g} N/m3, valid is 0 or above")

@@ -162,7 +162,7 @@ def _triangles(s: Scenario, solid: Triangles, key: str) -> Iterator[Problem]:
     except MeshFileError as fault:
         yield Problem(f"{key}.triangles", size, str(fault))
         return
-    if not _in_box(s, solid.solid.corners()):
+    if not _in_box(s, solid.solid.corners(), slack=1e-6):
         yield Problem(f"{key}.vertices_m", size, f"a solid inside the box, {_size(s)}")
 
 

@@ -12,11 +12,16 @@ import pytest
 from skfem import MeshTet
 
 from pattern_fe.coupling.interface import with_surface
+from pattern_fe.coupling.opening import open_coupled
 from pattern_fe.quality import mesh_sentence, tetrahedron_quality
 from pattern_fe.scene import pattern_of
+from sandmould.engines.program import build_program
 from sandmould.report.bending import drawing_sentences
+from sandmould.scenario import solids
 from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import Triangles, drawing_notes
 from sandmould.study.kinds.sand import planning as sand
 from tests.bracket import BRACKET, STEP
 from tests.patterns import _one_thread  # noqa: F401
@@ -142,3 +147,29 @@ def test_a_report_tells_a_drawing_that_has_changed(tmp_path: Path) -> None:
     assert drawing_sentences(scenario) == (
         "The drawing of the pattern is gone or has changed since the study was planned.",
     )
+
+
+def test_a_plan_tells_what_a_surface_of_many_triangles_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scenario = drawn(BRACKET, 1e-3)
+    assert scenario.pattern is not None
+    assert isinstance(scenario.pattern.shape, PatternDrawing)
+    assert not drawing_notes(scenario.pattern.shape, "pattern.shape")
+    monkeypatch.setattr(solids, "MANY_TRIANGLES", 600)
+    monkeypatch.setattr(solids, "READ_S", 0.1)
+    monkeypatch.setattr(solids, "READ_BYTES", 2_000_000)
+    (said,) = drawing_notes(scenario.pattern.shape, "pattern.shape")
+    assert "612 triangles: every process of the study takes about 61 s and 1,224 MB" in said
+
+
+def test_a_mesh_other_than_the_planned_one_does_not_start(tmp_path: Path) -> None:
+    scenario = sand.resolved(drawn(BRACKET, 1e-3))
+    solid = scenario.obstacles[-1]
+    assert isinstance(solid, Triangles)
+    moved = tuple((x + 1e-6, y, z) for x, y, z in solid.vertices_m)
+    other = scenario.model_copy(
+        update={"obstacles": (solid.model_copy(update={"vertices_m": moved}),)}
+    )
+    with pytest.raises(BadInputError, match=r"shape.file = .* meshes here as where the study was"):
+        open_coupled(build_program(other), tmp_path, tmp_path / "engine.log")
