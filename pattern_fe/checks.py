@@ -51,25 +51,29 @@ def check_mesh(mesh: Any) -> None:
         )
 
 
-def check_inside(mesh: Any, low_m: Array, high_m: Array) -> None:
+def check_inside(place_m: Array, low_m: Array, high_m: Array, hint: str = "") -> None:
     """Refuse a pattern that reaches out of a box.
 
     Parameters
     ----------
-    mesh : skfem.Mesh
+    place_m : (n, d) float64, m
+        Of the pattern's nodes, or of its drawing's.
     low_m, high_m : (d,) float64, m
         Corners of the box; a pattern may touch its walls.
+    hint : str, optional
+        What else to say of one outside.
 
     Raises
     ------
     ValueError
     """
-    least, most = mesh.p.min(axis=1), mesh.p.max(axis=1)
-    near_m = 1e-9 * float((most - least).max())
+    least, most = place_m.min(axis=0), place_m.max(axis=0)
+    # seven digits of an STL file may put a face on a wall out of it
+    near_m = 1e-6 * float((most - least).max())
     if (least < low_m - near_m).any() or (most > high_m + near_m).any():
         raise ValueError(
             f"pattern reaches from {_place(least)} to {_place(most)} m, valid is inside the box "
-            f"from {_place(low_m)} to {_place(high_m)} m"
+            f"from {_place(low_m)} to {_place(high_m)} m{hint}"
         )
 
 

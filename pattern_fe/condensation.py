@@ -30,6 +30,8 @@ class CondensedSurface:
     """(n, n) float64, N/m, symmetric."""
     mass_kg: Array
     """(n,) float64, kg; infinite where held."""
+    loose: int = 0
+    """Motions that nothing holds and that bend nothing."""
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
@@ -38,12 +40,14 @@ class CondensedSurface:
         Returns
         -------
         square_1_s2 : (m,) float64, 1/s2
-            Squares of the angular frequencies, ascending, of as many modes as free components.
+            Squares of the angular frequencies, ascending, of as many modes as free components; 0
+            of loose motions.
         shape : (n, m) float64, kg^-1/2
             Columns of unit modal mass, 0 where held.
         """
         free = np.isfinite(self.mass_kg)
         square, part = eigh(self.stiffness_n_m[np.ix_(free, free)], np.diag(self.mass_kg[free]))
+        square[: self.loose] = 0.0
         shape = np.zeros((len(free), len(square)))
         shape[free] = part
         return square, shape
@@ -54,6 +58,7 @@ def condensed_surface(
     mass_kg: Array,
     nodes: NDArray[np.int64],
     fixed: Mask,
+    loose: int = 0,
 ) -> CondensedSurface:
     """Schur complement on some nodes, exact for static loads on them (Guyan 1965).
 
@@ -64,8 +69,10 @@ def condensed_surface(
     mass_kg : (n,) float64, kg
         Of the retained nodes.
     nodes : (n,) int64
-        Retained, all those with a support among them.
+        Retained.
     fixed : (N, d) bool
+    loose : int, optional
+        Rigid motions that nothing holds.
 
     Returns
     -------
@@ -74,7 +81,8 @@ def condensed_surface(
     """
     d = fixed.shape[1]
     retained = (nodes[:, None] * d + np.arange(d)).ravel()
-    inner = np.setdiff1d(np.arange(fixed.size), retained)
+    # what is held inside does not move
+    inner = np.setdiff1d(np.flatnonzero(~fixed.ravel()), retained)
     schur = stiffness[retained][:, retained].toarray()
     if len(inner):
         factor = factorised(stiffness[inner][:, inner])
@@ -84,4 +92,4 @@ def condensed_surface(
             schur[:, columns] -= coupling.T @ factor.solve(coupling[:, columns].toarray())
     held = fixed.ravel()[retained]
     mass = np.where(held, np.inf, np.repeat(mass_kg, d))
-    return CondensedSurface(0.5 * (schur + schur.T), mass)
+    return CondensedSurface(0.5 * (schur + schur.T), mass, loose)

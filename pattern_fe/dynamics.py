@@ -9,28 +9,19 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import eigsh
 
-from pattern_fe.elasticity import element_stiffness_n_m
 from pattern_fe.material import Foam
 from pattern_fe.space import Space
 from pattern_fe.supports import Mask
+from pattern_fe.weak_forms import element_mass_kg, element_stiffness_n_m
 
 Array = NDArray[np.float64]
 
 
-def _shape_products(space: Space) -> tuple[Array, Array]:
-    """Shape functions, (k, ne, q), and the volume of each integration point, (ne, q), m3."""
-    basis = space.basis(2 * space.order)
-    values = [np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis]
-    return np.stack(values), basis.dx * space.thickness_m
-
-
 def consistent_mass_kg(space: Space, foam: Foam) -> csc_array:
     """Mass matrix of the shape functions, (n d, n d) sparse float64, kg."""
-    shape, volume = _shape_products(space)
-    products = foam.density_kg_m3 * np.einsum("aeq,beq,eq->eab", shape, shape, volume)
-    d = space.dimension
+    products = element_mass_kg(space, foam)
+    d, k = space.dimension, products.shape[1]
     blocks = products[:, :, None, :, None] * np.eye(d)[None, None, :, None, :]
-    k = len(shape)
     return space.assembled(blocks.reshape(-1, k * d, k * d))
 
 
@@ -41,9 +32,10 @@ def element_lumped_mass_kg(space: Space, foam: Foam) -> Array:
     unlike the sum of its rows (Hinton, Rock and Zienkiewicz, Earthquake Engineering and
     Structural Dynamics 4, 1976).
     """
-    shape, volume = _shape_products(space)
-    diagonal = np.einsum("aeq,eq->ea", shape**2, volume)
-    whole = foam.density_kg_m3 * volume.sum(axis=1, keepdims=True)
+    products = element_mass_kg(space, foam)
+    diagonal = np.einsum("eaa->ea", products)
+    # shape functions sum to 1, so all products sum to the whole
+    whole = products.sum(axis=(1, 2))[:, None]
     return np.asarray(whole * diagonal / diagonal.sum(axis=1, keepdims=True))
 
 

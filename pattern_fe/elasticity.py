@@ -1,4 +1,4 @@
-"""Forces and stiffness of elements in large displacements; small ones are those from rest.
+"""Forces and tangent of elements in large displacements; small ones are in ``weak_forms``.
 
 Total Lagrangian form with the law of St. Venant and Kirchhoff (Bonet and Wood, Nonlinear Continuum
 Mechanics for Finite Element Analysis, 2nd ed., sections 8 and 9): everything is integrated over
@@ -58,13 +58,13 @@ def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
     return inner_forces(space.cells, space.gradient, space.weight, moved, lam, mu)
 
 
-def element_stiffness_n_m(space: Space, foam: Foam, displacement_m: Array | None = None) -> Array:
+def element_tangent_n_m(space: Space, foam: Foam, displacement_m: Array) -> Array:
     """Change of the elements' forces with their displacements.
 
     Parameters
     ----------
-    displacement_m : (n, d) float64, m, optional
-        State about which they change, by default the drawing.
+    displacement_m : (n, d) float64, m
+        State about which they change.
 
     Returns
     -------
@@ -72,8 +72,7 @@ def element_stiffness_n_m(space: Space, foam: Foam, displacement_m: Array | None
     """
     lam, mu = foam.lame_pa
     ne, _, k, d = space.gradient.shape
-    at_rest = np.zeros_like(space.node_m) if displacement_m is None else displacement_m
-    slope = displacement_gradient(space, at_rest)
+    slope = displacement_gradient(space, displacement_m)
     deformation = np.eye(d) + slope
     stress = foam.stress_pa(green_strain(slope))
     weight = space.weight[..., None, None]

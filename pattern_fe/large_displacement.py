@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pattern_fe.contact import touch
-from pattern_fe.elasticity import displacement_gradient, element_stiffness_n_m, internal_force_n
+from pattern_fe.elasticity import displacement_gradient, element_tangent_n_m, internal_force_n
 from pattern_fe.factor import factorised
 from pattern_fe.material import Foam
 from pattern_fe.space import Space
@@ -81,7 +81,7 @@ class _Equilibrium:
 
     def newton_step_m(self, displacement_m: Array, residual_n: Array) -> Array:
         """Step under a residual without reactions of contact, which it finds too."""
-        matrices = element_stiffness_n_m(self.space, self.foam, displacement_m)
+        matrices = element_tangent_n_m(self.space, self.foam, displacement_m)
         tangent = self.space.assembled(matrices)
         tangent.setdiag(tangent.diagonal() + np.repeat(self.bedding, self.space.dimension))
         factor = factorised(tangent[self.free][:, self.free])

@@ -17,7 +17,6 @@ from pattern_fe.condensation import CondensedSurface, condensed_surface
 from pattern_fe.distance import Distance, distance_from_drawing
 from pattern_fe.elasticity import (
     displacement_gradient,
-    element_stiffness_n_m,
     green_strain,
     internal_force_n,
     small_strain,
@@ -29,8 +28,9 @@ from pattern_fe.material import Foam
 from pattern_fe.motion import CentralDifferences
 from pattern_fe.perimeter import perimeter_of
 from pattern_fe.space import space_of
-from pattern_fe.supports import Supports, check_held, fixed_components
+from pattern_fe.supports import Supports, check_held, fixed_components, loose_motions
 from pattern_fe.surroundings import Surroundings
+from pattern_fe.weak_forms import element_stiffness_n_m
 from sandmould.scenario.geometry import Scene
 
 Array = NDArray[np.float64]
@@ -101,6 +101,21 @@ class Pattern:
     def _factor(self) -> SuperLU:
         check_held(self.space.node_m, self.fixed, self.supports)
         return factorised(self.stiffness[self._free][:, self._free])
+
+    @property
+    def factor_numbers(self) -> int:
+        """Numbers that the factorised stiffness holds; none of a free pattern."""
+        return 0 if self.is_free else int(self._factor.nnz)
+
+    @cached_property
+    def _loose_motions(self) -> int:
+        bedded = self.supports.bedding_n_m3 > 0.0
+        return 0 if bedded else len(loose_motions(self.space.node_m, self.fixed))
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it can move without deforming."""
+        return self._loose_motions > 0
 
     def on_nodes(self, values: Array) -> Array:
         """Values of vertices as those of all nodes, 0 inside."""
@@ -211,11 +226,16 @@ class Pattern:
         return np.asarray(pushed / np.linalg.det(deformation)[..., None, None])
 
     def energy_j(self, displacement_m: Array, large: bool = False) -> float:
-        """Elastic energy, the bedding's left out; arguments as ``stress_pa``."""
+        """Elastic energy, that of a bedding among it; arguments as ``stress_pa``."""
         slope = displacement_gradient(self.space, displacement_m)
         strain = green_strain(slope) if large else small_strain(slope)
         density = np.sum(strain * self.foam.stress_pa(strain), axis=(-2, -1))
-        return float(0.5 * np.sum(density * self.space.weight))
+        bedding = np.sum(self._bedding_n_m[:, None] * displacement_m**2)
+        return float(0.5 * (np.sum(density * self.space.weight) + bedding))
+
+    def bedding_force_n(self, displacement_m: Array) -> Array:
+        """Force of the bedding on the nodes, (n, d) float64, N."""
+        return -self._bedding_n_m[:, None] * displacement_m
 
     def von_mises_pa(self, displacement_m: Array, large: bool = False) -> Array:
         """Mean equivalent stress of each element, (ne,) float64, Pa; arguments as ``stress_pa``."""
@@ -253,7 +273,9 @@ class Pattern:
         """
         area = self.surface.vertex_area_m2
         mass = self.mass_kg.sum() * area / area.sum()
-        return condensed_surface(self.stiffness, mass, self.surface.nodes, self.fixed)
+        return condensed_surface(
+            self.stiffness, mass, self.surface.nodes, self.fixed, self._loose_motions
+        )
 
     def critical_step_s(self, mass_scale: float = 1.0) -> float:
         """Largest stable step of ``central_differences``, of the stiffest element and bedding."""

@@ -19,10 +19,13 @@ from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
 from pattern_fe.supports import Supports
 from pattern_fe.surroundings import Surroundings
+from pattern_fe.volume_mesh import drawing_mesh
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.limits import PATTERN_ELEMENTS
-from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig
+from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig, PatternDrawing
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import drawn_surface, unit_hint
 
 Array = NDArray[np.float64]
 
@@ -41,8 +44,9 @@ def pattern_of(scenario: Scenario) -> Pattern:
     if len(config.position_m) != d:
         valid = f"{d} numbers, one a dimension"
         raise BadInputError([Problem("pattern.position_m", list(config.position_m), valid)])
-    if config.depth_m is not None and (d == 2 or isinstance(config.shape, MeshFile)):
-        valid = "null in 2D and for a mesh file, which has its own"
+    has_depth = isinstance(config.shape, MeshFile | PatternDrawing)
+    if config.depth_m is not None and (d == 2 or has_depth):
+        valid = "null in 2D and for a file, which has its own"
         raise BadInputError([Problem("pattern.depth_m", config.depth_m, valid)])
     _check_elements(config, box.depth_m if d == 3 else None)
     # what is shared by all runs of a study that differ in their sand or their loop
@@ -53,9 +57,9 @@ def pattern_of(scenario: Scenario) -> Pattern:
 
 
 def _check_elements(config: PatternConfig, box_depth_m: float | None) -> None:
-    """Refuse more elements than can be solved; a mesh file has its own."""
+    """Refuse more elements than can be solved; a mesh file has its own, drawings are counted."""
     shape = config.shape
-    if isinstance(shape, MeshFile):
+    if isinstance(shape, MeshFile | PatternDrawing):
         return
     across_m = shape.reach_m if isinstance(shape, LShape) else shape.width_m
     sides_m = [across_m, shape.height_m]
@@ -73,9 +77,9 @@ def surroundings_of(scenario: Scenario, pattern: Pattern) -> Surroundings:
 
 
 def _changed_ns(config: PatternConfig) -> int:
-    """When the mesh file of a pattern was last changed, 0 without one."""
+    """When the file of a pattern was last changed, 0 without one."""
     shape = config.shape
-    if isinstance(shape, MeshFile) and shape.path.is_file():
+    if isinstance(shape, MeshFile | PatternDrawing) and shape.path.is_file():
         return shape.path.stat().st_mtime_ns
     return 0
 
@@ -88,7 +92,7 @@ def _computed(
     with _blaming("pattern.shape", config.shape.model_dump(mode="json")):
         mesh = _mesh(config, size_m).translated(np.array(config.position_m))
     with _blaming("pattern.position_m", list(config.position_m)):
-        check_inside(mesh, np.zeros(len(size_m)), np.array(size_m))
+        check_inside(mesh.p.T, np.zeros(len(size_m)), np.array(size_m))
     # Threads of small matrices wait for one another, longest beside other runs.
     with (
         threadpool_limits(1),
@@ -96,13 +100,31 @@ def _computed(
     ):
         pattern = Pattern(
             mesh,
-            Supports(config.supports.clamped, config.supports.resting),
+            _supports(config),
             Foam(config.young_modulus_pa, config.poisson_ratio, config.density_kg_m3),
             config.order,
             thickness_m,
         )
-        pattern.solve_linear(np.zeros_like(pattern.space.node_m))
+        if not config.supports.free:
+            pattern.solve_linear(np.zeros_like(pattern.space.node_m))
     return pattern
+
+
+def _supports(config: PatternConfig) -> Supports:
+    """What holds the pattern, as its elements take it.
+
+    Raises
+    ------
+    ValueError
+        When a free pattern is held by something else too.
+    """
+    told = config.supports
+    held = told.clamped or told.resting or told.hung or told.bedding_n_m3
+    if told.free and held:
+        others = "clamped, resting, hung and bedding_n_m3"
+        raise ValueError(f"a free pattern is held by sand alone, valid is without {others}")
+    hung = tuple((box.low_m, box.high_m) for box in told.hung or ())
+    return Supports(told.clamped, told.resting, told.bedding_n_m3 or 0.0, hung)
 
 
 def _mesh(config: PatternConfig, size_m: tuple[float, ...]) -> Any:
@@ -113,6 +135,16 @@ def _mesh(config: PatternConfig, size_m: tuple[float, ...]) -> Any:
             valid = f"a mesh in {len(size_m)}D as the scene"
             raise ValueError(f"mesh file {shape.path.name} is in {mesh.dim()}D, valid is {valid}")
         return mesh
+    if isinstance(shape, PatternDrawing):
+        if len(size_m) == 2:
+            raise ValueError("a drawing is a solid, valid in 3D; draw a mesh in 2D for kind: file")
+        vertices_m, triangles = drawn_surface(shape, "pattern.shape")
+        # before it is meshed: in the wrong unit it would have millions of elements
+        box_m = np.array(size_m)
+        hint = unit_hint(np.ptp(vertices_m, axis=0), box_m, shape.unit_m)
+        with _blaming("pattern.position_m", list(config.position_m)):
+            check_inside(vertices_m + np.array(config.position_m), np.zeros(3), box_m, hint)
+        return drawing_mesh(shape, TriangleMesh("drawing", vertices_m, triangles), config.element_m)
     depth_m = None
     if len(size_m) == 3:
         depth_m = size_m[1] - config.position_m[1] if config.depth_m is None else config.depth_m
@@ -131,6 +163,8 @@ def _blaming(key: str, value: Any) -> Iterator[None]:
     """Tell what is wrong with a pattern at the key that holds it."""
     try:
         yield
+    except BadInputError:
+        raise
     except ValueError as fault:
         valid = f"one that can be computed: {fault}"
         raise BadInputError([Problem(key, value, valid)]) from fault

@@ -59,6 +59,11 @@ class Space:
         """2 or 3."""
         return self.node_m.shape[1]
 
+    @property
+    def slope_degree(self) -> int:
+        """Degree of products of gradients of shape functions, which are integrated exactly."""
+        return _slope_degree(self.mesh, self.order)
+
     def basis(self, integrated_degree: int) -> Any:
         """Scalar basis of scikit-fem whose degrees of freedom are the nodes."""
         element = _ELEMENTS[type(self.mesh)][self.order - 1]()
@@ -121,9 +126,8 @@ def space_of(mesh: Any, order: int = 2, thickness_m: float | None = None) -> Spa
         thickness_m = 1.0
     elif thickness_m is None or not 0.0 < thickness_m < np.inf:
         raise ValueError(f"thickness of the pattern is {thickness_m} m, valid in 2D is above 0")
-    # products of gradients: of degree 2 (order - 1) in simplices, 2 order in an axis of the others
-    degree = 2 * order if type(mesh) in (MeshQuad1, MeshHex1) else 2 * order - 2
-    basis = Basis(mesh, _ELEMENTS[type(mesh)][order - 1](), intorder=max(1, degree))
+    degree = _slope_degree(mesh, order)
+    basis = Basis(mesh, _ELEMENTS[type(mesh)][order - 1](), intorder=degree)
     gradients = [np.broadcast_to(b[0].grad, (mesh.dim(), *basis.dx.shape)) for b in basis.basis]
     return Space(
         mesh,
@@ -134,3 +138,9 @@ def space_of(mesh: Any, order: int = 2, thickness_m: float | None = None) -> Spa
         np.ascontiguousarray(np.stack(gradients).transpose(2, 3, 0, 1)),
         np.ascontiguousarray(basis.dx * thickness_m),
     )
+
+
+def _slope_degree(mesh: Any, order: int) -> int:
+    """Of products of gradients: 2 (order - 1) in simplices, 2 order in an axis of the others."""
+    degree = 2 * order if type(mesh) in (MeshQuad1, MeshHex1) else 2 * order - 2
+    return max(1, degree)

@@ -1,8 +1,9 @@
-"""How a pattern is held: clamped, resting on rollers, bedded on sand or free."""
+"""How a pattern is held: clamped, resting on rollers, hung, bedded on sand or free."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ class Supports:
     bedding_n_m3: float = 0.0
     """Springs all over the surface, N/m per m2 of it: a plain model of sand that holds a pattern
     (Winkler), and what makes the equations of a free one regular. 0 for none."""
+    hung: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...] = ()
+    """Least and greatest corner (m) of boxes, as the mesh lies; what is in one does not move."""
 
 
 def fixed_components(space: Space, supports: Supports) -> Mask:
@@ -41,8 +44,8 @@ def fixed_components(space: Space, supports: Supports) -> Mask:
     Raises
     ------
     ValueError
-        When a boundary is not there, a resting one is not across an axis, or the bedding is
-        negative.
+        When a boundary is not there, a resting one is not across an axis, a box holds no node, or
+        the bedding is negative.
     """
     if not 0.0 <= supports.bedding_n_m3 < np.inf:
         raise ValueError(f"bedding is {supports.bedding_n_m3:g} N/m3, valid is 0 or above")
@@ -57,7 +60,31 @@ def fixed_components(space: Space, supports: Supports) -> Mask:
     for name in supports.resting:
         nodes = space.nodes_of(name)
         fixed[nodes, _flat_axis(name, space.node_m[nodes])] = True
+    for box in supports.hung:
+        fixed[_nodes_in(space, *box)] = True
     return fixed
+
+
+def _nodes_in(space: Space, low_m: tuple[float, ...], high_m: tuple[float, ...]) -> Mask:
+    """Nodes in a box, its sides among it, (n,) bool."""
+    place_m, d = space.node_m, space.dimension
+    if not len(low_m) == len(high_m) == d:
+        raise ValueError(f"a box that hangs the pattern has corners of {d} numbers each")
+    near_m = 1e-9 * float(np.ptp(place_m, axis=0).max())
+    inside = (place_m >= np.array(low_m) - near_m) & (place_m <= np.array(high_m) + near_m)
+    found = inside.all(axis=1)
+    if not found.any():
+        reach = " to ".join(_place(corner) for corner in (low_m, high_m))
+        own = " to ".join(_place(end(place_m, axis=0)) for end in (np.min, np.max))
+        raise ValueError(
+            f"the box that hangs the pattern, {reach} m, holds no node of it; the pattern reaches "
+            f"from {own} m, and a box thinner than an element may miss its nodes"
+        )
+    return np.asarray(found)
+
+
+def _place(corner: Any) -> str:
+    return "({})".format(", ".join(f"{x:.4g}" for x in corner))
 
 
 def _flat_axis(name: str, place_m: Array) -> int:

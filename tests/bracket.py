@@ -1,6 +1,14 @@
-"""The shipped pattern of a disc with a side bracket; written by ``python -m tests.bracket``."""
+"""The shipped pattern of a disc with a side bracket; written by ``python -m tests.bracket``.
+
+As an STL file, and as a STEP file whose disc is round.
+"""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -8,6 +16,7 @@ import numpy as np
 from sandmould import ROOT
 
 BRACKET = ROOT / "config" / "meshes" / "bracket.stl"
+STEP = BRACKET.with_suffix(".step")
 SECTORS, HALF_TAB = 72, 4
 RADIUS, REACH = 30.0, 50.0
 HEIGHTS = (-8.0, -3.0, 3.0, 8.0)
@@ -55,11 +64,39 @@ def bracket() -> tuple[np.ndarray, np.ndarray]:
     return np.array(vertices), np.array(fans + split)
 
 
+def write_step(path: Path) -> None:
+    """Write disc and bracket as one round solid."""
+    half_mm = RADIUS * math.sin(HALF_TAB * 2 * math.pi / SECTORS)
+    low, inner, outer, high = HEIGHTS
+
+    def build(kernel: Any) -> None:
+        disc = kernel.addCylinder(0, 0, low, 0, 0, high - low, RADIUS)
+        tab = kernel.addBox(0, -half_mm, inner, REACH, 2 * half_mm, outer - inner)
+        kernel.fuse([(3, disc)], [(3, tab)])
+
+    write_solid(path, build)
+
+
+def write_solid(path: Path, build: Callable[[Any], Any]) -> None:
+    """Write a STEP file of what a function builds in mm with Gmsh's kernel of solids."""
+    import gmsh
+
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        build(gmsh.model.occ)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+
+
 def main() -> None:
-    """Write the file."""
+    """Write the files."""
     vertices, triangles = bracket()
     BRACKET.parent.mkdir(exist_ok=True)
     meshio.stl.write(str(BRACKET), meshio.Mesh(vertices, [("triangle", triangles)]), binary=True)
+    write_step(STEP)
 
 
 if __name__ == "__main__":

@@ -17,9 +17,9 @@ def contact_arrays(
     Parameters
     ----------
     surroundings : Surroundings, optional
-        In 2D; nothing unless given.
-    drawn_m : (nv, 2) float64, m
-    pressed : (2 nv,) int64
+        In 3D its floor and walls alone; nothing unless given.
+    drawn_m : (nv, d) float64, m
+    pressed : (d nv,) int64
         Components of these vertices.
     size : int
         Number of all components.
@@ -29,7 +29,7 @@ def contact_arrays(
     if surroundings is not None:
         least_m, most_m = surroundings.bounds_m()
         low[pressed], high[pressed] = least_m.ravel(), most_m.ravel()
-        sides = surroundings.outlines_m()
+        sides = surroundings.outlines_m() if surroundings.dimension == 2 else []
     ends = [np.hstack([line, np.roll(line, -1, axis=0)]) for line in sides]
     vertices = len(drawn_m)
     return ContactArrays(

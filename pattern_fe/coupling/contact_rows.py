@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,35 +12,63 @@ from scipy.sparse import csr_array, vstack
 
 from pattern_fe.coupling.explicit_foam import ContactBound
 from pattern_fe.pattern import Pattern
+from pattern_fe.perimeter import Perimeter
 from sandmould.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
+_CLOSEST = 2.0 / math.sqrt(3.0)
+"""Balls on the square of their diameter where they lie closest in a plane."""
 
 
 @dataclass(frozen=True)
 class ContactRows:
-    """What touches the surface at most: grains of one size in a row all round it, and one more.
+    """What touches the surface at most: grains of one size all round it, and one more.
+
+    In 2D they lie in a row; in 3D as close as balls can lie on a plane, spread evenly.
 
     A contact under central differences with lagged dashpots is borne by the mass
     dt C / 2 + dt^2 K / 4 (section 3.5); shared among the vertices as its force is, it is a matrix.
     """
 
     row_kg: tuple[Array, ...]
-    """(n, n) float64, kg: for each size the sum over a full row, components vertex by vertex."""
+    """(n, n) float64, kg: for each size the sum over a full row, components vertex by vertex; in 3D
+    of the size that weighs most."""
     one_kg: float
     """Of the heaviest contact."""
 
     @classmethod
     def of(cls, scenario: Scenario, pattern: Pattern) -> ContactRows:
-        """Rows of all sizes of a scenario's sand along the outer line of its pattern."""
-        rows: list[Array] = []
-        one_kg = 0.0
-        for size in scenario.sand.classes(scenario.dimension):
-            one_kg = ContactBound.of_grain(scenario, size.diameter_m).mass_kg(scenario.step_s)
-            share = shares_along(pattern, size.diameter_m)
-            row_kg = one_kg * np.kron(share.T @ share, np.eye(scenario.dimension))
-            rows.append(row_kg.astype(np.float64))
-        return cls(tuple(rows), one_kg)
+        """Rows of all sizes of a scenario's sand along the surface of its pattern."""
+        sizes = scenario.sand.classes(scenario.dimension)
+        masses_kg = [
+            ContactBound.of_grain(scenario, size.diameter_m).mass_kg(scenario.step_s)
+            for size in sizes
+        ]
+        if scenario.dimension == 2:
+            shares = [shares_along(pattern, size.diameter_m) for size in sizes]
+            products = [kg * share.T @ share for kg, share in zip(masses_kg, shares, strict=True)]
+        else:
+            # one matrix times a number a size: the largest bears them all
+            on_area = max(
+                _CLOSEST * kg / size.diameter_m**2
+                for kg, size in zip(masses_kg, sizes, strict=True)
+            )
+            products = [on_area * products_over(pattern.surface)]
+        rows = [np.kron(row, np.eye(scenario.dimension)).astype(np.float64) for row in products]
+        return cls(tuple(rows), masses_kg[-1])
+
+
+def products_over(surface: Perimeter) -> Array:
+    """Integrals of products of shape functions over a surface of triangles, (nv, nv) float64, m2.
+
+    Of linear ones over a triangle of area A they are A/12, and A/6 of one with itself.
+    """
+    area = np.linalg.norm(surface.facet_area_vector_m2, axis=1)
+    products = np.zeros((len(surface.vertices_m),) * 2)
+    for i, j in product(range(3), repeat=2):
+        share = area / (6.0 if i == j else 12.0)
+        np.add.at(products, (surface.facets[:, i], surface.facets[:, j]), share)
+    return products
 
 
 def shares_along(pattern: Pattern, apart_m: float) -> Array:

@@ -1,4 +1,4 @@
-"""Contact of a pattern that is stepped inside an engine with floor, walls and obstacles, in 2D.
+"""Contact of a pattern that is stepped inside an engine with floor, walls and, in 2D, obstacles.
 
 As in the other schemes gaps do not close beyond zero, reactions only press, and there is no
 friction. The forces act over the step that would close a gap too far and are just what leaves it
@@ -36,7 +36,7 @@ class ContactArrays(NamedTuple):
     corners: Floats
     """(c, 2) float64, m: of obstacles."""
     drawn: Floats
-    """(nv, 2) float64, m: vertices that may touch."""
+    """(nv, d) float64, m: vertices that may touch."""
     clear: Floats
     """(nv + 1,) float64, m: distance of each vertex from the obstacles, and that of their corners
     from the pattern, at the displacement ``clear_at``."""

@@ -67,6 +67,7 @@ class FoamBody:
             moved, touched = self._linear(load)
         reaction = self._inner_force_n(moved) - load
         reaction[~(pattern.fixed | (touched != 0.0)).any(axis=1)] = 0.0
+        reaction += pattern.bedding_force_n(moved)
         # Small displacements balance on the drawing, large ones where the nodes have come to.
         place_m = pattern.space.node_m + (moved if self._large else 0.0)
         outer = load + reaction

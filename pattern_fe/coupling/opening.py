@@ -5,20 +5,27 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
+
 from pattern_fe.coupling.body import ElasticBody
 from pattern_fe.coupling.explicit_foam import ExplicitFoam
 from pattern_fe.coupling.files_body import EXCHANGE, FilesBody
 from pattern_fe.coupling.foam_body import FoamBody
+from pattern_fe.coupling.free_body import FreeBody
 from pattern_fe.coupling.in_step import InStepSession
 from pattern_fe.coupling.monolithic_session import MonolithicSession
 from pattern_fe.coupling.schemes import explicit_foam, in_step_foam
 from pattern_fe.coupling.selective_mass import SelectiveMass
 from pattern_fe.coupling.session import CoupledSession
+from pattern_fe.pattern import Pattern
 from pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.engines.program import Program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
 from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.pattern import PatternDrawing
+from sandmould.scenario.scenario import Scenario
 
 MASSES_LOG = "pattern.log"
 
@@ -43,9 +50,16 @@ def open_coupled(
     assert config is not None
     name, loop, counts = config.name, config.loop, StepCounts.of(scenario)
     pattern, work, tolerance = pattern_of(scenario), log.parent, scenario.rest.load_tolerance
+    _refuse_other_mesh(scenario, pattern)
     open_session = engine_of(scenario).open_session
     large = config.statics == "large"
     around = surroundings_of(scenario, pattern)
+    if loop.scheme == "in_step":
+        sand = open_session(program, folder, log, checkpoint)
+        foam = in_step_foam(scenario, pattern)
+        (work / MASSES_LOG).write_text(_selective_masses(foam.mass), encoding="utf-8")
+        held = FreeBody(pattern, foam) if pattern.is_free else FoamBody(pattern, False, around)
+        return InStepSession(sand, foam, held, name, work, checkpoint, tolerance)
     body: ElasticBody = FoamBody(pattern, large, around)
     if loop.scheme == "monolithic":
         explicit = explicit_foam(scenario, pattern)
@@ -59,11 +73,25 @@ def open_coupled(
     sand = open_session(program, folder, log, checkpoint)
     if loop.exchange == "files":
         body = FilesBody(pattern, large, folder / EXCHANGE, sand, around)
-    if loop.scheme == "in_step":
-        foam = in_step_foam(scenario, pattern)
-        (work / MASSES_LOG).write_text(_selective_masses(foam.mass), encoding="utf-8")
-        return InStepSession(sand, foam, body, name, work, checkpoint, tolerance)
     return CoupledSession(sand, body, name, loop, counts, work, checkpoint, tolerance, around)
+
+
+def _refuse_other_mesh(scenario: Scenario, pattern: Pattern) -> None:
+    """Refuse a drawn pattern that is not meshed here as where the study was planned.
+
+    Raises
+    ------
+    BadInputError
+    """
+    config = scenario.pattern
+    assert config is not None
+    if not isinstance(config.shape, PatternDrawing):
+        return
+    planned_m = next(m.vertices_m for m in scenario.scene.meshes if m.name == config.name)
+    here_m = pattern.surface.outer.vertices_m
+    if planned_m.shape != here_m.shape or not np.allclose(planned_m, here_m, rtol=0.0, atol=1e-9):
+        valid = "a drawing that Gmsh meshes here as where the study was planned: the same version"
+        raise BadInputError([Problem("pattern.shape.file", config.shape.file, valid)])
 
 
 def _explicit_masses(foam: ExplicitFoam) -> str:

@@ -15,6 +15,7 @@ from pattern_fe.scene import surroundings_of
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_of, engines_that
 from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.limits import STEPPED_COMPONENTS
 from sandmould.scenario.pattern import Loop, Scheme
 from sandmould.scenario.scenario import Scenario
 
@@ -49,7 +50,13 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
     if scenario.dimension not in engine.bends_meshes:
         raise BadInputError([Problem("engine.name", name, _engines_in(scenario.dimension))])
     if scenario.dimension == 3:
-        _refuse_in_space(loop)
+        _refuse_in_space(scenario, pattern, loop)
+    if scenario.pattern.supports.free and scheme != "in_step":
+        valid = (
+            "in_step for a free pattern, which at rest is held by nothing that the others know; "
+            "supports.hung or supports.bedding_n_m3 for them"
+        )
+        raise _bad("scheme", scheme, valid)
     if not can_couple(scheme, engine):
         raise _bad("scheme", scheme, _schemes_on(name, engine, scheme))
     if scenario.frame not in engine.bends_in_frames:
@@ -95,10 +102,22 @@ def _schemes_on(name: str, engine: Capabilities, refused: Scheme) -> str:
     return f"another scheme on engine {name}, or engine {others}"
 
 
-def _refuse_in_space(loop: Loop) -> None:
-    """Refuse what is coupled in the plane alone."""
-    if not loop.has_windows:
-        raise _bad("scheme", loop.scheme, "a scheme with windows in 3D")
+def _refuse_in_space(scenario: Scenario, pattern: Pattern, loop: Loop) -> None:
+    """Refuse what is coupled in the plane alone, and a surface too fine for its matrix."""
+    assert scenario.pattern is not None
+    if loop.scheme == "monolithic":
+        raise _bad("scheme", loop.scheme, "another scheme in 3D")
+    if loop.scheme == "in_step":
+        STEPPED_COMPONENTS.check(
+            "pattern.element_m", pattern.surface.vertices_m.size, scenario.pattern.element_m
+        )
+        near = surroundings_of(scenario, pattern).solids
+        if near:
+            valid = (
+                f"a scheme with windows in 3D beside the obstacle '{near[0].name}', which the "
+                "pattern may reach"
+            )
+            raise _bad("scheme", loop.scheme, valid)
     if loop.exchange == "files":
         raise _bad("exchange", loop.exchange, "memory in 3D")
 

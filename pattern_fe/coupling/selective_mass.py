@@ -43,14 +43,14 @@ class SelectiveMass:
 
     @property
     def first_hz(self) -> float:
-        """Lowest natural frequency."""
-        own = float(self.square_1_s2[0])
+        """Lowest natural frequency, of a motion that bends the pattern where nothing holds it."""
+        own = _first(self.square_1_s2)
         return math.sqrt(own / (self.scale + own / self.omega_1_s**2)) / (2.0 * math.pi)
 
     @property
     def own_first_hz(self) -> float:
         """Lowest natural frequency with the pattern's own masses."""
-        return math.sqrt(float(self.square_1_s2[0])) / (2.0 * math.pi)
+        return math.sqrt(_first(self.square_1_s2)) / (2.0 * math.pi)
 
     def inverse_1_kg(self) -> Array:
         """Inverse of M, (n, n) float64, 1/kg; rows and columns of held components are 0."""
@@ -82,6 +82,7 @@ def selective_mass(
     if scale is not None and not 0.0 < scale < math.inf:
         raise ValueError(f"mass scale of the pattern is {scale:g}, valid is above 0")
     square, shape = surface.modes
+    first = _first(square)
     rows = [shape.T @ row @ shape for row in contacts.row_kg]
 
     def bears(scale: float, share_s2: float) -> bool:
@@ -92,16 +93,21 @@ def selective_mass(
         return left > 0.0 and all(_positive(np.diag(left * modal) - row) for row in rows)
 
     def most_s2(scale: float) -> float:
-        return 2.0 * SLOWED * scale / float(square[0])
+        return 2.0 * SLOWED * scale / first
 
     def leaves_bending(scale: float) -> bool:
         return most_s2(scale) > step_s**2 and bears(scale, most_s2(scale))
 
     chosen = _least(leaves_bending, 1.0) if scale is None else scale
     # the elastic force is found as a part of M u: not so small a part that its digits are lost
-    least_s2 = max(step_s**2, _PART * chosen / float(square[0]))
+    least_s2 = max(step_s**2, _PART * chosen / first)
     share_s2 = _least(lambda share_s2: bears(chosen, share_s2), least_s2)
     return SelectiveMass(chosen, 1.0 / math.sqrt(share_s2), square, shape)
+
+
+def _first(square_1_s2: Array) -> float:
+    """Least square of an angular frequency above 0."""
+    return float(square_1_s2[square_1_s2 > 0.0].min())
 
 
 def _least(holds: Callable[[float], bool], low: float) -> float:

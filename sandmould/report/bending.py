@@ -13,6 +13,8 @@ import numpy as np
 import pandas as pd
 
 from pattern_fe.coupling.loop_verdict import LoopVerdict, study_sentence
+from pattern_fe.quality import mesh_sentence
+from pattern_fe.scene import pattern_of
 from sandmould.report.bending_figure import draw_outlines
 from sandmould.report.chart import Area, Chart
 from sandmould.report.convergence_charts import ConvergenceChart, convergence_charts
@@ -27,6 +29,8 @@ from sandmould.runs.columns import (
     VIBRATION_TIME_S,
 )
 from sandmould.runs.formatting import number, setting_text, with_margin
+from sandmould.scenario.bad_input import BadInputError
+from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred, usable_values
 from sandmould.statistics.settings import group_settings, setting_of
@@ -97,6 +101,7 @@ def bending_pages(
         sentences=(
             study_sentence(list(verdicts.values())),
             *_tip_sentences(own, verdicts.get(pictured_run), scenario),
+            *drawing_sentences(scenario),
         ),
         deflection=deflection_chart(collected, verdict),
         outlines=picture,
@@ -107,6 +112,17 @@ def bending_pages(
         runs=_runs_table(study_folder, href, collected, verdict, verdicts),
         paper=paper_sentences(scenario, collected, pictured_run),
     )
+
+
+def drawing_sentences(scenario: Scenario) -> tuple[str, ...]:
+    """How good the mesh of a drawn pattern is; nothing of others."""
+    pattern = scenario.pattern
+    if pattern is None or not isinstance(pattern.shape, PatternDrawing):
+        return ()
+    try:
+        return (mesh_sentence(scenario, pattern_of(scenario)),)
+    except BadInputError:
+        return ("The drawing of the pattern is gone or has changed since the study was planned.",)
 
 
 def _begins_s(rows: pd.DataFrame) -> float:

@@ -14,7 +14,14 @@ from sandmould.scenario.limits import GRAINS
 from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
+from sandmould.scenario.solids import (
+    Cylinder,
+    SolidMesh,
+    Triangles,
+    cylinder_solid,
+    mesh_solid,
+    unit_hint,
+)
 from sandmould.scenario.time_step import LEAST_STEPS_A_PERIOD
 from sandmould.scenario.unbalance_checks import table_mass_problem, unbalance_problems
 from sandmould.scenario.vibration import VibrationStage
@@ -141,7 +148,11 @@ def _mesh(s: Scenario, solid: SolidMesh, key: str) -> Iterator[Problem]:
     if not s.box.holds(corners_m, s.dimension, slack=1e-6):
         ends_m = (corners_m.min(axis=0).tolist(), corners_m.max(axis=0).tolist())
         low, high = (f"({', '.join(f'{x:.4g}' for x in end)})" for end in ends_m)
-        valid = f"one that puts the mesh, now from {low} to {high} m, inside the box, {_size(s)}"
+        box_m = np.array([s.box.width_m, s.box.depth_m, s.box.height_m])
+        hint = unit_hint(np.ptp(corners_m, axis=0), box_m, solid.unit_m)
+        valid = (
+            f"one that puts the mesh, now from {low} to {high} m, inside the box, {_size(s)}{hint}"
+        )
         yield Problem(f"{key}.position_m", list(solid.position_m), valid)
 
 
@@ -154,7 +165,7 @@ def _triangles(s: Scenario, solid: Triangles, key: str) -> Iterator[Problem]:
     except MeshFileError as fault:
         yield Problem(f"{key}.triangles", size, str(fault))
         return
-    if not s.box.holds(solid.solid.corners(), s.dimension):
+    if not s.box.holds(solid.solid.corners(), s.dimension, slack=1e-6):
         yield Problem(f"{key}.vertices_m", size, f"a solid inside the box, {_size(s)}")
 
 

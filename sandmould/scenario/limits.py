@@ -98,6 +98,14 @@ PATTERN_ELEMENTS = Limit(
     500_000, "elements of the pattern", "a larger element_m",
     "2 million unknowns of its stiffness at order 2 in 2D",
 )  # fmt: skip
+SOLID_ELEMENTS = Limit(
+    20_000, "tetrahedra of a drawn pattern", "a larger element_m",
+    "0.7 GB and 14 s at 9 270 of order 2, nearly squared for twice as many: their equations fill",
+)  # fmt: skip
+STEPPED_COMPONENTS = Limit(
+    5_000, "components of a surface stepped in 3D", "a larger element_m, or a scheme with windows",
+    "a matrix of 200 MB that every step reads, and its modes",
+)  # fmt: skip
 RECORDS = Limit(
     2_000_000, "records", "a longer interval",
     "a row of a table each: a few hundred megabytes a run",
@@ -114,10 +122,11 @@ DRAWING_BYTES = Limit(
 )  # fmt: skip
 TRIANGLES = Limit(
     5_000_000, "triangles", "a coarser surface",
-    "0.5 kB a triangle to read it (301 MB at 720 000), more where shells touch",
+    "1.2 kB a triangle to read and check it (1.3 GB at 998 000), more where shells touch",
 )  # fmt: skip
 
 LIMITS = (
     YAML_BYTES, YAML_DEPTH, YAML_ALIASES, YAML_VALUES, RUNS, REPLICATES, GRAINS, CELLS, PARTICLES,
-    PATTERN_ELEMENTS, RECORDS, FRAMES, PIXELS, DRAWING_BYTES, TRIANGLES,
+    PATTERN_ELEMENTS, SOLID_ELEMENTS, STEPPED_COMPONENTS, RECORDS, FRAMES, PIXELS, DRAWING_BYTES,
+    TRIANGLES,
 )  # fmt: skip

@@ -1,9 +1,10 @@
-"""Closed surfaces from STL files, checked before they stand in a scene."""
+"""Closed surfaces from STL and STEP files, checked before they stand in a scene."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from scipy.spatial import cKDTree
 from sandmould.scenario.drawing_file import MeshFileError, file_hash
 from sandmould.scenario.limits import TRIANGLES
 from sandmould.scenario.mesh import signed_volumes_m3
+from sandmould.scenario.mesh_crossing import check_crossings
 from sandmould.scenario.mesh_shells import (
     SAME,
     at,
@@ -24,13 +26,23 @@ from sandmould.scenario.mesh_shells import (
     with_own_vertices,
 )
 from sandmould.scenario.mesh_union import united
+from sandmould.scenario.mesher import is_step, step_surface
 
 Array = NDArray[np.float64]
 Triangles = NDArray[np.int64]
 
 
+class Repairs(NamedTuple):
+    """What was changed in a drawing, or may have been meant otherwise."""
+
+    filled_shells: int
+    """Shells that change nothing: they lie in another and face outwards."""
+    turned_triangles: int
+    """Triangles that were drawn inside out."""
+
+
 def read_surface(path: Path) -> tuple[Array, Triangles]:
-    """Read an STL file, ASCII or binary, as a closed surface seen from outside.
+    """Read an STL file, ASCII or binary, or a STEP file as a closed surface seen from outside.
 
     Vertices are merged within a millionth of the extent. Inside is where the winding number of all
     shells is above 1/2: shells that touch or overlap are one solid, and one that faces inwards
@@ -44,20 +56,20 @@ def read_surface(path: Path) -> tuple[Array, Triangles]:
     Returns
     -------
     vertices : (nv, 3) float64
-        In the file's unit.
+        In the file's unit; metres of a STEP file.
     triangles : (nt, 3) int64
         The surface of the union alone: nothing inside it is left.
 
     Raises
     ------
     MeshFileError
-        When the file is missing or no STL, or its triangles bound no solid.
+        When the file is missing or of another kind, or its triangles bound no solid.
     """
     return _read(path, file_hash(path))[:2]
 
 
-def filled_shells(path: Path) -> int:
-    """How many shells of an STL file change nothing: they lie in another and face outwards.
+def repairs(path: Path) -> Repairs:
+    """What :func:`read_surface` changed in a file, and what it left as it is.
 
     Raises
     ------
@@ -68,11 +80,11 @@ def filled_shells(path: Path) -> int:
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, sha256: str) -> tuple[Array, Triangles, int]:
+def _read(path: Path, sha256: str) -> tuple[Array, Triangles, Repairs]:
     """Read a file once for each state of it: a sweep asks for the same one at every point."""
-    points, cells = _parsed(path)
+    points, cells = step_surface(path) if is_step(path) else _parsed(path)
     if len(cells) > TRIANGLES.most:
-        raise MeshFileError(f"an STL file {TRIANGLES.sentence(len(cells))}")
+        raise MeshFileError(f"a file {TRIANGLES.sentence(len(cells))}")
     vertices, triangles = _merged(points, cells)
     _check_triangles(vertices, triangles)
     # from the lowest vertex on: shells that touch may have one triangle in both ways
@@ -82,10 +94,12 @@ def _read(path: Path, sha256: str) -> tuple[Array, Triangles, int]:
     joined = joined_sides(vertices, triangles)
     shell = shells_of(joined, len(triangles))
     _check_doubles(vertices, triangles, np.column_stack([np.sort(triangles, axis=1), shell]))
-    triangles, filled = facing(vertices, triangles, shell)
+    faced, filled = facing(vertices, triangles, shell)
+    check_crossings(vertices, faced, shell)
+    done = Repairs(len(filled), int((faced != triangles).any(axis=1).sum()))
     if shell.any():
-        return *united(vertices, triangles, shell), len(filled)
-    return *with_own_vertices(vertices, triangles, joined_sides(vertices, triangles)), 0
+        return *united(vertices, faced, shell), done
+    return *with_own_vertices(vertices, faced, joined_sides(vertices, faced)), done
 
 
 def check_surface(vertices: Array, triangles: Triangles) -> None:

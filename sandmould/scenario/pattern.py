@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from sandmould import ROOT
 from sandmould.scenario.quantity import Section, quantity
@@ -67,16 +67,90 @@ class MeshFile(Section):
         return Path(os.path.normpath(ROOT / self.file))
 
 
-Shape = Annotated[Bar | LShape | TShape | MeshFile, Field(discriminator="kind")]
+class PatternDrawing(Section):
+    """A solid drawn in an STL or STEP file, 3D only; Gmsh fills it with tetrahedra."""
+
+    kind: Literal["drawing"]
+    file: str = quantity(
+        ...,
+        "STL or STEP file (.step, .stp), seen from the file that names it; in a resolved scenario, "
+        "from the repository.",
+        source="user",
+        min_length=1,
+    )
+    sha256: str | None = quantity(
+        None,
+        "Hash of the file; the plan of a study writes it, so that another drawing is another run.",
+        source="user",
+        pattern=r"^[0-9a-f]{64}$",
+    )
+    unit_m: float = quantity(
+        1.0,
+        "Length that stands for 1 in an STL file: 0.001 for one drawn in mm. A STEP file tells its "
+        "own unit.",
+        unit="m",
+        source="user",
+        gt=0,
+        le=100,
+    )
+    angle_deg: float = quantity(
+        0.0, "Turn about the vertical through the file's origin.", unit="deg", source="user",
+        ge=-360, le=360,
+    )  # fmt: skip
+
+    @property
+    def path(self) -> Path:
+        """Where the file lies."""
+        return Path(os.path.normpath(ROOT / self.file))
+
+
+Shape = Annotated[Bar | LShape | TShape | MeshFile | PatternDrawing, Field(discriminator="kind")]
+
+
+class Hung(Section):
+    """A box in which a pattern is held, as its gating holds it."""
+
+    low_m: tuple[float, ...] = quantity(
+        ..., "Corner with the least coordinates, in the moulding box, one number a dimension.",
+        unit="m", source="user", min_length=2, max_length=3,
+    )  # fmt: skip
+    high_m: tuple[float, ...] = quantity(
+        ..., "Corner with the greatest coordinates.", unit="m", source="user",
+        min_length=2, max_length=3,
+    )  # fmt: skip
 
 
 class SupportsConfig(Section):
-    """What holds the pattern: left, right, bottom, top, front, back, or groups of a mesh file."""
+    """What holds the pattern: left, right, bottom, top, front, back, or groups of a mesh file.
+
+    Its bottom is clamped unless it is hung, bedded or free.
+    """
 
     clamped: tuple[str, ...] = quantity(("bottom",), "Boundaries that do not move.", source=ARGUED)
     resting: tuple[str, ...] = quantity(
         (), "Flat boundaries that slide without friction and do not lift.", source=ARGUED
     )
+    hung: tuple[Hung, ...] | None = quantity(
+        None, "Boxes round the gating that the pattern hangs from: what of it lies in one does not "
+        "move.", source=ARGUED,
+    )  # fmt: skip
+    bedding_n_m3: float | None = quantity(
+        None, "Springs all over the surface, a plain model of sand that holds it (Winkler).",
+        unit="N/m3", source=ARGUED, gt=0, le=1e12,
+    )  # fmt: skip
+    free: bool | None = quantity(
+        None, "Whether sand alone holds it, floor and walls but for it; in_step only.",
+        source=ARGUED,
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _clamps_no_more(self) -> SupportsConfig:
+        """Take the clamped bottom away where something else is told to hold the pattern."""
+        holds_otherwise = self.hung or self.bedding_n_m3 is not None or self.free
+        if holds_otherwise and "clamped" not in self.model_fields_set:
+            # A section never changes once read; this is its reading.
+            object.__setattr__(self, "clamped", ())
+        return self
 
 
 Scheme = Literal[

@@ -9,13 +9,21 @@ from pathlib import Path
 from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.drawing_file import MeshFileError, file_hash
 from sandmould.scenario.mesh import TriangleMesh
+from sandmould.scenario.mesher import is_step
 from sandmould.scenario.quantity import Section, quantity
-from sandmould.scenario.revolved import Array, Revolved
+from sandmould.scenario.revolved import Revolved
+
+Array = NDArray[np.float64]
+MANY_TRIANGLES = 100_000
+"""From here on the plan tells what a surface takes."""
+READ_S, READ_BYTES = 4e-5, 1300
+"""Time and memory a triangle to read and check a surface: 41 s and 1.3 GB measured at 998 000."""
 
 
 class Cylinder(Section):
@@ -48,13 +56,14 @@ Named = TypeVar("Named", bound=NamesFile)
 
 
 class SolidMesh(Section):
-    """A solid bounded by the triangles of an STL file, 3D only."""
+    """A solid drawn in an STL or STEP file, 3D only."""
 
     kind: Literal["mesh"]
     name: str = quantity("mesh", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
     file: str = quantity(
         ...,
-        "STL file, seen from the file that names it; in a resolved scenario, from the repository.",
+        "STL or STEP file (.step, .stp), seen from the file that names it; in a resolved scenario, "
+        "from the repository.",
         source="user",
         min_length=1,
     )
@@ -66,7 +75,8 @@ class SolidMesh(Section):
     )
     unit_m: float = quantity(
         1.0,
-        "Length that stands for 1 in the file: 0.001 for one drawn in mm.",
+        "Length that stands for 1 in an STL file: 0.001 for one drawn in mm. A STEP file tells its "
+        "own unit.",
         unit="m",
         source="user",
         gt=0,
@@ -134,6 +144,18 @@ def cylinder_along(
     return Revolved(name, centre_m, axis, profile_m)
 
 
+class Drawing(NamesFile, Protocol):
+    """A section that names a file of a solid, and its unit and turn."""
+
+    @property
+    def unit_m(self) -> float:
+        """Length that stands for 1 in it."""
+
+    @property
+    def angle_deg(self) -> float:
+        """Turn about the vertical."""
+
+
 def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     """Geometry of a mesh, turned, scaled and shifted into the box.
 
@@ -148,43 +170,101 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     BadInputError
         When the file bounds no solid, or is not the one that the scenario was planned with.
     """
-    from sandmould.scenario.mesh_file import read_surface  # slow to import, and few scenes have it
-
-    file_name = display_path(solid.path)
-    try:
-        sha256_now = file_hash(solid.path)
-        if solid.sha256 not in (None, sha256_now):
-            valid = "the file that the study was planned with; this one has changed since"
-            raise MeshFileError(valid)
-        vertices, triangles = read_surface(solid.path)
-    except MeshFileError as fault:
-        raise BadInputError([Problem(f"{key}.file", file_name, str(fault))]) from fault
-    c, s = math.cos(math.radians(solid.angle_deg)), math.sin(math.radians(solid.angle_deg))
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    placed_m = solid.unit_m * vertices @ turn.T + np.array(solid.position_m)
-    return TriangleMesh(solid.name, placed_m, triangles)
+    drawn_m, triangles = drawn_surface(solid, key)
+    return TriangleMesh(solid.name, drawn_m + np.array(solid.position_m), triangles)
 
 
-def filled_note(solid: SolidMesh, key: str) -> str:
-    """What to tell of shells that may have been meant as cavities; empty without any.
+def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]:
+    """Closed surface of a drawing about its own origin, turned and scaled.
 
     Parameters
     ----------
-    solid : SolidMesh
+    drawing : Drawing
+    key : str
+        Key path of its section, for messages.
+
+    Returns
+    -------
+    vertices_m : (nv, 3) float64, m
+    triangles : (nt, 3) int64
+
+    Raises
+    ------
+    BadInputError
+        As :func:`mesh_solid`.
+    """
+    from sandmould.scenario.mesh_file import read_surface  # slow to import, and few scenes have it
+
+    file_name = display_path(drawing.path)
+    if is_step(drawing.path) and drawing.unit_m != 1.0:
+        valid = "absent, or 1, for a STEP file, which tells its own unit"
+        raise BadInputError([Problem(f"{key}.unit_m", drawing.unit_m, valid)])
+    try:
+        sha256_now = file_hash(drawing.path)
+        if drawing.sha256 not in (None, sha256_now):
+            valid = "the file that the study was planned with; this one has changed since"
+            raise MeshFileError(valid)
+        vertices, triangles = read_surface(drawing.path)
+    except MeshFileError as fault:
+        raise BadInputError([Problem(f"{key}.file", file_name, str(fault))]) from fault
+    return drawing.unit_m * vertices @ turn_about_vertical(drawing).T, triangles
+
+
+def turn_about_vertical(drawing: Drawing) -> Array:
+    """Matrix that turns a drawing about the vertical, (3, 3) float64."""
+    c, s = math.cos(math.radians(drawing.angle_deg)), math.sin(math.radians(drawing.angle_deg))
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def unit_hint(size_m: Array, box_m: Array, unit_m: float) -> str:
+    """What to say of a drawing far larger than its box: that it may be in mm; else nothing.
+
+    Parameters
+    ----------
+    size_m : (3,) float64, m
+        Of the drawing, as read.
+    box_m : (3,) float64, m
+    unit_m : float, m
+        That it was read with.
+    """
+    if unit_m == 1.0 and (size_m > 10.0 * box_m).any() and (1e-3 * size_m <= box_m).all():
+        return "; with unit_m: 0.001 it fits: it seems to be drawn in mm"
+    return ""
+
+
+def drawing_notes(drawing: Drawing, key: str) -> list[str]:
+    """What was repaired in a drawing, may have been meant otherwise, or takes long to read.
+
+    Parameters
+    ----------
+    drawing : Drawing
         Whose file can be read.
     key : str
-        Key path, for the sentence.
+        Key path, for the sentences.
     """
-    from sandmould.scenario.mesh_file import filled_shells  # see mesh_solid
+    from sandmould.scenario.mesh_file import read_surface, repairs  # see drawn_surface
 
-    count = filled_shells(solid.path)
-    if not count:
-        return ""
-    shells = "1 shell that lies" if count == 1 else f"{count} shells that lie"
-    return (
-        f"{key} has {shells} in another one with its faces outwards, and is part of the solid "
-        "there. A cavity faces inwards."
-    )
+    done, triangles = repairs(drawing.path), len(read_surface(drawing.path)[1])
+    said = []
+    if done.filled_shells:
+        count = done.filled_shells
+        shells = "1 shell that lies" if count == 1 else f"{count} shells that lie"
+        said.append(
+            f"{key} has {shells} in another one with its faces outwards, and is part of the solid "
+            "there. A cavity faces inwards."
+        )
+    if done.turned_triangles:
+        said.append(
+            f"{key} had {done.turned_triangles} triangles turned inside out. They were turned "
+            "round: their surface has no solid on its other side."
+        )
+    if triangles > MANY_TRIANGLES:
+        said.append(
+            f"{key} has {triangles:,} triangles: every process of the study takes about "
+            f"{READ_S * triangles:.0f} s and {1e-6 * READ_BYTES * triangles:,.0f} MB to read them. "
+            "A coarser surface does as well where its triangles are far smaller than grains."
+        )
+    return said
 
 
 def with_hash(solid: Named) -> Named:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from pattern_fe.elasticity import element_stiffness_n_m, internal_force_n
+from pattern_fe.elasticity import element_tangent_n_m, internal_force_n
 from pattern_fe.large_displacement import LoadNotReachedError, NewtonSettings
 from pattern_fe.material import Foam
 from pattern_fe.pattern import Pattern
@@ -53,7 +53,7 @@ def test_tangent_is_the_slope_of_the_force(kind: str) -> None:
     pattern = pattern_of_kind(kind, 2)
     random = np.random.default_rng(4)
     place, way = (1e-3 * random.standard_normal(pattern.space.node_m.shape) for _ in range(2))
-    tangent = pattern.space.assembled(element_stiffness_n_m(pattern.space, pattern.foam, place))
+    tangent = pattern.space.assembled(element_tangent_n_m(pattern.space, pattern.foam, place))
     force = [internal_force_n(pattern.space, pattern.foam, place + s * way) for s in (-1e-4, 1e-4)]
     slope = (force[1] - force[0]) / 2e-4
     change = (tangent @ way.ravel()).reshape(slope.shape)

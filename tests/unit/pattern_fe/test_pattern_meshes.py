@@ -246,9 +246,9 @@ def test_outline_that_touches_itself_is_refused() -> None:
 
 def test_pattern_outside_a_box_is_refused() -> None:
     mesh = mesh_of_kind("quadrilaterals")
-    check_inside(mesh, np.zeros(2), np.full(2, 0.02))
+    check_inside(mesh.p.T, np.zeros(2), np.full(2, 0.02))
     with pytest.raises(ValueError, match=r"reaches from \(0, 0\) to \(0.02, 0.02\) m, valid is in"):
-        check_inside(mesh, np.zeros(2), np.array([0.02, 0.019]))
+        check_inside(mesh.p.T, np.zeros(2), np.array([0.02, 0.019]))
 
 
 @pytest.mark.parametrize(

@@ -190,8 +190,27 @@ def test_a_mesh_file_of_tetrahedra_meets_the_sand(tmp_path: Path) -> None:
     [
         ({}, {"position_m": [0.06, 0.0]}, r"pattern.position_m = \[0.06, 0.0\] .* 3 numbers, one"),
         ({}, {"depth_m": 0.07}, r"pattern.position_m = .* reaches from \(0.06, 0.02, 0\) to"),
-        ({}, {"loop": {"scheme": "in_step"}}, r"loop.scheme = 'in_step' .* with windows in 3D"),
-        ({}, {"loop": {"scheme": "monolithic"}}, r"scheme = 'monolithic' .* with windows in 3D"),
+        ({}, {"loop": {"scheme": "monolithic"}}, r"scheme = 'monolithic' .* another scheme in 3D"),
+        (
+            {},
+            {"loop": {"scheme": "in_step"}, "element_m": 0.002},
+            r"element_m = 0.002 .* at most 5,000 components of a surface",
+        ),
+        (
+            {
+                **SPACE,
+                "obstacles": [
+                    {
+                        "kind": "plate",
+                        "name": "post",
+                        "centre_m": [0.02, 0.04, 0.05],
+                        "size_m": [0.01, 0.01, 0.02],
+                    }
+                ],
+            },
+            {"loop": {"scheme": "in_step"}},
+            r"scheme = 'in_step' .* with windows in 3D beside the obstacle 'post'",
+        ),
         (
             {},
             {"loop": {"scheme": "per_layer"}, "young_modulus_pa": 1e3},

@@ -115,7 +115,7 @@ CASES: dict[str, tuple[str, str]] = {
         f"file: {ROOT}/config/meshes/bracket.stl, position_m: [0, 0, 0.05]}}]}}",
         "trial.yaml: scenario.obstacles.0.position_m = [0.0, 0.0, 0.05] cannot be used: valid is "
         "one that puts the mesh, now from (-30, -30, -7.95) to (50, 30, 8.05) m, inside the box, "
-        "0.18 x 0.12 x 0.18 m.",
+        "0.18 x 0.12 x 0.18 m; with unit_m: 0.001 it fits: it seems to be drawn in mm.",
     ),
     "grains larger than the tube": (
         "based_on: tube\nscenario: {sand: {size_scale: 30}}",

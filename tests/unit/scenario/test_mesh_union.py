@@ -15,7 +15,7 @@ from sandmould.casting.arpm.raster import painted
 from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.geometry import Block
 from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.mesh_file import filled_shells, read_surface
+from sandmould.scenario.mesh_file import read_surface, repairs
 from tests.unit.meshes import CORNERS, FACETS
 from tests.unit.scenario.test_mesh_file import write_stl
 
@@ -123,8 +123,8 @@ def test_cavity_that_sticks_out_is_refused(tmp_path: Path) -> None:
 
 
 def test_shell_that_changes_nothing_is_counted(tmp_path: Path) -> None:
-    assert filled_shells(file_of(SCENES["one in the other"][0], tmp_path)) == 1
-    assert filled_shells(file_of(SCENES["hollow"][0], tmp_path)) == 0
+    assert repairs(file_of(SCENES["one in the other"][0], tmp_path)).filled_shells == 1
+    assert repairs(file_of(SCENES["hollow"][0], tmp_path)).filled_shells == 0
 
 
 def test_union_has_no_narrower_triangles_than_its_parts(tmp_path: Path) -> None:

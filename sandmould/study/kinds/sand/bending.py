@@ -39,8 +39,10 @@ class BentPattern:
         self.drawn: Perimeter = self.pattern.surface.outer
         """The surface that the sand meets, as drawn; in 2D a line."""
         held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
+        if not len(held):
+            held = self.pattern.space.node_m.mean(axis=0, keepdims=True)
         self.tip = farthest_corner(self.drawn.vertices_m, held)
-        """Its vertex farthest from the supports."""
+        """Its vertex farthest from the supports, or from its middle where it has none."""
         around = surroundings_of(scenario, self.pattern)
         self._body = FoamBody(self.pattern, config.statics == "large", around)
 
@@ -78,6 +80,8 @@ class BentPattern:
 
     def _answered_m(self, load_n: np.ndarray) -> float:
         """Deflection of the tip at rest under a load; NaN where there is no rest."""
+        if self.pattern.is_free:
+            return np.nan
         try:
             return -float(self._body.solve(load_n).displacement_m[self.tip, -1])
         except LoadNotReachedError:

@@ -17,9 +17,10 @@ from sandmould.scenario.hardness import Hardness, bed_hardness
 from sandmould.scenario.limits import FRAMES, RECORDS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.outline import Outline
+from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import SolidMesh, filled_note, with_hash
+from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawing_notes, with_hash
 from sandmould.scenario.wall_thickness import thinnest_wall
 from sandmould.study.kinds.kind import MachineSpeed, Note, Planning, SpeedClass
 from sandmould.study.kinds.sand import speed
@@ -27,6 +28,8 @@ from sandmould.study.kinds.sand.hardness_text import hardness_text, softness_war
 from sandmould.study.kinds.sand.measures import MEASURES
 
 BASE_MEMORY_MB = 600
+STEPPED_COPIES = 8
+"""Matrices of a surface held together while the masses of the in-step scheme are found."""
 GRAINS_PER_MB = 50
 SLOW_RATE = 1e6
 """Grain-steps per second of a slow core; benchmarks/ has those measured."""
@@ -38,6 +41,9 @@ in a snapshot: measured at 282 discs and 2 000 spheres."""
 PASSES = 4.0
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
+STEPPED_ENTRY_S = 0.55e-9
+"""Processor time of a step for an entry of the matrix of a pattern stepped in step: 0.88 ms
+measured at 1 292 components, 2.1 ms at 1 820."""
 PASS_S = 2e-3
 """Processor time of a pass of a window beside its grain-steps: loads, solution, new surface."""
 
@@ -47,9 +53,14 @@ def resolved(scenario: Scenario) -> Scenario:
 
     So a changed mesh makes another run.
     """
-    if scenario.pattern is not None:
+    pattern = scenario.pattern
+    if pattern is not None:
         from pattern_fe.coupling.interface import with_surface  # scikit-fem: few studies need it
 
+        if isinstance(pattern.shape, PatternDrawing):
+            shape = with_hash(pattern.shape)
+            pattern = pattern.model_copy(update={"shape": shape})
+            scenario = scenario.model_copy(update={"pattern": pattern})
         scenario = with_surface(scenario)
     solids = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
     hashed = {
@@ -125,8 +136,24 @@ def ranks(scenario: Scenario) -> int:
 
 
 def memory_mb(scenario: Scenario) -> int:
-    """Several times the 126 MB measured at 1 134 discs, 144 at 8 000."""
-    return BASE_MEMORY_MB + sum(plan_counts(scenario)) // GRAINS_PER_MB
+    """Several times the 126 MB measured at 1 134 discs, 144 at 8 000, and what meshes take."""
+    triangles = sum(len(mesh.triangles) for mesh in scenario.scene.meshes)
+    mesh_mb = READ_BYTES * triangles // 1_000_000
+    return (
+        BASE_MEMORY_MB + sum(plan_counts(scenario)) // GRAINS_PER_MB + mesh_mb + _foam_mb(scenario)
+    )
+
+
+def _foam_mb(scenario: Scenario) -> int:
+    """Memory for the equations of a pattern in 3D; in 2D it is lost in the rest."""
+    if scenario.pattern is None or scenario.dimension == 2:
+        return 0
+    from pattern_fe.scene import pattern_of  # see resolved
+
+    numbers = pattern_of(scenario).factor_numbers
+    if scenario.pattern.loop.scheme == "in_step":
+        numbers += STEPPED_COPIES * _stepped_components(scenario) ** 2
+    return 12 * numbers // 1_000_000
 
 
 def allowed_s(scenario: Scenario) -> float:
@@ -148,11 +175,22 @@ def predicted_s(scenario: Scenario) -> float:
 
 
 def beside_s(scenario: Scenario) -> float:
-    """Time for the pattern, which does not grow with the grains: so much a pass of a window."""
-    if scenario.pattern is None or not scenario.pattern.loop.has_windows:
+    """Time for the pattern, which does not grow with the grains: so much a pass or a step."""
+    if scenario.pattern is None:
         return 0.0
     loop = scenario.pattern.loop
+    if loop.scheme == "in_step":
+        return planned_steps(scenario) * _stepped_components(scenario) ** 2 * STEPPED_ENTRY_S
+    if not loop.has_windows:
+        return 0.0
     return min(loop.most_passes, PASSES) * planned_s(scenario) / loop.window_s * PASS_S
+
+
+def _stepped_components(scenario: Scenario) -> int:
+    """Components of the surface of a scenario's pattern."""
+    from pattern_fe.scene import pattern_of  # see resolved
+
+    return pattern_of(scenario).surface.vertices_m.size
 
 
 def planned_s(scenario: Scenario) -> float:
@@ -206,9 +244,27 @@ def notes(scenario: Scenario) -> list[Note]:
             )
             told.append(Note(f"walls of {solid.name}", text))
     for i, obstacle in enumerate(scenario.obstacles):
-        if isinstance(obstacle, SolidMesh) and (text := filled_note(obstacle, f"obstacles.{i}")):
-            told.append(Note(f"filled {i}", text))
-    return told
+        if isinstance(obstacle, SolidMesh):
+            key = f"obstacles.{i}"
+            told += [
+                Note(f"drawing {key} {n}", text)
+                for n, text in enumerate(drawing_notes(obstacle, key))
+            ]
+    return [*told, *_pattern_notes(scenario)]
+
+
+def _pattern_notes(scenario: Scenario) -> list[Note]:
+    """What was repaired in the drawing of a pattern, and how good its mesh is."""
+    if scenario.pattern is None or not isinstance(scenario.pattern.shape, PatternDrawing):
+        return []
+    from pattern_fe.quality import mesh_sentence
+    from pattern_fe.scene import pattern_of
+
+    said = [
+        *drawing_notes(scenario.pattern.shape, "pattern.shape"),
+        mesh_sentence(scenario, pattern_of(scenario)),
+    ]
+    return [Note(f"mesh of the pattern {n}", text) for n, text in enumerate(said)]
 
 
 def _hardness_note(hardness: Hardness) -> Note:

@@ -16,7 +16,7 @@ from sandmould.casting.arpm.estimates import (
 )
 from sandmould.runs.formatting import number
 from sandmould.scenario.solidification import Solidification
-from sandmould.scenario.solids import SolidMesh, filled_note
+from sandmould.scenario.solids import SolidMesh, drawing_notes
 from sandmould.scenario.wall_thickness import ThinWall, thinnest_wall
 from sandmould.study.kinds.kind import Note
 
@@ -32,7 +32,7 @@ def notes(scenario: Solidification) -> Sequence[Note]:
     """Notes of one scenario that has no problems."""
     it = scene.cooled_of(scenario)
     return [*_sand(scenario, it), *_symmetry(scenario), *_walls(scenario), *_volume(scenario),
-            *_filled(scenario), *_front(scenario)]  # fmt: skip
+            *_drawings(scenario), *_front(scenario)]  # fmt: skip
 
 
 def _sand(scenario: Solidification, it: Cooled) -> Iterator[Note]:
@@ -112,10 +112,11 @@ def _volume(scenario: Solidification) -> Iterator[Note]:
         )
 
 
-def _filled(scenario: Solidification) -> Iterator[Note]:
+def _drawings(scenario: Solidification) -> Iterator[Note]:
     for n, shape in enumerate(scenario.shapes):
-        if isinstance(shape, SolidMesh) and (text := filled_note(shape, f"shapes.{n}")):
-            yield Note(f"filled {n}", text)
+        if isinstance(shape, SolidMesh):
+            for k, text in enumerate(drawing_notes(shape, f"shapes.{n}")):
+                yield Note(f"drawing {n} {k}", text)
 
 
 def _front(scenario: Solidification) -> Iterator[Note]:
