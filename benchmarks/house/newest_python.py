@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from packaging.markers import Marker, default_environment
 
 from sandmould import ROOT
+from sandmould.scenario.module_main import run_main
 
 NEWEST = "3.13"
 SOURCE_ALONE = {"connection-pool"}
@@ -31,7 +32,7 @@ def pins(lock: str, python: str) -> Iterator[str]:
             yield f"{name}=={version}"
 
 
-def main() -> None:
+def main() -> int:
     """Have pip look for the wheels; its message names a package that has none."""
     lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
     wanted = [pin for pin in pins(lock, NEWEST) if pin.split("==")[0] not in SOURCE_ALONE]
@@ -43,8 +44,8 @@ def main() -> None:
     status = subprocess.run(command, cwd=ROOT).returncode
     found = "missing" if status else "all there"
     print(f"{len(wanted)} locked packages, wheels for Python {NEWEST}: {found}")
-    raise SystemExit(status)
+    return status
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main, "python -m benchmarks.house.newest_python")

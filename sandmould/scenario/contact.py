@@ -117,7 +117,7 @@ class Contact(Section):
         "springs are multiplied alike so that it comes out.",
         unit="m/s",
         source="user",
-        gt=0,
+        ge=1.0,
         le=1e4,
     )
     no_tension: Literal["total", "elastic"] = quantity(

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from sandmould.runs.columns import CLOCK
+from sandmould.runs.measures import measures_of
 from sandmould.scenario.flow import MetalFlow
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
@@ -16,13 +17,13 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.registry import kind_of
-from sandmould.study.plan.measured import measured_in
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.simulate import measure_run, render_run, simulate
 from tests.hopper import DEEP, hopper_scene
 from tests.instep import bed_scene
 from tests.scenes import tube_scene
 
+PIT = {"kind": "box", "name": "pit", "centre_m": [0.03, 0.03], "size_m": [0.04, 0.04]}
 BRIEF: dict[str, Any] = {
     "fill": {"layers": [{"count": 40}], "settling": {"shortest_s": 0.01}},
     "rest": {
@@ -100,6 +101,7 @@ SCENES = {
     "table with an unbalance": lambda: tube_scene(
         **BRIEF | {"vibration": [SHAKE | {"hold": "unbalance", "unbalance": TABLE}]}
     ),
+    "cavity": lambda: tube_scene(**BRIEF, cavities=[PIT]),
     "tube in 3D": lambda: tube_scene(**BRIEF, **TUBE_IN_3D),
     "level gate": hopper,
     "level gate in 3D": lambda: hopper(**DEEP),
@@ -130,7 +132,7 @@ def columns_of(scenario: Section, folder: Path) -> set[str]:
 
 
 def listed(scenario: Section) -> set[str]:
-    measures = [measure.name for measure in measured_in(kind_of(scenario), scenario)]
+    measures = [m.name for m in measures_of(kind_of(scenario).planning.measures, scenario)]
     assert len(set(measures)) == len(measures)
     return set(measures)
 

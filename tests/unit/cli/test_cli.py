@@ -10,7 +10,7 @@ from PIL import Image
 from typer.testing import CliRunner, Result
 
 from sandmould.cli.commands import app
-from sandmould.cli.study_file import SHIPPED, shipped_studies, study_file
+from sandmould.cli.study_file import STUDIES, shipped_studies, study_file
 from sandmould.scenario.bad_input import BadInputError
 
 COARSE = """\
@@ -97,7 +97,7 @@ def test_a_study_is_a_file_or_the_name_of_a_shipped_one(elsewhere: Path) -> None
     mine.touch()
     assert study_file("mine.yaml") == Path("mine.yaml")
     assert study_file(str(mine)) == mine
-    assert study_file("tube_demo") == SHIPPED / "tube_demo.yaml"
+    assert study_file("tube_demo") == STUDIES / "tube_demo.yaml"
     assert shipped_studies("plates") == ["plates", "plates_small"]
     for missing in ("mine", "", "../tube_demo", "no/tube_demo.yaml"):
         with pytest.raises(BadInputError, match="tube_demo"):
@@ -140,7 +140,7 @@ def test_run_hands_options_on_to_snakemake(monkeypatch: pytest.MonkeyPatch) -> N
     said = sandmould("run", "tube_demo", "--cores", "2", "--", "--quiet", "rules", "host")
     assert said.exit_code == 7
     assert sandmould("run", "tube_demo").exit_code == 7
-    file = SHIPPED / "tube_demo.yaml"
+    file = STUDIES / "tube_demo.yaml"
     assert calls == [(file, ["--cores", "2", "--quiet", "rules", "host"]), (file, [])]
 
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 
 from sandmould import ROOT
 from sandmould.cli.commands import app
-from sandmould.cli.study_file import SHIPPED
+from sandmould.cli.study_file import STUDIES
 from sandmould.study.plan.ownership import OWNER_FILE, owner_of, owner_path, owner_text
 from tests.finished_study import study_text
 
@@ -80,11 +80,11 @@ def test_the_file_is_named_as_seen_from_the_working_folder(
 
 
 def test_a_shipped_study_is_the_same_wherever_it_is_installed(tmp_path: Path) -> None:
-    assert owner_text(SHIPPED / "plates.yaml") == "shipped study plates"
+    assert owner_text(STUDIES / "plates.yaml") == "shipped study plates"
     folder = tmp_path / "results" / "plates"
     folder.mkdir(parents=True)
     (folder / OWNER_FILE).write_text("shipped study plates\n")
-    assert owner_path(folder) == SHIPPED / "plates.yaml"
+    assert owner_path(folder) == STUDIES / "plates.yaml"
     assert (ROOT / "config" / "studies" / "plates.yaml").is_file()
 
 

@@ -160,7 +160,7 @@ def test_the_record_of_a_shipped_study_is_taken_up_where_it_fits(
     study = tmp_path / "config" / "studies" / "two.yaml"
     study.parent.mkdir(parents=True)
     shutil.copy("two.yaml", study)
-    monkeypatch.setattr(recorded, "ROOT", tmp_path)
+    monkeypatch.setattr(recorded, "SHIPPED", tmp_path)
     monkeypatch.setattr(recorded, "RECORDS", tmp_path / "records")
     unpack(packed, RESULTS)
     plan = open_plan(study)
