@@ -93,8 +93,8 @@ def test_a_killed_job_stops_its_run_which_the_next_one_continues(tmp_path: Path)
     stopped = RunOutcome.read(run / "work" / "outcome.json")
     assert stopped.outcome is Outcome.OUT_OF_WALL_TIME
     second = job(tmp_path, [run])
-    second.communicate(timeout=120)
-    assert second.returncode == 0
+    said = second.communicate(timeout=120)[1]
+    assert second.returncode == 0, said
     assert RunOutcome.read(run / "outcome.json").outcome is Outcome.FINISHED
 
 
