@@ -21,7 +21,7 @@ SMALLEST_DISK_BYTES = 2_000_000_000
 
 
 @dataclass(frozen=True)
-class Finding:
+class InstallationPart:
     """One thing that was looked at."""
 
     what: str
@@ -30,7 +30,7 @@ class Finding:
     """What to do about it; empty where nothing is wrong."""
 
 
-def findings(folder: Path) -> list[Finding]:
+def findings(folder: Path) -> list[InstallationPart]:
     """Look at the program, its engines, the machine, the cluster and the disk.
 
     Parameters
@@ -39,9 +39,9 @@ def findings(folder: Path) -> list[Finding]:
         Where results would go.
     """
     return [
-        Finding("sandmould", f"{metadata.version('sandmould')} ({commit()})"),
-        Finding("Python", f"{platform.python_version()}, {platform.platform(terse=True)}"),
-        Finding("processor", f"{processor()}, {os.cpu_count()} cores"),
+        InstallationPart("sandmould", f"{metadata.version('sandmould')} ({commit()})"),
+        InstallationPart("Python", f"{platform.python_version()}, {platform.platform(terse=True)}"),
+        InstallationPart("processor", f"{processor()}, {os.cpu_count()} cores"),
         *(_engine(name) for name in ENGINE_NAMES),
         _kernels(),
         _slurm(),
@@ -49,40 +49,44 @@ def findings(folder: Path) -> list[Finding]:
     ]
 
 
-def _engine(name: str) -> Finding:
+def _engine(name: str) -> InstallationPart:
     engine = engine_module(name)
     problem = engine.installation_problem()
     version = engine.installed_version()
     found = f"version {version}" if version else "not installed"
     wrong = f"studies on this engine need {problem}" if problem else ""
-    return Finding(f"engine {name}", found, wrong)
+    return InstallationPart(f"engine {name}", found, wrong)
 
 
-def _kernels() -> Finding:
+def _kernels() -> InstallationPart:
     folder = cache_folder()
     if any(folder.glob("**/*.nbi")):
-        return Finding("compiled loops", f"kept in {folder}")
-    return Finding("compiled loops", f"none yet; the first study compiles them into {folder}")
+        return InstallationPart("compiled loops", f"kept in {folder}")
+    return InstallationPart(
+        "compiled loops", f"none yet; the first study compiles them into {folder}"
+    )
 
 
-def _slurm() -> Finding:
+def _slurm() -> InstallationPart:
     if shutil.which("sbatch") is None:
-        return Finding("cluster", "no Slurm on this machine")
+        return InstallationPart("cluster", "no Slurm on this machine")
     settings = f"{CLUSTER_FILE} is there" if CLUSTER_FILE.is_file() else f"no {CLUSTER_FILE} here"
-    return Finding("cluster", f"Slurm; {settings} (docs/cluster.md)")
+    return InstallationPart("cluster", f"Slurm; {settings} (docs/cluster.md)")
 
 
-def _disk(folder: Path) -> Finding:
+def _disk(folder: Path) -> InstallationPart:
     place = folder if folder.is_dir() else Path.cwd()
     free = shutil.disk_usage(place).free
     said = f"{size_text(free)} free in {place.absolute()}"
     if not os.access(place, os.W_OK):
-        return Finding("disk", said, "work in a folder that you may write to")
+        return InstallationPart("disk", said, "work in a folder that you may write to")
     few = free < SMALLEST_DISK_BYTES
-    return Finding("disk", said, "free some: a study can take a few hundred MB" if few else "")
+    return InstallationPart(
+        "disk", said, "free some: a study can take a few hundred MB" if few else ""
+    )
 
 
-def doctor_text(found: list[Finding]) -> str:
+def doctor_text(found: list[InstallationPart]) -> str:
     """One line a finding; what to do stands below it."""
     width = max(len(finding.what) for finding in found)
     lines = []
