@@ -24,6 +24,7 @@ from sandmould.report.templates import page_environment
 from sandmould.runs.files import replaced
 from sandmould.runs.formatting import listed, number
 from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.scenario.geometry import Bore, Cavity
 from sandmould.scenario.likely_bed import LikelyBed, likely_bed
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
@@ -159,10 +160,10 @@ def _facts(s: Scenario) -> tuple[Row, ...]:
     if s.obstacles:
         names = [o.name.replace("_", " ") for o in s.obstacles]
         rows.append(Row("in the box", listed(list(dict.fromkeys(names)), most=8)))
-    for bore in s.scene.bores:
-        rows.append(
-            Row(f"cavity {bore.name.replace('_', ' ')}", f"{1e3 * bore.length_m:g} mm deep")
-        )
+    spaces: list[Bore | Cavity] = [*s.scene.bores, *s.scene.cavities]
+    for space in spaces:
+        name = space.name.replace("_", " ")
+        rows.append(Row(f"cavity {name}", f"{1e3 * space.length_m:.4g} mm deep"))
     for stage in s.vibrations:
         along = ", ".join(f"{x:.3g}" for x in stage.unit_direction(d))
         moves = f"{number(stage.frequency_hz)} Hz along ({along}), {number(stage.duration_s)} s"

@@ -173,8 +173,8 @@ class SphereFrames:
             return light, {}
         name, script = f"{self.film.run}.js", self.whole.script
         href = f"{folder_href}{quote(name)}"
-        told = replace(light, beside=href, beside_bytes=len(script), beside_frames=total)
-        return told, {name: script}
+        inside = replace(light, beside=href, beside_bytes=len(script), beside_frames=total)
+        return inside, {name: script}
 
     def _behind(self, cut_m: float) -> tuple[NDArray[np.int64], tuple[float, float] | None]:
         """Grains on the plane of the cut and next behind it, and between which y they lie."""

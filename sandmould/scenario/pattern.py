@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from sandmould import ROOT
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
+from sandmould.scenario.solids import DRAWING_ANGLE, DRAWING_FILE, DRAWING_HASH, DRAWING_UNIT
 
 ROJEK = "Rojek 2004, section 4.3"
 
@@ -71,32 +72,10 @@ class PatternDrawing(Section):
     """A solid drawn in an STL or STEP file, 3D only; Gmsh fills it with tetrahedra."""
 
     kind: Literal["drawing"]
-    file: str = quantity(
-        ...,
-        "STL or STEP file (.step, .stp), seen from the file that names it; in a resolved scenario, "
-        "from the repository.",
-        source="user",
-        min_length=1,
-    )
-    sha256: str | None = quantity(
-        None,
-        "Hash of the file; the plan of a study writes it, so that another drawing is another run.",
-        source="user",
-        pattern=r"^[0-9a-f]{64}$",
-    )
-    unit_m: float = quantity(
-        1.0,
-        "Length that stands for 1 in an STL file: 0.001 for one drawn in mm. A STEP file tells its "
-        "own unit.",
-        unit="m",
-        source="user",
-        gt=0,
-        le=100,
-    )
-    angle_deg: float = quantity(
-        0.0, "Turn about the vertical through the file's origin.", unit="deg", source="user",
-        ge=-360, le=360,
-    )  # fmt: skip
+    file: str = DRAWING_FILE
+    sha256: str | None = DRAWING_HASH
+    unit_m: float = DRAWING_UNIT
+    angle_deg: float = DRAWING_ANGLE
 
     @property
     def path(self) -> Path:

@@ -55,37 +55,44 @@ class NamesFile(Protocol):
 Named = TypeVar("Named", bound=NamesFile)
 
 
+DRAWING_FILE: Any = quantity(
+    ...,
+    "STL or STEP file (.step, .stp), seen from the file that names it; in a resolved scenario, "
+    "from the repository.",
+    source="user",
+    min_length=1,
+)
+DRAWING_HASH: Any = quantity(
+    None,
+    "Hash of the file; the plan of a study writes it, so that another drawing is another run.",
+    source="user",
+    pattern=r"^[0-9a-f]{64}$",
+)
+DRAWING_UNIT: Any = quantity(
+    1.0,
+    "Length that stands for 1 in an STL file: 0.001 for one drawn in mm. A STEP file tells its "
+    "own unit.",
+    unit="m",
+    source="user",
+    gt=0,
+    le=100,
+)
+DRAWING_ANGLE: Any = quantity(
+    0.0, "Turn about the vertical through the file's origin.", unit="deg", source="user",
+    ge=-360, le=360,
+)  # fmt: skip
+"""Keys of whatever is drawn in a file, an obstacle or a pattern."""
+
+
 class SolidMesh(Section):
     """A solid drawn in an STL or STEP file, 3D only."""
 
     kind: Literal["mesh"]
     name: str = quantity("mesh", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
-    file: str = quantity(
-        ...,
-        "STL or STEP file (.step, .stp), seen from the file that names it; in a resolved scenario, "
-        "from the repository.",
-        source="user",
-        min_length=1,
-    )
-    sha256: str | None = quantity(
-        None,
-        "Hash of the file; the plan of a study writes it, so that another mesh is another run.",
-        source="user",
-        pattern=r"^[0-9a-f]{64}$",
-    )
-    unit_m: float = quantity(
-        1.0,
-        "Length that stands for 1 in an STL file: 0.001 for one drawn in mm. A STEP file tells its "
-        "own unit.",
-        unit="m",
-        source="user",
-        gt=0,
-        le=100,
-    )
-    angle_deg: float = quantity(
-        0.0, "Turn about the vertical through the file's origin.", unit="deg", source="user",
-        ge=-360, le=360,
-    )  # fmt: skip
+    file: str = DRAWING_FILE
+    sha256: str | None = DRAWING_HASH
+    unit_m: float = DRAWING_UNIT
+    angle_deg: float = DRAWING_ANGLE
     position_m: tuple[float, float, float] = quantity(
         (0.0, 0.0, 0.0), "Place of the file's origin in the box.", unit="m", source="user"
     )
