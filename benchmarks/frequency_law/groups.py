@@ -32,6 +32,8 @@ LAW = ("velocity_m_s", "in_modes")
 """The pair that the page's last part is about."""
 
 
+THROWN_G = 1.0
+"""Below it the box never throws the sand, so nothing of the law can hold."""
 NEAR = 1.3
 """A setting is near a velocity within this factor."""
 
@@ -64,7 +66,7 @@ class HeldOut:
 
     def best_in_modes(self, column: str) -> float:
         """F over c/(4 H) where ``fill`` or ``told`` is largest."""
-        return float(self.settings["in_modes"].loc[self.settings[column].idxmax()])
+        return float(self.settings["in_modes"].iloc[int(self.settings[column].argmax())])
 
 
 def settings_of(series: Sequence[Series]) -> pd.DataFrame:
@@ -89,11 +91,16 @@ def settings_of(series: Sequence[Series]) -> pd.DataFrame:
 def collapses(settings: pd.DataFrame, names: Sequence[str] = tuple(GROUPS)) -> list[Collapse]:
     """Each of these groups and each pair of them: singles first, then best first."""
     found = [
-        Collapse(groups, _root_mean_square(told_by_others(settings, groups) - settings["fill"]))
+        Collapse(groups, miss_of(settings, groups))
         for number in (1, 2)
         for groups in itertools.combinations(names, number)
     ]
     return sorted(found, key=lambda collapse: (len(collapse.groups), collapse.miss))
+
+
+def miss_of(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> float:
+    """Root mean square of what other curves tell less what was measured."""
+    return float(np.sqrt(np.mean((told_by_others(settings, groups) - settings["fill"]) ** 2)))
 
 
 def told_by_others(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> Array:
@@ -151,7 +158,3 @@ def shaken_range(settings: pd.DataFrame, velocity_m_s: float) -> tuple[float, fl
     near = np.abs(np.log(settings["velocity_m_s"] / velocity_m_s)) < np.log(NEAR)
     in_modes = settings.loc[near, "in_modes"]
     return float(in_modes.min()), float(in_modes.max())
-
-
-def _root_mean_square(values: Any) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

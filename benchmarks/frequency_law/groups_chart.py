@@ -46,7 +46,7 @@ def draw(settings: pd.DataFrame, velocities_m_s: Sequence[float], path: Path) ->
     figure.colorbar(dots, ax=left, label="peak velocity of the box, m/s")
     told = told_by_others(settings)
     for (study, label), mine in settings.groupby(["study", "label"], sort=False):
-        name = f"{study.removeprefix('tube_law_')}, {label}"
+        name = f"{str(study).removeprefix('tube_law_')}, {label}"
         right.errorbar(
             told[mine.index], mine["fill"], yerr=mine["se"], fmt="o", ms=4, lw=1, label=name
         )

@@ -87,7 +87,8 @@ def _study(folder: Path) -> dict[str, Any]:
 
 
 def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
-    settings = groups.settings_of([s for name in COLLAPSED for s in there[name]["series"]])
+    every = groups.settings_of([s for name in COLLAPSED for s in there[name]["series"]])
+    settings = every[every["acceleration_g"] > groups.THROWN_G].reset_index(drop=True)
     law = groups.Law(settings)
     asked = pd.DataFrame(
         [
@@ -102,6 +103,8 @@ def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     asked["fill"] = law.at(asked)
     return {
         "settings": settings,
+        "at_rest": len(every) - len(settings),
+        "miss_with_all": groups.miss_of(every),
         "names": groups.GROUPS,
         "collapses": groups.collapses(settings),
         "told_in_modes": TOLD_IN_MODES,
