@@ -7,6 +7,7 @@ other springs, depths and holds would tell it.
 from __future__ import annotations
 
 import itertools
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,6 +29,22 @@ GROUPS = {
     "in_modes": "f over c/(4 H)",
 }
 """What the fill may go with, as the page calls it. Amplitudes are peaks of the box's motion."""
+EXPLANATIONS: dict[str, tuple[str, ...]] = {
+    "how long the bed flies in a period: of a body that bounces without rebound it goes with "
+    "acceleration alone": ("acceleration_g",),
+    "how long the wave of a landing takes through the bed and back, 2 H/c, in periods": (
+        "in_modes",
+    ),
+    "how fast it lands": ("velocity_m_s",),
+    "sag of the bed under its weight, g H²/(2 c²), over the stroke": ("sag_over_stroke",),
+    "strain of a landing, velocity over c, and 2 H/c in periods": ("strain", "in_modes"),
+    "velocity over that of a fall through the bed, sqrt(g H), and 2 H/c in periods": (
+        "over_fall",
+        "in_modes",
+    ),
+    "velocity, and 2 H/c in periods": ("velocity_m_s", "in_modes"),
+}
+"""What may move the sand, and the groups that the fill would go with then."""
 LAW = ("velocity_m_s", "in_modes")
 """The pair that the page's last part is about."""
 
@@ -70,12 +87,28 @@ class HeldOut:
 
 
 def settings_of(series: Sequence[Series]) -> pd.DataFrame:
-    """One row a setting: ``curve`` (int), ``study``, ``label``, ``GROUPS``, ``fill``, ``se``."""
-    rows = []
+    """One row a setting.
+
+    Parameters
+    ----------
+    series : sequence of Series
+
+    Returns
+    -------
+    DataFrame
+        ``curve`` (int), ``study``, ``label``, ``GROUPS`` and the groups of ``EXPLANATIONS``, mean
+        ``fill`` and its standard error ``se``.
+    """
+    rows: list[pd.DataFrame] = []
     for curve, one in enumerate(series):
-        fills = one.fills
+        fills, depth_m, speed_m_s = one.fills, one.depth_m, one.wave_speed_m_s
+        gravity_m_s2 = one.scenario.gravity_m_s2
+        velocity_m_s, stroke_m = one.drives["velocity_m_s"], one.drives["displacement_m"]
         rows.append(
             one.drives.assign(
+                strain=velocity_m_s / speed_m_s,
+                over_fall=velocity_m_s / math.sqrt(gravity_m_s2 * depth_m),
+                sag_over_stroke=gravity_m_s2 * depth_m**2 / (2 * speed_m_s**2) / stroke_m,
                 curve=curve,
                 study=one.study,
                 label=one.label,
@@ -125,7 +158,7 @@ class Law:
     settings : DataFrame
         As of ``settings_of``.
     groups : sequence of str
-        Of ``GROUPS``.
+        Columns of the settings.
     """
 
     def __init__(self, settings: pd.DataFrame, groups: Sequence[str] = LAW) -> None:

@@ -107,6 +107,9 @@ def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
         "miss_with_all": groups.miss_of(every),
         "names": groups.GROUPS,
         "collapses": groups.collapses(settings),
+        "explanations": {
+            what: groups.miss_of(settings, needed) for what, needed in groups.EXPLANATIONS.items()
+        },
         "told_in_modes": TOLD_IN_MODES,
         "told": {
             v: dict(zip(mine["in_modes"], mine["fill"], strict=True))
