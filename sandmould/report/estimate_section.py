@@ -59,6 +59,11 @@ class EstimatePages:
     worths: Table | None
     cost: str
 
+    @property
+    def has_section(self) -> bool:
+        """Whether there is more to show than sentences."""
+        return bool(self.heaps or self.map or self.sands or self.worths)
+
 
 def estimate_pages(
     study_folder: Path, study: Study, collected: Collected, verdict: Verdict, scenario: AnyScenario

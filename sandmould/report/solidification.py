@@ -111,8 +111,9 @@ def _stand_ins(path: Path) -> tuple[str, ...]:
     keys = [key for key, source in sources.items() if source.startswith(STAND_IN)]
     if not keys:
         return ()
+    names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
     return (f"Stand-ins by their sources, so that times are those of no real casting: "
-            f"{listed(keys, most=20)}.",)  # fmt: skip
+            f"{listed(names, most=20)}.",)  # fmt: skip
 
 
 def _grounds(has_stand_ins: bool, scenario: Solidification) -> tuple[Ground, ...]:

@@ -14,8 +14,11 @@ import pytest
 
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report import figures
+from sandmould.report.method import provenance_rows
 from sandmould.report.page import LIMIT_BYTES, write_report
 from sandmould.report.sand import _layer_conclusion
+from sandmould.report.tables import Column, Table
+from sandmould.report.templates import page_environment
 from sandmould.study.collect import collect
 from tests.unit.report_study import (
     ENGINES,
@@ -117,6 +120,24 @@ def test_every_picture_is_told(text: str) -> None:
     figures = len(page.of("figure"))
     assert figures == len(page.of("figcaption")) >= 8
     assert re.findall(r"<b>Figure (\d+)\.</b>", text) == [str(n + 1) for n in range(figures)]
+
+
+def test_the_table_of_runs_folds_in_a_frame_that_scrolls(text: str) -> None:
+    folded = text[text.index('<details id="runs-table">') : text.index("</details>")]
+    assert "<summary>Table of 9 runs</summary>" in folded
+    assert '<div class="scroll" tabindex="0" role="region" aria-label="Runs">' in folded
+    assert folded.count("<tr") == 10
+
+
+def test_a_table_without_rows_vanishes() -> None:
+    charts = page_environment().get_template("charts.html").module
+    empty = Table((Column("hot spot"),), (), ())
+    assert str(charts.table(empty, True, "Hot spots")).strip() == ""  # type: ignore[attr-defined]
+
+
+def test_what_differs_from_run_to_run_is_no_origin_of_all() -> None:
+    rows = provenance_rows([{"command": f"run {n}", "versions": {"numpy": "2"}} for n in (1, 2)])
+    assert [(row.term, row.text) for row in rows] == [("versions: numpy", "2")]
 
 
 def test_headings_link_to_sections(text: str) -> None:
