@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from sandmould.cli.new import new
 from sandmould.cli.study_file import shipped_studies, study_file
 from sandmould.scenario.bad_input import BadInputError, Problem
 
@@ -79,6 +80,9 @@ def sandmould(
     ] = False,
 ) -> None:
     """Sand moulds for lost-foam casting: plan, run and report studies; results go to ./results."""
+
+
+app.command()(new)
 
 
 @app.command()
