@@ -238,6 +238,7 @@ def test_headings_sort_the_runs(page: webdriver.Chrome) -> None:
         cells = page.find_elements(By.CSS_SELECTOR, f"table.sortable td:nth-child({place})")
         return [cell.text for cell in cells]
 
+    page.find_element(By.CSS_SELECTOR, "#runs-table summary").click()
     heads = page.find_elements(By.CSS_SELECTOR, "table.sortable th")
     fill = next(n for n, head in enumerate(heads, 1) if head.text == "fill of the tube")
     for way in ("ascending", "descending"):

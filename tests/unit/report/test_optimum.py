@@ -45,8 +45,12 @@ def test_the_report_begins_with_the_optimum(tmp_path: Path) -> None:
     collect(folder)
     write_report(folder, folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")
-    first = text.index('class="verdict resolved"')
-    said = re.sub(r"<[^>]+>", "", text[first : first + 900]).replace("\xa0", " ")
+    first, detail = text.index('class="verdict resolved"'), text.index('id="details"')
+    answer = re.sub(r"<[^>]+>", "", text[first:detail]).replace("\xa0", " ")
+    assert re.search(
+        r"Shake at 4\d(\.\d)? Hz \([\d.]+ to [\d.]+ Hz\): there the tube fills", answer
+    )
+    said = re.sub(r"<[^>]+>", "", text[detail : detail + 900]).replace("\xa0", " ")
     assert re.search(
         r"The fill of the tube is highest at frequency 4\d(\.\d)? Hz \(95 % inter", said
     )

@@ -94,6 +94,7 @@ def test_an_artefact_is_the_first_sentence_of_the_report(tmp_path: Path) -> None
     said = re.sub(r"<[^>]+>", "", text[text.index('class="verdict') :][:1500]).replace("\xa0", " ")
     said = html.unescape(said[said.index(">") + 1 :].strip())
     assert said.startswith("The optimum at 50 Hz is an artefact of what is held constant: it moves")
+    said = html.unescape(text[text.index('id="details"') :])
     assert "Do not take it for a property of the sand's fill of the tube." in said
     assert 'class="verdict unresolved"' in text
     assert "Does the optimum belong to the sand?" in text
