@@ -12,7 +12,7 @@ TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
-.PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check docs clean
+.PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
 .PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow \
   reproduction
 
@@ -183,6 +183,10 @@ lock-check: $(INSTALLED)
 ## list stale results of docs/results and compute the smallest again
 results-check: $(INSTALLED)
 	$(BIN)/python -m sandmould.study.records check
+
+## the page of each committed result, and their list docs/results/README.md
+results-pages: $(INSTALLED)
+	$(BIN)/python -m benchmarks.house.record_pages
 
 ## remove results
 clean:
