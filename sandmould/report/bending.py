@@ -246,7 +246,7 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
         area = _area(aligned[aligned[RUN].isin(used)])
         if area is not None:
             said = f"{setting.label}: from the least to the greatest of {len(used)} runs"
-            areas.append(replace(area, tint=tint[setting.label], title=said))
+            areas.append(replace(area, tint=tint[setting.label], title=said, group=setting.label))
     clock = (
         "time since vibration began, s"
         if (collected.curves[VIBRATION_TIME_S] >= 0).any()
