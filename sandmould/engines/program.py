@@ -37,8 +37,10 @@ class Stage:
     """Among the stages of its kind, from 1; 0 of one that is the only one."""
     opens: str = ""
     """Plate that is taken away at the start."""
+    slides: str = ""
+    """Plate that slides away during the stage."""
     settling: Settling | None = None
-    """When the sand is at rest, which ends the stage; none in a vibration stage."""
+    """When the sand is at rest, which ends the stage; none in one of a given duration."""
     vibration: VibrationStage | None = None
     """How the box moves; in a stage of rest, the vibration that it comes from."""
     expected_s: float = 0.0
@@ -48,7 +50,7 @@ class Stage:
     vibration_steps: int = 0
     """Steps that the box has vibrated when the stage begins: it stops in the stage of rest."""
     steps: int = 0
-    """Steps of a stage that is a part of its vibration; 0 where it is all of it."""
+    """Steps of a stage of a given duration; 0 where its vibration has it."""
 
     @property
     def name(self) -> str:
@@ -64,8 +66,10 @@ class Stage:
         """Steps that the stage lasts; at most, where the sand comes to rest."""
         if self.settling is not None:
             return counts.steps(self.settling.longest_s)
+        if self.steps:
+            return self.steps
         assert self.vibration is not None
-        return self.steps or counts.vibration(self.vibration)
+        return counts.vibration(self.vibration)
 
     @property
     def stop_s(self) -> float:
@@ -160,15 +164,24 @@ def build_program(scenario: Scenario) -> Program:
     counts = plan_counts(scenario)
     stages = [*_pours(scenario, counts)]
     if scenario.discharge is not None:
-        stages.append(
-            Stage(
-                StageKind.DISCHARGE,
-                opens=scenario.discharge.gate,
-                settling=scenario.discharge.settling,
-                expected_s=_outflow_s(scenario, scenario.discharge),
-            )
-        )
+        stages += _flow(scenario, scenario.discharge)
     return Program(scenario, (*stages, *_box_stages(scenario)), tuple(counts))
+
+
+def _flow(scenario: Scenario, discharge: Discharge) -> Iterator[Stage]:
+    """The gate opens, and the sand flows until it rests or for a stated time."""
+    counts, gate = StepCounts.of(scenario), discharge.gate
+    opening_s, duration_s = discharge.opening_time_s or 0.0, discharge.duration_s
+    opening = counts.steps(opening_s)
+    if opening:
+        yield Stage(StageKind.OPEN, slides=gate, steps=opening, expected_s=opening_s)
+    if duration_s is None:
+        expected_s = _outflow_s(scenario, discharge)
+        settling = discharge.settling
+        yield Stage(StageKind.DISCHARGE, opens=gate, settling=settling, expected_s=expected_s)
+    else:
+        steps, left_s = counts.steps(duration_s) - opening, duration_s - opening_s
+        yield Stage(StageKind.DISCHARGE, opens=gate, steps=steps, expected_s=left_s)
 
 
 def _pours(scenario: Scenario, counts: list[int]) -> Iterator[Stage]:

@@ -183,6 +183,10 @@ def _discharge(s: Scenario) -> Iterator[Problem]:
     elif s.gate.angle_deg != 0.0:
         valid = "a plate with angle_deg 0, level or upright"
         yield Problem("discharge.gate", s.discharge.gate, valid)
+    opening_s, duration_s = s.discharge.opening_time_s, s.discharge.duration_s
+    if duration_s is not None and duration_s <= (opening_s or 0.0):
+        valid = f"more than discharge.opening_time_s, {opening_s:g} s, which is a part of it"
+        yield Problem("discharge.duration_s", duration_s, valid)
 
 
 def _pouring(s: Scenario) -> Iterator[Problem]:

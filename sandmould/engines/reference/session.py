@@ -14,7 +14,7 @@ from sandmould.dem import source_hash
 from sandmould.dem.solver import NotANumberError
 from sandmould.dem.table import MountedTable
 from sandmould.engines.box_motion import displacements, start_of_grains
-from sandmould.engines.program import Program
+from sandmould.engines.program import Program, Stage
 from sandmould.engines.reference.model import grains_of, scene_of, solver_of
 from sandmould.engines.session import Array, EngineStop, RefusedError
 from sandmould.engines.snapshot import Snapshot
@@ -23,6 +23,7 @@ from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_drive import table_motion
 from sandmould.engines.table_periods import TablePeriod, TablePeriods, window_of
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.discharge import slid_away_m
 from sandmould.scenario.fill import Settling
 
 
@@ -86,6 +87,15 @@ class ReferenceSession(StagedSession):
             self.solver.remove_surface(gate)
         else:  # about to be restored: there is nothing to list yet
             self.solver.surfaces.remove(gate)
+
+    def start_stage(self, stage: Stage) -> None:
+        """Begin a stage, in which a gate may slide away."""
+        super().start_stage(stage)
+        if stage.slides:
+            gate = self._scenario.gate
+            assert gate is not None
+            open_m = slid_away_m(gate, self._scenario.dimension)
+            self.move_surface(gate.name, open_m, stage.steps * self.step_s)
 
     def _restore(self, checkpoint: Path) -> None:
         with np.load(checkpoint / "solver.npz", allow_pickle=False) as arrays:
