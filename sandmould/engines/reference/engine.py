@@ -34,7 +34,6 @@ CAPABILITIES = Capabilities(
     loads_of_every_step=True,
     checkpoints_at_setups=False,
     moves_tables=True,
-    changes_step=True,
 )
 
 
