@@ -24,14 +24,9 @@ def _checks(program: Program) -> dict[str, tuple[int, int]]:
     into_check, checks = 0, {}
     for stage in program.stages:
         first = counts.check - into_check
-        if stage.settling is None:
-            assert stage.vibration is not None
-            longest = counts.vibration(stage.vibration)
-            into_check = (into_check + longest) % counts.check
-        else:
-            # A bed comes to rest at a check.
-            longest = counts.steps(stage.settling.longest_s)
-            into_check = 0
+        longest = stage.longest_steps(counts)
+        # A bed comes to rest at a check.
+        into_check = (into_check + longest) % counts.check if stage.settling is None else 0
         checks[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.check)))
     return checks
 
@@ -83,7 +78,7 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
         "rest_loads": scenario.rest.load_tolerance is not None and scenario.gravity_m_s2 > 0.0,
         "snapshot_steps": counts.records(scenario.record.snapshot_every_s),
         "steps": counts.steps,
-        "vibration_steps": counts.vibration,
+        "stage_steps": lambda stage: stage.longest_steps(counts),
         "vibration_key": lambda stage: vibration_key(program, stage),
         "direction": lambda v: v.unit_direction(scenario.dimension),
         "planned_mass": planned_masses_kg(program, classes),

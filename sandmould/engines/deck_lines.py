@@ -97,6 +97,8 @@ def skin_m(scenario: Scenario) -> float:
 
 def vibration_key(program: Program, stage: Stage) -> str:
     """Where in the scenario the vibration of a stage stands, or the one that a rest comes from."""
+    if stage.kind in (StageKind.POUR, StageKind.SETTLE):
+        return "fill.vibration"
     if stage.kind is StageKind.BETWEEN:
         return "fill.vibration_between_layers"
     if stage.kind is StageKind.REST:

@@ -237,7 +237,7 @@ class Driver:
                 f"{what} was not at rest after {stage.longest_key} = {longest_s:g}; "
                 f"{session.rest_sentence}",
             )
-        if stage.opens:
+        if stage.opens and settling is not None:
             why = what_blocks(self._scenario, session.snapshot())
             if why:
                 raise EngineStop(Outcome.NO_FLOW, why)
@@ -247,7 +247,9 @@ class Driver:
             session.insert_layer(stage.layer)
         session.start_stage(stage)
         snapshot = session.snapshot()  # all ranks take part in gathering
-        if (stage.counts_as_vibration or stage.opens) and self._recorder is not None:
+        if (
+            stage.counts_as_vibration or stage.opens or stage.slides
+        ) and self._recorder is not None:
             self._recorder.save(snapshot)
 
     def _window(self, session: Session) -> None:

@@ -17,6 +17,7 @@ from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, Session
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.engine import ENGINE_NAMES
+from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.unbalance_checks import unbalance_key
 
@@ -184,6 +185,10 @@ def engine_problem(scenario: Scenario) -> Problem | None:
             f"mounts moves on engine {able} alone, whose runs say with what amplitude"
         )
         return Problem(f"{key}.hold", "unbalance", valid)
+    if not engine.CAPABILITIES.moves_walls and (moved := moving_wall(scenario)):
+        able = " or ".join(engines_that(lambda can: can.moves_walls))
+        valid = f"absent on engine {scenario.engine.name}, whose walls stand; engine {able} has it"
+        return Problem(*moved, valid)
     fraction = scenario.time_step.bed_fraction
     if not engine.CAPABILITIES.changes_step and fraction is not None:
         able = " or ".join(engines_that(lambda can: can.changes_step))

@@ -133,10 +133,7 @@ class StagedSession(ABC):
 
     def _stage_steps(self) -> int:
         """Steps of the stage, at most."""
-        if self.stage.settling is not None:
-            return self._counts.steps(self.stage.settling.longest_s)
-        assert self.stage.vibration is not None
-        return self._counts.vibration(self.stage.vibration)
+        return self.stage.longest_steps(self._counts)
 
     def start_stage(self, stage: Stage) -> None:
         """Begin to settle, to flow out, to vibrate or to rest."""

@@ -53,6 +53,7 @@ from sandmould.report.optimum import (
 )
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sand import pictured_runs
+from sandmould.report.small_multiples import small_multiples
 from sandmould.report.sureness import certificate_ground, finished_ground
 from sandmould.report.tables import (
     KeyNumber,
@@ -226,6 +227,7 @@ def _render(
         provenance=provenance_rows(provenance),
         files=data_files(page.study_folder, page.href),
         both_sizes=_both_sizes,
+        multiples=small_multiples,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
         advice=(*of_kind.advice, *([] if optimum else _beside_mode(page, mode))),
         warning=of_kind.warning,

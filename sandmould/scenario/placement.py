@@ -6,6 +6,7 @@ it to the drop height over the bed that it finds.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -116,6 +117,12 @@ def _gate_under_sand_m(s: Scenario) -> float:
 def loose_height_m(s: Scenario, count: int) -> float:
     """Height of the falling column of a layer, before it is placed."""
     return count * _mean_grain_measure(s) / s.floor_measure / LOOSE_FRACTION[s.dimension]
+
+
+def fall_s(s: Scenario, count: int) -> float:
+    """Time that the highest grain of a layer falls, at most; infinite without gravity."""
+    fall_m = loose_height_m(s, count) + s.fill.drop_height_m
+    return math.sqrt(2 * fall_m / s.gravity_m_s2) if s.gravity_m_s2 > 0 else math.inf
 
 
 def _draw_classes(s: Scenario, count: int, rng: np.random.Generator) -> NDArray[np.int64]:

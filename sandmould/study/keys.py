@@ -43,6 +43,19 @@ def keys_text(path: str = "") -> str:
     return "\n".join(line for field in fields.values() for line in _of_key(parts[-1], field))
 
 
+def key_paths(start: str) -> list[str]:
+    """Key paths that begin so, one level deep, for the shell to complete.
+
+    Parameters
+    ----------
+    start : str
+    """
+    above, _, last = start.rpartition(".")
+    parts = [part for part in above.split(".") if part and not part.isdecimal()]
+    keys = {key for kind in KINDS.values() for key in keys_at(kind.study, parts)}
+    return [f"{above}.{key}".lstrip(".") for key in sorted(keys) if key.startswith(last)]
+
+
 def _sections(parts: list[str]) -> list[tuple[str, type[BaseModel]]]:
     """Sections that can stand at a path, with the kinds of study that have them."""
     found: dict[type[BaseModel], list[str]] = {}

@@ -26,6 +26,7 @@ CAPABILITIES = Capabilities(
     loads_of_every_step=False,
     checkpoints_at_setups=True,
     moves_tables=False,
+    moves_walls=False,
     changes_step=False,
 )
 

@@ -34,6 +34,7 @@ CAPABILITIES = Capabilities(
     loads_of_every_step=True,
     checkpoints_at_setups=False,
     moves_tables=True,
+    moves_walls=True,
     changes_step=True,
 )
 

@@ -25,6 +25,7 @@ BARE = Capabilities(
     loads_of_every_step=False,
     checkpoints_at_setups=False,
     moves_tables=False,
+    moves_walls=False,
     changes_step=False,
 )
 
