@@ -166,10 +166,11 @@ reproduction: $(INSTALLED)
 decks: $(INSTALLED)
 	$(BIN)/pytest tests/decks --refresh-golden
 
-## config/schema.json, config/default.yaml, docs/measures.md and docs/limits.md from the types
+## config/schema.json, config/default.yaml and docs/{measures,limits,keys,files,commands}.md from the types
 schema: $(INSTALLED)
 	$(BIN)/python -m sandmould.study.schema
 	$(BIN)/python -m sandmould.study.reference
+	$(BIN)/python -m sandmould.cli.reference
 
 ## pin all dependencies in requirements.lock, for every Python and platform that is supported
 lock:

@@ -29,7 +29,7 @@ from sandmould.runs.columns import RUN
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.collect import read_collected
+from sandmould.study.collect import Collected, read_collected
 from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.plan.plan_files import VERDICT_FILE, read_run
 
@@ -163,7 +163,7 @@ class Result:
         return upto[-1].load()
 
     @cached_property
-    def _collected(self) -> Any:
+    def _collected(self) -> Collected:
         return read_collected(self.folder)
 
     def _repr_html_(self) -> str:

@@ -141,16 +141,16 @@ def told_by_others(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> Array
     told = np.empty(len(settings))
     for curve in settings["curve"].unique():
         left_out = (settings["curve"] == curve).to_numpy()
-        told[left_out] = Law(settings[~left_out], groups).at(settings[left_out])
+        told[left_out] = FillLaw(settings[~left_out], groups).at(settings[left_out])
     return told
 
 
 def held_out(settings: pd.DataFrame, others: pd.DataFrame) -> HeldOut:
     """Ask the law of ``settings`` for those of another study."""
-    return HeldOut(others.assign(told=Law(settings).at(others)))
+    return HeldOut(others.assign(told=FillLaw(settings).at(others)))
 
 
-class Law:
+class FillLaw:
     """A smooth function of the logarithms of some groups: a Gaussian process with noise.
 
     Parameters

@@ -11,7 +11,7 @@ from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from benchmarks.frequency_law.groups import Law, shaken_range, told_by_others
+from benchmarks.frequency_law.groups import FillLaw, shaken_range, told_by_others
 
 
 def draw(settings: pd.DataFrame, velocities_m_s: Sequence[float], path: Path) -> None:
@@ -28,7 +28,7 @@ def draw(settings: pd.DataFrame, velocities_m_s: Sequence[float], path: Path) ->
     """
     figure = Figure(figsize=(10.0, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    law, colours = Law(settings), colormaps["viridis"]
+    law, colours = FillLaw(settings), colormaps["viridis"]
     velocities = settings["velocity_m_s"]
     norm = LogNorm(velocities.min(), velocities.max())
     dots = left.scatter(

