@@ -249,9 +249,11 @@ OF_STUDY: tuple[File, ...] = (
     File("report.html", "The report; it opens offline."),
     File("verdict.txt", "Its first sentence."),
     File("figures/<name>.svg", "Its charts."),
+    File("figures/.snakemake_timestamp", "Mark of Snakemake."),
     File("figures/<name>.png", "Its pictures of sand, pattern, heat and flow."),
     File("spheres/<name>.js", "All grains of a film that the page holds a part of, 3D."),
     File("rounds.json", "What each round of `refine` added, and why."),
+    File("all_runs_finished", "Mark: the check of all runs is done."),
     File("batches/<name>.done", "Mark: the runs of one job are whole."),
     File("logs/<name>.log", "What jobs said."),
     File("logs/<name>.txt", "The same, of the screen."),
@@ -261,6 +263,13 @@ OF_STUDY: tuple[File, ...] = (
     File("runs/<run>/", "A folder a run: see below."),
 )  # fmt: skip
 """Files of ``results/<study>``."""
+OF_ALL: tuple[File, ...] = (
+    File("calibration.json", "How fast the engines are on this machine, for the price of plans."),
+    File(
+        "materials/<sand>.yaml", "Sands that studies have calibrated; `material: <sand>` uses one."
+    ),
+)
+"""Files of ``results``."""
 OF_RUN: tuple[File, ...] = (
     File("scenario.yaml", "The run as planned: scenario, parameters, sources of values."),
     File("deck.in", "What the engine was given."),
@@ -283,6 +292,8 @@ OF_RUN: tuple[File, ...] = (
         Described("largest_overlap_fraction", "Largest overlap over a radius."),
         Described("<probe>_k", "Temperature at a probe of a solidification."),
         *_SOLIDIFIED, *_FLOWING,
+        Described(MEASURES, "Measures of an own deck.", "of the measure"),
+        Described("log_<column>", "Columns of its log.", "as in the log"),
     )),
     File("loads.tsv", "Force of the sand on each surface, its mean since the last record.", (
         *_CLOCK,
@@ -315,7 +326,9 @@ OF_RUN: tuple[File, ...] = (
     File("engine.log", "What the engine said."),
     File("pattern.log", "What the pattern's side said."),
     File("output/<name>", "What an own deck writes."),
-    File("end/<name>", "State at the end of a fill that runs share."),
+    File("end_checkpoint/<name>", "State at the end of a fill that runs share."),
+    File("lock", "Held while the run is computed."),
+    File("lock_owner", "Who holds it."),
     File("compute_again.txt", "Mark of the plan: why the run is computed again."),
     File("measure_again.txt", "Mark of the plan: why the run is measured again."),
     File("work/<name>", "What a run that goes on has written, with its checkpoints."),
@@ -346,6 +359,8 @@ def undescribed(folder: Path) -> list[str]:
             file = next((f for f in files if _fits(f.name, each)), None)
             if file is None:
                 found.append(each)
+                continue
+            if file.name.endswith("/<name>"):  # an engine's own
                 continue
             for column in _columns(path, each.removeprefix(name).lstrip("/")):
                 if not any(_is_column(c.name, column, swept, measures) for c in file.columns):
@@ -404,6 +419,7 @@ def _measures_of(study: Study) -> list[str]:
 def files_lines() -> Iterator[str]:
     """The page: lists of files, each table of columns once."""
     for title, where, files in (
+        ("All studies", "results/", OF_ALL),
         ("A study", "results/<study>/", OF_STUDY),
         ("A run", "results/<study>/runs/<run>/", OF_RUN),
     ):
