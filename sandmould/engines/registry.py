@@ -142,6 +142,12 @@ def mpi_ranks(scenario: Scenario) -> int:
     return scenario.engine.ranks if engine_of(scenario).RANKS is Ranks.PROCESSES else 1
 
 
+def calls_our_kernels(scenario: Scenario) -> bool:
+    """Whether compiled code of the house takes part, as the engine or beside it."""
+    sources = engine_of(scenario).session_sources(scenario)
+    return any(path.is_relative_to(ROOT / "sandmould" / "dem") for path in sources)
+
+
 def communicator_of(scenario: Scenario) -> Any:
     """The MPI communicator of the processes that compute a run; None where there is one."""
     if mpi_ranks(scenario) == 1:
