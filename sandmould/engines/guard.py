@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +79,9 @@ class Guard:
             else:
                 sand_kg = mass * s.sand_share(unbalance)
                 wall = 2 * unbalance.largest_amplitude_m(omega, sand_kg) * omega
-        bound = mass * (s.gravity_m_s2 * top + 2 * wall**2)
+        fastest = max((math.hypot(*g.velocity_m_s) for g in s.fill.grains if g.velocity_m_s),
+                      default=0.0)  # fmt: skip
+        bound = mass * (s.gravity_m_s2 * top + 2 * wall**2 + 0.5 * fastest**2)
         self._energy_bound_j = s.guard.kinetic_energy_factor * bound
 
     def check(self, snapshot: Snapshot) -> Health:

@@ -78,17 +78,18 @@ def solver_of(scenario: Scenario, stage: Stage, step_s: float) -> MovedSolver:
 
 
 def grains_of(scenario: Scenario, layer: PlannedLayer, base_m: float, first_id: int) -> Grains:
-    """Grains of a planned layer at rest, its lowest point at a height."""
+    """Grains of a planned layer at rest, its lowest point at a height, or as placed by hand."""
     d, n = scenario.dimension, len(layer.radius_m)
     radius, spins = layer.radius_m, 1 if d == 2 else 3
-    position = layer.position_m.copy()
-    position[:, -1] += base_m
+    position, by_hand = layer.position_m.copy(), layer.velocity_m_s
+    if by_hand is None:
+        position[:, -1] += base_m
     mass = scenario.sand.grain_mass_kg(1.0, d) * (2 * radius) ** d
     factor = inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d)
     return Grains(
         first_id + np.arange(n),
         position,
-        np.zeros((n, d)),
+        np.zeros((n, d)) if by_hand is None else by_hand.copy(),
         np.zeros((n, spins)),
         radius.copy(),
         mass,
