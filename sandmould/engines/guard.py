@@ -13,6 +13,7 @@ from sandmould.engines.session import EngineStop
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,8 @@ class Guard:
         s = self._scenario
         mass = float(grain_masses_kg(s, snapshot).sum())
         top = float((snapshot.position_m[:, -1] + snapshot.radius_m).max())
-        wall = 0.0
+        piston = s.box.piston if stage.kind is StageKind.PRESS else None
+        wall = 0.0 if piston is None else abs(piston.velocity_m_s)
         if stage.vibration is not None:
             omega, unbalance = stage.vibration.angular_frequency_rad_s, stage.vibration.unbalance
             if unbalance is None:

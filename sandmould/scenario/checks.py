@@ -11,6 +11,7 @@ from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_bloc
 from sandmould.scenario.cavity_checks import cavity_problems
 from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.limits import GRAINS
+from sandmould.scenario.moving_walls import piston_problems
 from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placed_checks import placed_problems
 from sandmould.scenario.placement import fall_s, plan_counts, predicted_bed_height_m
@@ -47,6 +48,7 @@ def problems(scenario: Scenario) -> list[Problem]:
     faults = [
         *_obstacles(scenario),
         *_discharge(scenario),
+        *piston_problems(scenario),
         *_grains(scenario),
         *_pouring(scenario),
         *placed_problems(scenario),

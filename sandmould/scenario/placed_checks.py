@@ -27,7 +27,8 @@ def placed_problems(s: Scenario) -> Iterator[Problem]:
     for i in np.flatnonzero(s.scene.clearance_m(centre_m) < radius_m * (1 - ROUND_OFF)).tolist():
         valid = f"a place {radius_m[i]:.6g} m or more from walls and obstacles, its radius"
         yield Problem(f"fill.grains.{i}.position_m", centre_m[i].tolist(), valid)
-    for i in np.flatnonzero(centre_m[:, -1] + radius_m > s.box.height_m).tolist():
+    top_m = s.box.height_m * (1 + ROUND_OFF)
+    for i in np.flatnonzero(centre_m[:, -1] + radius_m > top_m).tolist():
         valid = f"a place in the box, {s.box.size_text(s.dimension)}"
         yield Problem(f"fill.grains.{i}.position_m", centre_m[i].tolist(), valid)
     for i, j in sorted(cKDTree(centre_m).query_pairs(2 * radius_m.max())):
