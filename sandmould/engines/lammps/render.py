@@ -138,6 +138,12 @@ def layer_data(scenario: Scenario, layer: PlannedLayer, number: int) -> str:
             zip(layer.class_number.tolist(), layer.position_m.tolist(), strict=True), start=1
         )
     ]
+    if layer.velocity_m_s is not None:
+        rows += ["", "Velocities", ""]
+        rows += [
+            f"{i} {' '.join(map(repr, v))}{' 0' if d == 2 else ''} 0 0 0"
+            for i, v in enumerate(layer.velocity_m_s.tolist(), start=1)
+        ]
     return "\n".join([*head, *rows]) + "\n"
 
 

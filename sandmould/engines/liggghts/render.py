@@ -135,7 +135,9 @@ def layer_data(scenario: Scenario, layer: PlannedLayer, number: int, first_id: i
         f"layer {number}: id, type, diameter (m), density (kg/m3), x, y, z (m); seed"
         f" {scenario.seed}"
     )
-    return atoms_data(scenario, title, first_id, layer.class_number, layer.position_m)
+    velocity_m_s = layer.velocity_m_s
+    moves = None if velocity_m_s is None else (velocity_m_s, np.zeros((len(velocity_m_s), 3)))
+    return atoms_data(scenario, title, first_id, layer.class_number, layer.position_m, moves)
 
 
 def write_deck(
