@@ -200,9 +200,8 @@ def _loop_of_small_displacements(scenario: Scenario) -> Loop:
 
 def _shaken_hz(scenario: Scenario) -> float:
     """Highest frequency of the box, 0 where it stands still."""
-    between = scenario.fill.vibration_between_layers
-    stages = (*scenario.vibrations, *((between,) if between else ()))
-    return max((stage.frequency_hz for stage in stages), default=0.0)
+    shakings = (*scenario.vibrations, *scenario.fill.shakings)
+    return max((shaking.frequency_hz for shaking in shakings), default=0.0)
 
 
 def _swings(scale: float, first_hz: float, shaken_hz: float, also: str = "") -> BadInputError:

@@ -32,6 +32,36 @@ def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
     return stage.vibration.displacements_at(times, stage.stops_smoothly)
 
 
+def start_of_grains(
+    scenario: Scenario, stage: Stage, steps: int, step_s: float
+) -> tuple[Array, Array]:
+    """Where and how fast grains begin that stand still while the box vibrates.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    stage : Stage
+    steps : int
+        Steps since the stage began.
+    step_s : float
+
+    Returns
+    -------
+    shift_m : (d,) float64, m
+        From their place in the box to that in the frame of the computation.
+    velocity_m_s : (d,) float64, m/s
+        In the frame of the computation, half a step ago.
+    """
+    zero = np.zeros(scenario.dimension)
+    if stage.vibration is None:
+        return zero, zero
+    direction = np.array(stage.vibration.unit_direction(scenario.dimension))
+    before, now = displacements(stage, steps - 1, 2, step_s)
+    if scenario.frame == "box":
+        return zero, -(now - before) / step_s * direction
+    return now * direction, zero
+
+
 def box_motion(scenario: Scenario, stage: Stage, steps: int, step_s: float) -> tuple[Array, Array]:
     """Displacement (d,) in m and velocity (d,) in m/s of the walls, zero in the box frame.
 

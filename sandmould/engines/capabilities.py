@@ -29,6 +29,5 @@ class Capabilities:
     """Whether a checkpoint forces a setup of the engine, so that it has to come with one."""
     moves_tables: bool
     """Whether the box can stand on a table that rotating masses, mounts and the sand move."""
-    changes_step: bool
-    """Whether a session finds the exact limit of its contacts, ``exact_limit_s``, and goes on from
-    a checkpoint with another time step."""
+    moves_walls: bool
+    """Whether a gate opens in a stated time, and a wall of the box moves as a piston."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from sandmould.engines.bed_deck import follows_bed, step_line
 from sandmould.engines.deck import remark
 from sandmould.engines.deck_lines import (
     SKIN,
@@ -24,14 +25,9 @@ def _checks(program: Program) -> dict[str, tuple[int, int]]:
     into_check, checks = 0, {}
     for stage in program.stages:
         first = counts.check - into_check
-        if stage.settling is None:
-            assert stage.vibration is not None
-            longest = counts.vibration(stage.vibration)
-            into_check = (into_check + longest) % counts.check
-        else:
-            # A bed comes to rest at a check.
-            longest = counts.steps(stage.settling.longest_s)
-            into_check = 0
+        longest = stage.longest_steps(counts)
+        # A bed comes to rest at a check.
+        into_check = (into_check + longest) % counts.check if stage.settling is None else 0
         checks[stage.name] = (first, 1 + max(0, math.ceil((longest - first) / counts.check)))
     return checks
 
@@ -64,12 +60,15 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
         "study": remark(study),
         "scenario": scenario,
         "program": program,
+        "stages": program.stages,
+        "after_bed": follows_bed(scenario),
         "classes": classes,
         "clip": scenario.contact.no_tension == "total",
         "damping": scenario.background_damping,
         "gate": "" if scenario.discharge is None else scenario.discharge.gate,
         "critical": critical,
         "step_s": counts.step_s,
+        "step_line": step_line(lines),
         "step_fraction": counts.step_s / critical.step_s,
         "skin": skin_m(scenario),
         "skin_source": f"{SKIN:g} of the mean diameter",
@@ -83,7 +82,7 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
         "rest_loads": scenario.rest.load_tolerance is not None and scenario.gravity_m_s2 > 0.0,
         "snapshot_steps": counts.records(scenario.record.snapshot_every_s),
         "steps": counts.steps,
-        "vibration_steps": counts.vibration,
+        "stage_steps": lambda stage: stage.longest_steps(counts),
         "vibration_key": lambda stage: vibration_key(program, stage),
         "direction": lambda v: v.unit_direction(scenario.dimension),
         "planned_mass": planned_masses_kg(program, classes),

@@ -214,7 +214,8 @@ class Driver:
             if self._keeps_end and stage is self._program.stages[-1]:
                 self._write_end(session)
             elif finds_limit:
-                self._write_checkpoint(session, checkpoints.next_folder(self._work))
+                self._write_next(session)
+                session.share(None)  # no rank looks for the checkpoint before it is sealed
                 return False
             session.end_stage()
         if session.is_root:
@@ -237,7 +238,7 @@ class Driver:
                 f"{what} was not at rest after {stage.longest_key} = {longest_s:g}; "
                 f"{session.rest_sentence}",
             )
-        if stage.opens:
+        if stage.opens and settling is not None:
             why = what_blocks(self._scenario, session.snapshot())
             if why:
                 raise EngineStop(Outcome.NO_FLOW, why)
@@ -247,7 +248,9 @@ class Driver:
             session.insert_layer(stage.layer)
         session.start_stage(stage)
         snapshot = session.snapshot()  # all ranks take part in gathering
-        if (stage.counts_as_vibration or stage.opens) and self._recorder is not None:
+        if (
+            stage.counts_as_vibration or stage.opens or stage.slides
+        ) and self._recorder is not None:
             self._recorder.save(snapshot)
 
     def _window(self, session: Session) -> None:
@@ -311,14 +314,17 @@ class Driver:
         stop = session.share(self._stop_requested or time.monotonic() - self._begun > limit_s)
         if not stop and session.steps % self._checkpoint_steps:
             return
-        # All ranks write into the one folder that the first has emptied.
-        folder = checkpoints.next_folder(self._work) if session.is_root else self._work
-        self._write_checkpoint(session, session.share(folder))
+        self._write_next(session)
         if stop:
             why = "the system asked" if self._stop_requested else "guard.wall_limit_s came"
             raise EngineStop(
                 Outcome.OUT_OF_WALL_TIME, f"stopped at {session.time_s:.4g} s because {why}"
             )
+
+    def _write_next(self, session: Session) -> None:
+        """Write a checkpoint: all ranks into the one folder that the first has emptied."""
+        folder = checkpoints.next_folder(self._work) if session.is_root else self._work
+        self._write_checkpoint(session, session.share(folder))
 
     def _write_end(self, session: Session) -> None:
         """Write the checkpoint that other runs go on from."""

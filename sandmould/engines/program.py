@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.box import Piston
 from sandmould.scenario.discharge import Discharge
-from sandmould.scenario.fill import Settling
+from sandmould.scenario.fill import FillVibration, Settling
 from sandmould.scenario.placement import (
     PlannedLayer,
+    fall_s,
     filled_measure,
-    loose_height_m,
     plan_counts,
     plan_layer,
 )
@@ -37,8 +38,10 @@ class Stage:
     """Among the stages of its kind, from 1; 0 of one that is the only one."""
     opens: str = ""
     """Plate that is taken away at the start."""
+    slides: str = ""
+    """Plate that slides away during the stage."""
     settling: Settling | None = None
-    """When the sand is at rest, which ends the stage; none in a vibration stage."""
+    """When the sand is at rest, which ends the stage; none in one of a given duration."""
     vibration: VibrationStage | None = None
     """How the box moves; in a stage of rest, the vibration that it comes from."""
     expected_s: float = 0.0
@@ -47,6 +50,8 @@ class Stage:
     """Whether the box stops smoothly once the vibration is over, since a rest follows."""
     vibration_steps: int = 0
     """Steps that the box has vibrated when the stage begins: it stops in the stage of rest."""
+    steps: int = 0
+    """Steps of a stage of a given duration; 0 where its vibration has it."""
 
     @property
     def name(self) -> str:
@@ -56,12 +61,21 @@ class Stage:
     @property
     def layer(self) -> int:
         """Layer that falls at the start, from 1; 0 in any other stage."""
-        return self.number if self.kind is StageKind.SETTLE else 0
+        return self.number if self.kind in (StageKind.SETTLE, StageKind.POUR) else 0
+
+    def longest_steps(self, counts: StepCounts) -> int:
+        """Steps that the stage lasts; at most, where the sand comes to rest."""
+        if self.settling is not None:
+            return counts.steps(self.settling.longest_s)
+        if self.steps:
+            return self.steps
+        assert self.vibration is not None
+        return counts.vibration(self.vibration)
 
     @property
     def stop_s(self) -> float:
         """Time in which the box stops at the beginning of a stage of rest."""
-        if self.kind is not StageKind.REST or self.vibration is None:
+        if self.settling is None or self.vibration is None:
             return 0.0
         return self.vibration.stop_s
 
@@ -129,10 +143,10 @@ class Program:
 
 def _settling_s(scenario: Scenario, count: int) -> float:
     """Guess of the time a layer needs: the fall of its highest grain, then coming to rest."""
-    fall = loose_height_m(scenario, count) + scenario.fill.drop_height_m
-    guess = math.sqrt(2 * fall / scenario.gravity_m_s2) if scenario.gravity_m_s2 > 0 else math.inf
     settling = scenario.fill.settling
-    return min(max(guess + REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s)
+    return min(
+        max(fall_s(scenario, count) + REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s
+    )
 
 
 def _outflow_s(scenario: Scenario, discharge: Discharge) -> float:
@@ -149,36 +163,78 @@ def _outflow_s(scenario: Scenario, discharge: Discharge) -> float:
 def build_program(scenario: Scenario) -> Program:
     """Write out the stages of a scenario."""
     counts = plan_counts(scenario)
-    between = scenario.fill.vibration_between_layers
-    stages: list[Stage] = []
+    stages = [*_pours(scenario, counts)]
+    if scenario.box.piston is not None:
+        stages += _press(scenario, scenario.box.piston)
+    if scenario.discharge is not None:
+        stages += _flow(scenario, scenario.discharge)
+    return Program(scenario, (*stages, *_box_stages(scenario)), tuple(counts))
+
+
+def _press(scenario: Scenario, piston: Piston) -> Iterator[Stage]:
+    """A wall moves into the sand, which comes to rest once it stands."""
+    steps = StepCounts.of(scenario).steps(piston.duration_s)
+    yield Stage(StageKind.PRESS, steps=steps, expected_s=piston.duration_s)
+    settling = scenario.fill.settling
+    rest_s = min(max(REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s)
+    yield Stage(StageKind.HOLD, settling=settling, expected_s=rest_s)
+
+
+def _flow(scenario: Scenario, discharge: Discharge) -> Iterator[Stage]:
+    """The gate opens, and the sand flows until it rests or for a stated time."""
+    counts, gate = StepCounts.of(scenario), discharge.gate
+    opening_s, duration_s = discharge.opening_time_s or 0.0, discharge.duration_s
+    opening = counts.steps(opening_s)
+    if opening:
+        yield Stage(StageKind.OPEN, slides=gate, steps=opening, expected_s=opening_s)
+    if duration_s is None:
+        expected_s = _outflow_s(scenario, discharge)
+        settling = discharge.settling
+        yield Stage(StageKind.DISCHARGE, opens=gate, settling=settling, expected_s=expected_s)
+    else:
+        steps, left_s = counts.steps(duration_s) - opening, duration_s - opening_s
+        yield Stage(StageKind.DISCHARGE, opens=gate, steps=steps, expected_s=left_s)
+
+
+def _pours(scenario: Scenario, counts: list[int]) -> Iterator[Stage]:
+    """Stages of the fill."""
+    vibration, between = scenario.fill.vibration, scenario.fill.vibration_between_layers
+    if vibration is not None:
+        yield from _vibrated_pours(scenario, vibration, len(counts))
+        return
     for number, count in enumerate(counts, start=1):
-        stages.append(
-            Stage(
-                StageKind.SETTLE,
-                number,
-                settling=scenario.fill.settling,
-                expected_s=_settling_s(scenario, count),
-            )
+        yield Stage(
+            StageKind.SETTLE,
+            number,
+            settling=scenario.fill.settling,
+            expected_s=_settling_s(scenario, count),
         )
         if between is not None and number < len(counts):
-            stages.append(
-                Stage(
-                    StageKind.BETWEEN,
-                    number,
-                    vibration=between,
-                    expected_s=between.whole_duration_s,
-                )
+            yield Stage(
+                StageKind.BETWEEN, number, vibration=between, expected_s=between.whole_duration_s
             )
-    if scenario.discharge is not None:
-        stages.append(
-            Stage(
-                StageKind.DISCHARGE,
-                opens=scenario.discharge.gate,
-                settling=scenario.discharge.settling,
-                expected_s=_outflow_s(scenario, scenario.discharge),
-            )
+
+
+def _vibrated_pours(scenario: Scenario, vibration: FillVibration, layers: int) -> Iterator[Stage]:
+    """Layers that fall into the vibrating box; once it has stopped, the sand comes to rest."""
+    counts, whole = StepCounts.of(scenario), vibration.over(layers)
+    last_s = whole.whole_duration_s - (layers - 1) * vibration.layer_s
+    begin = 0
+    for number in range(1, layers + 1):
+        last = number == layers
+        end = counts.vibration(whole) if last else counts.steps(number * vibration.layer_s)
+        yield Stage(
+            StageKind.POUR,
+            number,
+            vibration=whole,
+            expected_s=last_s if last else vibration.layer_s,
+            stops_smoothly=True,
+            vibration_steps=begin,
+            steps=end - begin,
         )
-    return Program(scenario, (*stages, *_box_stages(scenario)), tuple(counts))
+        begin = end
+    rest = RestStage(kind="rest", longest_s=scenario.fill.settling.longest_s)
+    yield replace(_rest_stage(scenario, 0, rest, whole), kind=StageKind.SETTLE)
 
 
 def _box_stages(scenario: Scenario) -> Iterator[Stage]:

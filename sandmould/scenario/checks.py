@@ -11,8 +11,10 @@ from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_bloc
 from sandmould.scenario.cavity_checks import cavity_problems
 from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.limits import GRAINS
+from sandmould.scenario.moving_walls import piston_problems
 from sandmould.scenario.outline import outline_fault
-from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
+from sandmould.scenario.placed_checks import placed_problems
+from sandmould.scenario.placement import fall_s, plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import (
     Cylinder,
@@ -24,7 +26,7 @@ from sandmould.scenario.solids import (
 )
 from sandmould.scenario.time_step import LEAST_STEPS_A_PERIOD
 from sandmould.scenario.unbalance_checks import table_mass_problem, unbalance_problems
-from sandmould.scenario.vibration import VibrationStage
+from sandmould.scenario.vibration import Shaking, VibrationStage
 
 SHORTEST_STEP_S = 1e-9
 """A second of shorter steps takes more than ten hours for a thousand grains."""
@@ -46,8 +48,10 @@ def problems(scenario: Scenario) -> list[Problem]:
     faults = [
         *_obstacles(scenario),
         *_discharge(scenario),
+        *piston_problems(scenario),
         *_grains(scenario),
         *_pouring(scenario),
+        *placed_problems(scenario),
         *_springs(scenario),
         *_time(scenario),
         *_vibration(scenario),
@@ -183,6 +187,10 @@ def _discharge(s: Scenario) -> Iterator[Problem]:
     elif s.gate.angle_deg != 0.0:
         valid = "a plate with angle_deg 0, level or upright"
         yield Problem("discharge.gate", s.discharge.gate, valid)
+    opening_s, duration_s = s.discharge.opening_time_s, s.discharge.duration_s
+    if duration_s is not None and duration_s <= (opening_s or 0.0):
+        valid = f"more than discharge.opening_time_s, {opening_s:g} s, which is a part of it"
+        yield Problem("discharge.duration_s", duration_s, valid)
 
 
 def _pouring(s: Scenario) -> Iterator[Problem]:
@@ -271,7 +279,7 @@ def _bed_step(s: Scenario, fraction: float) -> Iterator[Problem]:
 
 
 def _vibration(s: Scenario) -> Iterator[Problem]:
-    stages = []
+    stages: list[tuple[str, Shaking]] = []
     for i, stage in enumerate(s.vibration):
         shortest_s = s.fill.settling.shortest_s
         if isinstance(stage, VibrationStage):
@@ -279,20 +287,26 @@ def _vibration(s: Scenario) -> Iterator[Problem]:
         elif stage.longest_s <= shortest_s:
             valid = f"more than fill.settling.shortest_s, {shortest_s:g} s"
             yield Problem(f"vibration.{i}.longest_s", stage.longest_s, valid)
-    if s.fill.vibration_between_layers is not None:
-        stages.append(("fill.vibration_between_layers", s.fill.vibration_between_layers))
-    for key, stage in stages:
-        if not isinstance(stage.direction, str) and len(stage.direction) != s.dimension:
+    between, pouring = s.fill.vibration_between_layers, s.fill.vibration
+    if between is not None:
+        stages.append(("fill.vibration_between_layers", between))
+        if pouring is not None:
+            valid = "absent with fill.vibration, which has no pause between layers"
+            yield Problem("fill.vibration_between_layers", "given", valid)
+    if pouring is not None:
+        stages.append(("fill.vibration", pouring))
+    for key, shaking in stages:
+        if not isinstance(shaking.direction, str) and len(shaking.direction) != s.dimension:
             yield Problem(
                 f"{key}.direction",
-                list(stage.direction),
+                list(shaking.direction),
                 f"vertical, horizontal or {s.dimension} numbers",
             )
-        steps = 1 / (stage.frequency_hz * s.step_s)
+        steps = 1 / (shaking.frequency_hz * s.step_s)
         if steps < LEAST_STEPS_A_PERIOD:
             yield Problem(
                 f"{key}.frequency_hz",
-                stage.frequency_hz,
+                shaking.frequency_hz,
                 f"at most {1 / (LEAST_STEPS_A_PERIOD * s.step_s):.4g} Hz, "
                 f"{LEAST_STEPS_A_PERIOD} time steps a period",
             )
@@ -307,6 +321,7 @@ def _fill(s: Scenario) -> Iterator[Problem]:
     if too_many := [*GRAINS.problems("fill.layers", sum(counts))]:
         yield from too_many
         return
+    yield from _time_of_layers(s, counts)
     height = predicted_bed_height_m(s, counts)
     floor = s.box.width_m * (s.box.depth_m if s.dimension == 3 else 1.0)
     # The box's own walls hold sand that is poured over all of it.
@@ -323,3 +338,14 @@ def _fill(s: Scenario) -> Iterator[Problem]:
             f"a bed about {height:.4g} m high",
             f"layers that fit into box.height_m, {s.box.height_m:g} m",
         )
+
+
+def _time_of_layers(s: Scenario, counts: list[int]) -> Iterator[Problem]:
+    """A layer that is poured on before it has fallen."""
+    vibration = s.fill.vibration
+    if vibration is None:
+        return
+    least_s = max(1 / vibration.frequency_hz, *(fall_s(s, count) for count in counts))
+    if vibration.layer_s < least_s:
+        valid = f"at least {least_s:.4g} s, in which a layer falls and the box vibrates once"
+        yield Problem("fill.vibration.layer_s", vibration.layer_s, valid)

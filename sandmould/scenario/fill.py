@@ -7,7 +7,7 @@ from pydantic_core import PydanticCustomError
 
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
-from sandmould.scenario.vibration import VibrationStage
+from sandmould.scenario.vibration import Shaking, VibrationStage
 
 
 class Layer(Section):
@@ -50,12 +50,54 @@ class Settling(Section):
         return self
 
 
+class PlacedGrain(Section):
+    """One grain placed by hand."""
+
+    position_m: tuple[float, ...] = quantity(
+        ..., "Place of its centre in the box, one number a dimension.", unit="m", source="user"
+    )
+    diameter_m: float = quantity(
+        ..., "Diameter, that of a size class of the sand.", unit="m", source="user", gt=0, le=1
+    )
+    velocity_m_s: tuple[float, ...] | None = quantity(
+        None, "Velocity at the start; none unless given.", unit="m/s", source="user"
+    )
+
+
+class FillVibration(Shaking):
+    """Vibration from the first layer on until after the last, without a pause.
+
+    A layer then falls a stated time after the one before, and the sand comes to rest at the end.
+    """
+
+    layer_s: float = quantity(
+        0.4, "Time from the drop of a layer to that of the next.", unit="s", source=ARGUED,
+        gt=0, le=30,
+    )  # fmt: skip
+    after_s: float = quantity(
+        0.0, "How long the box goes on once the last layer has had its layer_s.", unit="s",
+        source=ARGUED, ge=0, le=100,
+    )  # fmt: skip
+
+    def over(self, layers: int) -> VibrationStage:
+        """The whole of it, as one stage of vibration: its time is rounded to whole periods."""
+        given = {name: getattr(self, name) for name in Shaking.model_fields}
+        duration_s = layers * self.layer_s + self.after_s
+        # A long fill may last longer than a stage that is read.
+        return VibrationStage.model_construct(**given, duration_s=duration_s)
+
+
 class Fill(Section):
-    """Layers of sand dropped one after the other, each on a bed at rest."""
+    """Layers of sand dropped one after the other, each on a bed at rest or on a vibrating one."""
 
     layers: tuple[Layer, ...] = Field(
-        (Layer(height_m=0.02, repeat=2),), min_length=1, description="Layers from the bottom up."
+        (Layer(height_m=0.02, repeat=2),),
+        description="Layers from the bottom up; an empty list with grains placed by hand alone.",
     )
+    grains: tuple[PlacedGrain, ...] = Field(
+        (), max_length=10_000,
+        description="Grains placed by hand; layers fall on them once they are at rest.",
+    )  # fmt: skip
     drop_height_m: float = quantity(
         0.005,
         "Gap between the bed's highest grain and the lowest of the new layer.",
@@ -84,9 +126,23 @@ class Fill(Section):
         lt=1,
     )
     settling: Settling = Field(Settling(), description="How long a layer may take to settle.")
+    vibration: FillVibration | None = Field(
+        None, description="Vibration while the layers are poured; the box stands unless given."
+    )
     vibration_between_layers: VibrationStage | None = Field(
         None, description="Vibration after each layer but the last."
     )
+
+    @model_validator(mode="after")
+    def _some_sand(self) -> Fill:
+        if not self.layers and not self.grains:
+            raise PydanticCustomError("fill", "at least one layer in layers, or grains")
+        return self
+
+    @property
+    def shakings(self) -> tuple[Shaking, ...]:
+        """How the box vibrates during the fill."""
+        return tuple(x for x in (self.vibration, self.vibration_between_layers) if x is not None)
 
     def each_layer(self) -> tuple[Layer, ...]:
         """The layers with repeats written out."""

@@ -10,10 +10,18 @@ class StageKind(Enum):
 
     SETTLE = "settle"
     """A layer falls and comes to rest."""
+    POUR = "pour"
+    """A layer falls into the vibrating box."""
     BETWEEN = "between"
     """The box vibrates before the next layer falls."""
+    PRESS = "press"
+    """A wall moves as a piston."""
+    HOLD = "hold"
+    """The piston stands, and the sand comes to rest."""
+    OPEN = "open"
+    """The gate slides away."""
     DISCHARGE = "discharge"
-    """Sand flows out through the gate until it rests."""
+    """Sand flows out through the gate until it rests, or for a stated time."""
     VIBRATE = "vibrate"
     """The box vibrates after the fill."""
     REST = "rest"
@@ -22,7 +30,7 @@ class StageKind(Enum):
     @property
     def fills(self) -> bool:
         """Whether the stage belongs to the fill."""
-        return self in (StageKind.SETTLE, StageKind.BETWEEN)
+        return self in (StageKind.SETTLE, StageKind.POUR, StageKind.BETWEEN)
 
     def numbered(self, number: int) -> str:
         """Name of a stage of this kind, counted from 1; 0 of one that is the only one."""

@@ -31,10 +31,13 @@ def unbalance_key(s: Scenario) -> str | None:
 
 def unbalance_problems(s: Scenario) -> Iterator[Problem]:
     """Stages with an unbalance that do not go with the rest of a scene."""
-    between = s.fill.vibration_between_layers
+    between, pouring = s.fill.vibration_between_layers, s.fill.vibration
     if between is not None and between.unbalance is not None:
         valid = f"{_LAID_DOWN} between layers: the table stands while it is filled"
         yield Problem("fill.vibration_between_layers.hold", "unbalance", valid)
+    if pouring is not None and pouring.unbalance is not None:
+        valid = f"{_LAID_DOWN} while layers are poured: a table on mounts is not filled"
+        yield Problem("fill.vibration.hold", "unbalance", valid)
     for key, unbalance in _unbalances(s):
         depth_m = unbalance.flask_depth_m
         if s.dimension == 2 and depth_m is None:

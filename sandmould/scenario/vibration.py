@@ -15,7 +15,7 @@ motion follows from it (``sandmould.scenario.unbalance``).
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,9 @@ STOP_PERIODS = 1.0
 vibration, in one 1.05 times; a longer stop goes on shaking the sand (docs/measured_at_rest.md)."""
 
 
-class VibrationStage(Section):
-    """One stage of vibration at one frequency."""
+class Shaking(Section):
+    """How the box vibrates: direction, frequency and amplitude."""
 
-    kind: Literal["vibrate"] = "vibrate"
     direction: Literal["vertical", "horizontal"] | tuple[float, ...] = quantity(
         "vertical", "Direction of the box motion: a word or a vector.", source=TUBE_PAPER
     )
@@ -70,15 +69,9 @@ class VibrationStage(Section):
         ge=0.1,
         le=10000,
     )
-    duration_s: float = quantity(
-        1.0, "Duration, rounded to whole periods.", unit="s", source=ARGUED, gt=0, le=3600
-    )
-    ramp_s: float = quantity(
-        0.0, "Time to reach and to leave full amplitude.", unit="s", source=ARGUED, ge=0
-    )
 
     @model_validator(mode="after")
-    def _one_amplitude(self) -> VibrationStage:
+    def _one_amplitude(self) -> Self:
         given = self._given()
         if self.hold == "unbalance":
             self._unbalance_alone()
@@ -94,8 +87,6 @@ class VibrationStage(Section):
                 "amplitude",
                 "an amplitude of the kind that hold names, or reference_frequency_hz beside it",
             )
-        if 2 * self.ramp_s > self.duration_s:
-            raise PydanticCustomError("ramp", "a ramp_s of at most half the duration_s")
         if not isinstance(self.direction, str) and not any(self.direction):
             raise PydanticCustomError("direction", "a direction vector that is not zero")
         return self
@@ -149,16 +140,6 @@ class VibrationStage(Section):
         """A omega^2 over 9.80665 m/s2."""
         return self.amplitude_m * self.angular_frequency_rad_s**2 / STANDARD_GRAVITY_M_S2
 
-    @property
-    def whole_duration_s(self) -> float:
-        """Duration rounded to a whole number of periods, at least one."""
-        return max(1, round(self.duration_s * self.frequency_hz)) / self.frequency_hz
-
-    @property
-    def stop_s(self) -> float:
-        """Time in which the box stops once the stage is over; 0 of a stage that has a ramp."""
-        return 0.0 if self.ramp_s > 0 else STOP_PERIODS / self.frequency_hz
-
     def unit_direction(self, dimension: int) -> tuple[float, ...]:
         """Direction as a unit vector of the scene's dimension."""
         if self.direction == "vertical":
@@ -169,6 +150,34 @@ class VibrationStage(Section):
             vector = tuple(float(x) for x in self.direction)
         length = math.hypot(*vector)
         return tuple(x / length for x in vector)
+
+
+class VibrationStage(Shaking):
+    """One stage of vibration at one frequency."""
+
+    kind: Literal["vibrate"] = "vibrate"
+    duration_s: float = quantity(
+        1.0, "Duration, rounded to whole periods.", unit="s", source=ARGUED, gt=0, le=3600
+    )
+    ramp_s: float = quantity(
+        0.0, "Time to reach and to leave full amplitude.", unit="s", source=ARGUED, ge=0
+    )
+
+    @model_validator(mode="after")
+    def _short_ramp(self) -> VibrationStage:
+        if 2 * self.ramp_s > self.duration_s:
+            raise PydanticCustomError("ramp", "a ramp_s of at most half the duration_s")
+        return self
+
+    @property
+    def whole_duration_s(self) -> float:
+        """Duration rounded to a whole number of periods, at least one."""
+        return max(1, round(self.duration_s * self.frequency_hz)) / self.frequency_hz
+
+    @property
+    def stop_s(self) -> float:
+        """Time in which the box stops once the stage is over; 0 of a stage that has a ramp."""
+        return 0.0 if self.ramp_s > 0 else STOP_PERIODS / self.frequency_hz
 
     def displacements_at(
         self, time_s: NDArray[np.float64], stops_smoothly: bool = False

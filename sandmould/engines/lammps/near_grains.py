@@ -16,7 +16,7 @@ from typing import ClassVar
 from sandmould.engines.deck import exact, vector
 from sandmould.scenario.geometry import Block, Wall
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.vibration import VibrationStage
+from sandmould.scenario.vibration import Shaking
 
 MOST_GROUPS = 32 - 2
 """LAMMPS has 32 at most, one of them is ``all``, and a layer that falls takes one for a moment."""
@@ -65,9 +65,8 @@ class NearGrains:
         return max(fallen + max(shaken, default=0.0), _SLOWEST_M_S)
 
     @property
-    def _vibrations(self) -> list[VibrationStage]:
-        between = self.scenario.fill.vibration_between_layers
-        return [*self.scenario.vibrations, *([] if between is None else [between])]
+    def _vibrations(self) -> list[Shaking]:
+        return [*self.scenario.vibrations, *self.scenario.fill.shakings]
 
     @property
     def one_for_all(self) -> bool:

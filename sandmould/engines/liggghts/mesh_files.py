@@ -58,9 +58,8 @@ def largest_motion_m(scenario: Scenario) -> float:
     """How far the walls go in the laboratory frame; in that of the box they stand."""
     if scenario.frame == "box":
         return 0.0
-    between = scenario.fill.vibration_between_layers
-    stages = [*scenario.vibrations, *([between] if between else [])]
-    return max((stage.amplitude_m for stage in stages), default=0.0)
+    shakings = (*scenario.vibrations, *scenario.fill.shakings)
+    return max((shaking.amplitude_m for shaking in shakings), default=0.0)
 
 
 def _rectangle(corner: Array, first: Array, second: Array) -> Array:

@@ -13,8 +13,8 @@ import numpy as np
 from sandmould.dem import source_hash
 from sandmould.dem.solver import NotANumberError
 from sandmould.dem.table import MountedTable
-from sandmould.engines.box_motion import displacements
-from sandmould.engines.program import Program
+from sandmould.engines.box_motion import displacements, start_of_grains
+from sandmould.engines.program import Program, Stage
 from sandmould.engines.reference.model import grains_of, scene_of, solver_of
 from sandmould.engines.session import Array, EngineStop, RefusedError
 from sandmould.engines.snapshot import Snapshot
@@ -23,7 +23,10 @@ from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_drive import table_motion
 from sandmould.engines.table_periods import TablePeriod, TablePeriods, window_of
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.box import piston_wall
+from sandmould.scenario.discharge import slid_away_m
 from sandmould.scenario.fill import Settling
+from sandmould.scenario.stages import StageKind
 
 
 class ReferenceSession(StagedSession):
@@ -64,13 +67,17 @@ class ReferenceSession(StagedSession):
     def insert_layer(self, number: int) -> None:
         """Drop a planned layer from over the bed and all obstacles."""
         s = self._scenario
-        top = s.pouring_top_m
+        since = self.steps - self._stage_start
+        shift, velocity = start_of_grains(s, self.stage, since, self.step_s)
+        top = s.pouring_top_m + float(shift[-1])
         if self.grains:
             grains = self.solver.grains
             top = max(top, float((grains.position[:, -1] + grains.radius).max()))
-        base = top + s.fill.drop_height_m
         layer = self._program.layers[number - 1]
-        self.solver.add(grains_of(s, layer, base, self.grains + 1))
+        grains = grains_of(s, layer, top - shift[-1] + s.fill.drop_height_m, self.grains + 1)
+        grains.position[:] += shift
+        grains.velocity[:] += velocity
+        self.solver.add(grains)
 
     def set_state(self, position_m: Array, velocity_m_s: Array, spin_rad_s: Array) -> None:
         """Place all grains now in the box exactly, without contact history."""
@@ -82,6 +89,26 @@ class ReferenceSession(StagedSession):
             self.solver.remove_surface(gate)
         else:  # about to be restored: there is nothing to list yet
             self.solver.surfaces.remove(gate)
+
+    def start_stage(self, stage: Stage) -> None:
+        """Begin a stage, in which a gate may slide away or a wall move as a piston."""
+        super().start_stage(stage)
+        if stage.kind is StageKind.PRESS:
+            self._press(stage.steps * self.step_s)
+        if stage.slides:
+            gate = self._scenario.gate
+            assert gate is not None
+            open_m = slid_away_m(gate, self._scenario.dimension)
+            self.move_surface(gate.name, open_m, stage.steps * self.step_s)
+
+    def _press(self, time_s: float) -> None:
+        """Let the piston go its way from where the wall stands; a lid is put on the box first."""
+        box, d = self._scenario.box, self._scenario.dimension
+        assert box.piston is not None
+        rows = self._vertices_of(box.piston.wall)
+        self.solver.surfaces.arrays.vertices[rows] = piston_wall(box, d, 0.0).point_m
+        end = piston_wall(box, d, box.piston.velocity_m_s * time_s)
+        self.move_surface(end.name, end.point_m[None], time_s)
 
     def _restore(self, checkpoint: Path) -> None:
         with np.load(checkpoint / "solver.npz", allow_pickle=False) as arrays:
