@@ -12,7 +12,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -41,7 +41,7 @@ AXES = ("x", "z"), ("x", "y", "z")
 class Picture:
     """A picture that a notebook shows by itself."""
 
-    png: bytes
+    png: bytes = field(repr=False)
 
     def save(self, path: Path | str) -> Path:
         """Write it to a file."""
