@@ -86,6 +86,7 @@ def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, fl
     column = max(layer.height_m for layer in program.layers)
     # Half a bed more than predicted: a heap may stand higher than an even bed.
     top = max(1.5 * bed, scenario.scene.top_m) + scenario.fill.drop_height_m + column + margin
+    top += max((layer.rise_m(scenario.gravity_m_s2) for layer in program.layers), default=0.0)
     return [(-margin, size + margin) for size in across] + [(-margin, top)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from sandmould.engines.session import EngineStop
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,8 @@ class Guard:
         s = self._scenario
         mass = float(grain_masses_kg(s, snapshot).sum())
         top = float((snapshot.position_m[:, -1] + snapshot.radius_m).max())
-        wall = 0.0
+        piston = s.box.piston if stage.kind is StageKind.PRESS else None
+        wall = 0.0 if piston is None else abs(piston.velocity_m_s)
         if stage.vibration is not None:
             omega, unbalance = stage.vibration.angular_frequency_rad_s, stage.vibration.unbalance
             if unbalance is None:
@@ -78,7 +81,9 @@ class Guard:
             else:
                 sand_kg = mass * s.sand_share(unbalance)
                 wall = 2 * unbalance.largest_amplitude_m(omega, sand_kg) * omega
-        bound = mass * (s.gravity_m_s2 * top + 2 * wall**2)
+        fastest = max((math.hypot(*g.velocity_m_s) for g in s.fill.grains if g.velocity_m_s),
+                      default=0.0)  # fmt: skip
+        bound = mass * (s.gravity_m_s2 * top + 2 * wall**2 + 0.5 * fastest**2)
         self._energy_bound_j = s.guard.kinetic_energy_factor * bound
 
     def check(self, snapshot: Snapshot) -> Health:

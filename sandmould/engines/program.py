@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from sandmould.engines.step_counts import StepCounts
+from sandmould.scenario.box import Piston
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.fill import FillVibration, Settling
 from sandmould.scenario.placement import (
@@ -163,9 +164,20 @@ def build_program(scenario: Scenario) -> Program:
     """Write out the stages of a scenario."""
     counts = plan_counts(scenario)
     stages = [*_pours(scenario, counts)]
+    if scenario.box.piston is not None:
+        stages += _press(scenario, scenario.box.piston)
     if scenario.discharge is not None:
         stages += _flow(scenario, scenario.discharge)
     return Program(scenario, (*stages, *_box_stages(scenario)), tuple(counts))
+
+
+def _press(scenario: Scenario, piston: Piston) -> Iterator[Stage]:
+    """A wall moves into the sand, which comes to rest once it stands."""
+    steps = StepCounts.of(scenario).steps(piston.duration_s)
+    yield Stage(StageKind.PRESS, steps=steps, expected_s=piston.duration_s)
+    settling = scenario.fill.settling
+    rest_s = min(max(REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s)
+    yield Stage(StageKind.HOLD, settling=settling, expected_s=rest_s)
 
 
 def _flow(scenario: Scenario, discharge: Discharge) -> Iterator[Stage]:

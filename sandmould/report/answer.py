@@ -11,7 +11,7 @@ import pandas as pd
 from sandmould.report.drive import drive_at
 from sandmould.report.next_steps import NextSteps
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
-from sandmould.report.robustness import RobustnessPages
+from sandmould.report.robustness import RobustnessPages, follows_springs
 from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, KeyNumber, Table, share_of_what_fits
 from sandmould.runs.formatting import (
@@ -94,6 +94,7 @@ def optimum_headline(
     robustness: RobustnessPages | None,
     verdict: Verdict,
     summary: pd.DataFrame,
+    has_speed: bool,
 ) -> tuple[str, bool]:
     """Say in one sentence where the optimum of a refined study lies.
 
@@ -105,6 +106,8 @@ def optimum_headline(
     verdict : Verdict
     summary : DataFrame
         One row a run of the sweep.
+    has_speed : bool
+        Whether the study gives the wave speed of the real sand.
     """
     optimum = pages.optimum
     if optimum is None:
@@ -113,6 +116,13 @@ def optimum_headline(
         return robustness.assessment.sentences[0], False
     advised = pages.recommendation
     if advised is not None and advised.interval_hz is None:
+        ends = any(optimum.at_end(key) for key in optimum.keys)
+        if follows_springs(robustness) and not (has_speed or ends):
+            return (
+                "No frequency in Hz is recommended: the best one goes with the hardness of the "
+                "sand, and that of your sand is not given.",
+                False,
+            )
         return advised.sentence, False
     places = []
     for key, value in optimum.setting.items():
@@ -206,11 +216,21 @@ def choices_table(choices: Sequence[Sequence[KeyNumber]]) -> Table:
 
 
 def optimum_choice(
-    pages: OptimumPages, summary: pd.DataFrame, verdict: Verdict
+    pages: OptimumPages, summary: pd.DataFrame, verdict: Verdict, is_artefact: bool
 ) -> tuple[KeyNumber, ...]:
-    """The optimum between the settings, in words of the machine."""
-    optimum = pages.optimum
-    if optimum is None:
+    """The optimum between the settings, in words of the machine; nothing where it is not to be set.
+
+    Parameters
+    ----------
+    pages : OptimumPages
+    summary : DataFrame
+        One row a run of the sweep.
+    verdict : Verdict
+    is_artefact : bool
+        Whether its controls show it to be none of the sand's.
+    """
+    optimum, advised = pages.optimum, pages.recommendation
+    if optimum is None or is_artefact or (advised is not None and advised.interval_hz is None):
         return ()
     drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
     of_keys = [

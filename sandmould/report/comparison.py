@@ -36,7 +36,7 @@ _LONGEST = 60
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedStudy:
     """One of the studies."""
 
     name: str
@@ -74,11 +74,11 @@ def _leaves(tree: Any, above: str = "") -> Iterator[tuple[str, Any]]:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class SideBySide:
     """What is said of studies that have a measure in common."""
 
     measure: str
-    studies: tuple[Compared, ...]
+    studies: tuple[ComparedStudy, ...]
 
     @cached_property
     def _settings(self) -> list[dict[str, Setting]]:
@@ -202,7 +202,7 @@ def _value_text(stated: dict[str, Any], key: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
 
 
-def read_comparison(folders: Sequence[Path]) -> Comparison:
+def read_comparison(folders: Sequence[Path]) -> SideBySide:
     """Read finished studies.
 
     Parameters
@@ -226,10 +226,10 @@ def read_comparison(folders: Sequence[Path]) -> Comparison:
         if measure not in summary:
             valid = f"a study with {measure}, which {studies[0].name} is judged by"
             raise BadInputError([Problem("STUDY", each.name, valid)])
-    return Comparison(measure, studies)
+    return SideBySide(measure, studies)
 
 
-def _read(name: str, folder: Path) -> Compared:
+def _read(name: str, folder: Path) -> ComparedStudy:
     if not (folder / SUMMARY).is_file():
         valid = f"a finished study: {folder} has no {SUMMARY}; sandmould run comes first"
         raise BadInputError([Problem("STUDY", name, valid)])
@@ -237,18 +237,18 @@ def _read(name: str, folder: Path) -> Compared:
         study, collected = read_study(folder), read_collected(folder)
         verdict_file = folder / VERDICT_FILE
         said = verdict_file.read_text(encoding="utf-8").strip() if verdict_file.is_file() else "–"
-        return Compared(name, folder, study, collected, said)
+        return ComparedStudy(name, folder, study, collected, said)
     except (OSError, ValueError) as error:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("STUDY", name, valid)]) from error
 
 
-def write_comparison(comparison: Comparison, out: Path) -> Path:
+def write_comparison(comparison: SideBySide, out: Path) -> Path:
     """Write the page, and beside it its picture as SVG.
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : SideBySide
     out : Path
         The HTML file; it opens offline.
 

@@ -175,7 +175,11 @@ def _filling(scenario: Scenario) -> str:
     layers = len(fill.each_layer())
     between = ", vibrated in between" if fill.vibration_between_layers else ""
     plural = "s" if layers > 1 else ""
-    dropped = f"{layers} layer{plural} dropped {1e3 * fill.drop_height_m:g} mm"
+    by_hand = f"{len(fill.grains)} grains placed by hand" if fill.grains else ""
+    if not layers:
+        return by_hand
+    dropped = f"{by_hand}{', ' if by_hand else ''}{layers} layer{plural} dropped "
+    dropped += f"{1e3 * fill.drop_height_m:g} mm"
     if (shaken := fill.vibration) is not None:
         return (
             f"{dropped}, one every {shaken.layer_s:g} s, while the box vibrates at "

@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pandas as pd
 
+from sandmould.report.agreement import AgreementPages
 from sandmould.report.curves import best_passage
+from sandmould.report.optimum import OptimumPages
+from sandmould.report.robustness import RobustnessPages, follows_springs
 from sandmould.runs.columns import RUN, finished
 from sandmould.runs.formatting import listed, name_of, value_text
 from sandmould.statistics.config import fewest_points
@@ -53,7 +56,7 @@ def next_steps(
     collected: Collected,
     verdict: Verdict,
     is_sound: bool,
-    of_kind: Sequence[NextStep] = (),
+    specific: Sequence[NextStep] = (),
 ) -> NextSteps:
     """Say what to do after a study.
 
@@ -66,22 +69,14 @@ def next_steps(
     verdict : Verdict
     is_sound : bool
         Whether the question is answered.
-    of_kind : sequence of NextStep, optional
-        What its kind adds.
+    specific : sequence of NextStep, optional
+        What this answer, and its kind of study, ask for.
     """
-    steps = [*_failed(collected.summary)]
+    steps = [*_failed(collected.summary), *specific]
     if study.seeks_best:
-        steps += [*_replicates(study, verdict), *_beyond(verdict, study)]
         steps += [*_longer(collected.of_sweep, verdict), *_certificate(study, verdict)]
         if is_sound and not steps:
             steps.append(NextStep("Nothing is left to compute: try it on the real machine."))
-    elif any(1 < s.n < FEW for s in verdict.settings):
-        text = f"Run every setting at least {FEW} times: two runs say little of chance."
-        steps.append(NextStep(text, f"replicates: {FEW}"))
-    if study.calibration.sands and is_sound:
-        text = "Use the sand in a study of your own:"
-        steps.append(NextStep(text, f"material: {study.calibration.sands[0].name}"))
-    steps += of_kind
     owner = owner_of(study_folder)
     has_lines = any(step.line for step in steps)
     shipped = shipped_name(owner)
@@ -95,6 +90,71 @@ def next_steps(
         f"{where}, then run" if has_lines else "",
         f"sandmould run {file}" if has_lines else "",
     )
+
+
+def setting_steps(study: Study, verdict: Verdict) -> list[NextStep]:
+    """What the comparison of settings asks for: more runs, or values past the sweep's end."""
+    return [*_replicates(study, verdict), *_beyond(verdict, study)]
+
+
+def optimum_steps(
+    study: Study, pages: OptimumPages, robustness: RobustnessPages | None
+) -> list[NextStep]:
+    """What an optimum and its controls ask for.
+
+    Parameters
+    ----------
+    study : Study
+    pages : OptimumPages
+    robustness : RobustnessPages, optional
+        Its controls.
+    """
+    optimum = pages.optimum
+    if optimum is None:
+        return [NextStep("Add settings to the sweep, or runs to each of them.")]
+    steps = []
+    for key in optimum.keys:
+        end = optimum.at_end(key)
+        if end:
+            side = {"lowest": "below", "highest": "above"}.get(end, "on both sides of")
+            text = f"Add a {name_of(key)} {side} what was swept: the best may lie there."
+            steps.append(NextStep(text))
+    low_high = {key: optimum.interval(key) for key in study.refine.interval}
+    if any(high - low > study.refine.interval[k] for k, (low, high) in low_high.items()):
+        text = "Go on with more rounds: the interval is not yet as narrow as asked."
+        steps.append(NextStep(text, f"refine: {{rounds: {study.refine.rounds + 2}}}"))
+    cause = robustness.assessment.cause if robustness is not None else ""
+    if cause == "artefact of what is held constant":
+        text = "State with hold what your table really holds, and sweep again."
+        steps.append(NextStep(text))
+    elif cause == "artefact of the numerics":
+        text = "Repeat it with a smaller time step (time_step.fraction) until the optimum stays."
+        steps.append(NextStep(text))
+    elif study.certificate.sand_wave_speed is None and follows_springs(robustness):
+        text = "Say how fast waves run in your sand: the best frequency goes with that."
+        line = 'certificate: {sand_wave_speed: {low_m_s: ..., high_m_s: ..., by: "..."}}'
+        steps.append(NextStep(text, line))
+    return steps
+
+
+def agreement_steps(pages: AgreementPages) -> list[NextStep]:
+    """What a comparison of settings that should agree asks for."""
+    if pages.sound:
+        return [NextStep("Take the cheapest of them: it gives the same.")]
+    text = "See in the table of comparisons which differ, and which need more runs."
+    return [NextStep(text)]
+
+
+def estimate_steps(study: Study, verdict: Verdict, is_sound: bool) -> list[NextStep]:
+    """What a value that was to be found asks for."""
+    steps = []
+    if any(1 < s.n < FEW for s in verdict.settings):
+        text = f"Run every setting at least {FEW} times: two runs say little of chance."
+        steps.append(NextStep(text, f"replicates: {FEW}"))
+    if study.calibration.sands and is_sound:
+        text = "Use the sand in a study of your own:"
+        steps.append(NextStep(text, f"material: {study.calibration.sands[0].name}"))
+    return steps
 
 
 def _failed(summary: pd.DataFrame) -> list[NextStep]:

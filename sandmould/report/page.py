@@ -44,7 +44,13 @@ from sandmould.report.method import (
     provenance_rows,
     statistics_method,
 )
-from sandmould.report.next_steps import next_steps
+from sandmould.report.next_steps import (
+    agreement_steps,
+    estimate_steps,
+    next_steps,
+    optimum_steps,
+    setting_steps,
+)
 from sandmould.report.optimum import (
     OptimumPages,
     effort_sentence,
@@ -254,14 +260,21 @@ def _answer(
     figures: tuple[KeyNumber, ...] = ()
     table = None
     if optimum is not None:
-        headline, is_sound = optimum_headline(optimum, robustness, verdict, summary)
-        figures = optimum_choice(optimum, summary, verdict)
+        headline, is_sound = optimum_headline(
+            optimum, robustness, verdict, summary, study.certificate.sand_wave_speed is not None
+        )
+        steps = optimum_steps(study, optimum, robustness)
+        is_artefact = robustness is not None and robustness.assessment.is_artefact
+        figures = optimum_choice(optimum, summary, verdict, is_artefact)
     elif agreement is not None and agreement.is_question:
         headline, is_sound = agreement.sentences[0], agreement.sound
+        steps = agreement_steps(agreement)
     elif estimate is not None:
         headline, is_sound = of_kind.answer or estimate.headline, estimate.sound
+        steps = estimate_steps(study, verdict, is_sound)
     else:
         headline, is_sound = headline_of(verdict, collected.keys, drives)
+        steps = setting_steps(study, verdict)
         choices = choices_of(verdict, summary, drives)
         figures = choices[0] if len(choices) == 1 else ()
         table = choices_table(choices) if len(choices) > 1 else None
@@ -270,8 +283,9 @@ def _answer(
         *of_kind.grounds,
         *certificate_ground(study, robustness),
     )
-    steps = next_steps(page.study_folder, study, collected, verdict, is_sound, of_kind.steps)
-    return Answer(headline, is_sound, figures, table, grounds, steps)
+    specific = (*steps, *of_kind.steps)
+    after = next_steps(page.study_folder, study, collected, verdict, is_sound, specific)
+    return Answer(headline, is_sound, figures, table, grounds, after)
 
 
 def _write_beside(folder: Path, scripts: Mapping[str, str]) -> None:

@@ -41,7 +41,7 @@ def finished_ground(summary: pd.DataFrame) -> tuple[Ground, ...]:
     return (Ground("Runs", f"{lost} of {len(summary)} did not finish and are not counted."),)
 
 
-def scatter_ground(verdict: Verdict, differ_in: str) -> tuple[Ground, ...]:
+def scatter_ground(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple[Ground, ...]:
     """Say how much replicates differ.
 
     Parameters
@@ -49,6 +49,8 @@ def scatter_ground(verdict: Verdict, differ_in: str) -> tuple[Ground, ...]:
     verdict : Verdict
     differ_in : str
         What the replicates of a setting do not share.
+    seeks_best : bool
+        Whether the two best settings are to be compared.
     """
     used = [s for s in verdict.settings if s.n]
     if not used:
@@ -62,7 +64,7 @@ def scatter_ground(verdict: Verdict, differ_in: str) -> tuple[Ground, ...]:
         f"{_runs(used)} of each setting, alike but for {differ_in}. Their "
         f"{name_of(verdict.measure)} differs by {number(sd, 2)} (standard deviation)"
     )
-    first = verdict.comparisons[0] if verdict.comparisons and verdict.better != "neither" else None
+    first = verdict.comparisons[0] if verdict.comparisons and seeks_best else None
     if first is None or not first.tested or verdict.best is None:
         return (Ground("Scatter", f"{text}."),)
     return (
@@ -109,7 +111,7 @@ def sand_grounds(scenario: Scenario, study: Study, verdict: Verdict) -> tuple[Gr
     study : Study
     verdict : Verdict
     """
-    grounds = [*scatter_ground(verdict, "the grains' starting places")]
+    grounds = [*scatter_ground(verdict, "the grains' starting places", study.seeks_best)]
     hardness = bed_hardness(scenario)
     if study.seeks_best and frequency_key(study.sweep):
         sand = study.certificate.sand_wave_speed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -17,6 +18,31 @@ from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
 
 
+class Piston(Section):
+    """A wall of the box that moves evenly into the sand once it is filled in, and stays there.
+
+    The top is a lid that is put on the box, at its height, when it begins to move.
+    """
+
+    wall: Literal["top", "floor", "left", "right", "front", "back"] = quantity(
+        ..., "Wall that moves; front and back in 3D.", source="user"
+    )
+    velocity_m_s: float = quantity(
+        ..., "Velocity into the box; below 0 out of it.", unit="m/s", source="user", ge=-10, le=10
+    )
+    duration_s: float = quantity(..., "How long it moves.", unit="s", source="user", gt=0, le=1000)
+
+    @property
+    def way_m(self) -> float:
+        """How far it goes into the box."""
+        return self.velocity_m_s * self.duration_s
+
+    @property
+    def axis(self) -> int:
+        """Axis that it moves along: x, y of 3D or the vertical, -1."""
+        return {"left": 0, "right": 0, "front": 1, "back": 1}.get(self.wall, -1)
+
+
 class Box(Section):
     """Inner size of the moulding box; its walls also guide the sand that falls from above."""
 
@@ -25,6 +51,10 @@ class Box(Section):
         0.05, "Inner depth along y, 3D only.", unit="m", source=ARGUED, gt=0, le=100
     )
     height_m: float = quantity(0.1, "Inner height.", unit="m", source=ARGUED, gt=0, le=100)
+
+    piston: Piston | None = Field(
+        None, description="A wall that presses on the filled sand; all stand unless given."
+    )
 
     def size_m(self, dimension: int) -> tuple[float, ...]:
         """Width and height in 2D; width, depth and height in 3D."""
@@ -256,6 +286,24 @@ def box_walls(box: Box, dimension: int) -> list[Wall]:
             Wall("back", unit[1] * box.depth_m, -unit[1]),
         ]
     return walls
+
+
+def piston_wall(box: Box, dimension: int, way_m: float) -> Wall:
+    """The wall that moves as a piston, once it has gone a way.
+
+    Parameters
+    ----------
+    box : Box
+        With a piston.
+    dimension : int
+    way_m : float, m
+        Into the box.
+    """
+    assert box.piston is not None
+    up = np.eye(dimension)[-1]
+    walls = [*box_walls(box, dimension), Wall("top", up * box.height_m, -up)]
+    (wall,) = (wall for wall in walls if wall.name == box.piston.wall)
+    return replace(wall, point_m=wall.point_m + way_m * wall.normal)
 
 
 def build_scene(box: Box, obstacles: tuple[AnyObstacle, ...], dimension: int) -> Scene:

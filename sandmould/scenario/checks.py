@@ -11,7 +11,9 @@ from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_bloc
 from sandmould.scenario.cavity_checks import cavity_problems
 from sandmould.scenario.drawing_file import MeshFileError
 from sandmould.scenario.limits import GRAINS
+from sandmould.scenario.moving_walls import piston_problems
 from sandmould.scenario.outline import outline_fault
+from sandmould.scenario.placed_checks import placed_problems
 from sandmould.scenario.placement import fall_s, plan_counts, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import (
@@ -46,8 +48,10 @@ def problems(scenario: Scenario) -> list[Problem]:
     faults = [
         *_obstacles(scenario),
         *_discharge(scenario),
+        *piston_problems(scenario),
         *_grains(scenario),
         *_pouring(scenario),
+        *placed_problems(scenario),
         *_springs(scenario),
         *_time(scenario),
         *_vibration(scenario),

@@ -50,6 +50,20 @@ class Settling(Section):
         return self
 
 
+class PlacedGrain(Section):
+    """One grain placed by hand."""
+
+    position_m: tuple[float, ...] = quantity(
+        ..., "Place of its centre in the box, one number a dimension.", unit="m", source="user"
+    )
+    diameter_m: float = quantity(
+        ..., "Diameter, that of a size class of the sand.", unit="m", source="user", gt=0, le=1
+    )
+    velocity_m_s: tuple[float, ...] | None = quantity(
+        None, "Velocity at the start; none unless given.", unit="m/s", source="user"
+    )
+
+
 class FillVibration(Shaking):
     """Vibration from the first layer on until after the last, without a pause.
 
@@ -77,8 +91,13 @@ class Fill(Section):
     """Layers of sand dropped one after the other, each on a bed at rest or on a vibrating one."""
 
     layers: tuple[Layer, ...] = Field(
-        (Layer(height_m=0.02, repeat=2),), min_length=1, description="Layers from the bottom up."
+        (Layer(height_m=0.02, repeat=2),),
+        description="Layers from the bottom up; an empty list with grains placed by hand alone.",
     )
+    grains: tuple[PlacedGrain, ...] = Field(
+        (), max_length=10_000,
+        description="Grains placed by hand; layers fall on them once they are at rest.",
+    )  # fmt: skip
     drop_height_m: float = quantity(
         0.005,
         "Gap between the bed's highest grain and the lowest of the new layer.",
@@ -113,6 +132,12 @@ class Fill(Section):
     vibration_between_layers: VibrationStage | None = Field(
         None, description="Vibration after each layer but the last."
     )
+
+    @model_validator(mode="after")
+    def _some_sand(self) -> Fill:
+        if not self.layers and not self.grains:
+            raise PydanticCustomError("fill", "at least one layer in layers, or grains")
+        return self
 
     @property
     def shakings(self) -> tuple[Shaking, ...]:

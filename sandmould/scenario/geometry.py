@@ -233,6 +233,11 @@ class Scene:
         """The scene after one of its blocks was taken away."""
         return replace(self, blocks=tuple(b for b in self.blocks if b.name != block))
 
+    def with_wall(self, wall: Wall) -> Scene:
+        """The scene with a wall in the place of that of its name, or one more."""
+        others = tuple(other for other in self.walls if other.name != wall.name)
+        return replace(self, walls=(*others, wall))
+
     def bent(self, name: str, vertices_m: Array) -> Scene:
         """The scene with the vertices of one outline or mesh elsewhere, (k, d) float64, m."""
 

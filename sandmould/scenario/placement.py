@@ -37,12 +37,21 @@ class PlannedLayer:
     radius_m: Array
     """(n,) float64, m."""
     position_m: Array
-    """(n, d) float64, m; the vertical counts from the layer's own lowest point."""
+    """(n, d) float64, m; the vertical counts from the layer's own lowest point, or from the floor
+    where the grains are placed by hand."""
+    velocity_m_s: Array | None = None
+    """(n, d) float64, m/s, of grains placed by hand; all others are dropped over the bed."""
 
     @property
     def height_m(self) -> float:
         """Height of the loose column."""
         return float((self.position_m[:, -1] + self.radius_m).max())
+
+    def rise_m(self, gravity_m_s2: float) -> float:
+        """How far a grain that is placed with a velocity can fly up, 0 without gravity."""
+        if self.velocity_m_s is None or gravity_m_s2 == 0.0:
+            return 0.0
+        return float(np.maximum(self.velocity_m_s[:, -1], 0.0).max()) ** 2 / (2 * gravity_m_s2)
 
 
 def nominal_fraction(s: Scenario) -> float:
@@ -60,14 +69,15 @@ def _mean_grain_measure(s: Scenario) -> float:
 def plan_counts(s: Scenario) -> list[int]:
     """Number of grains of each layer, from its height, mass or count.
 
-    A height counts over the whole floor: obstacles only lift the bed.
+    Grains placed by hand are the first layer. A height counts over the whole floor: obstacles only
+    lift the bed.
     """
     mean_measure = _mean_grain_measure(s)
     mean_mass = sum(
         c.count_fraction * s.sand.grain_mass_kg(c.diameter_m, s.dimension)
         for c in s.sand.classes(s.dimension)
     )
-    counts = []
+    counts = [len(s.fill.grains)] if s.fill.grains else []
     for layer in s.fill.each_layer():
         if layer.count is not None:
             counts.append(layer.count)
@@ -134,6 +144,21 @@ def _draw_classes(s: Scenario, count: int, rng: np.random.Generator) -> NDArray[
     return rng.permutation(1 + np.searchsorted(share[:-1], quantile, side="right")).astype(np.int64)
 
 
+def placed_grains(s: Scenario) -> PlannedLayer:
+    """Grains placed by hand, each in the class whose diameter is nearest to its own."""
+    classes = s.sand.classes(s.dimension)
+    diameters_m = np.array([c.diameter_m for c in classes])
+    given_m = np.array([grain.diameter_m for grain in s.fill.grains])
+    nearest = np.abs(given_m[:, None] - diameters_m).argmin(axis=1)
+    at_rest = (0.0,) * s.dimension
+    return PlannedLayer(
+        nearest + 1,
+        diameters_m[nearest] / 2,
+        np.array([grain.position_m for grain in s.fill.grains]),
+        np.array([grain.velocity_m_s or at_rest for grain in s.fill.grains]),
+    )
+
+
 def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     """Place one layer's grains by random sequential addition, largest first.
 
@@ -148,6 +173,8 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     -------
     PlannedLayer
     """
+    if s.fill.grains and number == 1:
+        return placed_grains(s)
     rng = np.random.default_rng([s.seed, number])
     drawn = np.sort(_draw_classes(s, count, rng))[::-1]
     diameters = {c.number: c.diameter_m for c in s.sand.classes(s.dimension)}

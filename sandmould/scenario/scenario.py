@@ -11,7 +11,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field
 
-from sandmould.scenario.box import Box, Obstacle, Plate, build_scene
+from sandmould.scenario.box import Box, Obstacle, Plate, build_scene, piston_wall
 from sandmould.scenario.cavities import CavityKey, cavity_space
 from sandmould.scenario.contact import BackgroundDamping, Contact
 from sandmould.scenario.discharge import Discharge
@@ -23,7 +23,7 @@ from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.rest import Rest
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.springs import springs_in_use
-from sandmould.scenario.stages import is_filling
+from sandmould.scenario.stages import StageKind, is_filling
 from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
 from sandmould.scenario.unbalance import Unbalance
 from sandmould.scenario.vibration import BoxStage, VibrationStage
@@ -147,10 +147,19 @@ class Scenario(Section):
         return replace(scene, cavities=tuple(spaces))
 
     def scene_in(self, stage: str = "") -> Scene:
-        """Geometry in a stage, the last where none is named: from the discharge on without gate."""
-        if self.discharge is None or (stage and is_filling(stage)):
-            return self.scene
-        return self.scene.without(self.discharge.gate)
+        """Geometry in a stage, the last where none is named.
+
+        A piston stands where it has gone to once it has moved, from the discharge on there is no
+        gate. While it moves it counts as where it is farther out.
+        """
+        scene, piston = self.scene, self.box.piston
+        if stage and is_filling(stage):
+            return scene
+        if piston is not None and (piston.way_m < 0.0 or stage != StageKind.PRESS.value):
+            scene = scene.with_wall(piston_wall(self.box, self.dimension, piston.way_m))
+        if self.discharge is None or stage in (StageKind.PRESS.value, StageKind.HOLD.value):
+            return scene
+        return scene.without(self.discharge.gate)
 
     @property
     def vibrations(self) -> tuple[VibrationStage, ...]:

@@ -13,6 +13,7 @@ import yaml
 import sandmould
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.contents import undescribed
 from sandmould.study.plan.build_plan import open_plan
 
 FREQUENCY = "vibration.0.frequency_hz"
@@ -73,6 +74,7 @@ def test_a_study_is_computed_and_read(
     result = sandmould.run(STUDY, name="little", cores=2)
     assert "little: 2 of 2 runs done" in capsys.readouterr().out
     assert result.verdict.startswith("Not resolved")
+    assert undescribed(result.folder) == []
     assert sorted(result.summary[FREQUENCY]) == [50, 75]
     assert set(result.curves["run"]) == set(result.runs)
     run = result.runs[0]

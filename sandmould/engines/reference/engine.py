@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sandmould.dem import source_files, source_hash
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, exact
@@ -35,7 +37,6 @@ CAPABILITIES = Capabilities(
     checkpoints_at_setups=False,
     moves_tables=True,
     moves_walls=True,
-    changes_step=True,
 )
 
 
@@ -106,12 +107,16 @@ def _damping_keys(scenario: Scenario) -> list[tuple[str, str]]:
 
 
 def _write_layer(layer: PlannedLayer, path: Path, d: int) -> None:
-    """Write a planned layer as a table; heights count from its lowest point."""
-    rows = ["\t".join(["class", "radius_m", *(f"{axis}_m" for axis in "xyz"[:d])])]
-    for number, radius, position in zip(
-        layer.class_number.tolist(), layer.radius_m.tolist(), layer.position_m.tolist(), strict=True
+    """Write a planned layer as a table; heights count from its lowest point, or from the floor."""
+    names, columns = [f"{axis}_m" for axis in "xyz"[:d]], [layer.radius_m, *layer.position_m.T]
+    if layer.velocity_m_s is not None:
+        names += [f"v{axis}_m_s" for axis in "xyz"[:d]]
+        columns += [*layer.velocity_m_s.T]
+    rows = ["\t".join(["class", "radius_m", *names])]
+    for number, numbers in zip(
+        layer.class_number.tolist(), np.column_stack(columns).tolist(), strict=True
     ):
-        rows.append("\t".join([str(number), *(exact(x) for x in (radius, *position))]))
+        rows.append("\t".join([str(number), *map(exact, numbers)]))
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
 
 

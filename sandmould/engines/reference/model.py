@@ -12,6 +12,7 @@ from sandmould.dem.surfaces import Surfaces
 from sandmould.engines.program import Stage
 from sandmould.engines.reference.moved_solver import MovedSolver
 from sandmould.engines.solid_surfaces import add_solids
+from sandmould.scenario.box import piston_wall
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
@@ -20,6 +21,9 @@ from sandmould.scenario.time_step import inertia_factor
 SKIN_OVER_DIAMETER = 0.3
 """Neighbour skin over the mean diameter. A run of 1 134 shaken discs took no longer at 0.4 and more
 than twice as long at 0.15, one busy machine, two runs each."""
+
+LID_WAITS_M = 1e3
+"""How far over the box its lid waits until it is put on: no layer falls from there."""
 
 
 def _law(scenario: Scenario, law: ContactLaw, step_s: float) -> Law:
@@ -58,6 +62,10 @@ def surfaces_of(scenario: Scenario) -> Surfaces:
     surfaces = Surfaces(scenario.dimension)
     for wall in scene.walls:
         surfaces.add_plane(wall.name, wall.point_m, wall.normal)
+    piston = scenario.box.piston
+    if piston is not None and piston.wall == "top":
+        lid = piston_wall(scenario.box, scenario.dimension, -LID_WAITS_M)
+        surfaces.add_plane(lid.name, lid.point_m, lid.normal)
     for block in scene.blocks:
         surfaces.add_facets(block.name, block.corners(), block.facets())
     add_solids(surfaces, scene)
@@ -78,17 +86,18 @@ def solver_of(scenario: Scenario, stage: Stage, step_s: float) -> MovedSolver:
 
 
 def grains_of(scenario: Scenario, layer: PlannedLayer, base_m: float, first_id: int) -> Grains:
-    """Grains of a planned layer at rest, its lowest point at a height."""
+    """Grains of a planned layer at rest, its lowest point at a height, or as placed by hand."""
     d, n = scenario.dimension, len(layer.radius_m)
     radius, spins = layer.radius_m, 1 if d == 2 else 3
-    position = layer.position_m.copy()
-    position[:, -1] += base_m
+    position, by_hand = layer.position_m.copy(), layer.velocity_m_s
+    if by_hand is None:
+        position[:, -1] += base_m
     mass = scenario.sand.grain_mass_kg(1.0, d) * (2 * radius) ** d
     factor = inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d)
     return Grains(
         first_id + np.arange(n),
         position,
-        np.zeros((n, d)),
+        np.zeros((n, d)) if by_hand is None else by_hand.copy(),
         np.zeros((n, spins)),
         radius.copy(),
         mass,

@@ -23,8 +23,10 @@ from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_drive import table_motion
 from sandmould.engines.table_periods import TablePeriod, TablePeriods, window_of
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.box import piston_wall
 from sandmould.scenario.discharge import slid_away_m
 from sandmould.scenario.fill import Settling
+from sandmould.scenario.stages import StageKind
 
 
 class ReferenceSession(StagedSession):
@@ -89,13 +91,24 @@ class ReferenceSession(StagedSession):
             self.solver.surfaces.remove(gate)
 
     def start_stage(self, stage: Stage) -> None:
-        """Begin a stage, in which a gate may slide away."""
+        """Begin a stage, in which a gate may slide away or a wall move as a piston."""
         super().start_stage(stage)
+        if stage.kind is StageKind.PRESS:
+            self._press(stage.steps * self.step_s)
         if stage.slides:
             gate = self._scenario.gate
             assert gate is not None
             open_m = slid_away_m(gate, self._scenario.dimension)
             self.move_surface(gate.name, open_m, stage.steps * self.step_s)
+
+    def _press(self, time_s: float) -> None:
+        """Let the piston go its way from where the wall stands; a lid is put on the box first."""
+        box, d = self._scenario.box, self._scenario.dimension
+        assert box.piston is not None
+        rows = self._vertices_of(box.piston.wall)
+        self.solver.surfaces.arrays.vertices[rows] = piston_wall(box, d, 0.0).point_m
+        end = piston_wall(box, d, box.piston.velocity_m_s * time_s)
+        self.move_surface(end.name, end.point_m[None], time_s)
 
     def _restore(self, checkpoint: Path) -> None:
         with np.load(checkpoint / "solver.npz", allow_pickle=False) as arrays:

@@ -27,7 +27,7 @@ def _deck_pages(findings: Findings[OwnDeck]) -> KindPages:
         (),
         {"curves": curves},
         curve_figures(curves),
-        grounds=scatter_ground(findings.verdict, "their seed"),
+        grounds=scatter_ground(findings.verdict, "their seed", findings.study.seeks_best),
     )
 
 

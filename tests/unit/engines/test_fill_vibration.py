@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sandmould import ROOT
 from sandmould.engines.box_motion import displacements
 from sandmould.engines.program import build_program
 from sandmould.engines.step_counts import StepCounts
@@ -188,3 +189,11 @@ def test_it_leaves_no_pause_between_layers() -> None:
     between = {"acceleration_g": 1.0, "duration_s": 0.02}
     both = tube_scene(fill={"vibration": SHAKE, "vibration_between_layers": between})
     assert "fill.vibration_between_layers" in [problem.key for problem in problems(both)]
+
+
+def test_the_shipped_bracket_is_poured_into_a_vibrating_box() -> None:
+    study = open_study(ROOT / "config" / "studies" / "bracket_fill_small.yaml")
+    for run in expand(study):
+        assert problems(run.scenario) == []
+        stages = [stage.name for stage in build_program(run.scenario).stages]
+        assert stages == ["pour_1", "pour_2", "pour_3", "pour_4", "settle"]

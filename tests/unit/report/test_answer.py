@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from sandmould.report.answer import choices_of, choices_table, headline_of
-from sandmould.report.next_steps import NextSteps, next_steps
+from sandmould.report.next_steps import NextSteps, next_steps, setting_steps
 from sandmould.report.sureness import certificate_ground, sand_grounds
 from sandmould.runs.columns import CROSS_CHECK, OUTCOME_CODE, PART, RUN, SWEEP
 from sandmould.scenario.drive import BoxDrive
@@ -110,7 +110,9 @@ def steps_of(folder: Path, table: pd.DataFrame, replicates: int = 3) -> NextStep
     study = SandStudy.model_validate({"sweep": {"keys": keys}, "replicates": replicates})
     collected = Collected(table, pd.DataFrame(columns=[RUN]), (KEY,))
     verdict, _ = judged(table)
-    return next_steps(folder, study, collected, verdict, verdict.resolved)
+    return next_steps(
+        folder, study, collected, verdict, verdict.resolved, setting_steps(study, verdict)
+    )
 
 
 def test_what_to_do_next_says_how_many_runs_and_which_command(tmp_path: Path) -> None:
