@@ -12,7 +12,7 @@ TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
-.PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
+.PHONY: help install demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
 .PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow \
   reproduction
 
@@ -22,6 +22,10 @@ help:
 	  help && /^[a-z-]+:/ {sub(/:.*/, "", $$1); printf "  %-14s %s\n", $$1, help} {help = ""}' \
 	  $(firstword $(MAKEFILE_LIST))
 	@echo 'The command itself: $(BIN)/sandmould --help'
+
+## install the command into .venv and do nothing else
+install: $(INSTALLED)
+	@echo 'The command: $(BIN)/sandmould --help. A first try: $(BIN)/sandmould demo --quick'
 
 ## the main job on real input: sand flows into a tube at four frequencies
 demo: $(INSTALLED)
