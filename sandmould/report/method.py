@@ -180,6 +180,9 @@ def _filling(scenario: Scenario) -> str:
         return by_hand
     dropped = f"{by_hand}{', ' if by_hand else ''}{layers} layer{plural} dropped "
     dropped += f"{1e3 * fill.drop_height_m:g} mm"
+    if (spout := fill.spout) is not None:
+        dropped += f" in {spout.portions} portions out of a spout {1e3 * spout.width_m:g} mm wide"
+        dropped += f" that moves over the box in {spout.time_s:g} s"
     if (shaken := fill.vibration) is not None:
         return (
             f"{dropped}, one every {shaken.layer_s:g} s, while the box vibrates at "
