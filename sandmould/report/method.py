@@ -175,7 +175,8 @@ def _filling(scenario: Scenario) -> str:
     layers = len(fill.each_layer())
     between = ", vibrated in between" if fill.vibration_between_layers else ""
     plural = "s" if layers > 1 else ""
-    by_hand = f"{len(fill.grains)} grains placed by hand" if fill.grains else ""
+    placed = len(fill.grains)
+    by_hand = f"{placed} grain{'s' if placed > 1 else ''} placed by hand" if placed else ""
     if not layers:
         return by_hand
     dropped = f"{by_hand}{', ' if by_hand else ''}{layers} layer{plural} dropped "
