@@ -12,7 +12,7 @@ TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
-.PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check clean
+.PHONY: help demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
 .PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow \
   reproduction
 
@@ -150,6 +150,10 @@ flow: $(INSTALLED) .venv-peers-flow/installed
 solidification: $(INSTALLED)
 	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.arpm $(QUICK)
 
+## the documentation as a site in site/, strictly: links and anchors are checked
+docs: $(INSTALLED)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
 ## draw the rooms and write docs/architecture.md
 architecture: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.house.architecture
@@ -162,14 +166,15 @@ reproduction: $(INSTALLED)
 decks: $(INSTALLED)
 	$(BIN)/pytest tests/decks --refresh-golden
 
-## config/schema.json, config/default.yaml, docs/measures.md and docs/limits.md from the types
+## config/schema.json, config/default.yaml and docs/{measures,limits,keys,files,commands}.md from the types
 schema: $(INSTALLED)
 	$(BIN)/python -m sandmould.study.schema
 	$(BIN)/python -m sandmould.study.reference
+	$(BIN)/python -m sandmould.cli.reference
 
 ## pin all dependencies in requirements.lock, for every Python and platform that is supported
 lock:
-	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --extra dev --generate-hashes --no-strip-markers \
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --extra dev --extra docs --generate-hashes --no-strip-markers \
 	  --no-header --output-file requirements.lock pyproject.toml
 
 ## look for wheels of all locked packages for the newest supported Python
@@ -179,6 +184,10 @@ lock-check: $(INSTALLED)
 ## list stale results of docs/results and compute the smallest again
 results-check: $(INSTALLED)
 	$(BIN)/python -m sandmould.study.records check
+
+## the page of each committed result, and their list docs/results/README.md
+results-pages: $(INSTALLED)
+	$(BIN)/python -m benchmarks.house.record_pages
 
 ## remove results
 clean:

@@ -12,7 +12,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -29,7 +29,7 @@ from sandmould.runs.columns import RUN
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.collect import read_collected
+from sandmould.study.collect import Collected, read_collected
 from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.plan.plan_files import VERDICT_FILE, read_run
 
@@ -41,7 +41,7 @@ AXES = ("x", "z"), ("x", "y", "z")
 class Picture:
     """A picture that a notebook shows by itself."""
 
-    png: bytes
+    png: bytes = field(repr=False)
 
     def save(self, path: Path | str) -> Path:
         """Write it to a file."""
@@ -163,7 +163,7 @@ class Result:
         return upto[-1].load()
 
     @cached_property
-    def _collected(self) -> Any:
+    def _collected(self) -> Collected:
         return read_collected(self.folder)
 
     def _repr_html_(self) -> str:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from benchmarks.frame import render
-from benchmarks.frequency_law.chart import draw
+from benchmarks.frequency_law import chart, groups, groups_chart
 from benchmarks.frequency_law.series import FREQUENCY, Power, Series, power_of, series_of
 from sandmould import ROOT
 from sandmould.runs.formatting import number, seconds
@@ -21,6 +21,13 @@ from sandmould.study.plan.load_study import open_study
 from sandmould.study.records import RECORDS
 
 STUDIES = ("tube_law_springs", "tube_law_depth", "tube_law_hold", "tube_law_width")
+COLLAPSED = ("tube_law_springs", "tube_law_depth", "tube_law_hold")
+"""Studies of one tube and one sand, which differ in springs, depth and what is held."""
+HELD_OUT = ("tube_frequency", "tube_frequency_stroke")
+"""Studies of the same tube with finer grains: the law is asked for them, not fitted to them."""
+TOLD_M_S = (0.02, 0.04, 0.08)
+TOLD_IN_MODES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
+"""Where the page tabulates the law."""
 POWERS: dict[str, tuple[str, str, Callable[[Series], float]]] = {
     "tube_law_springs": ("wave speed c", "1", lambda series: series.wave_speed_m_s),
     "tube_law_depth": ("depth H of the bed", "-1", lambda series: series.depth_m),
@@ -35,16 +42,27 @@ POWERS: dict[str, tuple[str, str, Callable[[Series], float]]] = {
 
 def page(records: Path = RECORDS, picture: Path | None = None) -> str:
     """Write the page from the records that are there, and its picture where it is given a place."""
-    studies, missing = [], []
-    for name in STUDIES:
-        folder = records / name
-        if (folder / "record.json").is_file():
-            studies.append(_study(folder))
-        else:
-            missing.append(name)
-    if studies and picture is not None:
-        draw(studies, picture)
-    values = {"studies": studies, "missing": missing, "number": number, "seconds": seconds}
+    there = {
+        name: _study(records / name)
+        for name in (*STUDIES, *HELD_OUT)
+        if (records / name / "record.json").is_file()
+    }
+    studies = [there[name] for name in STUDIES if name in there]
+    law = _law(there) if all(name in there for name in COLLAPSED) else None
+    if picture is not None:
+        if studies:
+            chart.draw(studies, picture)
+        if law:
+            groups_chart.draw(
+                law["settings"], TOLD_M_S, picture.with_stem(f"{picture.stem}_groups")
+            )
+    values = {
+        "studies": studies,
+        "missing": [name for name in STUDIES if name not in there],
+        "law": law,
+        "number": number,
+        "seconds": seconds,
+    }
     return render(Path(__file__).with_name("page.md.j2"), values)
 
 
@@ -53,10 +71,10 @@ def _study(folder: Path) -> dict[str, Any]:
     opened = open_study(ROOT / record["study"])
     summary = read_summary(folder)
     keys = swept_keys(pd.read_csv(folder / "runs.tsv", sep="\t"))
-    other = next(key for key in keys if key != FREQUENCY)
+    other = next((key for key in keys if key != FREQUENCY), None)
     scenarios: dict[Any, Scenario] = {}
     for run in expand(opened):
-        scenarios.setdefault(run.parameters[other], run.scenario)
+        scenarios.setdefault(None if other is None else run.parameters[other], run.scenario)
     series = series_of(folder.name, summary, keys, scenarios)
     return {
         "name": folder.name,
@@ -65,6 +83,43 @@ def _study(folder: Path) -> dict[str, Any]:
         "record": record,
         "runs": len(summary),
         "power": _power(folder.name, series),
+    }
+
+
+def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    every = groups.settings_of([s for name in COLLAPSED for s in there[name]["series"]])
+    settings = every[every["acceleration_g"] > groups.THROWN_G].reset_index(drop=True)
+    law = groups.FillLaw(settings)
+    asked = pd.DataFrame(
+        [
+            (velocity, in_modes)
+            for velocity in TOLD_M_S
+            for low, high in [groups.shaken_range(settings, velocity)]
+            for in_modes in TOLD_IN_MODES
+            if low <= in_modes <= high
+        ],
+        columns=list(groups.LAW),
+    )
+    asked["fill"] = law.at(asked)
+    return {
+        "settings": settings,
+        "at_rest": len(every) - len(settings),
+        "miss_with_all": groups.miss_of(every),
+        "names": groups.GROUPS,
+        "collapses": groups.collapses(settings),
+        "explanations": {
+            what: groups.miss_of(settings, needed) for what, needed in groups.EXPLANATIONS.items()
+        },
+        "told_in_modes": TOLD_IN_MODES,
+        "told": {
+            v: dict(zip(mine["in_modes"], mine["fill"], strict=True))
+            for v, mine in asked.groupby("velocity_m_s")
+        },
+        "held_out": {
+            name: groups.held_out(settings, groups.settings_of(there[name]["series"]))
+            for name in HELD_OUT
+            if name in there
+        },
     }
 
 

@@ -23,6 +23,12 @@ Array = NDArray[np.float64]
 FREQUENCY = "vibration.0.frequency_hz"
 MEASURE = "tube_fill_fraction"
 BED_HEIGHT = "bed_height_m"
+DRIVE = {
+    "drive_acceleration_g": "acceleration_g",
+    "drive_velocity_m_s": "velocity_m_s",
+    "drive_displacement_m": "displacement_m",
+}
+"""Columns of a summary with the box's motion, and their names in a ``Series``."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,8 @@ class Series:
     optimum: Optimum
     fills: pd.DataFrame
     """A row a filling, a column a frequency in rising order; NaN where a run failed."""
+    drives: pd.DataFrame
+    """A row a frequency in the same order: ``DRIVE``, peaks of the box's motion."""
 
     @property
     def largest_rise(self) -> Rise:
@@ -142,6 +150,7 @@ def series_of(
                 pd.DataFrame({"hz": hz, "filling": number_blocks(used), "fill": values}).pivot(
                     index="filling", columns="hz", values="fill"
                 ),
+                used.groupby(FREQUENCY)[list(DRIVE)].mean().rename(columns=DRIVE),
             )
         )
     return found

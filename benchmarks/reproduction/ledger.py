@@ -50,9 +50,7 @@ class OurSource(Section):
     """Where a number of ours is recorded, and what is taken of it."""
 
     record: str = Field("", description="Folder of docs/results; its summary.tsv is read.")
-    in_readme: bool = Field(
-        False, description="Read the tables of the record in docs/results/README."
-    )
+    in_readme: bool = Field(False, description="Read the tables of the record's page.")
     results: Literal["", "arpm", "mps"] = Field(
         "", description="Theme of benchmarks; its results.json is read."
     )

@@ -203,7 +203,7 @@ class LedgerPage:
             failed = int((~finished(record.summary)).sum())
             machine = record.record["machine"]["processor"]
             rows.append([
-                f"[{name}](results/README.md#{name})", record.record["commit"], machine,
+                f"[{name}](results/{name}/README.md)", record.record["commit"], machine,
                 str(len(record.summary)), str(failed or ""), seconds(record.took_s),
                 record.stale or "stands",
             ])  # fmt: skip

@@ -60,10 +60,9 @@ class StudyRecord:
 
     @cached_property
     def readme_tables(self) -> pd.DataFrame:
-        """Tables of its section in the README of all records, one row a line."""
-        text = "\n" + (self.folder.parent / "README.md").read_text(encoding="utf-8")
-        section = text.partition(f"\n## {self.name}\n")[2].partition("\n## ")[0]
-        return pd.DataFrame(list(table_rows(section)))
+        """Tables of what was found, in the record's README, one row a line."""
+        text = (self.folder / "README.md").read_text(encoding="utf-8")
+        return pd.DataFrame(list(table_rows(text.partition("\n## Record\n")[0])))
 
     @property
     def study(self) -> str:

@@ -1,7 +1,7 @@
 """Rounds against plain sweeps of as many runs, on planted curves: ``python -m benchmarks.rounds``.
 
 How often the interval holds the planted optimum, how wide it is, and how far the best setting is
-from it. It prints the table of docs/choices.md; nothing of it is simulated.
+from it. It prints the table of docs/explanation/statistics.md; nothing of it is simulated.
 """
 
 from __future__ import annotations

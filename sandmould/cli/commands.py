@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from sandmould.cli.new import new
 from sandmould.cli.study_file import shipped_studies, study_file
 from sandmould.scenario.bad_input import BadInputError, Problem
 
@@ -54,6 +55,12 @@ class _Verbs(TyperGroup):
             raise typer.Exit(1) from None
 
 
+def _key_paths(start: str) -> list[str]:
+    from sandmould.study.keys import key_paths
+
+    return key_paths(start)
+
+
 app = typer.Typer(
     name="sandmould",
     cls=_Verbs,
@@ -81,7 +88,10 @@ def sandmould(
     """Sand moulds for lost-foam casting: plan, run and report studies; results go to ./results."""
 
 
-@app.command()
+app.command(epilog="Example: sandmould new my_study.yaml --yes --hold displacement")(new)
+
+
+@app.command(epilog="Example: sandmould plan tube_demo --cores 4")
 def plan(study: StudyFile, cores: Cores = None, adopt: Adopt = False) -> None:
     """Check a study, print its runs and their price; nothing starts."""
     from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
@@ -95,7 +105,7 @@ def plan(study: StudyFile, cores: Cores = None, adopt: Adopt = False) -> None:
         typer.echo(said)
 
 
-@app.command()
+@app.command(epilog="Example: sandmould run my_study.yaml")
 def run(
     study: StudyFile,
     options: Annotated[
@@ -122,7 +132,7 @@ def run(
     raise typer.Exit(run_study(study, [*_cores_option(cores), *profile, *(options or [])]))
 
 
-@app.command()
+@app.command(epilog="Example: sandmould demo --quick")
 def demo(
     quick: Annotated[
         bool, typer.Option("--quick", help="A coarse one of a minute, to try the installation.")
@@ -136,7 +146,7 @@ def demo(
     raise typer.Exit(run_study(study, _cores_option(cores)))
 
 
-@app.command()
+@app.command(epilog="Example: sandmould again tube_demo/frequency_25_r1_45f4dc")
 def again(
     runs: Annotated[
         list[str],
@@ -159,7 +169,7 @@ def again(
         typer.echo(f"sandmould run {study} computes them again.")
 
 
-@app.command()
+@app.command(epilog="Example: sandmould status my_study.yaml")
 def status(study: StudyFile, cores: Cores = None) -> None:
     """Say where a study stands and what is left of it."""
     from sandmould.study.plan.build_plan import RESULTS, open_plan
@@ -168,7 +178,7 @@ def status(study: StudyFile, cores: Cores = None) -> None:
     typer.echo(status_text(open_plan(study), RESULTS, cores or _all_cores()))
 
 
-@app.command()
+@app.command(epilog="Example: sandmould tidy my_study.yaml --yes")
 def tidy(
     study: StudyFile,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask first.")] = False,
@@ -193,7 +203,7 @@ def tidy(
         typer.echo(f"{number} run folders removed, {size} freed")
 
 
-@app.command()
+@app.command(epilog="Example: sandmould pack my_study.yaml -o runs.tar.xz")
 def pack(
     study: StudyFile,
     output: Annotated[
@@ -223,7 +233,7 @@ def pack(
     typer.echo(packed.text())
 
 
-@app.command()
+@app.command(epilog="Example: sandmould unpack runs.tar.xz")
 def unpack(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE...", help="What sandmould pack wrote.")
@@ -243,7 +253,7 @@ def unpack(
         typer.echo(unpack_runs(file, RESULTS, checkpoints).text())
 
 
-@app.command()
+@app.command(epilog="Example: sandmould measures tube_demo")
 def measures(study: StudyFile) -> None:
     """List what runs of a study can be measured by, with units."""
     from sandmould.study.plan.load_study import open_study
@@ -252,9 +262,14 @@ def measures(study: StudyFile) -> None:
     typer.echo(measures_text(open_study(study)))
 
 
-@app.command()
+@app.command(epilog="Example: sandmould keys scenario.vibration")
 def keys(
-    path: Annotated[str, typer.Argument(metavar="[PATH]", help="Such as scenario.vibration.")] = "",
+    path: Annotated[
+        str,
+        typer.Argument(
+            metavar="[PATH]", autocompletion=_key_paths, help="Such as scenario.vibration."
+        ),
+    ] = "",
 ) -> None:
     """Explain the keys of a study's file: unit, default, meaning."""
     from sandmould.study.keys import keys_text
@@ -262,7 +277,7 @@ def keys(
     typer.echo(keys_text(path))
 
 
-@app.command()
+@app.command(epilog="Example: sandmould doctor")
 def doctor() -> None:
     """Say what the installation has, and what is missing."""
     from sandmould.study.installation import doctor_text, findings
@@ -271,7 +286,7 @@ def doctor() -> None:
     typer.echo(doctor_text(findings(RESULTS)))
 
 
-@app.command()
+@app.command(epilog="Example: sandmould show my_study.yaml -o scene.html")
 def show(
     study: StudyFile,
     output: Annotated[
@@ -300,7 +315,7 @@ def show(
     typer.echo(out)
 
 
-@app.command()
+@app.command(epilog="Example: sandmould report my_study.yaml")
 def report(study: StudyFile) -> None:
     """Write the report of a study again from its results."""
     from sandmould.report.page import write_report
@@ -324,6 +339,40 @@ def report(study: StudyFile) -> None:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("results", str(folder), valid)]) from error
     typer.echo(last_line(folder))
+
+
+@app.command(epilog="Example: sandmould compare tube_frequency tube_frequency_stroke")
+def compare(
+    studies: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="STUDY...",
+            autocompletion=shipped_studies,
+            help="Finished studies, or their folders of results.",
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", show_default="A_B_compared.html",
+            help="The page; its picture lies beside it as .svg.",
+        ),
+    ] = None,
+) -> None:  # fmt: skip
+    """Put finished studies side by side: table, picture and page."""
+    from sandmould.report.comparison import read_comparison, write_comparison
+    from sandmould.study.plan.build_plan import RESULTS
+
+    folders = [
+        Path(each) if Path(each).is_dir() else RESULTS / study_file(each).stem for each in studies
+    ]
+    compared = read_comparison(folders)
+    out = output or Path(
+        "_".join([*(folder.resolve().name for folder in folders), "compared.html"])
+    )
+    picture = write_comparison(compared, out)
+    typer.echo(compared.text())
+    typer.echo(f"\n{out}\n{picture}")
 
 
 def _adopt(study: Path) -> None:

@@ -31,6 +31,3 @@ class Capabilities:
     """Whether the box can stand on a table that rotating masses, mounts and the sand move."""
     moves_walls: bool
     """Whether a gate opens in a stated time, and a wall of the box moves as a piston."""
-    changes_step: bool
-    """Whether a session finds the exact limit of its contacts, ``exact_limit_s``, and goes on from
-    a checkpoint with another time step."""

@@ -106,9 +106,9 @@ class Deck:
         return "\n".join(line for line in bare if line)
 
     @classmethod
-    def render(cls, dialect: str, context: Mapping[str, Any]) -> Deck:
-        """Render the deck of a dialect."""
-        return cls(environment(dialect).get_template("deck.in.j2").render(context))
+    def render(cls, dialect: str, context: Mapping[str, Any], template: str = "deck.in.j2") -> Deck:
+        """Render the deck of a dialect, or a part of it by another template."""
+        return cls(environment(dialect).get_template(template).render(context))
 
     @classmethod
     def read(cls, path: Path) -> Deck:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from sandmould.engines.bed_deck import follows_bed, step_line
 from sandmould.engines.deck import remark
 from sandmould.engines.deck_lines import (
     SKIN,
@@ -59,12 +60,15 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
         "study": remark(study),
         "scenario": scenario,
         "program": program,
+        "stages": program.stages,
+        "after_bed": follows_bed(scenario),
         "classes": classes,
         "clip": scenario.contact.no_tension == "total",
         "damping": scenario.background_damping,
         "gate": "" if scenario.discharge is None else scenario.discharge.gate,
         "critical": critical,
         "step_s": counts.step_s,
+        "step_line": step_line(lines),
         "step_fraction": counts.step_s / critical.step_s,
         "skin": skin_m(scenario),
         "skin_source": f"{SKIN:g} of the mean diameter",

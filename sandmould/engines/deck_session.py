@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from pathlib import Path
 from typing import ClassVar
 
+from sandmould.engines.bed_deck import blocks_of
 from sandmould.engines.deck import Deck
 from sandmould.engines.program import Program
-from sandmould.engines.staged_session import StagedSession
+from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.staged_session import StagedSession, step_of
 
 _SETUP = ("header", "box", "create", "contacts", "motion", "walls", "background", "integration",
-          "measures")  # fmt: skip
+          "measures", "count_on")  # fmt: skip
 
 
 class DeckSession(StagedSession):
@@ -30,24 +33,37 @@ class DeckSession(StagedSession):
         deck : Deck
         """
         super().__init__(program)
-        self._blocks = deck.blocks
+        self._blocks = blocks_of(deck, program.scenario)
         self._setup_due = True
 
     @abstractmethod
     def send(self, commands: str) -> str | None:
         """Execute commands; an error becomes the outcome that fits."""
 
+    @abstractmethod
+    def snapshot(self) -> Snapshot:
+        """State of all grains, relative to the box."""
+
     def _set_up(self, checkpoint: Path | None) -> None:
         """Execute all blocks before the first layer, afresh or from a checkpoint."""
-        for name in _SETUP:
+        # In the order of the deck: engines count on at different places.
+        for name in (name for name in self._blocks if name in _SETUP):
             if name == "create" and checkpoint is not None:
                 self.send(f'read_restart "{checkpoint.absolute()}/{self._restart}"')
-            else:
+            elif name != "count_on" or self._counts_on(checkpoint):
                 self.send(self._blocks[name].text)
 
+    def _counts_on(self, checkpoint: Path | None) -> bool:
+        """Whether a checkpoint was computed with another time step."""
+        return checkpoint is not None and step_of(checkpoint) not in (None, self.step_s)
+
+    def _change_step(self, earlier_s: float, steps: int) -> None:
+        assert self.steps == steps, "the deck counts on as the session does"
+
     def _around_run(self) -> tuple[str, str]:
-        """Commands of the stage before and after its long run."""
-        return self._blocks[self.stage.name].around_run()
+        """Commands of the stage before and after its long run; none of a fill that is over."""
+        block = self._blocks.get(self.stage.name)
+        return ("", "") if block is None else block.around_run()
 
     def _open(self, gate: str) -> None:
         self.send(self._blocks[f"open_{gate}"].text)
@@ -69,6 +85,17 @@ class DeckSession(StagedSession):
         after = self._blocks.get(f"after_{self.stage.name}")
         if after is not None:
             self.send(after.text)
+
+    def exact_limit_s(self) -> float:
+        """Limit of our own solver's contacts where the engine's grains are."""
+        snapshot = self.snapshot()  # all ranks take part in gathering
+        limit_s = math.inf
+        if self.is_root:
+            # Compiled code takes a while to load: only runs that ask for it wait.
+            from sandmould.engines.bed_limit import limit_of_snapshot_s
+
+            limit_s = limit_of_snapshot_s(self._scenario, self.stage, snapshot, self._opened)
+        return self.share(limit_s)
 
     def _save(self, folder: Path) -> None:
         self.send(f'write_restart "{folder.absolute()}/{self._restart}"')

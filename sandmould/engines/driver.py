@@ -214,7 +214,8 @@ class Driver:
             if self._keeps_end and stage is self._program.stages[-1]:
                 self._write_end(session)
             elif finds_limit:
-                self._write_checkpoint(session, checkpoints.next_folder(self._work))
+                self._write_next(session)
+                session.share(None)  # no rank looks for the checkpoint before it is sealed
                 return False
             session.end_stage()
         if session.is_root:
@@ -315,14 +316,17 @@ class Driver:
         stop = session.share(self._stop_requested or time.monotonic() - self._begun > limit_s)
         if not stop and session.steps % self._checkpoint_steps:
             return
-        # All ranks write into the one folder that the first has emptied.
-        folder = checkpoints.next_folder(self._work) if session.is_root else self._work
-        self._write_checkpoint(session, session.share(folder))
+        self._write_next(session)
         if stop:
             why = "the system asked" if self._stop_requested else "guard.wall_limit_s came"
             raise EngineStop(
                 Outcome.OUT_OF_WALL_TIME, f"stopped at {session.time_s:.4g} s because {why}"
             )
+
+    def _write_next(self, session: Session) -> None:
+        """Write a checkpoint: all ranks into the one folder that the first has emptied."""
+        folder = checkpoints.next_folder(self._work) if session.is_root else self._work
+        self._write_checkpoint(session, session.share(folder))
 
     def _write_end(self, session: Session) -> None:
         """Write the checkpoint that other runs go on from."""

@@ -142,6 +142,19 @@ def mpi_ranks(scenario: Scenario) -> int:
     return scenario.engine.ranks if engine_of(scenario).RANKS is Ranks.PROCESSES else 1
 
 
+def calls_our_kernels(scenario: Scenario) -> bool:
+    """Whether compiled code of the house takes part, as the engine or beside it."""
+    sources = engine_of(scenario).session_sources(scenario)
+    return any(path.is_relative_to(ROOT / "sandmould" / "dem") for path in sources)
+
+
+def communicator_of(scenario: Scenario) -> Any:
+    """The MPI communicator of the processes that compute a run; None where there is one."""
+    if mpi_ranks(scenario) == 1:
+        return None
+    return deck_reader(scenario.engine.name).communicator()
+
+
 def deck_hash(scenario: Scenario) -> str:
     """Hash of all that turns a scenario into a deck, and of our code that computes beside it."""
     return _code_hash(scenario) + dialect_hash(scenario.engine.name)
@@ -189,14 +202,6 @@ def engine_problem(scenario: Scenario) -> Problem | None:
         able = " or ".join(engines_that(lambda can: can.moves_walls))
         valid = f"absent on engine {scenario.engine.name}, whose walls stand; engine {able} has it"
         return Problem(*moved, valid)
-    fraction = scenario.time_step.bed_fraction
-    if not engine.CAPABILITIES.changes_step and fraction is not None:
-        able = " or ".join(engines_that(lambda can: can.changes_step))
-        valid = (
-            f"absent on engine {scenario.engine.name}, which has one time step from the first line "
-            f"of its deck to the last; engine {able} takes one from the bed"
-        )
-        return Problem("time_step.bed_fraction", fraction, valid)
     try:
         engine.refuse(scenario)
     except RefusedError as refusal:

@@ -219,17 +219,13 @@ class Session(Protocol):
         """
 
     def exact_limit_s(self) -> float:
-        """Find the step up to which the contacts of this moment stay bounded, or refuse.
+        """Find the step up to which the contacts of this moment stay bounded.
 
         Returns
         -------
         float, s
             Limit of the whole system with its dashpots, eq. (42); infinite where nothing touches.
             All contacts count as sticking, and none opens: the stiffest case.
-
-        Raises
-        ------
-        RefusedError
         """
 
     def write_checkpoint(self, folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -53,13 +54,19 @@ class Snapshot:
     def arrays(self) -> dict[str, Any]:
         """Values by name, as files hold them."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values["vibration_time_s"] = self.clock_s
         return {name: value for name, value in values.items() if value is not None}
+
+    @property
+    def clock_s(self) -> float:
+        """Time of vibration as files have it: NaN before it began."""
+        return self.vibration_time_s if self.vibration_time_s >= 0.0 else math.nan
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, Any]) -> Snapshot:
         """The snapshot that such values are of; a KeyError or TypeError where some are missing."""
         values = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays}
-        for scalar, kind in (("time_s", float), ("vibration_time_s", float), ("stage", str)):
+        for scalar, kind in (("time_s", float), ("vibration_time_s", clock_of), ("stage", str)):
             values[scalar] = kind(values[scalar])
         return cls(**values)
 
@@ -77,6 +84,12 @@ class Snapshot:
                 return cls.of_arrays(data)
         except Exception as error:
             raise ValueError(f"{path}: not a readable snapshot ({error})") from error
+
+
+def clock_of(stored: Any) -> float:
+    """Time of vibration that a file has: -1 where it is absent, as older files say themselves."""
+    value = float(stored)
+    return -1.0 if math.isnan(value) else value
 
 
 def scene_at(scenario: Scenario, snapshot: Snapshot) -> Scene:

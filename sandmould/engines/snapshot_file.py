@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot import Snapshot, clock_of
 from sandmould.runs.files import replaced
 
 SNAPSHOTS = "snapshots.npz"
@@ -83,11 +83,11 @@ class StoredSnapshot:
         """Simulated time and time of vibration; raises whatever a broken file leads to."""
         names = ("time_s", "vibration_time_s")
         if self._places is not None:
-            time_s, vibration_s = (float(self._places[n].read(self.path)) for n in names)
+            time_s, vibration_s = (self._places[n].read(self.path) for n in names)
         else:
             with np.load(self.path, allow_pickle=False) as arrays:
-                time_s, vibration_s = (float(arrays[n]) for n in names)
-        return time_s, vibration_s
+                time_s, vibration_s = (arrays[n] for n in names)
+        return float(time_s), clock_of(vibration_s)
 
 
 def stored_snapshots(folder: Path) -> list[StoredSnapshot]:

@@ -37,6 +37,17 @@ class StageState(NamedTuple):
     """See ``StagedSession``."""
 
 
+def _state_of(checkpoint: Path) -> dict[str, Any]:
+    """Where the stage of a checkpoint stands."""
+    state: dict[str, Any] = json.loads((checkpoint / "session.json").read_text(encoding="utf-8"))
+    return state
+
+
+def step_of(checkpoint: Path) -> float | None:
+    """Time step of a checkpoint, s; those of earlier versions do not say it."""
+    return _state_of(checkpoint).get("step_s")
+
+
 class StagedSession(ABC):
     """A session in one process; see ``sandmould.engines.session.Session``.
 
@@ -288,25 +299,21 @@ class StagedSession(ABC):
         self._watch = replace(state.watch)
         self._last_sums = dict(state.last_sums)
 
-    def exact_limit_s(self) -> float:
-        """Refuse: this engine does not show its contacts."""
-        fraction = self._scenario.time_step.bed_fraction
-        raise RefusedError("time_step.bed_fraction", fraction, "absent on this engine")
-
     def attach_mover(self, name: str, mover: StepMover) -> None:
         """Refuse: this engine calls nobody in its steps."""
         raise RefusedError("surface", name, self._valid_surface)
 
-    def _take_step_over(self, earlier_s: float) -> None:
+    def _take_step_over(self, earlier_s: float, earlier_steps: int) -> None:
         """Go on from the end of a stage with another step, at the next step that ends a check."""
-        time_s = self._time_at_0_s + self.steps * earlier_s
-        lasted_s = (self.steps - self._stage_start) * earlier_s
-        self._change_step(earlier_s, -(-self.steps // self._counts.check) * self._counts.check)
+        time_s = self._time_at_0_s + earlier_steps * earlier_s
+        lasted_s = (earlier_steps - self._stage_start) * earlier_s
+        self._change_step(earlier_s, -(-earlier_steps // self._counts.check) * self._counts.check)
         self._time_at_0_s = time_s - self.steps * self.step_s
         self._stage_start = self.steps - self._counts.steps(lasted_s)
 
+    @abstractmethod
     def _change_step(self, earlier_s: float, steps: int) -> None:
-        """Refuse: this engine computes with one step.
+        """Compute with another step from now on.
 
         Parameters
         ----------
@@ -315,8 +322,6 @@ class StagedSession(ABC):
         steps : int
             That count as done from now on.
         """
-        valid = f"{earlier_s:g}, as before, on this engine"
-        raise RefusedError("time_step.step_s", self.step_s, valid)
 
     @property
     def can_checkpoint(self) -> bool:
@@ -329,6 +334,7 @@ class StagedSession(ABC):
         if self.is_root:
             state = {
                 "stage": self.stage.name,
+                "steps": self.steps,
                 "stage_start": self._stage_start,
                 "vibration_start": self._vibration_start,
                 "checks_at_rest": [self._watch.in_row, self._watch.all_in_row],
@@ -342,9 +348,7 @@ class StagedSession(ABC):
 
     def _take_up(self, checkpoint: Path) -> None:
         """Go on inside the stage of a checkpoint, with the gates of earlier stages open."""
-        state: dict[str, Any] = json.loads(
-            (checkpoint / "session.json").read_text(encoding="utf-8")
-        )
+        state = _state_of(checkpoint)
         names = [stage.name for stage in self._program.stages]
         passed = self._program.stages[: names.index(state["stage"]) + 1]
         for stage in passed:
@@ -357,7 +361,7 @@ class StagedSession(ABC):
         self._time_at_0_s = state.get("time_at_0_s", 0.0)
         earlier_s = state.get("step_s", self.step_s)
         if earlier_s != self.step_s:
-            self._take_step_over(earlier_s)
+            self._take_step_over(earlier_s, state.get("steps", self.steps))
         self._stage_end = self._stage_start + self._stage_steps()
         self._vibration_start = state["vibration_start"]
         self._watch.in_row, self._watch.all_in_row = state["checks_at_rest"]

@@ -233,7 +233,7 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     parts = []
     for _, rows in drawn.curves.groupby(RUN):
         shift_s = _begins_s(rows) if (rows[VIBRATION_TIME_S] >= 0.0).any() else 0.0
-        parts.append(rows.assign(time_s=rows[TIME_S] - shift_s, vibration_time_s=-1.0))
+        parts.append(rows.assign(time_s=rows[TIME_S] - shift_s, vibration_time_s=math.nan))
     aligned = pd.concat(parts)
     chart = time_chart(aligned, drawn.summary, part, collected.keys, TIP)
     if chart is None:
@@ -246,7 +246,7 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
         area = _area(aligned[aligned[RUN].isin(used)])
         if area is not None:
             said = f"{setting.label}: from the least to the greatest of {len(used)} runs"
-            areas.append(replace(area, tint=tint[setting.label], title=said))
+            areas.append(replace(area, tint=tint[setting.label], title=said, group=setting.label))
     clock = (
         "time since vibration began, s"
         if (collected.curves[VIBRATION_TIME_S] >= 0).any()

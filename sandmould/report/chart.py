@@ -57,8 +57,9 @@ def tints(n: int, ordered: bool) -> tuple[Tint, ...]:
     )
 
 
-LineStyle = Literal["run", "mean", "joined"]
-"""Thin for one run or edge, thick for a mean, dotted between points that it only joins."""
+LineStyle = Literal["run", "mean", "joined", "behind"]
+"""Thin for one run or edge, thick for a mean, dotted between points that it only joins, faint
+behind others."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,8 @@ class Line:
     style: LineStyle = "run"
     label: str = ""
     title: str = ""
+    group: str = ""
+    """Setting that it belongs to."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,12 @@ class Area:
     """(k,) float64, in the units of the axes."""
     tint: Tint = PLAIN
     title: str = ""
+    group: str = ""
+    """Setting that it belongs to."""
+
+
+Range = tuple[float, float]
+"""Ends of an axis."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +127,8 @@ class Chart:
     band: tuple[float, float] | None = None
     """Values along x between which the chart is shaded."""
     areas: tuple[Area, ...] = ()
+    frame: tuple[Range, Range] | None = None
+    """Ends of both axes; round the values unless given."""
     is_logarithmic: bool = False
     """Whether both axes are; what is not above zero then has no place."""
 
@@ -186,6 +197,8 @@ class Laid:
     width: float
     height: float
     left: float
+    foot: float
+    """Of the plot, where the axis along x lies."""
     x: Axis
     y: Axis
     x_ticks: tuple[Tick, ...]
@@ -214,6 +227,8 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
         height = 66.0 + 42.0 * len(chart.rows)
     log = chart.is_logarithmic
     y_low, y_high = _log_range(_ys(chart)) if log else _range(_ys(chart))
+    if chart.frame:
+        y_low, y_high = chart.frame[1]
     ticks_of = _log_ticks if log else _round_ticks
     y_ticks = () if chart.rows else ticks_of(y_low, y_high, max(3, int(height / 55)))
     y_text = [_text(t, y_ticks, log) for t in y_ticks]
@@ -221,18 +236,21 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
     label = max((len(line.label) for line in chart.lines), default=0)
     xs = _xs(chart)
     x_low, x_high = _log_range(xs) if log else _range(xs, tight=not chart.marks)
+    if chart.frame:
+        x_low, x_high = chart.frame[0]
     beside = 30.0 if any(m.shift_px for m in chart.marks) else 0.0
     right = width - (12.0 + _BOLD * label if label else 16.0)
     x = Axis(x_low, x_high, margin + beside, right, log)
-    foot = height - 44.0
+    foot = height - (44.0 if chart.x_title else 26.0)
     y = Axis(-0.7, len(chart.rows) - 0.3, 10.0, foot) if chart.rows else None
-    y = y or Axis(y_low, y_high, foot, 34.0, log)
+    y = y or Axis(y_low, y_high, foot, 34.0 if chart.y_title else 10.0, log)
     x_ticks = chart.x_ticks or ticks_of(x_low, x_high, max(4, int(width / 80)))
     return Laid(
         chart=chart,
         width=width,
         height=height,
         left=margin,
+        foot=foot,
         x=x,
         y=y,
         x_ticks=_not_touching([Tick(x.at(t), _text(t, x_ticks, log)) for t in x_ticks]),

@@ -128,14 +128,21 @@ def time_chart(
                 continue
             xy = by_run[str(run)]
             ended = f", {reason_text(why, outcome)}" if why else ""
-            lines.append(Line(_thinned(xy, stride), tint, title=f"{run}: {setting.label}{ended}"))
+            lines.append(
+                Line(
+                    _thinned(xy, stride),
+                    tint,
+                    title=f"{run}: {setting.label}{ended}",
+                    group=setting.label,
+                )
+            )
             if not why:
                 complete.append(xy[np.isfinite(xy).all(axis=1)])
         mean = _mean_curve(complete)
         if mean is not None:
             label = setting.label if setting.label in labelled else ""
             title = f"{setting.label}, mean of {len(complete)}"
-            means.append(Line(_thinned(mean, stride), tint, "mean", label, title))
+            means.append(Line(_thinned(mean, stride), tint, "mean", label, title, setting.label))
     when = "time of vibration, s" if clock == VIBRATION_TIME_S else "time, s"
     return Chart(when, what, _alt(what, when, means), tuple(lines + means))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,6 +28,9 @@ from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
 
+NOTHING = 1e-3
+"""Share of the largest value below which one is told as none."""
+
 
 @dataclass(frozen=True)
 class SandEstimate:
@@ -43,6 +47,8 @@ class EstimatePages:
     """What the section shows."""
 
     title: str
+    headline: str
+    """Answers the study's question."""
     sentences: tuple[str, ...]
     sound: bool
     """Whether the study's question is answered."""
@@ -52,6 +58,11 @@ class EstimatePages:
     sands: tuple[SandEstimate, ...]
     worths: Table | None
     cost: str
+
+    @property
+    def has_section(self) -> bool:
+        """Whether there is more to show than sentences."""
+        return bool(self.heaps or self.map or self.sands or self.worths)
 
 
 def estimate_pages(
@@ -81,6 +92,7 @@ def estimate_pages(
     what = name_of(verdict.measure)
     return EstimatePages(
         title="Angle of repose" if verdict.measure == "heap_angle_deg" else what.capitalize(),
+        headline=_headline(settings, sands, verdict.measure, keys),
         sentences=tuple(sentences) or (f"No run has a {what} that could be measured.",),
         sound=bool(settings) and all(sand.posterior for sand in sands),
         heaps=heaps_of(study_folder, summary, verdict, scenario),
@@ -90,6 +102,48 @@ def estimate_pages(
         worths=_worth_table(calibrated) if calibrated and calibrated.worths else None,
         cost=_cost(summary),
     )
+
+
+def _headline(
+    settings: Sequence[Setting], sands: Sequence[SandEstimate], measure: str, keys: Sequence[str]
+) -> str:
+    """The calibrated sands, where the measure changes most, or its value."""
+    what, unit = name_of(measure), unit_of(measure)
+    unit = unit if unit in ("", "°") else f" {unit}"
+    if sands:
+        found = [sand.name for sand in sands if sand.posterior]
+        lacking = [sand.name for sand in sands if not sand.posterior]
+        said = f"Found frictions for {listed(found)}" if found else "Not resolved"
+        return f"{said}; none for {listed(lacking)}." if lacking else f"{said}."
+    if not settings:
+        return f"Not resolved: no run has a {what} that could be measured."
+    largest = max(abs(s.mean) for s in settings)
+
+    def told(value: float) -> str:
+        return f"about 0{unit}" if abs(value) < NOTHING * largest else f"{number(value)}{unit}"
+
+    if len(settings) == 1:
+        (only,) = settings
+        return f"The {what} is {with_margin(only.mean, only.ci_half_width)}{unit}."
+    low, high = min(settings, key=lambda s: s.mean), max(settings, key=lambda s: s.mean)
+    said = (
+        f"The {what} goes from {told(low.mean)} ({low.label}) to {told(high.mean)} ({high.label})"
+    )
+    is_on_a_scale = len(keys) == 1 and all(
+        isinstance(s.values[keys[0]], int | float | np.number) for s in settings
+    )
+    if not is_on_a_scale or len(settings) < 4:
+        return f"{said}."
+    still = list(itertools.takewhile(lambda s: abs(s.mean) < NOTHING * largest, settings))
+    if still and len(still) < len(settings) - 1:
+        begins, last = settings[len(still)], settings[-1]
+        return (
+            f"The {what} is {told(0.0)} up to {still[-1].label}, {told(begins.mean)} at "
+            f"{begins.label} and {told(last.mean)} at {last.label}."
+        )
+    steps = list(itertools.pairwise(settings))
+    before, after = max(steps, key=lambda pair: abs(pair[1].mean - pair[0].mean))
+    return f"{said}; it changes most between {before.label} and {after.label}."
 
 
 def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:

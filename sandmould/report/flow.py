@@ -23,10 +23,11 @@ from sandmould.report.flow_film import SHADES, FlowFilm, make_flow_film
 from sandmould.report.flow_map import condition_text, said_of, stability_map
 from sandmould.report.method import Row
 from sandmould.report.pressure_histories import PressureHistory, pressure_history
+from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
-from sandmould.runs.formatting import listed, name_of, number
+from sandmould.runs.formatting import listed, name_of, number, setting_text
 from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
@@ -52,6 +53,9 @@ class FlowPages:
     colours: tuple[str, ...]
     curves: tuple[Curve, ...]
     pours: bool
+    answer: str
+    """Where the metal stays calm, in one sentence."""
+    grounds: tuple[Ground, ...]
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,9 @@ def flow_pages(
             collected, verdict, [*probes, "largest_speed_m_s"], lambda *_: ""
         ),
         pours=not isinstance(scenario.case, StillTank) and scenario.case.starts == "empty",
+        answer=next(iter(_hopping(scenario, ranked, collected.keys)), "")
+        or _calm(scenario, ranked, collected.keys),
+        grounds=_grounds(scenario),
     )  # fmt: skip
 
 
@@ -174,6 +181,44 @@ def _sentences(
             f"of {len(ranked)} runs. The paper does not say which it takes."
         )
     return tuple(said)
+
+
+def _calm(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> str:
+    """At which settings the pressure stays calm, the calmest first."""
+    if ranked.empty:
+        return "Not resolved: no run finished."
+    labels = [setting_text({key: row[key] for key in keys}) for _, row in ranked.iterrows()]
+    verdicts = list(ranked[CLASSIFICATION])
+    # the calmest come first
+    calm = labels[: verdicts.count(StabilityRating.EXCELLENT.value)]
+    stopped = verdicts.count(StabilityRating.FAILED.value)
+    noise_pa = float(pd.to_numeric(ranked[f"{scene.deepest(scenario)}_sd_pa"]).iloc[0])
+    broke = f" {stopped} of {len(labels)} runs broke down." if stopped else ""
+    if not calm:
+        return f"The pressure stays calm at none of {len(labels)} settings.{broke}"
+    where = "all" if len(calm) == len(labels) else f"{len(calm)} of {len(labels)}"
+    return (
+        f"The pressure stays calm at {where} settings, calmest at {calm[0]}: it deviates by "
+        f"{number(noise_pa, 2)} Pa there.{broke}"
+    )
+
+
+def _grounds(scenario: MetalFlow) -> tuple[Ground, ...]:
+    """What calm means, and what the answer rests on."""
+    name = scene.deepest(scenario)
+    return (
+        Ground(
+            "Calm",
+            f"the pressure at {name} deviates by less than {scenario.quiet_pa:g} Pa (standard "
+            "deviation), and no metal hops.",
+        ),
+        Ground("Chance", "nothing in these runs is left to it: one run of each setting is enough."),
+        Ground(
+            "Method",
+            "the gradient as the paper prints it makes every run fail; another one, "
+            f"{scenario.gradient}, is used instead.",
+        ),
+    )
 
 
 def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> tuple[str, ...]:

@@ -290,7 +290,7 @@ def _seeds(summary: pd.DataFrame) -> str:
 
 
 def provenance_rows(all_runs: Sequence[Mapping[str, Any]]) -> tuple[Row, ...]:
-    """What the runs say of their origin, values that differ from run to run counted.
+    """What the runs say of their origin; what is another one in every run tells nothing of them.
 
     Parameters
     ----------
@@ -305,10 +305,10 @@ def provenance_rows(all_runs: Sequence[Mapping[str, Any]]) -> tuple[Row, ...]:
     rows = []
     for key in dict.fromkeys(k for p in flat for k in p):
         values = list(dict.fromkeys(p[key] for p in flat if key in p))
+        if len(values) == len(flat) > 1:
+            continue
         more = f" and {len(values) - 1} others" if len(values) > 1 else ""
-        each = len(values) == len(flat) > 1
-        text = "another one in every run" if each else f"{values[0]}{more}"
-        rows.append(Row(key.replace("_", " ").replace(".", ": "), text))
+        rows.append(Row(key.replace("_", " ").replace(".", ": "), f"{values[0]}{more}"))
     return tuple(rows)
 
 

@@ -38,7 +38,8 @@ WRONG = {"frequency_hz": 10.0}
 """By how much a key may be set wrong in a foundry; others by a tenth of their range."""
 SHARE_LOST = 0.05
 """Of the best value, what counts as no worse where the study sets no margin."""
-_TWO_SIDED = float(ndtri(0.5 + CONFIDENCE / 2))
+TWO_SIDED = float(ndtri(0.5 + CONFIDENCE / 2))
+"""Standard errors on either side of a mean that its interval holds."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,8 @@ class OptimumPages:
     sound: bool
     """Whether the optimum lies inside the sweep, as narrow as asked."""
     optimum: Optimum | None
+    recommendation: Recommendation | None = None
+    """A frequency for the table, or why none is named; None where its controls were not run."""
 
 
 def optimum_pages(
@@ -96,6 +99,7 @@ def optimum_pages(
     if study.refine.rounds:
         said.append(effort_sentence(log, study, summary))
     sound = not ends and not wide
+    advised = None
     if robustness is not None:
         opening = opening_sentences(robustness, objective.measure)
         advised = _advised(optimum, study, robustness)
@@ -106,7 +110,7 @@ def optimum_pages(
         said = [*told, *said] if is_first else [said[0], *told, *said[1:]]
         is_advised = advised is not None and advised.interval_hz is not None
         sound = sound and is_advised and robustness.assessment.is_sound
-    return OptimumPages(tuple(said), sound, optimum)
+    return OptimumPages(tuple(said), sound, optimum, advised)
 
 
 def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
@@ -120,7 +124,7 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
             f"{name_of(key)} {value_text(key, _rounded(value))} "
             f"(95 % interval {range_text(key, low, _rounded(high))})"
         )
-    where = f"{listed(places)}: {with_margin(mean, _TWO_SIDED * se)}"
+    where = f"{listed(places)}: {with_margin(mean, TWO_SIDED * se)}"
     if not ends:
         return f"The {what} is {most} at {where}."
     reached = [
@@ -206,10 +210,10 @@ def with_surface(chart: Chart, optimum: Optimum, study: Study) -> Chart:
     x, tint = optimum.points[:, 0], tints(1, False)[0]
     lines = [Line(np.column_stack([x, factor * mean]), tint, "mean", title="fitted mean")]
     for sign in (-1.0, 1.0):
-        edge = factor * (mean + sign * _TWO_SIDED * se)
+        edge = factor * (mean + sign * TWO_SIDED * se)
         lines.append(Line(np.column_stack([x, edge]), PLAIN, title="95 % of the fitted mean"))
     key = optimum.keys[0]
-    reach = factor * _TWO_SIDED * se
+    reach = factor * TWO_SIDED * se
     foot, top = float((factor * mean - reach).min()), float((factor * mean + reach).max())
     lines += reported_lines(study, key, foot, top)
     low, high = optimum.interval(key)

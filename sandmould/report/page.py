@@ -14,14 +14,23 @@ from urllib.parse import quote
 import pandas as pd
 from jinja2 import Environment
 
-from sandmould.report.agreement import agreement_pages
+from sandmould.report.agreement import AgreementPages, agreement_pages
 from sandmould.report.animation import BUDGET_BYTES
+from sandmould.report.answer import (
+    Answer,
+    choices_of,
+    choices_table,
+    headline_of,
+    optimum_choice,
+    optimum_headline,
+)
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.report.curves import objective_charts
 from sandmould.report.drive import with_amplitudes
-from sandmould.report.estimate_section import estimate_figures, estimate_pages
+from sandmould.report.estimate_section import EstimatePages, estimate_figures, estimate_pages
 from sandmould.report.figure_files import numbered, write_figures
+from sandmould.report.kinds.kind import KindPages
 from sandmould.report.kinds.registry import (
     drives_of,
     kind_pages,
@@ -35,9 +44,30 @@ from sandmould.report.method import (
     provenance_rows,
     statistics_method,
 )
-from sandmould.report.optimum import effort_sentence, optimum_pages, with_surface
+from sandmould.report.next_steps import (
+    agreement_steps,
+    estimate_steps,
+    next_steps,
+    optimum_steps,
+    setting_steps,
+)
+from sandmould.report.optimum import (
+    OptimumPages,
+    effort_sentence,
+    optimum_pages,
+    with_surface,
+)
+from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sand import pictured_runs
-from sandmould.report.tables import data_files, key_numbers, runs_table, settings_table
+from sandmould.report.small_multiples import small_multiples
+from sandmould.report.sureness import certificate_ground, finished_ground
+from sandmould.report.tables import (
+    KeyNumber,
+    data_files,
+    key_numbers,
+    runs_table,
+    settings_table,
+)
 from sandmould.report.templates import page_environment
 from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
 from sandmould.runs.columns import RUN
@@ -149,7 +179,7 @@ def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
 def _render(
     page: _Page, environment: Environment, film_budget_bytes: int
 ) -> tuple[str, dict[str, Chart | bytes], Mapping[str, str], str]:
-    """The page, its figures for files, scripts beside it, and the sentence it begins with."""
+    """The page, its figures for files, scripts beside it, and the sentence that answers."""
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
     summary = page.collected.summary
     seeks_best = page.study.seeks_best
@@ -178,6 +208,7 @@ def _render(
         *own_measures_method(page.study.own_measures),
         statistics_method(page.study.objective, of_kind.ends),
     )
+    answer = _answer(page, optimum, agreement, estimate, robustness, of_kind)
     statement = optimum or (agreement if agreement and agreement.is_question else estimate)
     is_verdict = statement is None or (seeks_best and optimum is None)
     text = environment.get_template(of_kind.template).render(
@@ -191,9 +222,9 @@ def _render(
         estimate=estimate,
         optimum=optimum,
         robustness=robustness,
-        statement=statement,
-        is_verdict=is_verdict,
-        key_numbers=key_numbers(summary, verdict if seeks_best else replace(verdict, best=None)),
+        answer=answer,
+        statement=verdict if is_verdict else statement,
+        key_numbers=key_numbers(summary),
         objective_charts=[_both_sizes(c) for c in charts],
         drawn_note=drawn_note(of_sweep, verdict),
         settings=settings_table(verdict, drives_of(page.by_setting)),
@@ -202,6 +233,7 @@ def _render(
         provenance=provenance_rows(provenance),
         files=data_files(page.study_folder, page.href),
         both_sizes=_both_sizes,
+        multiples=small_multiples,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
         advice=(*of_kind.advice, *([] if optimum else _beside_mode(page, mode))),
         warning=of_kind.warning,
@@ -209,9 +241,51 @@ def _render(
         **of_kind.context,
     )
     of_estimate = estimate_figures(estimate) if estimate else {}
-    sentences = verdict.sentences if statement is None or is_verdict else statement.sentences
     figures = {**numbered("objective", charts), **of_estimate, **of_kind.figures}
-    return text, figures, of_kind.beside, sentences[0]
+    return text, figures, of_kind.beside, answer.headline
+
+
+def _answer(
+    page: _Page,
+    optimum: OptimumPages | None,
+    agreement: AgreementPages | None,
+    estimate: EstimatePages | None,
+    robustness: RobustnessPages | None,
+    of_kind: KindPages,
+) -> Answer:
+    """The first screen."""
+    study, collected, verdict = page.study, page.collected, page.verdict
+    summary = collected.of_sweep.summary
+    drives = drives_of(page.by_setting)
+    figures: tuple[KeyNumber, ...] = ()
+    table = None
+    if optimum is not None:
+        headline, is_sound = optimum_headline(
+            optimum, robustness, verdict, summary, study.certificate.sand_wave_speed is not None
+        )
+        steps = optimum_steps(study, optimum, robustness)
+        is_artefact = robustness is not None and robustness.assessment.is_artefact
+        figures = optimum_choice(optimum, summary, verdict, is_artefact)
+    elif agreement is not None and agreement.is_question:
+        headline, is_sound = agreement.sentences[0], agreement.sound
+        steps = agreement_steps(agreement)
+    elif estimate is not None:
+        headline, is_sound = of_kind.answer or estimate.headline, estimate.sound
+        steps = estimate_steps(study, verdict, is_sound)
+    else:
+        headline, is_sound = headline_of(verdict, collected.keys, drives)
+        steps = setting_steps(study, verdict)
+        choices = choices_of(verdict, summary, drives)
+        figures = choices[0] if len(choices) == 1 else ()
+        table = choices_table(choices) if len(choices) > 1 else None
+    grounds = (
+        *finished_ground(collected.summary),
+        *of_kind.grounds,
+        *certificate_ground(study, robustness),
+    )
+    specific = (*steps, *of_kind.steps)
+    after = next_steps(page.study_folder, study, collected, verdict, is_sound, specific)
+    return Answer(headline, is_sound, figures, table, grounds, after)
 
 
 def _write_beside(folder: Path, scripts: Mapping[str, str]) -> None:

@@ -16,6 +16,7 @@ from analysis.freezing_plots import draw_freezing, draw_temperature
 from sandmould.report.chart import Chart, Mark, tints
 from sandmould.report.figures import png
 from sandmould.report.method import Row
+from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
@@ -26,6 +27,8 @@ from sandmould.study.collect import Collected
 from sandmould.study.definition.sweep import Point
 from sandmould.study.plan.plan_files import read_run
 
+NEAR_PERCENT = 5.0
+"""Off the reference's solidification time: as near as the answer takes for good."""
 STAND_IN = "stand-in"
 """How the source of a value begins that is not what it stands for."""
 
@@ -45,6 +48,9 @@ class SolidPages:
     error_cost: tuple[Chart, ...]
     """Empty where nothing can be compared."""
     errors: Table | None
+    answer: str
+    """How near the reference cheap elements come, or when the casting is solid."""
+    grounds: tuple[Ground, ...]
 
 
 @dataclass(frozen=True)
@@ -84,15 +90,18 @@ def solid_pages(
     curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"], _silent)
     fields, sentences, spots = _fields(study_folder / "runs" / pictured_run, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
+    stand_ins = _stand_ins(study_folder / "runs" / pictured_run / "scenario.yaml")
     return SolidPages(
         pictured_run=pictured_run, fields=fields,
-        sentences=(*sentences, *_stand_ins(study_folder / "runs" / pictured_run / "scenario.yaml")),
+        sentences=(*sentences, *stand_ins),
         spots=spots, curves=curves,
         reference=setting_text(reference)
         if reference
         else "",
         error_cost=_error_charts(errors),
         errors=_error_table(errors) if errors else None,
+        answer=_cheapest(errors, reference, collected) or sentences[0],
+        grounds=_grounds(bool(stand_ins), scenario),
     )  # fmt: skip
 
 
@@ -102,8 +111,24 @@ def _stand_ins(path: Path) -> tuple[str, ...]:
     keys = [key for key, source in sources.items() if source.startswith(STAND_IN)]
     if not keys:
         return ()
+    names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
     return (f"Stand-ins by their sources, so that times are those of no real casting: "
-            f"{listed(keys, most=20)}.",)  # fmt: skip
+            f"{listed(names, most=20)}.",)  # fmt: skip
+
+
+def _grounds(has_stand_ins: bool, scenario: Solidification) -> tuple[Ground, ...]:
+    """What the answer rests on."""
+    values = (
+        "some are stand-ins, so that the times are those of no real casting."
+        if has_stand_ins
+        else "those of the study's sources."
+    )
+    flat = "two dimensions: heat that leaves across the plane is not counted."
+    return (
+        Ground("Material values", values),
+        Ground("Chance", "nothing in these runs is left to it: one run of each setting is enough."),
+        *([Ground("Shape", flat)] if scenario.dimensions == 2 else []),
+    )
 
 
 def _silent(collected: Collected, verdict: Verdict, measure: str) -> str:
@@ -179,6 +204,28 @@ def _errors(point: Point, scenario: Solidification, collected: Collected) -> lis
         label = setting_text({key: row[key] for key in collected.keys})
         errors.append(_Error(label, float(row[CPU_S]), 100.0 * (time_s / base_s - 1.0), curve))
     return sorted(errors, key=lambda error: error.cpu_s)
+
+
+def _cheapest(errors: Sequence[_Error], reference: Point, collected: Collected) -> str:
+    """The cheapest setting that is near the reference; empty where there is none to compare."""
+    if not errors:
+        return ""
+    near = [e for e in errors if abs(e.time_percent) <= NEAR_PERCENT]
+    of = "of the solidification time of the reference"
+    if not near:
+        nearest = min(errors, key=lambda e: abs(e.time_percent))
+        return (
+            f"No setting comes within {NEAR_PERCENT:g} % {of}: the nearest, {nearest.label}, is "
+            f"{number(abs(nearest.time_percent), 2)} % off it."
+        )
+    done = collected.summary[finished(collected.summary)]
+    reference_s = float(_of_point(done, reference)[CPU_S].iloc[0])
+    cheap = near[0]
+    return (
+        f"The cheapest setting within {NEAR_PERCENT:g} % {of} is {cheap.label}: "
+        f"{number(abs(cheap.time_percent), 2)} % off it in {seconds(cheap.cpu_s)} of processor "
+        f"time instead of {seconds(reference_s)}."
+    )
 
 
 def _curve_percent(

@@ -35,7 +35,7 @@ from sandmould.runs.columns import (
     finished,
     total_s,
 )
-from sandmould.runs.formatting import name_of, number, seconds, size, titled, with_margin
+from sandmould.runs.formatting import number, seconds, size, titled, with_margin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.agreement import sweep_part
@@ -82,30 +82,39 @@ class Table:
     """What it leaves out."""
 
 
-def _of_what_fits(summary: pd.DataFrame, verdict: Verdict) -> list[KeyNumber]:
-    """How much of what a tube or cavity could hold is in it at the best setting."""
-    space = verdict.measure.removesuffix("_fill_fraction")
-    column = space + "_fill_of_bed_fraction"
-    if verdict.best is None or column not in summary:
-        return []
-    at_best = sweep_part(summary[finished(summary)])
-    for key, value in verdict.best.values.items():
-        at_best = at_best[at_best[key] == value]
-    share = at_best[column].mean()
-    if not math.isfinite(share):
-        return []
-    name = space.replace("_", " ")
-    what = f"of what fits in, {verdict.best.label}: the {name} as dense as the bed is 100 %"
-    return [KeyNumber(f"{100 * share:.0f} %", what)]
-
-
-def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...]:
-    """Objective of the best setting, runs that finished, size, cost and health of the runs.
+def share_of_what_fits(
+    summary: pd.DataFrame, measure: str, values: Mapping[str, Any] | None = None
+) -> float:
+    """How much of what a tube or cavity could hold is in it, as the mean of finished runs.
 
     Parameters
     ----------
     summary : DataFrame
-    verdict : Verdict
+    measure : str
+        The fill of that space.
+    values : mapping of str to object, optional
+        A setting; all settings together unless given.
+
+    Returns
+    -------
+    float
+        1 where it is packed as densely as the bed; NaN where runs do not tell.
+    """
+    column = measure.removesuffix("_fill_fraction") + "_fill_of_bed_fraction"
+    if column not in summary:
+        return math.nan
+    at = sweep_part(summary[finished(summary)])
+    for key, value in (values or {}).items():
+        at = at[at[key] == value]
+    return float(at[column].mean())
+
+
+def key_numbers(summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
+    """Runs that finished, size, cost and health of the runs.
+
+    Parameters
+    ----------
+    summary : DataFrame
 
     Returns
     -------
@@ -113,12 +122,6 @@ def key_numbers(summary: pd.DataFrame, verdict: Verdict) -> tuple[KeyNumber, ...
         Without those whose data are missing.
     """
     numbers: list[KeyNumber] = []
-    if verdict.best is not None:
-        best = verdict.best
-        label = f"{name_of(verdict.measure)}, {best.label}"
-        mean = f"mean of {best.n} runs" if best.n > 1 else "one run"
-        numbers.append(KeyNumber(number(best.mean), label, mean))
-        numbers += _of_what_fits(summary, verdict)
     complete = summary[finished(summary)]
     checks = PART in summary and (summary[PART] != SWEEP).any()
     label = "runs finished, checks included" if checks else "runs finished"

@@ -64,7 +64,7 @@ OVERLAP_P99_FRACTION: Final = "overlap_p99_fraction"
 
 TIME_S: Final = "time_s"
 VIBRATION_TIME_S: Final = "vibration_time_s"
-"""-1 before the vibration begins."""
+"""Absent before the vibration begins, and where nothing vibrates; older tables have -1 there."""
 STAGE: Final = "stage"
 GRAINS: Final = "grains"
 SOLID_FRACTION: Final = "solid_fraction"

@@ -31,6 +31,11 @@ class BoxDrive:
     """Amplitude: half of the stroke."""
 
     @property
+    def stroke_m(self) -> float:
+        """From one end of the motion to the other."""
+        return 2.0 * self.displacement_m
+
+    @property
     def velocity_m_s(self) -> float:
         """Amplitude of the velocity."""
         return 2 * math.pi * self.frequency_hz * self.displacement_m

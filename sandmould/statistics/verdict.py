@@ -295,17 +295,34 @@ def _sentences(
     )
 
 
-def _more_sentence(comparisons: Sequence[Comparison], best: Setting) -> str:
+def further_replicates(comparisons: Sequence[Comparison], best: Setting) -> int | None:
     """How many more replicates would tell the best from those that it cannot be told from.
 
     An interval shrinks with the root of the number of replicates, so that it leaves zero out once
     n (half width / difference)^2 of them are there.
+
+    Parameters
+    ----------
+    comparisons : sequence of Comparison
+    best : Setting
+
+    Returns
+    -------
+    int or None
+        Of each of these settings, if their differences are as large as they seem. None where
+        nothing is open, or where too few replicates tell.
     """
     open_ones = [c for c in comparisons if c.tested and not c.separated]
     if not open_ones or any(c.difference == 0.0 for c in open_ones):
-        return ""
+        return None
     needed = max(best.n * ((c.ci[1] - c.ci[0]) / 2 / c.difference) ** 2 for c in open_ones)
-    more = math.ceil(needed) - best.n
+    return math.ceil(needed) - best.n
+
+
+def _more_sentence(comparisons: Sequence[Comparison], best: Setting) -> str:
+    more = further_replicates(comparisons, best)
+    if more is None:
+        return ""
     if more > MOST_REPLICATES:
         return f" More than {MOST_REPLICATES} further replicates would be needed to decide."
     return (

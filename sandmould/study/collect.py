@@ -368,12 +368,12 @@ def _rows_at(
     """Row of the measures that the summary takes of each run that has one, by its place."""
     if measures.rows.empty:
         return {}
-    time_s = measures.rows[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
+    clock_s = measures.rows[[TIME_S, VIBRATION_TIME_S]].to_numpy(dtype=np.float64)
     bounds = measures.bounds(len(outcomes)).tolist()
     rows = {}
     for place, outcome in enumerate(outcomes):
         is_finished = outcome is not None and outcome.outcome is Outcome.FINISHED
-        own_s = time_s[bounds[place] : bounds[place + 1]]
+        own_s = clock_s[bounds[place] : bounds[place + 1]]
         row = _row_at(own_s, at_vibration_s, is_finished)
         if row is not None:
             rows[place] = bounds[place] + row
@@ -381,7 +381,7 @@ def _rows_at(
 
 
 def _row_at(
-    time_s: NDArray[np.float64], at_vibration_s: float | None, is_finished: bool
+    clock_s: NDArray[np.float64], at_vibration_s: float | None, is_finished: bool
 ) -> int | None:
     """Snapshot nearest a time of vibration, or at the end of a run that finished.
 
@@ -391,18 +391,18 @@ def _row_at(
     counts as reached.
     """
     # a snapshot that could not be read has a row without a time
-    rows = np.flatnonzero(~np.isnan(time_s))
+    rows = np.flatnonzero(~np.isnan(clock_s[:, 0]))
     if not len(rows):
         return None
     if at_vibration_s is None:
         return int(rows[-1]) if is_finished else None
-    time_s = time_s[rows]
-    shaken = time_s[time_s >= 0]
+    rows = rows[clock_s[rows, 1] >= 0]
+    shaken = clock_s[rows, 1]
     if not len(shaken):
         return None
     interval_s = float(np.diff(shaken).max()) if len(shaken) > 1 else 0.0
-    place = int(np.argmin(np.abs(time_s - at_vibration_s)))
-    if abs(time_s[place] - at_vibration_s) > 0.5 * interval_s + 1e-9:
+    place = int(np.argmin(np.abs(shaken - at_vibration_s)))
+    if abs(shaken[place] - at_vibration_s) > 0.5 * interval_s + 1e-9:
         return None
     return int(rows[place])
 
@@ -413,7 +413,9 @@ def _with_clock(table: pd.DataFrame) -> pd.DataFrame:
     if missing:
         raise ValueError(f"no column {', '.join(missing)}")
     times = {name: pd.to_numeric(table[name]) for name in (TIME_S, VIBRATION_TIME_S)}
-    return table.assign(**times)
+    shaken_s = times[VIBRATION_TIME_S]
+    # older tables say -1 where nothing had vibrated yet
+    return table.assign(**times | {VIBRATION_TIME_S: shaken_s.where(shaken_s >= 0)})
 
 
 def read_provenance(folder: Path) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from sandmould.compiled import cache_folder
 from sandmould.engines.registry import engine_module
+from sandmould.kernel_cache import cache_folder
 from sandmould.runs.formatting import size_text
 from sandmould.runs.provenance import commit, processor
 from sandmould.scenario.engine import ENGINE_NAMES

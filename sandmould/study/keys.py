@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.quantity import fields_at, keys_at, models_at, models_in
+from sandmould.scenario.quantity import NAME, fields_at, keys_at, models_at, models_in
 from sandmould.study.kinds.registry import KINDS
 
 _WIDTH = 100
@@ -43,6 +43,19 @@ def keys_text(path: str = "") -> str:
     return "\n".join(line for field in fields.values() for line in _of_key(parts[-1], field))
 
 
+def key_paths(start: str) -> list[str]:
+    """Key paths that begin so, one level deep, for the shell to complete.
+
+    Parameters
+    ----------
+    start : str
+    """
+    above, _, last = start.rpartition(".")
+    parts = [part for part in above.split(".") if part and not part.isdecimal()]
+    keys = {key for kind in KINDS.values() for key in keys_at(kind.study, parts)}
+    return [f"{above}.{key}".lstrip(".") for key in sorted(keys) if key.startswith(last)]
+
+
 def _sections(parts: list[str]) -> list[tuple[str, type[BaseModel]]]:
     """Sections that can stand at a path, with the kinds of study that have them."""
     found: dict[type[BaseModel], list[str]] = {}
@@ -68,6 +81,79 @@ def _of_sections(sections: list[tuple[str, type[BaseModel]]], path: str) -> Iter
     if below:
         first = ".".join(filter(None, (path, below[0])))
         yield f"\nKeys with ... have keys below them: sandmould keys {first}"
+
+
+def keys_lines() -> Iterator[str]:
+    """A page of all keys: a heading a section, a row a key."""
+    shown: set[type[BaseModel]] = set()
+    for kind in KINDS.values():
+        yield from ("", f"## Studies of kind {kind.name}")
+        yield from _section_lines(kind.study, "", shown)
+
+
+def _section_lines(model: type[BaseModel], path: str, shown: set[type[BaseModel]]) -> Iterator[str]:
+    """A section and then those below it, each at the first path that leads to it."""
+    shown.add(model)
+    of = f" (`kind: {_kind_of(model)}`)" if path and _kind_of(model) else ""
+    yield from ("", f"### {f'`{path}`' if path else 'The file'}{of}", "")
+    yield from ("| key | unit | default | valid | meaning | source |", "|" + " --- |" * 6)
+    below = []
+    for name, field in model.model_fields.items():
+        extra: Any = field.json_schema_extra or {}
+        cells = (
+            f"`{name}`", _unit_cell(field), _default_cell(field), _valid_cell(field),
+            field.description or "", extra.get("source", ""),
+        )  # fmt: skip
+        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        below += [(f"{path}.{name}".lstrip("."), inner) for inner in models_in(field.annotation)]
+    for inner_path, inner in below:
+        if inner not in shown:
+            yield from _section_lines(inner, inner_path, shown)
+
+
+def _unit_cell(field: FieldInfo) -> str:
+    """Unit of a number; nothing for words and for yes and no."""
+    extra: Any = field.json_schema_extra or {}
+    unit = str(extra.get("unit", ""))
+    types = (field.annotation, *get_args(field.annotation))
+    return "" if unit == "1" and not {int, float} & set(_leaf_types(types)) else unit
+
+
+def _leaf_types(types: Sequence[Any]) -> Iterator[Any]:
+    for each in types:
+        yield type(each) if isinstance(each, int) and not isinstance(each, bool) else each
+        yield from _leaf_types(get_args(each))
+
+
+def _default_cell(field: FieldInfo) -> str:
+    if any(True for _ in models_in(field.annotation)) and not field.is_required():
+        return "" if field.default is not None else "absent"
+    text = _default_text(field)
+    return f"`{text.removeprefix('default ')}`" if text.startswith("default ") else text
+
+
+_BOUNDS = {"gt": "> ", "ge": "≥ ", "lt": "< ", "le": "≤ "}
+
+
+def _valid_cell(field: FieldInfo) -> str:
+    """Choices of words, and bounds of numbers or of their count."""
+    told = [f"`{value}`" for value in _choices_in(field.annotation)]
+    for rule in field.metadata:
+        told += [f"{sign}{getattr(rule, name):g}" for name, sign in _BOUNDS.items()
+                 if isinstance(getattr(rule, name, None), int | float)]  # fmt: skip
+        lengths = (("min_length", "at least"), ("max_length", "at most"))
+        told += [f"{w} {getattr(rule, name)} of them" for name, w in lengths if hasattr(rule, name)]
+        if getattr(rule, "pattern", None) == NAME:
+            told.append("small letters, digits and `_`")
+    return ", ".join(told)
+
+
+def _choices_in(annotation: Any) -> Iterator[Any]:
+    if get_origin(annotation) is Literal:
+        yield from get_args(annotation)
+        return
+    for part in get_args(annotation):
+        yield from _choices_in(part)
 
 
 def _kind_of(model: type[BaseModel]) -> str:

@@ -1,6 +1,6 @@
-"""Pages of the documentation that are written from the code: measures and limits.
+"""Pages of the documentation that are written from the code: measures, limits, keys and files.
 
-``python -m sandmould.study.reference`` writes both again.
+``python -m sandmould.study.reference`` writes them again.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from sandmould import ROOT
 from sandmould.runs.measures import Measure
 from sandmould.scenario.limits import LIMITS
 from sandmould.scenario.module_main import run_main
+from sandmould.study.contents import files_lines
+from sandmould.study.keys import keys_lines
 from sandmould.study.kinds.registry import KINDS, kind_named
 from sandmould.study.plan.expand import scenes
 from sandmould.study.plan.load_study import OpenStudy
@@ -19,6 +21,8 @@ from sandmould.study.plan.measured import measured_in
 
 MEASURES = ROOT / "docs" / "measures.md"
 LIMITS_PAGE = ROOT / "docs" / "limits.md"
+KEYS = ROOT / "docs" / "keys.md"
+FILES = ROOT / "docs" / "files.md"
 _WRITTEN = "Written by `make schema` from the code; nothing here is edited by hand."
 
 
@@ -87,6 +91,36 @@ def limits_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def keys_page() -> str:
+    """The page of all keys."""
+    lines = [
+        "# Keys", "", _WRITTEN, "",
+        "A study's file states only what differs from these defaults and from what it is "
+        "`based_on`. `sandmould keys scenario.vibration` prints a part of this page. A section "
+        "that several places can hold stands once, at the first of them. A unit of 1 is a pure "
+        "number. A value may be written `{value: 0.35, unit: \"1\", source: \"shear test\"}`: the "
+        "source then stands in the deck. Entries of lists are counted from 0, as in "
+        "`vibration.0.frequency_hz`.",
+        *keys_lines(),
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def files_page() -> str:
+    """The page of all files and what stands in them."""
+    lines = [
+        "# Files", "", _WRITTEN, "",
+        "Tables are text with tabs between columns. What is absent is an empty cell or `nan` in a "
+        "table, NaN in an array and `null` in JSON. The unit stands at the end of a name; 1 is a "
+        "pure number, and words have none. `<...>` stands for a name.",
+        *files_lines(),
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+PAGES = {MEASURES: measures_page, LIMITS_PAGE: limits_page, KEYS: keys_page, FILES: files_page}
+
+
 def _cells(measure: Measure) -> Sequence[str]:
     meaning = measure.meaning.replace("<", "\\<")
     return f"`{measure.name}`", measure.unit, meaning
@@ -97,9 +131,9 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
 
 
 def main() -> None:
-    """Write both pages."""
-    MEASURES.write_text(measures_page(), encoding="utf-8")
-    LIMITS_PAGE.write_text(limits_page(), encoding="utf-8")
+    """Write the pages."""
+    for path, page in PAGES.items():
+        path.write_text(page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -78,7 +78,7 @@ def _standing_by(plan: Plan, options: Sequence[str]) -> contextlib.AbstractConte
     """Have what runs need loaded beforehand, where jobs are on this machine and any is left."""
     left = any(not is_done(RESULTS / plan.study.name / run.place) for run in plan.runs)
     if left and starts_jobs(options) and not may_be_elsewhere(options):
-        return standing_by(plan.classes.values())
+        return standing_by([alike[0] for alike in plan.classes.values()])
     return contextlib.nullcontext()
 
 

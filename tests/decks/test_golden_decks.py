@@ -9,6 +9,7 @@ import jinja2
 import pytest
 
 from sandmould import ROOT
+from sandmould.engines.bed_step import with_bed_step
 from sandmould.engines.deck import Deck, DeckBlock, environment, exact
 from sandmould.engines.lammps.render import layer_data, render_deck
 from sandmould.engines.program import build_program
@@ -58,10 +59,16 @@ VARIANTS: dict[str, dict[str, object]] = {
 }
 
 
+STEP_OF_BED = "lammps_step_of_bed"
+
+
 def deck_of(name: str) -> Deck:
     """Render the first run of a shipped study, a variant of the small scene or the hopper."""
     if name == HOPPER:
         return render_deck(build_program(hopper_scene("lammps")), {}, "test", "golden")
+    if name == STEP_OF_BED:
+        scene = with_bed_step(tube_scene(time_step={"bed_fraction": 0.7}), 4e-5)
+        return render_deck(build_program(scene), {}, "test", "golden")
     if name in VARIANTS:
         program = build_program(tube_scene(**VARIANTS[name]))
         return render_deck(program, {}, "test", "golden")
@@ -69,7 +76,7 @@ def deck_of(name: str) -> Deck:
     return render_deck(build_program(run.scenario), run.sources, "first", run.study)
 
 
-@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER])
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER, STEP_OF_BED])
 def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) -> None:
     path = GOLDEN / f"{name}.in"
     text = deck_of(name).text
@@ -78,22 +85,23 @@ def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) 
     assert text == path.read_text(encoding="utf-8"), "pytest tests/decks --refresh-golden, and look"
 
 
-@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER])
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER, STEP_OF_BED])
 def test_every_number_has_its_unit_and_source(name: str) -> None:
     for line in deck_of(name).text.splitlines():
         if re.match(r"variable \w+ (index|equal) -?[\d.]", line) and "0.0  #" not in line:
             assert re.search(r"  # [^,]+, \S", line), line
 
 
-@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER])
+@pytest.mark.parametrize("name", [*STUDIES, *VARIANTS, HOPPER, STEP_OF_BED])
 def test_background_damping_comes_after_every_other_force(name: str) -> None:
-    text = deck_of(name).text
-    fixes = re.findall(r"^fix (\w+) all (\S+)", text, re.M)
-    order = [style for _, style in fixes]
-    damping = [i for i, s in enumerate(order) if s in ("damping/cundall", "viscous")]
-    forces = [i for i, s in enumerate(order) if s in ("gravity", "wall/gran/region", "enforce2d")]
-    assert forces
-    assert all(d > max(forces) for d in damping)
+    for part in re.split(r"^clear$", deck_of(name).text, flags=re.M):
+        order = re.findall(r"^fix \w+ all (\S+)", part, re.M)
+        damping = [i for i, s in enumerate(order) if s in ("damping/cundall", "viscous")]
+        forces = [
+            i for i, s in enumerate(order) if s in ("gravity", "wall/gran/region", "enforce2d")
+        ]
+        assert forces
+        assert all(d > max(forces) for d in damping)
 
 
 def test_a_misspelt_name_in_a_template_is_an_error() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from sandmould.engines.bed_step import with_bed_step
 from sandmould.engines.deck import Deck
 from sandmould.engines.liggghts.process import executable
 from sandmould.engines.liggghts.render import render_deck, write_deck
@@ -42,14 +43,20 @@ VARIANTS: dict[str, dict[str, object]] = {
 }
 
 
+STEP_OF_BED = "liggghts_step_of_bed"
+
+
 def liggghts_deck(name: str) -> Deck:
     """Render a variant of the small scene, or the hopper."""
     if name == HOPPER:
         return render_deck(build_program(hopper_scene("liggghts")), {}, "test", "golden")
+    if name == STEP_OF_BED:
+        scene = with_bed_step(liggghts_scene(time_step={"bed_fraction": 0.7}), 4e-5)
+        return render_deck(build_program(scene), {}, "test", "golden")
     return render_deck(build_program(liggghts_scene(**VARIANTS[name])), {}, "test", "golden")
 
 
-@pytest.mark.parametrize("name", [*VARIANTS, HOPPER])
+@pytest.mark.parametrize("name", [*VARIANTS, HOPPER, STEP_OF_BED])
 def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) -> None:
     path = GOLDEN / f"{name}.in"
     text = liggghts_deck(name).text
@@ -58,14 +65,14 @@ def test_deck_equals_its_golden_file(name: str, request: pytest.FixtureRequest) 
     assert text == path.read_text(encoding="utf-8"), "pytest tests/decks --refresh-golden, and look"
 
 
-@pytest.mark.parametrize("name", [*VARIANTS, HOPPER])
+@pytest.mark.parametrize("name", [*VARIANTS, HOPPER, STEP_OF_BED])
 def test_every_number_has_its_unit_and_source(name: str) -> None:
     for line in liggghts_deck(name).text.splitlines():
         if re.match(r'variable \w+ (index|equal|string) "?-?[\d.]', line) and "0.0  #" not in line:
             assert re.search(r"  # [^,]+, \S", line), line
 
 
-@pytest.mark.parametrize("name", [*VARIANTS, HOPPER])
+@pytest.mark.parametrize("name", [*VARIANTS, HOPPER, STEP_OF_BED])
 def test_background_damping_comes_after_every_other_force(name: str) -> None:
     fixes = re.findall(r"^fix \w+ all (\S+)", liggghts_deck(name).text, re.M)
     forces = [i for i, s in enumerate(fixes) if s in ("gravity", "wall/gran", "setforce")]

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from sandmould.compiled import cache_folder
+from sandmould.kernel_cache import cache_folder
 from tests.fuzz.readers import PROBE, READERS
 
 LIMIT_S = 60.0

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import sandmould
+from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
+from sandmould.study.contents import undescribed
+from sandmould.study.plan.build_plan import open_plan
 
 FREQUENCY = "vibration.0.frequency_hz"
 STUDY: dict[str, Any] = {
@@ -24,6 +29,43 @@ STUDY: dict[str, Any] = {
 }
 
 
+NOTEBOOK = ROOT / "docs" / "first_study.ipynb"
+
+
+def _code_cells() -> list[str]:
+    cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+
+
+def _follow_the_notebook(result: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Execute its cells on a study that is computed already: its own takes a minute."""
+    told: list[Path] = []
+
+    def run(study: dict[str, Any], name: str) -> Any:
+        told.append(folder / f"{name}.yaml")
+        told[0].write_text(yaml.safe_dump(study))
+        return result
+
+    monkeypatch.setattr("sandmould.notebook.run", run)
+    names: dict[str, Any] = {}
+    for cell in _code_cells():
+        exec(compile(cell, str(NOTEBOOK), "exec"), names)
+    monkeypatch.undo()
+    monkeypatch.chdir(folder)
+    assert len(open_plan(*told).runs) == 4
+    assert len(names["grains"]) == 20
+
+
+def test_the_notebook_is_executed_and_small() -> None:
+    text = NOTEBOOK.read_text(encoding="utf-8")
+    assert len(text.encode()) < 500_000
+    cells = [cell for cell in json.loads(text)["cells"] if cell["cell_type"] == "code"]
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    outputs = [output for cell in cells for output in cell["outputs"]]
+    assert all(output["output_type"] != "error" for output in outputs)
+    assert sum("image/png" in output.get("data", {}) for output in outputs) == 2
+
+
 @pytest.mark.slow
 def test_a_study_is_computed_and_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -32,6 +74,7 @@ def test_a_study_is_computed_and_read(
     result = sandmould.run(STUDY, name="little", cores=2)
     assert "little: 2 of 2 runs done" in capsys.readouterr().out
     assert result.verdict.startswith("Not resolved")
+    assert undescribed(result.folder) == []
     assert sorted(result.summary[FREQUENCY]) == [50, 75]
     assert set(result.curves["run"]) == set(result.runs)
     run = result.runs[0]
@@ -49,6 +92,7 @@ def test_a_study_is_computed_and_read(
         result.grains("other")
     with pytest.raises(BadInputError, match=r"time_s = -1.0 .* at least"):
         result.grains(run, time_s=-1.0)
+    _follow_the_notebook(result, tmp_path, monkeypatch)
     # The same study again computes nothing; another one of its name is refused.
     assert sandmould.run(STUDY, name="little").runs == result.runs
     with pytest.raises(BadInputError, match=r"little.yaml holds another study"):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -32,13 +30,6 @@ from tests.unit.report_study import scenario, write_study
 
 pytestmark = pytest.mark.browser
 
-_FLAGS = (
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--window-size=1100,900",
-    # WebGL without a graphics card
-    "--enable-unsafe-swiftshader",
-)  # fmt: skip
 NO_WEBGL = """
 const real = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
@@ -47,23 +38,6 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
 """
 LAYERS = {"orange": (230, 159, 0), "blue": (86, 180, 233), "green": (0, 158, 115)}
 """Colours of the first layers."""
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if chromium is None or driver is None:
-        said = "chromium and chromium-driver are not installed"
-        if os.environ.get("CI"):
-            pytest.fail(said)
-        pytest.skip(said)
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    for flag in (*_FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('chromium')}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    with webdriver.Chrome(options, webdriver.ChromeService(driver)) as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module", params=[2, 3])
@@ -238,6 +212,7 @@ def test_headings_sort_the_runs(page: webdriver.Chrome) -> None:
         cells = page.find_elements(By.CSS_SELECTOR, f"table.sortable td:nth-child({place})")
         return [cell.text for cell in cells]
 
+    page.find_element(By.CSS_SELECTOR, "#runs-table summary").click()
     heads = page.find_elements(By.CSS_SELECTOR, "table.sortable th")
     fill = next(n for n, head in enumerate(heads, 1) if head.text == "fill of the tube")
     for way in ("ascending", "descending"):

@@ -7,6 +7,7 @@ from importlib import metadata
 from pathlib import Path
 
 from sandmould.dem import source_files
+from sandmould.engines.bed_deck import sources_of_step
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
@@ -30,7 +31,6 @@ CAPABILITIES = Capabilities(
     checkpoints_at_setups=True,
     moves_tables=False,
     moves_walls=False,
-    changes_step=False,
 )
 
 
@@ -56,7 +56,7 @@ def installation_problem() -> str | None:
 def session_sources(scenario: Scenario) -> list[Path]:
     """The session, and our solver where LAMMPS is given forces of surfaces and damping by it."""
     here = Path(__file__).parent
-    session = [here / "session.py", here / "wall_loads.py"]
+    session = [here / "session.py", here / "wall_loads.py", *sources_of_step(scenario)]
     if not needs_callback(scenario):
         return session
     callback = [here / name for name in ("bridge.py", "callback.py", "surface_kernel.py")]

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from sandmould.engines.bed_deck import render_parts
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
-from sandmould.engines.deck_lines import Lines, simulation_box
+from sandmould.engines.deck_lines import Lines, simulation_box, size_classes
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.dashpots import Dashpots
 from sandmould.engines.lammps.near_grains import NearGrains
@@ -79,13 +81,22 @@ def render_deck(
     run, study : str
         Names for the deck's first line.
     """
+
+    def context_of(program: Program) -> dict[str, Any]:
+        lines = Lines(program.scenario, sources)
+        return deck_context(program, lines, run, study) | _own_context(program)
+
+    return render_parts("lammps", program, context_of)
+
+
+def _own_context(program: Program) -> dict[str, Any]:
+    """What only the templates of LAMMPS are given."""
     scenario = program.scenario
-    contact = scenario.laws
-    context = deck_context(program, Lines(scenario, sources), run, study)
-    context |= {
+    contact, step_s = scenario.laws, scenario.step_s
+    return {
         "scene": scenario.scene,
         "laws": {"grain": contact.grain_grain, "wall": contact.grain_wall},
-        "dashpots": Dashpots(contact, context["classes"], contact.lag_s(context["step_s"])),
+        "dashpots": Dashpots(contact, size_classes(scenario), contact.lag_s(step_s)),
         "slip_of_half_step": scenario.dimension == 3 and contact.slip_normal == "half_step",
         "simulation_box": simulation_box(scenario, program),
         "half_slab": HALF_SLAB_M,
@@ -96,7 +107,6 @@ def render_deck(
         "needs_callback": needs_callback(scenario),
         "oldest_version": OLDEST_VERSION,
     }
-    return Deck.render("lammps", context)
 
 
 def layer_data(scenario: Scenario, layer: PlannedLayer, number: int) -> str:

@@ -312,6 +312,11 @@ class LammpsSession(DeckSession):
         if self._kernel is not None and self.is_root:
             np.savez(folder / "kernel.npz", **self._kernel.state())
 
+    def _change_step(self, earlier_s: float, steps: int) -> None:
+        super()._change_step(earlier_s, steps)
+        if self._kernel is not None:
+            self._kernel.count_on(steps)
+
     def close(self) -> None:
         """Free LAMMPS."""
         self._lmp.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sandmould.engines.bed_deck import sources_of_step
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck
 from sandmould.engines.liggghts import OLDEST_VERSION
@@ -27,7 +28,6 @@ CAPABILITIES = Capabilities(
     checkpoints_at_setups=True,
     moves_tables=False,
     moves_walls=False,
-    changes_step=False,
 )
 
 
@@ -55,7 +55,8 @@ def session_sources(scenario: Scenario) -> list[Path]:
     """The session and the files that pass between it and the engine."""
     names = ("session.py", "process.py", "grains_file.py", "mesh_files.py", "bending_mesh.py",
              "vtk_stress.py")  # fmt: skip
-    return [Path(__file__).with_name(name) for name in names]
+    session = [Path(__file__).with_name(name) for name in names]
+    return [*session, *sources_of_step(scenario)]
 
 
 def load_session(scenario: Scenario) -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.engines.bed_deck import render_parts
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
-from sandmould.engines.deck_lines import Lines, simulation_box
+from sandmould.engines.deck_lines import Lines, simulation_box, size_classes
 from sandmould.engines.liggghts import OLDEST_VERSION
 from sandmould.engines.liggghts.contact_model import pair_tables, rolling_model
 from sandmould.engines.liggghts.mesh_files import (
@@ -54,17 +56,20 @@ def render_deck(
     run, study : str
         Names for the deck's first line.
     """
+
+    def context_of(program: Program) -> dict[str, Any]:
+        lines = Lines(program.scenario, sources)
+        return deck_context(program, lines, run, study) | _own_context(program, lines)
+
+    return render_parts("liggghts", program, context_of)
+
+
+def _own_context(program: Program, lines: Lines) -> dict[str, Any]:
+    """What only the templates of LIGGGHTS are given."""
     scenario = program.scenario
-    lines = Lines(scenario, sources)
-    context = deck_context(program, lines, run, study)
-    context |= {
-        "tables": pair_tables(
-            scenario.laws,
-            context["classes"],
-            lines,
-            context["step_s"],
-            scenario.discharge is not None,
-        ),
+    gate = scenario.discharge is not None
+    return {
+        "tables": pair_tables(scenario.laws, size_classes(scenario), lines, scenario.step_s, gate),
         "rolling_model": rolling_model(scenario.laws),
         "simulation_box": bounds_m(program),
         "surfaces": list(surface_meshes(program)),
@@ -72,7 +77,6 @@ def render_deck(
         "first_id": [1 + sum(program.counts[:i]) for i in range(len(program.counts))],
         "oldest_version": OLDEST_VERSION,
     }
-    return Deck.render("liggghts", context)
 
 
 def atoms_data(

@@ -37,7 +37,6 @@ CAPABILITIES = Capabilities(
     checkpoints_at_setups=False,
     moves_tables=True,
     moves_walls=True,
-    changes_step=True,
 )
 
 

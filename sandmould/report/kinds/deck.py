@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import deck_method
+from sandmould.report.sureness import scatter_ground
 from sandmould.report.time_series import Curve, curve_figures, measure_curves, whole_conclusion
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.statistics.verdict import Verdict
@@ -26,6 +27,7 @@ def _deck_pages(findings: Findings[OwnDeck]) -> KindPages:
         (),
         {"curves": curves},
         curve_figures(curves),
+        grounds=scatter_ground(findings.verdict, "their seed", findings.study.seeks_best),
     )
 
 

@@ -40,6 +40,8 @@ def _flow_pages(findings: Findings[MetalFlow]) -> KindPages:
             **pictures(stability_map=pages.map, fields=pages.fields),
             **numbered("histories", (history.chart for history in pages.histories)),
         },
+        answer=pages.answer,
+        grounds=pages.grounds,
     )
 
 

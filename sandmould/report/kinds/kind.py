@@ -13,7 +13,9 @@ from sandmould.report.bed_mode import BedMode
 from sandmould.report.chart import Chart
 from sandmould.report.heaps import Heap
 from sandmould.report.method import Row
+from sandmould.report.next_steps import NextStep
 from sandmould.report.robustness import RobustnessPages
+from sandmould.report.sureness import Ground
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study
@@ -37,6 +39,12 @@ class KindPages:
     """What is written as files too, by name."""
     beside: Mapping[str, str] = field(default_factory=dict)
     """Scripts for the folder ``SPHERES`` beside the page, by file name."""
+    answer: str = ""
+    """Answers the title's question in one sentence; empty where the objective does."""
+    grounds: tuple[Ground, ...] = ()
+    """How sure the answer is."""
+    steps: tuple[NextStep, ...] = ()
+    """What to do next that other kinds do not ask for."""
     warning: str = ""
     """Why the verdict is to be doubted, beside it; empty where there is no reason."""
 

@@ -6,6 +6,7 @@ import pandas as pd
 
 from sandmould.report.figure_files import numbered, pictures
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.next_steps import NextStep
 from sandmould.report.solidification import choose_pictured_run, solid_method, solid_pages
 from sandmould.report.time_series import curve_figures
 from sandmould.scenario.solidification import Solidification
@@ -40,7 +41,19 @@ def _solidification_pages(findings: Findings[Solidification]) -> KindPages:
             **numbered("error_cost", pages.error_cost),
             **curve_figures(pages.curves),
         },
+        answer="" if study.seeks_best else pages.answer,
+        grounds=pages.grounds,
+        steps=_steps(scenario, bool(pages.reference)),
     )
+
+
+def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...]:
+    """Finer elements, where no reference tells how good these are."""
+    if has_reference:
+        text = "Take these elements for a casting of this kind, and check them once by finer ones."
+        return (NextStep(text),)
+    finer = f"scenario: {{element_m: {scenario.element_m / 2:g}}}"
+    return (NextStep("See whether the result stays with elements half as large:", finer),)
 
 
 def _run_of(summary: pd.DataFrame, verdict: Verdict) -> str:

@@ -8,6 +8,7 @@ import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +52,18 @@ class Plan:
         return kind_named(self.study.study.kind)
 
     @cached_property
-    def classes(self) -> dict[SpeedClass, AnyScenario]:
-        """A scenario of each class that is computed at one speed."""
-        return {self.kind.planning.speed_class(run.scenario): run.scenario for run in self.runs}
+    def classes(self) -> dict[SpeedClass, list[AnyScenario]]:
+        """Scenarios of each class that is computed at one speed: the dearest, the first, the last.
+
+        What a deck of the user's own takes may depend on the point more than the plan knows.
+        """
+        planning, found = self.kind.planning, dict[SpeedClass, list[AnyScenario]]()
+        for run in self.runs:
+            found.setdefault(planning.speed_class(run.scenario), []).append(run.scenario)
+        return {
+            each: [max(alike, key=planning.planned_work), alike[0], alike[-1]]
+            for each, alike in found.items()
+        }
 
     @cached_property
     def _by_name(self) -> dict[str, Run]:
@@ -310,8 +320,11 @@ def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
     speed = plan.kind.planning.speed
     if speed is None:
         return {}
-    stored = {each: speed.stored(scenario, results) for each, scenario in plan.classes.items()}
-    return {each: rate for each, rate in stored.items() if rate is not None}
+    stored = {
+        each: [rate for rate in (speed.stored(s, results) for s in scenarios) if rate is not None]
+        for each, scenarios in plan.classes.items()
+    }
+    return {each: min(rates) for each, rates in stored.items() if rates}
 
 
 def measure_speeds(plan: Plan, results: Path) -> bool:
@@ -327,7 +340,8 @@ def measure_speeds(plan: Plan, results: Path) -> bool:
     speed = plan.kind.planning.speed
     if speed is None or not may_run(plan.study, plan.runs):
         return False
-    before = stored_speeds(plan, results)
-    missing = [scenario for each, scenario in plan.classes.items() if each not in before]
-    measured = [speed.measured(scenario, results) for scenario in missing]
-    return any(rate is not None for rate in measured)
+    found = False
+    for scenario in chain.from_iterable(plan.classes.values()):
+        if speed.stored(scenario, results) is None:
+            found |= speed.measured(scenario, results) is not None
+    return found

@@ -35,6 +35,12 @@ def owner_of(folder: Path) -> str | None:
         return None
 
 
+def shipped_name(owner: str | None) -> str:
+    """Name of the shipped study that results belong to; empty where it is none of them."""
+    is_shipped = owner is not None and owner.startswith(_SHIPPED_TEXT)
+    return owner.removeprefix(_SHIPPED_TEXT) if owner is not None and is_shipped else ""
+
+
 def owner_path(folder: Path) -> Path | None:
     """The file that the results of a study name; None where it is not named or not there."""
     text = owner_of(folder)

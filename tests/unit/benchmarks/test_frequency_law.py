@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks.frequency_law.groups import LAW, collapses, held_out, settings_of
 from benchmarks.frequency_law.series import FREQUENCY, MEASURE, power_of, series_of
 from sandmould.runs.columns import OUTCOME_CODE, REPLICATE, SEED
 from sandmould.scenario.scenario import Scenario
 
 SPEED = "contact.wave_speed_m_s"
 SPEEDS_M_S = (64.0, 128.0, 256.0)
+ASKED = ("acceleration_g", "velocity_m_s", "in_modes")
 FREQUENCIES_HZ = (15.0, 21.0, 30.0, 42.0, 60.0, 85.0, 120.0, 170.0, 240.0)
+
+
+def drive(hz: float, velocity_m_s: float) -> dict[str, float]:
+    """Peaks of a sine."""
+    turn = 2 * np.pi * hz
+    return {"drive_velocity_m_s": velocity_m_s, "drive_displacement_m": velocity_m_s / turn,
+            "drive_acceleration_g": velocity_m_s * turn / 9.81}  # fmt: skip
 
 
 def planted(exponent: float, drop: float) -> pd.DataFrame:
@@ -28,7 +39,8 @@ def planted(exponent: float, drop: float) -> pd.DataFrame:
                 value = 0.5 - drop * away**2 + filling + noise.normal(0.0, 0.01)
                 rows.append(
                     {SPEED: speed, FREQUENCY: hz, REPLICATE: replicate, SEED: replicate,
-                     MEASURE: value, "bed_height_m": 0.08, OUTCOME_CODE: 0}
+                     MEASURE: value, "bed_height_m": 0.08, OUTCOME_CODE: 0,
+                     **drive(hz, 1.5 * 9.81 / (2 * np.pi * hz))}
                 )  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -68,3 +80,47 @@ def test_the_largest_rise_is_told_beside_a_fall_from_the_lowest_frequency() -> N
     # Fillings differ by the same at both frequencies, so pairs do not scatter.
     assert rise.half_width == pytest.approx(0.0, abs=1e-12)
     assert curve.fills.shape == (4, len(FREQUENCIES_HZ))
+
+
+def planted_settings(law: Callable[[float, float, float], float]) -> pd.DataFrame:
+    """Settings of curves of three wave speeds, each with acceleration, velocity or stroke held."""
+    series = []
+    for held in (1.0, 0.0, -1.0):
+        runs = planted(0.0, 0.0)
+        velocities = 0.04 * (runs[FREQUENCY] / 60.0) ** -held
+        runs = runs.assign(**pd.DataFrame(list(map(drive, runs[FREQUENCY], velocities))))
+        modes = runs[SPEED] / (4 * 0.08)
+        runs[MEASURE] = list(map(law, runs[FREQUENCY], velocities, modes))
+        series += series_of(f"held {held:g}", runs, (SPEED, FREQUENCY), scenes())
+    return settings_of(series)
+
+
+@pytest.mark.parametrize(
+    ("law", "groups"),
+    [
+        (lambda hz, v, mode: 0.5 + 0.1 * np.log(v / 0.04) + 0.2 * np.tanh(5 * hz / mode),
+         ("velocity_m_s", "in_modes")),
+        (lambda hz, v, mode: 0.5 + 0.1 * np.log(hz * v) + 0.2 * np.tanh(5 * hz / mode),
+         ("acceleration_g", "in_modes")),
+    ],
+)  # fmt: skip
+def test_the_planted_pair_of_groups_collapses_the_curves(
+    law: Callable[[float, float, float], float], groups: tuple[str, str]
+) -> None:
+    settings = planted_settings(law)
+    pairs = [found for found in collapses(settings, ASKED) if len(found.groups) == 2]
+    assert pairs[0].groups == groups
+    assert pairs[0].miss < 0.5 * pairs[1].miss
+    # The whole is the same for a curve that the law was not fitted to, but for a shift.
+    others = settings[settings["curve"] == 0].assign(fill=lambda rows: rows["fill"] + 0.05)
+    asked = held_out(settings, others)
+    if groups == LAW:
+        assert asked.shift == pytest.approx(0.05, abs=0.01)
+        assert asked.best_in_modes("told") == asked.best_in_modes("fill")
+
+
+def test_a_single_group_is_best_where_the_fill_goes_with_it_alone() -> None:
+    settings = planted_settings(lambda hz, v, mode: 0.5 + 0.1 * np.log(hz))
+    best = collapses(settings, ("velocity_m_s", "frequency_hz"))[0]
+    assert best.groups == ("frequency_hz",)
+    assert best.miss < 0.1 * settings["fill"].std()

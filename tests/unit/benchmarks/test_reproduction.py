@@ -21,13 +21,13 @@ from sandmould.scenario.bad_input import BadInputError
 
 HZ = "vibration.0.frequency_hz"
 README = """\
-## planted
+# planted
 
 | vibrated | 0 | 5 s |
 |---|---|---|
 | fill (sand) | 0.30 | 0.52 (0.01) |
 
-## another
+## Record
 
 | vibrated | 0 |
 |---|---|
@@ -55,7 +55,7 @@ def numbers(tmp_path: Path) -> RecordedNumbers:
         "study": "config/studies/tube_demo.yaml", "wall_s_of_all_runs": 90.0, "commit": "abc",
         "machine": {"processor": "one"},
     }))  # fmt: skip
-    (tmp_path / "records" / "README.md").write_text(README)
+    (folder / "README.md").write_text(README)
     theme = tmp_path / "benchmarks" / "arpm"
     theme.mkdir(parents=True)
     rows = [

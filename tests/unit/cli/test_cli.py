@@ -144,14 +144,48 @@ def test_run_hands_options_on_to_snakemake(monkeypatch: pytest.MonkeyPatch) -> N
     assert calls == [(file, ["--cores", "2", "--quiet", "rules", "host"]), (file, [])]
 
 
-def test_names_of_studies_are_completed() -> None:
+VERBS = (
+    *("demo", "new", "show", "plan", "run", "status", "again", "tidy", "report", "compare"),
+    *("measures", "keys", "doctor"),
+)
+
+
+def test_every_verb_has_help_with_an_example() -> None:
+    verbs = {command.name or command.callback.__name__ for command in app.registered_commands}
+    assert set(VERBS) <= verbs
+    for verb in verbs:
+        said = sandmould(verb, "--help")
+        assert said.exit_code == 0
+        assert f"Usage: sandmould {verb} " in said.output
+        assert f"Example: sandmould {verb}" in said.output
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("plan plates_", ["plates_small"]),
+        ("compare tube_demo plates_", ["plates_small"]),
+        ("keys scenario.vibr", ["scenario.vibration"]),
+        ("keys scenario.vibration.0.freq", ["scenario.vibration.0.frequency_hz"]),
+        ("keys repl", ["replicates"]),
+    ],
+)
+def test_the_shell_is_offered_studies_and_keys(typed: str, offered: list[str]) -> None:
     words = {
         "_SANDMOULD_COMPLETE": "complete_bash",
-        "COMP_WORDS": "sandmould plan plates_",
-        "COMP_CWORD": "2",
+        "COMP_WORDS": f"sandmould {typed}",
+        "COMP_CWORD": str(len(typed.split())),
     }
     said = CliRunner().invoke(app, [], prog_name="sandmould", env=words)
-    assert said.stdout.split() == ["plates_small"]
+    assert said.stdout.split() == offered
+
+
+def test_the_shell_can_be_told_to_complete() -> None:
+    assert "--install-completion" in sandmould("--help").output
+    said = CliRunner().invoke(
+        app, [], prog_name="sandmould", env={"_SANDMOULD_COMPLETE": "source_bash"}
+    )
+    assert "complete -o default -F" in said.stdout
 
 
 def test_measures_of_a_study_are_printed() -> None:

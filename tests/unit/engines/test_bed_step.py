@@ -11,10 +11,7 @@ import pytest
 from sandmould.engines.bed_step import MOMENTS, limit_moments, limit_warning, with_bed_step
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.registry import engine_problem
-from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import damped_step
-from tests.liggghts_scenes import liggghts_scene
 from tests.scenes import tube_scene
 
 OF_BED: dict[str, Any] = {"engine": {"name": "reference"}, "time_step": {"bed_fraction": 0.7}}
@@ -96,13 +93,3 @@ def test_moments_see_all_phases_of_the_box() -> None:
 def test_a_limit_below_the_step_is_told() -> None:
     assert limit_warning(3e-5, None) == limit_warning(3e-5, 3e-5) == ""
     assert "the time step 3e-05 s was above the exact limit" in limit_warning(3e-5, 2.9e-5)
-
-
-@pytest.mark.parametrize("scene", [tube_scene(), liggghts_scene()], ids=["lammps", "liggghts"])
-def test_engines_with_one_step_refuse_it(scene: Scenario) -> None:
-    step = scene.time_step.model_copy(update={"bed_fraction": 0.7})
-    problem = engine_problem(scene.model_copy(update={"time_step": step}))
-    assert problem is not None
-    assert (problem.key, problem.value) == ("time_step.bed_fraction", 0.7)
-    assert problem.valid.startswith(f"absent on engine {scene.engine.name}, which has one time ")
-    assert problem.valid.endswith("; engine reference takes one from the bed")

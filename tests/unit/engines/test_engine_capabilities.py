@@ -26,7 +26,6 @@ BARE = Capabilities(
     checkpoints_at_setups=False,
     moves_tables=False,
     moves_walls=False,
-    changes_step=False,
 )
 
 
@@ -52,7 +51,6 @@ def test_sessions_have_the_methods_that_their_engine_promises(name: str) -> None
         ("save_checkpoint", promised.repeats_windows),
         ("restore_checkpoint", promised.repeats_windows),
         ("attach_mover", promised.calls_movers),
-        ("exact_limit_s", promised.changes_step),
     ):
         own = getattr(session, method) is not getattr(StagedSession, method)
         assert own == promise, method

@@ -13,8 +13,15 @@ from types import SimpleNamespace
 import pytest
 
 from pattern_fe.inner_forces import _BY_DIMENSION
-from sandmould import ROOT, compiled
-from sandmould.compiled import PACKAGES, cache_folder, cache_key, is_own, kernel_sources
+from sandmould import ROOT, kernel_cache
+from sandmould.kernel_cache import (
+    PACKAGES,
+    are_compiled,
+    cache_folder,
+    cache_key,
+    is_own,
+    kernel_sources,
+)
 
 
 @pytest.fixture
@@ -111,6 +118,8 @@ def test_what_is_compiled_is_kept_for_the_next_process(house: Path) -> None:
     assert kept
     printed(house, ARPM)
     assert {path: path.stat().st_mtime_ns for path in (house / "cache").rglob("*.nbc")} == kept
+    (folder,) = (house / "cache" / "sandmould").iterdir()
+    assert (are_compiled("arpm", folder), are_compiled("dem", folder)) == (True, False)
 
 
 def test_kernels_of_one_source_are_kept_under_names_of_their_own() -> None:
@@ -139,14 +148,17 @@ def test_another_processor_has_another_folder(
 ) -> None:
     here = cache_folder()
     other = SimpleNamespace(flatten=lambda: "+other") if "features" in of_llvm else "other"
-    monkeypatch.setattr(compiled.binding, of_llvm, lambda: other)
+    monkeypatch.setattr(kernel_cache.binding, of_llvm, lambda: other)
     assert cache_folder() != here
 
 
 @pytest.mark.parametrize("package", ["numba", "llvmlite"])
 def test_another_version_has_another_folder(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
     here = cache_folder()
-    monkeypatch.setattr(getattr(compiled, package), "__version__", "0.0")
+    known = kernel_cache.version
+    monkeypatch.setattr(
+        kernel_cache, "version", lambda name: "0.0" if name == package else known(name)
+    )
     assert cache_folder() != here
 
 

@@ -62,7 +62,7 @@ def said_beside_the_verdict(folder: Path) -> str:
     collect(folder)
     write_report(folder, folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")
-    there = text[text.index('class="verdict') : text.index('<dl class="key">')]
+    there = text[text.index('class="verdict') : text.index('id="scene"')]
     return html.unescape(re.sub(r"<[^>]+>", "", there)).replace("\xa0", " ")
 
 

@@ -14,8 +14,11 @@ import pytest
 
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report import figures
+from sandmould.report.method import provenance_rows
 from sandmould.report.page import LIMIT_BYTES, write_report
 from sandmould.report.sand import _layer_conclusion
+from sandmould.report.tables import Column, Table
+from sandmould.report.templates import page_environment
 from sandmould.study.collect import collect
 from tests.unit.report_study import (
     ENGINES,
@@ -119,6 +122,24 @@ def test_every_picture_is_told(text: str) -> None:
     assert re.findall(r"<b>Figure (\d+)\.</b>", text) == [str(n + 1) for n in range(figures)]
 
 
+def test_the_table_of_runs_folds_in_a_frame_that_scrolls(text: str) -> None:
+    folded = text[text.index('<details id="runs-table">') : text.index("</details>")]
+    assert "<summary>Table of 9 runs</summary>" in folded
+    assert '<div class="scroll" tabindex="0" role="region" aria-label="Runs">' in folded
+    assert folded.count("<tr") == 10
+
+
+def test_a_table_without_rows_vanishes() -> None:
+    charts = page_environment().get_template("charts.html").module
+    empty = Table((Column("hot spot"),), (), ())
+    assert str(charts.table(empty, True, "Hot spots")).strip() == ""  # type: ignore[attr-defined]
+
+
+def test_what_differs_from_run_to_run_is_no_origin_of_all() -> None:
+    rows = provenance_rows([{"command": f"run {n}", "versions": {"numpy": "2"}} for n in (1, 2)])
+    assert [(row.term, row.text) for row in rows] == [("versions: numpy", "2")]
+
+
 def test_headings_link_to_sections(text: str) -> None:
     page = Page(text)
     targets = {a["href"][1:] for a in page.of("a") if a["href"].startswith("#")}
@@ -128,8 +149,8 @@ def test_headings_link_to_sections(text: str) -> None:
 
 
 def test_first_sentence_recommends_what_is_resolved(text: str) -> None:
-    assert first_sentence(text).startswith("50 Hz is best: it gives the highest fill of the tube")
-    assert "Recommended among the settings swept: 50 Hz" in Page(text).text
+    assert first_sentence(text).startswith("Shake at 50 Hz with a stroke of 0.298 mm (1.50 g): the")
+    assert "50 Hz is best: it gives the highest fill of the tube" in Page(text).text
 
 
 def test_failed_run_is_marked_with_its_sentence(text: str) -> None:
@@ -171,7 +192,7 @@ def test_same_study_gives_the_same_page(text: str, study: Path, tmp_path: Path) 
 def test_tie_says_at_once_that_it_is_not_resolved(tmp_path: Path) -> None:
     text = report(write_study(tmp_path / "tie", dict.fromkeys(PLANTED, 0.4), spread=0.05))
     assert first_sentence(text).startswith("Not resolved:")
-    assert "Recommended" not in text
+    assert "Shake at" not in text
 
 
 def test_single_replicates(tmp_path: Path) -> None:
@@ -235,7 +256,7 @@ def test_without_a_tube_its_parts_vanish(tmp_path: Path) -> None:
     text = report(study)
     assert "fill of the tube" not in text
     assert "the sand in the tube comes from" not in text
-    assert "solid fraction" in first_sentence(text)
+    assert "solid fraction" in Page(text).text
 
 
 def test_spheres(tmp_path: Path) -> None:
@@ -291,7 +312,7 @@ def test_study_of_twins_begins_with_whether_they_agree(tmp_path: Path) -> None:
     ):
         assert said in page.text, said
     # no setting is to be recommended, nor is an optimum under suspicion
-    for absent in ("compared with the best", "Recommended", "optimum belongs", "is best"):
+    for absent in ("compared with the best", "Shake at", "optimum belongs", "is best"):
         assert absent not in page.text, absent
     bands = [attrs for tag, attrs in page.tags if tag == "rect"]
     assert len(bands) == 2 * 2
@@ -309,14 +330,12 @@ def test_cross_check_stands_beside_a_verdict_that_it_does_not_touch(tmp_path: Pa
     folder = write_cross_check(tmp_path / "demo")
     text = report(folder)
     # the other engine's runs at 50 Hz are 0.3 higher
-    assert first_sentence(text).startswith(
-        "50 Hz is best: it gives the highest fill of the tube, 0.5"
-    )
+    assert first_sentence(text).startswith("Shake at 50 Hz with a stroke of ")
+    assert "50 Hz is best: it gives the highest fill of the tube, 0.5" in text
     page = Page(text)
     assert "The verdict above uses the sweep's own engine alone" in page.text
     assert "reference − lammps, 50 Hz" in page.text
     assert text.count("engine_lammps_f50_r1") >= 1
-    assert "Recommended among the settings swept: 50 Hz" in page.text
     checked = next(s for s in page.of("svg") if "fill of the tube by setting" in s["aria-label"])
     assert "50 Hz: 0.550, 3 runs" in checked["aria-label"]
 

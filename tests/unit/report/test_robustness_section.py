@@ -10,11 +10,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.report.answer import optimum_choice, optimum_headline
+from sandmould.report.next_steps import optimum_steps
 from sandmould.report.optimum import optimum_pages
 from sandmould.report.page import write_report
 from sandmould.report.robustness import robustness_pages
 from sandmould.statistics.config import SandWaveSpeed
-from sandmould.study.collect import collect, gather, read_study
+from sandmould.statistics.verdict import Verdict, compare_settings
+from sandmould.study.collect import Collected, collect, gather, read_study
 from sandmould.study.definition.certificate import spanned_hz
 from sandmould.study.definition.run import Run
 from sandmould.study.plan.plan_files import write_plan
@@ -94,6 +97,7 @@ def test_an_artefact_is_the_first_sentence_of_the_report(tmp_path: Path) -> None
     said = re.sub(r"<[^>]+>", "", text[text.index('class="verdict') :][:1500]).replace("\xa0", " ")
     said = html.unescape(said[said.index(">") + 1 :].strip())
     assert said.startswith("The optimum at 50 Hz is an artefact of what is held constant: it moves")
+    said = html.unescape(text[text.index('id="details"') :])
     assert "Do not take it for a property of the sand's fill of the tube." in said
     assert 'class="verdict unresolved"' in text
     assert "Does the optimum belong to the sand?" in text
@@ -155,6 +159,12 @@ def test_without_a_source_of_the_wave_speed_no_frequency_is_named_first(tmp_path
     assert second.startswith("No frequency in Hz is recommended: the optimum follows the springs")
     assert third.startswith("The fill of the tube is highest at frequency")
     assert "times the bed's own first mode, measured by a small shake" in fourth
+    swept, verdict = collected.of_sweep.summary, judged(collected)
+    said, _ = optimum_headline(optimum, pages, verdict, swept, has_speed=False)
+    assert said.startswith("No frequency in Hz is recommended: the best one goes with the hardness")
+    assert optimum_choice(optimum, swept, verdict, is_artefact=False) == ()
+    (step,) = optimum_steps(study, optimum, pages)
+    assert step.line.startswith("certificate: {sand_wave_speed: {")
     # The waves of the bed, some 36 m/s by its mode, are those of a sand with a source here.
     sand = SandWaveSpeed(low_m_s=30.0, high_m_s=40.0, by="Somebody 2020")
     asked = study.certificate.model_copy(update={"sand_wave_speed": sand})
@@ -165,12 +175,19 @@ def test_without_a_source_of_the_wave_speed_no_frequency_is_named_first(tmp_path
     assert advised.sentences[0] == third
     assert advised.sentences[2].startswith("Recommended with the acceleration held: ")
     assert "30 to 40 m/s (Somebody 2020)" in advised.sentences[2]
+    said, is_sound = optimum_headline(advised, pages, verdict, swept, has_speed=True)
+    assert re.match(r"Shake at 50\.?5? Hz \([\d.]+ to [\d.]+ Hz\): there the tube fills best", said)
+    assert is_sound
+    assert optimum_steps(sourced, advised, pages) == []
     # An optimum at the end of what was swept is no frequency to set.
-    swept = collected.of_sweep.summary
     cut = optimum_pages(folder, sourced, swept[swept[KEY] <= 50.0], pages, pages.mode)
     assert cut is not None
     assert not cut.sound
     assert cut.sentences[1].startswith("No frequency in Hz is recommended: the interval of the op")
+
+
+def judged(collected: Collected) -> Verdict:
+    return compare_settings(collected.of_sweep.summary, [KEY], "tube_fill_fraction")
 
 
 def test_there_is_no_certificate_before_its_frequencies_are_chosen(tmp_path: Path) -> None:

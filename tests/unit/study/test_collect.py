@@ -62,6 +62,16 @@ def test_curves_hold_every_snapshot_with_its_parameters(study: Path) -> None:
     assert set(curves.loc[curves["run"] == "f25_r2", KEY]) == {25}
 
 
+def test_time_of_vibration_is_absent_before_it_also_in_older_tables(study: Path) -> None:
+    older = pd.read_csv(study / "runs" / "f25_r1" / "measures.tsv", sep="\t")
+    before = older["vibration_time_s"] == -1
+    assert before.any()
+    curves = gather(study).curves
+    shaken_s = curves.loc[curves["run"] == "f25_r1", "vibration_time_s"]
+    assert shaken_s.isna().tolist() == before.tolist()
+    assert shaken_s.min() == 0.0
+
+
 def test_failed_run_has_gaps_and_says_why(study: Path) -> None:
     row = gather(study).summary.set_index("run").loc[FAILED]
     assert row["outcome"] == "lost grains"

@@ -234,7 +234,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
     assert summary["speed_m_s"].tolist() == pytest.approx([1.001, 1.002, 2.002, 2.004])
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text()
-    assert "Recommended among the settings swept: <b>20" in page
+    assert "Use 20 °: there the speed is highest." in page
     assert "speed from v_speed" in page
     assert (folder / "figures" / "curves.svg").exists()
     assert "vibration" not in page.split("<style>")[0] + page.split("</style>")[1]

@@ -17,6 +17,7 @@ from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.wall_thickness import thinnest_wall
+from sandmould.study.kinds.sand import planning
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
@@ -241,7 +242,35 @@ def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
     assert "Note:" not in told[0.8]
 
 
-def test_obstacles_thinner_than_a_grain_are_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize("compiled", [False, True])
+def test_what_is_to_be_compiled_is_told_once(
+    compiled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planning, "are_compiled", lambda room, folder: compiled)
+    path = tmp_path / "engines.yaml"
+    path.write_text(
+        yaml.safe_dump(
+            {
+                "scenario": TUBE_SCENE,
+                "objective": {"measure": "solid_fraction"},
+                "sweep": {
+                    "keys": {"engine.name": ["lammps", "reference"], "gravity_m_s2": [9.0, 10.0]}
+                },
+            }
+        )
+    )
+    said = plan_table(expand(open_study(path)), Prices(), 1)
+    # LAMMPS computes this scene alone
+    told = "about 25 s of a core more, once. (At 2 of 4 points; first at engine_reference_"
+    assert said.count("compiled") == (0 if compiled else 1)
+    assert (told in said) != compiled
+
+
+def test_obstacles_thinner_than_a_grain_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planning, "are_compiled", lambda room, folder: True)
+
     def table(thickness_m: float) -> str:
         vertices = [[0.02, 0.02], [0.06, 0.02], [0.06, 0.02 + thickness_m],
                     [0.02, 0.02 + thickness_m]]  # fmt: skip

@@ -160,7 +160,7 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     assert "The casting is solid after" in page
     assert "Cooling curves" in page
     assert "Stand-ins by their sources" in page
-    assert "casting.solidus_k" in page
+    assert "casting solidus" in page
     names = {path.name for path in (folder / "figures").iterdir()}
     assert {"fields.png", "error_cost.svg", "curves.svg"} <= names
     assert Image.open(folder / "figures" / "fields.png").width > 200

@@ -38,7 +38,7 @@ def measure(run: Run, folder: Path) -> None:
     series = pd.read_csv(folder / "series.tsv", sep="\t")
     names = [name for name in run.scenario.measures if name in series]
     time_s = series["time_s"] if "time_s" in series else pd.Series(dtype=float)
-    clock = {"time_s": time_s, "vibration_time_s": -1.0, "stage": "deck"}
+    clock = {"time_s": time_s, "vibration_time_s": math.nan, "stage": "deck"}
     table = pd.DataFrame({**clock, **{name: series[name] for name in names}})
     with replaced(folder / "measures.tsv") as partial:
         table.to_csv(partial, sep="\t", index=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from pathlib import Path
 
@@ -26,7 +27,7 @@ def measure(run: Run, folder: Path) -> None:
     table = by_window(series, names, scenario.record_s)
     if table.empty:  # stopped in its first step: a row for the verdict all the same
         table.loc[0, "time_s"] = outcome.simulated_s
-    table.insert(1, "vibration_time_s", -1.0)
+    table.insert(1, "vibration_time_s", math.nan)
     table.insert(2, "stage", "flowing")
     measures = measure_flow(scenario, series, outcome.detail)
     for name in names:

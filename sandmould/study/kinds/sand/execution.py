@@ -43,7 +43,11 @@ def compute(run: Run, folder: Path) -> Computed:
     run_hash, is_fill = scenario_hash(run.scenario), run.part == FILL
 
     def write_deck(program: Program) -> None:
-        _write_deck(program, run, folder)
+        world = registry.communicator_of(run.scenario)
+        if world is None or world.rank == 0:  # one process writes for all
+            _write_deck(program, run, folder)
+        if world is not None:
+            world.barrier()
 
     driver = Driver(program, folder, run.run, run_hash, opening, is_fill, write_deck)
     outcome = driver.run()
@@ -67,7 +71,7 @@ def load_computing(scenario: Scenario) -> None:
     """Import the engine's side of the house, and the pattern's where there is one."""
     registry.engine_of(scenario).load_session(scenario)
     if scenario.time_step.bed_fraction is not None:
-        importlib.import_module("sandmould.dem.critical_step")
+        importlib.import_module("sandmould.engines.bed_limit")
     if scenario.pattern is not None:
         importlib.import_module("pattern_fe.coupling.opening")
 

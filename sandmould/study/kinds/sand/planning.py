@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -10,6 +11,7 @@ import pattern_fe
 from sandmould.digest import digest
 from sandmould.engines import registry
 from sandmould.engines.program import build_program
+from sandmould.kernel_cache import are_compiled, cache_folder
 from sandmould.runs.formatting import number
 from sandmould.scenario import checks
 from sandmould.scenario.bad_input import Problem
@@ -41,6 +43,10 @@ in a snapshot: measured at 282 discs and 2 000 spheres."""
 PASSES = 4.0
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
+COMPILE_S = 25.0
+"""Processor time for what a first run compiles: 24 s measured in 2D, 26 s in 3D, 24 s with a
+pattern (fe_column)."""
+_kernel_folder = functools.cache(cache_folder)
 STEPPED_ENTRY_S = 0.55e-9
 """Processor time of a step for an entry of the matrix of a pattern stepped in step: 0.88 ms
 measured at 1 292 components, 2.1 ms at 1 820."""
@@ -224,6 +230,12 @@ def notes(scenario: Scenario) -> list[Note]:
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
     hardness = bed_hardness(scenario)
     told = [_hardness_note(hardness)] if hardness else []
+    if registry.calls_our_kernels(scenario) and not are_compiled("dem", _kernel_folder()):
+        text = (
+            "Sandmould's own code is not compiled on this machine yet. The first start compiles "
+            f"it: about {COMPILE_S:g} s of a core more, once."
+        )
+        told.append(Note("compiling", text))
     if scenario.time_step.bed_fraction is not None:
         text = (
             "The price counts the planned time step. What follows the fill takes "

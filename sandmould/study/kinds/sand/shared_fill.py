@@ -37,10 +37,10 @@ def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
     """
     if not run.fill:
         return None
-    if registry.mpi_ranks(run.scenario) == 1:
+    world = registry.communicator_of(run.scenario)
+    if world is None:
         is_root, failed = True, _lay(run, folder, program)
     else:  # one process lays the files for all
-        world = registry.deck_reader(run.scenario.engine.name).communicator()
         is_root = world.rank == 0
         failed = world.bcast(_lay(run, folder, program) if is_root else None, root=0)
     if failed is None:

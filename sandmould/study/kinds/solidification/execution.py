@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +21,7 @@ def measure(run: Run, folder: Path) -> None:
 
     series = pd.read_csv(folder / "series.tsv", sep="\t")
     _, _, heat_column = scene.series_columns(run.scenario)
-    clock = {"time_s": series["time_s"], "vibration_time_s": -1.0, "stage": "cooling"}
+    clock = {"time_s": series["time_s"], "vibration_time_s": math.nan, "stage": "cooling"}
     table = pd.DataFrame({**clock, **series.drop(columns=["time_s", heat_column])})
     fields, draw = casting.read_fields(folder), None
     if fields:

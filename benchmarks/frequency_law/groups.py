@@ -1,0 +1,193 @@
+"""Which properties of the shaking the fill goes with, over all curves of the law at once.
+
+A curve is told from the other curves alone: were the fill a function of some groups, curves of
+other springs, depths and holds would tell it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from benchmarks.frequency_law.series import Series
+
+Array = NDArray[np.float64]
+GROUPS = {
+    "frequency_hz": "frequency f",
+    "acceleration_g": "acceleration",
+    "velocity_m_s": "velocity",
+    "displacement_m": "stroke",
+    "in_modes": "f over c/(4 H)",
+}
+"""What the fill may go with, as the page calls it. Amplitudes are peaks of the box's motion."""
+EXPLANATIONS: dict[str, tuple[str, ...]] = {
+    "how long the bed flies in a period: of a body that bounces without rebound it goes with "
+    "acceleration alone": ("acceleration_g",),
+    "how long the wave of a landing takes through the bed and back, 2 H/c, in periods": (
+        "in_modes",
+    ),
+    "how fast it lands": ("velocity_m_s",),
+    "sag of the bed under its weight, g H²/(2 c²), over the stroke": ("sag_over_stroke",),
+    "strain of a landing, velocity over c, and 2 H/c in periods": ("strain", "in_modes"),
+    "velocity over that of a fall through the bed, sqrt(g H), and 2 H/c in periods": (
+        "over_fall",
+        "in_modes",
+    ),
+    "velocity, and 2 H/c in periods": ("velocity_m_s", "in_modes"),
+}
+"""What may move the sand, and the groups that the fill would go with then."""
+LAW = ("velocity_m_s", "in_modes")
+"""The pair that the page's last part is about."""
+
+
+THROWN_G = 1.0
+"""Below it the box never throws the sand, so nothing of the law can hold."""
+NEAR = 1.3
+"""A setting is near a velocity within this factor."""
+
+
+@dataclass(frozen=True)
+class Collapse:
+    """How well some groups alone tell the fill of a curve that they were not fitted to."""
+
+    groups: tuple[str, ...]
+    miss: float
+    """Root mean square over all settings."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What the law says of a study that it was not fitted to."""
+
+    settings: pd.DataFrame
+    """With ``told``, the law's fill."""
+
+    @property
+    def shift(self) -> float:
+        """Mean of measured less told."""
+        return float((self.settings["fill"] - self.settings["told"]).mean())
+
+    @property
+    def miss(self) -> float:
+        """Root mean square of measured less told, without the shift."""
+        return float((self.settings["fill"] - self.settings["told"]).std(ddof=0))
+
+    def best_in_modes(self, column: str) -> float:
+        """F over c/(4 H) where ``fill`` or ``told`` is largest."""
+        return float(self.settings["in_modes"].iloc[int(self.settings[column].argmax())])
+
+
+def settings_of(series: Sequence[Series]) -> pd.DataFrame:
+    """One row a setting.
+
+    Parameters
+    ----------
+    series : sequence of Series
+
+    Returns
+    -------
+    DataFrame
+        ``curve`` (int), ``study``, ``label``, ``GROUPS`` and the groups of ``EXPLANATIONS``, mean
+        ``fill`` and its standard error ``se``.
+    """
+    rows: list[pd.DataFrame] = []
+    for curve, one in enumerate(series):
+        fills, depth_m, speed_m_s = one.fills, one.depth_m, one.wave_speed_m_s
+        gravity_m_s2 = one.scenario.gravity_m_s2
+        velocity_m_s, stroke_m = one.drives["velocity_m_s"], one.drives["displacement_m"]
+        rows.append(
+            one.drives.assign(
+                strain=velocity_m_s / speed_m_s,
+                over_fall=velocity_m_s / math.sqrt(gravity_m_s2 * depth_m),
+                sag_over_stroke=gravity_m_s2 * depth_m**2 / (2 * speed_m_s**2) / stroke_m,
+                curve=curve,
+                study=one.study,
+                label=one.label,
+                frequency_hz=fills.columns.to_numpy(dtype=np.float64),
+                in_modes=fills.columns.to_numpy(dtype=np.float64) / one.column_hz,
+                fill=fills.mean(),
+                se=fills.sem(),
+            )
+        )
+    return pd.concat(rows, ignore_index=True)
+
+
+def collapses(settings: pd.DataFrame, names: Sequence[str] = tuple(GROUPS)) -> list[Collapse]:
+    """Each of these groups and each pair of them: singles first, then best first."""
+    found = [
+        Collapse(groups, miss_of(settings, groups))
+        for number in (1, 2)
+        for groups in itertools.combinations(names, number)
+    ]
+    return sorted(found, key=lambda collapse: (len(collapse.groups), collapse.miss))
+
+
+def miss_of(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> float:
+    """Root mean square of what other curves tell less what was measured."""
+    return float(np.sqrt(np.mean((told_by_others(settings, groups) - settings["fill"]) ** 2)))
+
+
+def told_by_others(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> Array:
+    """Fill of each setting as all other curves tell it, (n,) float64."""
+    told = np.empty(len(settings))
+    for curve in settings["curve"].unique():
+        left_out = (settings["curve"] == curve).to_numpy()
+        told[left_out] = FillLaw(settings[~left_out], groups).at(settings[left_out])
+    return told
+
+
+def held_out(settings: pd.DataFrame, others: pd.DataFrame) -> HeldOut:
+    """Ask the law of ``settings`` for those of another study."""
+    return HeldOut(others.assign(told=FillLaw(settings).at(others)))
+
+
+class FillLaw:
+    """A smooth function of the logarithms of some groups: a Gaussian process with noise.
+
+    Parameters
+    ----------
+    settings : DataFrame
+        As of ``settings_of``.
+    groups : sequence of str
+        Columns of the settings.
+    """
+
+    def __init__(self, settings: pd.DataFrame, groups: Sequence[str] = LAW) -> None:
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+        self._groups = list(groups)
+        points = np.log(settings[self._groups].to_numpy(dtype=np.float64))
+        self._low, self._span = points.min(axis=0), np.ptp(points, axis=0)
+        kernel = ConstantKernel(1.0, (1e-2, 1e3)) * Matern(
+            [0.5] * len(self._groups), (0.05, 20.0), nu=2.5
+        ) + WhiteKernel(1e-2, (1e-6, 1.0))
+        self._process: Any = GaussianProcessRegressor(
+            kernel, normalize_y=True, n_restarts_optimizer=2, random_state=1
+        )
+        with warnings.catch_warnings(), threadpool_limits(1):
+            # A length at its bound says that the fill hardly depends on a group.
+            warnings.simplefilter("ignore")
+            self._process.fit((points - self._low) / self._span, settings["fill"].to_numpy())
+
+    def at(self, settings: pd.DataFrame) -> Array:
+        """Fill at settings, (n,) float64."""
+        points = np.log(settings[self._groups].to_numpy(dtype=np.float64))
+        told: Array = self._process.predict((points - self._low) / self._span)
+        return told
+
+
+def shaken_range(settings: pd.DataFrame, velocity_m_s: float) -> tuple[float, float]:
+    """Least and greatest f over c/(4 H) of the settings near a velocity."""
+    near = np.abs(np.log(settings["velocity_m_s"] / velocity_m_s)) < np.log(NEAR)
+    in_modes = settings.loc[near, "in_modes"]
+    return float(in_modes.min()), float(in_modes.max())

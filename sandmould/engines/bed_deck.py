@@ -1,0 +1,112 @@
+"""Decks whose time step changes once the bed is filled: two parts, each set up on its own.
+
+LAMMPS and LIGGGHTS are told dashpots that depend on the time step before their first grain. So the
+first part fills the box and keeps the bed in a restart file; the second reads it, with all numbers
+found anew for its own time step. A session computes one part or the other.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from sandmould.dem import source_files
+from sandmould.engines.bed_step import with_bed_step
+from sandmould.engines.deck import Deck, DeckBlock
+from sandmould.engines.deck_lines import Lines
+from sandmould.engines.program import Program, build_program
+from sandmould.scenario.scenario import Scenario
+
+_KEEP_BED = "#--- block: keep_bed ---"
+"""Where the second part begins."""
+_NUMBER = re.compile(r"^variable (\w+) index (\S+)", re.M)
+
+
+def follows_bed(scenario: Scenario) -> bool:
+    """Whether a scene has got the step of its filled bed."""
+    return scenario.time_step.bed_fraction is not None and scenario.time_step.step_s is not None
+
+
+def sources_of_step(scenario: Scenario) -> list[Path]:
+    """Files of ours that find the step of a bed that another engine computes; none without one."""
+    if scenario.time_step.bed_fraction is None:
+        return []
+    here = Path(__file__).parent
+    names = ("bed_deck.py", "bed_limit.py", "solid_surfaces.py", "reference/model.py")
+    return [*source_files(), *(here / name for name in names)]
+
+
+def step_line(lines: Lines) -> str:
+    """The time step of a deck, or of a part of it, as its variable."""
+    scenario, source = lines.scenario, lines.source("time_step.fraction")
+    critical, fraction = scenario.critical_step, scenario.time_step.bed_fraction
+    if fraction is not None and follows_bed(scenario):
+        meaning = f"time step after the fill, {fraction:g} of the exact limit of the filled bed"
+        of_bed = f"eqs. (40)-(54) of all its contacts; {lines.source('time_step.bed_fraction')}"
+        return lines.number("time_step", scenario.step_s, "s", f"{meaning}, rounded down", of_bed)
+    meaning = "time step" if fraction is None else "time step of the fill"
+    share = f"{scenario.step_s / critical.step_s:.3g} of the critical {critical.step_s:.4g} s"
+    return lines.number(
+        "time_step", scenario.step_s, "s", f"{meaning}, {share} set by {critical.cause}",
+        f"eqs. (40)-(54); {source}",
+    )  # fmt: skip
+
+
+def render_parts(
+    dialect: str, program: Program, context_of: Callable[[Program], dict[str, Any]]
+) -> Deck:
+    """Render a deck, in two parts where it takes its time step from the filled bed.
+
+    Before the bed is known the planned step stands in the second part too.
+
+    Parameters
+    ----------
+    dialect : str
+    program : Program
+    context_of : callable
+        Names and values for the templates, of a program.
+    """
+    scenario, filled = program.scenario, program.fill_stages
+    if scenario.time_step.bed_fraction is None or filled == len(program.stages):
+        return Deck.render(dialect, context_of(program))
+    planned = scenario.time_step.model_copy(update={"step_s": None})
+    fill = replace(program, scenario=scenario.model_copy(update={"time_step": planned}))
+    first = Deck.render(
+        dialect, context_of(fill) | {"stages": program.stages[:filled]}, "start.in.j2"
+    )
+    shaken = program
+    if not follows_bed(scenario):
+        shaken = build_program(with_bed_step(scenario, math.inf))
+    parts = {"fill_stages": program.stages[:filled], "stages": shaken.stages[filled:]}
+    second = Deck.render(dialect, context_of(shaken) | parts, "bed.in.j2")
+    text = second.text
+    if shaken is not program:
+        text = (
+            f"# The bed is not filled yet: until then this part has the planned time step.\n{text}"
+        )
+    return Deck(first.text + _given_anew(text, first.text))
+
+
+def _given_anew(text: str, earlier: str) -> str:
+    """Let a part give the numbers that differ from those of an earlier part.
+
+    A number that can be changed from outside is given once, unless it is deleted.
+    """
+    before = dict(_NUMBER.findall(earlier))
+
+    def anew(number: re.Match[str]) -> str:
+        name, value = number.groups()
+        same = before.get(name, value) == value
+        return number.group() if same else f"variable {name} delete\n{number.group()}"
+
+    return _NUMBER.sub(anew, text)
+
+
+def blocks_of(deck: Deck, scenario: Scenario) -> dict[str, DeckBlock]:
+    """Blocks of the part of a deck that a session computes."""
+    first, _, second = deck.text.partition(_KEEP_BED)
+    return Deck(second if second and follows_bed(scenario) else first).blocks

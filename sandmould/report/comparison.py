@@ -1,0 +1,275 @@
+"""Finished studies side by side: a table, a picture and a page of several studies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sandmould.report.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.templates import page_environment
+from sandmould.runs.files import write_text
+from sandmould.runs.formatting import (
+    display_scale,
+    listed,
+    name_of,
+    titled,
+    with_margin,
+)
+from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.statistics.settings import Setting
+from sandmould.statistics.verdict import FEW, compare_settings
+from sandmould.study.collect import Collected, read_collected, read_study
+from sandmould.study.definition.study import Study
+from sandmould.study.plan.plan_files import SUMMARY, VERDICT_FILE
+
+_LEFT_OUT = ("title", "based_on", "sweep")
+_MOST_DIFFERENCES = 60
+_LONGEST = 60
+"""Letters of a value that is written out."""
+
+
+@dataclass(frozen=True)
+class ComparedStudy:
+    """One of the studies."""
+
+    name: str
+    folder: Path
+    study: Study
+    collected: Collected
+    verdict: str
+    """The first sentence of its report."""
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """What it sweeps."""
+        return self.collected.keys
+
+    def settings(self, measure: str) -> tuple[Setting, ...]:
+        """Means of a measure at its settings."""
+        summary = self.collected.of_sweep.summary
+        return compare_settings(summary, self.keys, measure, seeks_best=False).settings
+
+    @cached_property
+    def stated(self) -> dict[str, Any]:
+        """What the study states, by key path."""
+        tree = self.study.model_dump(mode="json")
+        return dict(_leaves({k: v for k, v in tree.items() if k not in _LEFT_OUT}))
+
+
+def _leaves(tree: Any, above: str = "") -> Iterator[tuple[str, Any]]:
+    inner = tree.items() if isinstance(tree, dict) else enumerate(tree)
+    for name, value in inner:
+        key = f"{above}.{name}" if above else str(name)
+        if isinstance(value, dict | list) and value:
+            yield from _leaves(value, key)
+        else:
+            yield key, value
+
+
+@dataclass(frozen=True)
+class SideBySide:
+    """What is said of studies that have a measure in common."""
+
+    measure: str
+    studies: tuple[ComparedStudy, ...]
+
+    @cached_property
+    def _settings(self) -> list[dict[str, Setting]]:
+        return [{s.label: s for s in each.settings(self.measure)} for each in self.studies]
+
+    @cached_property
+    def labels(self) -> list[str]:
+        """Settings of all studies, in rising order where they are numbers of one key."""
+        values = {s.label: s.values for one in self._settings for s in one.values()}
+        keys = {key for at in values.values() for key in at}
+        if len(keys) == 1 and all(_is_number(v) for at in values.values() for v in at.values()):
+            return sorted(values, key=lambda label: next(iter(values[label].values())))
+        return list(values)
+
+    @property
+    def key(self) -> str:
+        """The one key with numbers that all of them sweep; empty where there is none."""
+        swept = {each.keys for each in self.studies}
+        values = [v for one in self._settings for s in one.values() for v in s.values.values()]
+        if len(swept) == 1 and len(key := swept.pop()) == 1 and all(map(_is_number, values)):
+            return key[0]
+        return ""
+
+    def objective_table(self) -> Table:
+        """Mean of the objective and its 95 % interval: a row a setting, a column a study."""
+        rows = [
+            (
+                Cell(label, str(place)),
+                *(_mean_cell(settings.get(label)) for settings in self._settings),
+            )
+            for place, label in enumerate(self.labels)
+        ]
+        columns = (Column("setting", False), *(Column(each.name) for each in self.studies))
+        return Table(columns, tuple(rows), (False,) * len(rows))
+
+    def differences(self) -> Table:
+        """What the studies state differently, but for what they sweep."""
+        stated = [each.stated for each in self.studies]
+        swept = tuple(f"scenario.{key}" for each in self.studies for key in each.keys)
+        keys = [key for key in dict.fromkeys(k for one in stated for k in one)
+                if not key.startswith(swept)]  # fmt: skip
+        told = [(key, [_value_text(one, key) for one in stated]) for key in keys]
+        found = [(key, texts) for key, texts in told if len(set(texts)) > 1]
+        rows = [
+            (Cell(key, str(place)), *(Cell(text, text) for text in texts))
+            for place, (key, texts) in enumerate(found[:_MOST_DIFFERENCES])
+        ]
+        columns = (Column("key", False), *(Column(each.name, False) for each in self.studies))
+        left = len(found) - len(rows)
+        note = f"{left} more keys differ; study.yaml of each study has all." if left else ""
+        return Table(columns, tuple(rows), (False,) * len(rows), note)
+
+    def chart(self) -> Chart:
+        """Means with their intervals, over the swept key or, without a common one, in rows."""
+        factor, what = display_scale(self.measure)
+        colours = tints(len(self.studies), ordered=False)
+        alt = f"Mean {name_of(self.measure)} of {listed([e.name for e in self.studies])}."
+        marks: list[Mark] = []
+        lines: list[Line] = []
+        rows: list[str] = []
+        for n, (each, settings) in enumerate(zip(self.studies, self._settings, strict=True)):
+            shift_px = 5.0 * (n - (len(self.studies) - 1) / 2)
+            points = []
+            for label in (label for label in self.labels if label in settings):
+                setting = settings[label]
+                if not setting.n:
+                    continue
+                reach = factor * setting.ci_half_width if setting.n >= FEW else math.nan
+                mean = with_margin(setting.mean, setting.ci_half_width)
+                title = f"{each.name}, {label}: mean {mean}, {setting.n} runs"
+                y = factor * setting.mean
+                if self.key:
+                    x = float(setting.values[self.key])
+                    points.append((x, y))
+                    marks.append(Mark(x, y, "mean", colours[n], reach, title, shift_px))
+                else:
+                    marks.append(Mark(y, len(rows), "mean", colours[n], reach, title))
+                    rows.append(f"{each.name}: {label}")
+            if points:
+                label = each.name
+                lines.append(Line(np.array(points), colours[n], "run", label, label))
+        x_title = titled(self.key) if self.key else what
+        ticks = sorted({x for line in lines for x in line.xy[:, 0].tolist()})
+        return Chart(
+            x_title,
+            what if self.key else "",
+            alt,
+            tuple(lines),
+            tuple(marks),
+            x_ticks=tuple(ticks) if len(ticks) <= 12 else (),
+            rows=tuple(rows),
+        )
+
+    def text(self) -> str:
+        """The table of the objective and the verdicts for the terminal."""
+        table = self.objective_table()
+        rows = [[c.title for c in table.columns], *([c.text for c in row] for row in table.rows)]
+        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+        lines = ["  ".join(t.ljust(w) for t, w in zip(row, widths, strict=True)).rstrip()
+                 for row in rows]  # fmt: skip
+        said = [f"{each.name}: {each.verdict}" for each in self.studies]
+        return "\n".join([f"Mean {titled(self.measure)} ± 95 %", "", *lines, "", *said])
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+
+
+def _mean_cell(setting: Setting | None) -> Cell:
+    if setting is None or not setting.n:
+        return Cell("–", "nan")
+    runs = "1 run" if setting.n == 1 else f"{setting.n} runs"
+    return Cell(f"{with_margin(setting.mean, setting.ci_half_width)} ({runs})", str(setting.mean))
+
+
+def _value_text(stated: dict[str, Any], key: str) -> str:
+    if key not in stated or stated[key] in (None, [], {}):
+        return "–"
+    value = stated[key]
+    text = f"{value:.9g}" if _is_number(value) else str(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+
+
+def read_comparison(folders: Sequence[Path]) -> SideBySide:
+    """Read finished studies.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Their folders of results, at least two. The objective of the first is compared.
+
+    Raises
+    ------
+    BadInputError
+        When one is no finished study, or lacks that measure.
+    """
+    if len(folders) < 2:
+        raise BadInputError([Problem("STUDY", str(*folders), "two studies or more")])
+    stems = [folder.resolve().name for folder in folders]
+    names = [s if stems.count(s) == 1 else str(f) for s, f in zip(stems, folders, strict=True)]
+    studies = tuple(_read(n, f) for n, f in zip(names, folders, strict=True))
+    measure = studies[0].study.objective.measure
+    for each in studies:
+        summary = each.collected.of_sweep.summary
+        if measure not in summary:
+            valid = f"a study with {measure}, which {studies[0].name} is judged by"
+            raise BadInputError([Problem("STUDY", each.name, valid)])
+    return SideBySide(measure, studies)
+
+
+def _read(name: str, folder: Path) -> ComparedStudy:
+    if not (folder / SUMMARY).is_file():
+        valid = f"a finished study: {folder} has no {SUMMARY}; sandmould run comes first"
+        raise BadInputError([Problem("STUDY", name, valid)])
+    try:
+        study, collected = read_study(folder), read_collected(folder)
+        verdict_file = folder / VERDICT_FILE
+        said = verdict_file.read_text(encoding="utf-8").strip() if verdict_file.is_file() else "–"
+        return ComparedStudy(name, folder, study, collected, said)
+    except (OSError, ValueError) as error:
+        valid = f"a folder of results that can be read ({error})"
+        raise BadInputError([Problem("STUDY", name, valid)]) from error
+
+
+def write_comparison(comparison: SideBySide, out: Path) -> Path:
+    """Write the page, and beside it its picture as SVG.
+
+    Parameters
+    ----------
+    comparison : SideBySide
+    out : Path
+        The HTML file; it opens offline.
+
+    Returns
+    -------
+    Path
+        The picture.
+    """
+    environment = page_environment()
+    chart = comparison.chart()
+    page = environment.get_template("comparison.html").render(
+        names=[each.name for each in comparison.studies],
+        studies=comparison.studies,
+        measure_name=name_of(comparison.measure),
+        sizes=(lay_out(chart, WIDE), lay_out(chart, NARROW)),
+        objective=comparison.objective_table(),
+        differences=comparison.differences(),
+        few=FEW,
+    )
+    write_text(out, page)
+    picture = out.with_suffix(".svg")
+    figure = environment.get_template("figure.svg").render(laid=lay_out(chart, WIDE))
+    write_text(picture, figure)
+    return picture

@@ -1,0 +1,167 @@
+"""The first screen: what to set on the machine, how sure that is, what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sandmould.report.answer import choices_of, choices_table, headline_of
+from sandmould.report.next_steps import NextSteps, next_steps, setting_steps
+from sandmould.report.sureness import certificate_ground, sand_grounds
+from sandmould.runs.columns import CROSS_CHECK, OUTCOME_CODE, PART, RUN, SWEEP
+from sandmould.scenario.drive import BoxDrive
+from sandmould.statistics.verdict import Verdict, compare_settings
+from sandmould.study.collect import Collected
+from sandmould.study.kinds.sand.kind import SandStudy
+from sandmould.study.plan.ownership import OWNER_FILE
+from tests.unit.report_study import scenario
+
+KEY = "vibration.0.frequency_hz"
+FILL = "tube_fill_fraction"
+
+
+def summary(fills: Mapping[float, Sequence[float]], share: float = 1.25) -> pd.DataFrame:
+    """Fills of each frequency's replicates; what fits in is 1 / share of the space."""
+    rows = [
+        {RUN: f"f{hz:g}_r{r}", KEY: hz, "replicate": r, "seed": r, PART: SWEEP, OUTCOME_CODE: 0,
+         "outcome": "finished", FILL: fill, "tube_fill_of_bed_fraction": share * fill}
+        for hz, values in fills.items()
+        for r, fill in enumerate(values)
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def judged(table: pd.DataFrame) -> tuple[Verdict, dict[str, BoxDrive]]:
+    verdict = compare_settings(table[table[PART] == SWEEP], [KEY], FILL)
+    drives = {s.label: BoxDrive(float(s.values[KEY]), 1.5e-4) for s in verdict.settings}
+    return verdict, drives
+
+
+CLEAR = {25.0: (0.30, 0.31, 0.32), 50.0: (0.60, 0.61, 0.63), 100.0: (0.40, 0.42, 0.41)}
+ALIKE = {25.0: (0.58, 0.62, 0.60), 50.0: (0.61, 0.59, 0.63), 100.0: (0.30, 0.31, 0.32)}
+
+
+@pytest.mark.parametrize(
+    ("fills", "said", "is_sound"),
+    [
+        (CLEAR, "Shake at 50 Hz with a stroke of 0.300 mm (1.51 g): there the tube fills best.",
+         True),
+        (ALIKE, "Shake at 50 Hz or 25 Hz: these runs cannot tell which of them is best. 100 Hz is "
+         "worse.", False),
+        ({25.0: (0.5, 0.6), 50.0: (0.6, 0.5)}, "Not resolved: these runs cannot tell which is "
+         "best, 25 Hz or 50 Hz.", False),
+        ({25.0: (0.5, 0.6)}, "Not resolved: there are results of 25 Hz alone, nothing to compare.",
+         False),
+        ({25.0: (float("nan"),)}, "Not resolved: 1 of 1 runs finished, but none gives a fill of "
+         "the tube that can be used (1 has no value).", False),
+    ],
+)  # fmt: skip
+def test_the_headline_says_what_to_set(
+    fills: Mapping[float, Sequence[float]], said: str, is_sound: bool
+) -> None:
+    verdict, drives = judged(summary(fills))
+    assert headline_of(verdict, [KEY], drives) == (said, is_sound)
+
+
+def test_the_best_setting_stands_in_words_of_the_machine() -> None:
+    table = summary(CLEAR)
+    other = table[table[KEY] == 50.0].assign(**{PART: CROSS_CHECK, FILL: 0.1})
+    table = pd.concat([table, other.assign(tube_fill_of_bed_fraction=0.1)], ignore_index=True)
+    verdict, drives = judged(table)
+    (figures,) = choices_of(verdict, table, drives)
+    assert [(it.value, it.label) for it in figures] == [
+        ("50 Hz", "frequency"),
+        ("0.300 mm", "stroke, end to end"),
+        ("1.51 g", "peak acceleration"),
+        ("77 %", "of what fits in"),
+        ("0.613 ± 0.038", "fill of the tube"),
+    ]
+
+
+def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
+    table = summary(ALIKE)
+    verdict, drives = judged(table)
+    shown = choices_table(choices_of(verdict, table, drives))
+    assert [[cell.text for cell in row[:2]] for row in shown.rows] == [
+        ["50 Hz", "0.300 mm"],
+        ["25 Hz", "0.300 mm"],
+    ]
+    # what holds for both is said once
+    assert shown.note == (
+        "± 0.150 mm; 100 %: the tube packed as densely as the sand round it; 3 runs, ± 95 %."
+    )
+    assert {cell.note for row in shown.rows for cell in row} == {"", "47.1 mm/s", "23.6 mm/s"}
+
+
+def test_results_without_the_share_and_without_a_drive_have_no_such_figures() -> None:
+    table = summary(CLEAR).drop(columns="tube_fill_of_bed_fraction")
+    (figures,) = choices_of(judged(table)[0], table, {})
+    assert [(it.value, it.label) for it in figures] == [
+        ("50 Hz", "frequency"),
+        ("0.613 ± 0.038", "fill of the tube"),
+    ]
+
+
+def steps_of(folder: Path, table: pd.DataFrame, replicates: int = 3) -> NextSteps:
+    keys = {KEY: sorted(set(table[KEY]))}
+    study = SandStudy.model_validate({"sweep": {"keys": keys}, "replicates": replicates})
+    collected = Collected(table, pd.DataFrame(columns=[RUN]), (KEY,))
+    verdict, _ = judged(table)
+    return next_steps(
+        folder, study, collected, verdict, verdict.resolved, setting_steps(study, verdict)
+    )
+
+
+def test_what_to_do_next_says_how_many_runs_and_which_command(tmp_path: Path) -> None:
+    (tmp_path / OWNER_FILE).write_text("mine/tube.yaml\n")
+    table = summary(ALIKE)
+    table.loc[table[KEY] == 25.0, FILL] = [0.58, 0.57, 0.585]
+    steps = steps_of(tmp_path, table)
+    lines = [step.line for step in steps.steps]
+    wanted = int(lines[0].removeprefix("replicates: "))
+    assert 3 < wanted <= 33
+    assert steps.steps[0].text.startswith(f"Run about {wanted - 3} more fillings of each setting")
+    assert steps.before == "Write them into mine/tube.yaml, then run"
+    assert steps.command == "sandmould run mine/tube.yaml"
+
+
+def test_a_difference_that_is_not_worth_the_runs_is_left_alone(tmp_path: Path) -> None:
+    steps = steps_of(tmp_path, summary(ALIKE))
+    assert steps.steps[0].text.startswith("Choose between 50 Hz and 25 Hz by what suits your mach")
+    assert steps.steps[0].line == ""
+
+
+def test_a_shipped_study_is_gone_on_with_in_a_file_of_ones_own(tmp_path: Path) -> None:
+    (tmp_path / OWNER_FILE).write_text("shipped study tube_demo\n")
+    fills = {f: (0.5 - abs(f - 50) / 200,) for f in (25.0, 50.0, 75.0, 100.0)}
+    steps = steps_of(tmp_path, summary(fills), replicates=1)
+    assert steps.steps[0].line == "replicates: 3"
+    assert steps.steps[1].line == "certificate: {controls: [springs, hold, time_step]}"
+    assert (
+        steps.before == "Write them into a file my_study.yaml below based_on: tube_demo, then run"
+    )
+    assert steps.command == "sandmould run my_study.yaml"
+
+
+def test_the_end_of_the_sweep_and_failed_runs_are_next(tmp_path: Path) -> None:
+    table = summary({25.0: (0.6, 0.61, 0.62), 50.0: (0.3, 0.31, 0.33), 100.0: (0.2, 0.21, 0.2)})
+    table.loc[table[RUN] == "f100_r2", OUTCOME_CODE] = 3
+    failed, beyond, few = steps_of(tmp_path, table).steps
+    assert failed.command == "sandmould again f100_r2"
+    assert beyond.text == "Add a frequency below 25 Hz to the sweep: the best may lie there."
+    assert few.text == "Sweep 4 frequencies or more: fewer show no best one."
+
+
+def test_how_sure_it_is_names_scatter_springs_drive_and_certificate() -> None:
+    verdict, _ = judged(summary(CLEAR))
+    study = SandStudy.model_validate({"sweep": {"keys": {KEY: [25, 50, 100]}}, "replicates": 3})
+    grounds = (*sand_grounds(scenario(50.0), study, verdict), *certificate_ground(study, None))
+    said = {it.about: it.text for it in grounds}
+    assert said["Scatter"].startswith("3 runs of each setting, alike but for the grains' starting")
+    assert "the means of 50 Hz and 100 Hz differ by 0.20" in said["Scatter"]
+    assert "waves run at 128 m/s" in said["Springs"]
+    assert said["Drive"].startswith("the acceleration stays the same when the frequency changes")
+    assert said["Certificate"].startswith("not computed.")

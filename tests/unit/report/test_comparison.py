@@ -1,0 +1,88 @@
+"""Finished studies side by side, by the command."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sandmould.cli.commands import app
+from sandmould.report.comparison import read_comparison
+from sandmould.study.plan.plan_files import VERDICT_FILE
+from tests.finished_study import finished_study, study_text
+
+SWEEP = """\
+based_on: plates
+scenario: {until_s: 100, heat_transfer_w_m2_k: null, layers: [], %s}
+sweep: {keys: {element_m: %s}}
+reference: {value: {}, source: replaces that of plates}
+"""
+OBJECTIVE = "objective: {measure: solidified_fraction}\n"
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two sweeps of one key and one of two, computed once."""
+    folder = tmp_path_factory.mktemp("compared")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        texts = {
+            "faces": (SWEEP + OBJECTIVE) % ("exchange: faces", "[0.01, 0.02]"),
+            "difference": (SWEEP + OBJECTIVE) % ("exchange: difference", "[0.01, 0.02, 0.04]"),
+            "both": study_text(elements_m=(0.02, 0.01), exchanges=("faces",)) + OBJECTIVE,
+        }
+        for name, text in texts.items():
+            path = folder / f"{name}.yaml"
+            path.write_text(text)
+            plan = finished_study(path)
+            (folder / "results" / plan.study.name / VERDICT_FILE).write_text(f"{name} says so.\n")
+    return folder
+
+
+def compare(*arguments: str) -> tuple[int, str, str]:
+    said = CliRunner().invoke(app, ["compare", *arguments])
+    return said.exit_code, said.stdout, said.stderr
+
+
+def test_studies_of_one_key_stand_over_it(finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(finished)
+    status, out, err = compare("faces.yaml", "results/difference", "-o", "page.html")
+    assert status == 0, err
+    lines = out.splitlines()
+    assert lines[2].split() == ["setting", "faces", "difference"]
+    assert re.match("0.04 m +– +0", lines[5])
+    assert out.rstrip().endswith("page.html\npage.svg")
+    assert "faces: faces says so." in lines
+    page = Path("page.html").read_text()
+    assert "scenario.exchange" in page
+    assert "scenario.element_m" not in page  # it is swept
+    assert "http" not in page.replace("http://www.w3.org", "")
+    assert Path("page.svg").read_text().count("<circle") == 5
+
+
+def test_studies_without_a_common_key_stand_in_rows(
+    finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(finished)
+    found = read_comparison([Path("results/faces"), Path("results/both")])
+    assert found.key == ""
+    chart = found.chart()
+    assert len(chart.rows) == len(chart.marks) == 4
+    assert chart.rows[0].startswith("faces: ")
+
+
+def test_what_cannot_be_compared_is_one_sentence(
+    finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(finished)
+    for arguments, sentence in (
+        (["faces.yaml"], "STUDY = 'results/faces' cannot be used: valid is two studies"),
+        (["faces.yaml", "tube_demo"], "STUDY = 'tube_demo' cannot be used: valid is a finished"),
+        (["faces.yaml", "no_such"], "STUDY = 'no_such' cannot be used: valid is the path of"),
+    ):
+        status, out, err = compare(*arguments)
+        assert (status, out) == (1, "")
+        assert err.startswith(sentence)
+        assert len(err.splitlines()) == 1
