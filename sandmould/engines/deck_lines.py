@@ -84,8 +84,10 @@ def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, fl
     across = [scenario.box.width_m, scenario.box.depth_m][: scenario.dimension - 1]
     bed = predicted_bed_height_m(scenario, list(program.counts))
     column = max(layer.height_m for layer in program.layers)
-    # Half a bed more than predicted: a heap may stand higher than an even bed.
-    top = max(1.5 * bed, scenario.scene.top_m) + scenario.fill.drop_height_m + column + margin
+    # Half a bed more than predicted: a heap may stand higher than an even bed, and under a spout
+    # far higher.
+    heap = 3.0 if scenario.fill.spout is not None else 1.5
+    top = max(heap * bed, scenario.scene.top_m) + scenario.fill.drop_height_m + column + margin
     top += max((layer.rise_m(scenario.gravity_m_s2) for layer in program.layers), default=0.0)
     return [(-margin, size + margin) for size in across] + [(-margin, top)]
 

@@ -231,7 +231,9 @@ class Driver:
         """Stop where the sand did not come to rest, or came to rest before it had flowed out."""
         settling = stage.settling
         if settling is not None and not session.at_rest:
-            what = f"layer {stage.layer}" if stage.layer else "the sand"
+            what = "the sand"
+            if stage.layer:
+                what = f"layer {self._program.layer_numbers[stage.layer - 1]}"
             longest_s = settling.longest_s - stage.stop_s
             raise EngineStop(
                 Outcome.NOT_SETTLED,

@@ -72,7 +72,7 @@ class Guard:
         s = self._scenario
         mass = float(grain_masses_kg(s, snapshot).sum())
         top = float((snapshot.position_m[:, -1] + snapshot.radius_m).max())
-        piston = s.box.piston if stage.kind is StageKind.PRESS else None
+        piston = s.piston if stage.kind is StageKind.PRESS else None
         wall = 0.0 if piston is None else abs(piston.velocity_m_s)
         if stage.vibration is not None:
             omega, unbalance = stage.vibration.angular_frequency_rad_s, stage.vibration.unbalance

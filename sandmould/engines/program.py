@@ -17,6 +17,7 @@ from sandmould.scenario.placement import (
     filled_measure,
     plan_counts,
     plan_layer,
+    portion_of,
 )
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
@@ -60,7 +61,7 @@ class Stage:
 
     @property
     def layer(self) -> int:
-        """Layer that falls at the start, from 1; 0 in any other stage."""
+        """Layer that falls at the start, or portion of one, from 1; 0 in any other stage."""
         return self.number if self.kind in (StageKind.SETTLE, StageKind.POUR) else 0
 
     def longest_steps(self, counts: StepCounts) -> int:
@@ -107,6 +108,11 @@ class Program:
     def layers(self) -> tuple[PlannedLayer, ...]:
         """Where the grains of each layer start; drawn when first asked for."""
         return tuple(plan_layer(self.scenario, i + 1, count) for i, count in enumerate(self.counts))
+
+    @property
+    def layer_numbers(self) -> list[int]:
+        """Layer that each dropped one belongs to, from 1: it may be a portion of it."""
+        return [portion_of(self.scenario, i + 1)[0] for i in range(len(self.counts))]
 
     @cached_property
     def _masses_kg(self) -> tuple[float, ...]:
@@ -164,8 +170,8 @@ def build_program(scenario: Scenario) -> Program:
     """Write out the stages of a scenario."""
     counts = plan_counts(scenario)
     stages = [*_pours(scenario, counts)]
-    if scenario.box.piston is not None:
-        stages += _press(scenario, scenario.box.piston)
+    if scenario.piston is not None:
+        stages += _press(scenario, scenario.piston)
     if scenario.discharge is not None:
         stages += _flow(scenario, scenario.discharge)
     return Program(scenario, (*stages, *_box_stages(scenario)), tuple(counts))
@@ -202,7 +208,15 @@ def _pours(scenario: Scenario, counts: list[int]) -> Iterator[Stage]:
     if vibration is not None:
         yield from _vibrated_pours(scenario, vibration, len(counts))
         return
+    spout = scenario.fill.spout
+    steps = 0 if spout is None else StepCounts.of(scenario).steps(spout.interval_s)
     for number, count in enumerate(counts, start=1):
+        layer = portion_of(scenario, number)[0]
+        if spout is not None and number < len(counts) and (
+            portion_of(scenario, number + 1)[0] == layer
+        ):  # fmt: skip
+            yield Stage(StageKind.POUR, number, steps=steps, expected_s=spout.interval_s)
+            continue
         yield Stage(
             StageKind.SETTLE,
             number,

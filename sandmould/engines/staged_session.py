@@ -68,7 +68,7 @@ class StagedSession(ABC):
         self._program = program
         self._scenario = program.scenario
         self._counts = StepCounts.of(program.scenario)
-        self._layer_of_id = np.repeat(np.arange(1, len(program.counts) + 1), program.counts)
+        self._layer_of_id = np.repeat(program.layer_numbers, program.counts)
         self.step_s = self._counts.step_s
         self._time_at_0_s = 0.0
         """Simulated time at step 0, had the step always been this one."""

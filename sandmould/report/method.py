@@ -175,11 +175,15 @@ def _filling(scenario: Scenario) -> str:
     layers = len(fill.each_layer())
     between = ", vibrated in between" if fill.vibration_between_layers else ""
     plural = "s" if layers > 1 else ""
-    by_hand = f"{len(fill.grains)} grains placed by hand" if fill.grains else ""
+    placed = len(fill.grains)
+    by_hand = f"{placed} grain{'s' if placed > 1 else ''} placed by hand" if placed else ""
     if not layers:
         return by_hand
     dropped = f"{by_hand}{', ' if by_hand else ''}{layers} layer{plural} dropped "
     dropped += f"{1e3 * fill.drop_height_m:g} mm"
+    if (spout := fill.spout) is not None:
+        dropped += f" in {spout.portions} portions out of a spout {1e3 * spout.width_m:g} mm wide"
+        dropped += f" that moves over the box in {spout.time_s:g} s"
     if (shaken := fill.vibration) is not None:
         return (
             f"{dropped}, one every {shaken.layer_s:g} s, while the box vibrates at "

@@ -164,6 +164,9 @@ def _facts(s: Scenario) -> tuple[Row, ...]:
     for space in spaces:
         name = space.name.replace("_", " ")
         rows.append(Row(f"cavity {name}", f"{1e3 * space.length_m:.4g} mm deep"))
+    if (pouring := s.fill.vibration) is not None:
+        moves = f"{number(pouring.frequency_hz)} Hz, {pouring.peak_acceleration_g:.3g} g"
+        rows.append(Row("vibration of the fill", f"{moves}, a layer every {pouring.layer_s:g} s"))
     for stage in s.vibrations:
         along = ", ".join(f"{x:.3g}" for x in stage.unit_direction(d))
         moves = f"{number(stage.frequency_hz)} Hz along ({along}), {number(stage.duration_s)} s"

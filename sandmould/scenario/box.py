@@ -52,10 +52,6 @@ class Box(Section):
     )
     height_m: float = quantity(0.1, "Inner height.", unit="m", source=ARGUED, gt=0, le=100)
 
-    piston: Piston | None = Field(
-        None, description="A wall that presses on the filled sand; all stand unless given."
-    )
-
     def size_m(self, dimension: int) -> tuple[float, ...]:
         """Width and height in 2D; width, depth and height in 3D."""
         middle = (self.depth_m,) if dimension == 3 else ()
@@ -288,21 +284,20 @@ def box_walls(box: Box, dimension: int) -> list[Wall]:
     return walls
 
 
-def piston_wall(box: Box, dimension: int, way_m: float) -> Wall:
+def piston_wall(piston: Piston, box: Box, dimension: int, way_m: float) -> Wall:
     """The wall that moves as a piston, once it has gone a way.
 
     Parameters
     ----------
+    piston : Piston
     box : Box
-        With a piston.
     dimension : int
     way_m : float, m
         Into the box.
     """
-    assert box.piston is not None
     up = np.eye(dimension)[-1]
     walls = [*box_walls(box, dimension), Wall("top", up * box.height_m, -up)]
-    (wall,) = (wall for wall in walls if wall.name == box.piston.wall)
+    (wall,) = (wall for wall in walls if wall.name == piston.wall)
     return replace(wall, point_m=wall.point_m + way_m * wall.normal)
 
 

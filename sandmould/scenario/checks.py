@@ -14,7 +14,7 @@ from sandmould.scenario.limits import GRAINS
 from sandmould.scenario.moving_walls import piston_problems
 from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placed_checks import placed_problems
-from sandmould.scenario.placement import fall_s, plan_counts, predicted_bed_height_m
+from sandmould.scenario.placement import fall_s, plan_counts, portion_of, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import (
     Cylinder,
@@ -51,6 +51,7 @@ def problems(scenario: Scenario) -> list[Problem]:
         *piston_problems(scenario),
         *_grains(scenario),
         *_pouring(scenario),
+        *_spout(scenario),
         *placed_problems(scenario),
         *_springs(scenario),
         *_time(scenario),
@@ -207,6 +208,29 @@ def _pouring(s: Scenario) -> Iterator[Problem]:
             yield Problem(f"fill.{key}", [low, high], valid)
 
 
+def _spout(s: Scenario) -> Iterator[Problem]:
+    """A spout that leaves the box, is too narrow, or does not go with another key."""
+    spout, largest = s.fill.spout, s.largest_diameter_m
+    if spout is None:
+        return
+    if s.fill.vibration is not None:
+        yield Problem("fill.spout", "given", "absent with fill.vibration, which pours at once")
+    if spout.width_m < 3 * largest:
+        valid = f"at least three of the largest grains, {3 * largest:.6g} m"
+        yield Problem("fill.spout.width_m", spout.width_m, valid)
+    for key in ("from_m", "to_m"):
+        middle, half_m = getattr(spout, key), spout.width_m / 2
+        if len(middle) != s.dimension - 1:
+            valid = "one number, x, in 2D and two, x and y, in 3D"
+            yield Problem(f"fill.spout.{key}", list(middle), valid)
+        elif any(
+            not half_m <= x <= size_m - half_m
+            for x, size_m in zip(middle, s.box.size_m(s.dimension), strict=False)
+        ):
+            valid = f"a spout over the box, {_size(s)}, with half of width_m on either side"
+            yield Problem(f"fill.spout.{key}", list(middle), valid)
+
+
 def _grains(s: Scenario) -> Iterator[Problem]:
     largest = s.largest_diameter_m
     narrowest = min(s.box.width_m, s.box.depth_m) if s.dimension == 3 else s.box.width_m
@@ -316,7 +340,9 @@ def _fill(s: Scenario) -> Iterator[Problem]:
     counts = plan_counts(s)
     for i, count in enumerate(counts):
         if count < 1:
-            yield Problem("fill.layers", f"layer {i + 1}", "a layer of at least one grain")
+            valid = "a layer of at least one grain, or one for each portion of fill.spout"
+            valid = valid if s.fill.spout is not None else "a layer of at least one grain"
+            yield Problem("fill.layers", f"layer {portion_of(s, i + 1)[0]}", valid)
             return
     if too_many := [*GRAINS.problems("fill.layers", sum(counts))]:
         yield from too_many
@@ -341,8 +367,13 @@ def _fill(s: Scenario) -> Iterator[Problem]:
 
 
 def _time_of_layers(s: Scenario, counts: list[int]) -> Iterator[Problem]:
-    """A layer that is poured on before it has fallen."""
-    vibration = s.fill.vibration
+    """Layers or portions that are poured on before they have fallen."""
+    vibration, spout = s.fill.vibration, s.fill.spout
+    if spout is not None:
+        least_s = (spout.portions - 1) * max(fall_s(s, count) for count in counts)
+        if spout.time_s < least_s:
+            valid = f"at least {least_s:.4g} s, in which each portion falls before the next"
+            yield Problem("fill.spout.time_s", spout.time_s, valid)
     if vibration is None:
         return
     least_s = max(1 / vibration.frequency_hz, *(fall_s(s, count) for count in counts))

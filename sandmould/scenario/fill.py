@@ -64,6 +64,40 @@ class PlacedGrain(Section):
     )
 
 
+class Spout(Section):
+    """A square spout that moves evenly over the box while a layer is poured, in portions."""
+
+    from_m: tuple[float, ...] = quantity(
+        ..., "Middle of the spout at the first portion: x in 2D, x and y in 3D.", unit="m",
+        source="user", min_length=1, max_length=2,
+    )  # fmt: skip
+    to_m: tuple[float, ...] = quantity(
+        ..., "Its middle at the last portion of each layer.", unit="m", source="user",
+        min_length=1, max_length=2,
+    )  # fmt: skip
+    width_m: float = quantity(
+        ..., "Width of the spout, along x and y.", unit="m", source="user", gt=0, le=10
+    )
+    time_s: float = quantity(
+        1.0, "Time from the first portion of a layer to the last.", unit="s", source=ARGUED,
+        gt=0, le=100,
+    )  # fmt: skip
+    portions: int = quantity(
+        5, "Portions of a layer, dropped at equal times.", source=ARGUED, ge=2, le=100
+    )
+
+    @property
+    def interval_s(self) -> float:
+        """Time from a portion to the next."""
+        return self.time_s / (self.portions - 1)
+
+    def window_m(self, portion: int) -> tuple[tuple[float, float], ...]:
+        """Where a portion, counted from 0, is dropped: (low, high) of each horizontal axis, m."""
+        share, half_m = portion / (self.portions - 1), self.width_m / 2
+        middle = (a + (b - a) * share for a, b in zip(self.from_m, self.to_m, strict=True))
+        return tuple((x - half_m, x + half_m) for x in middle)
+
+
 class FillVibration(Shaking):
     """Vibration from the first layer on until after the last, without a pause.
 
@@ -117,6 +151,9 @@ class Fill(Section):
         None, "Part of the box's depth that sand is poured over, 3D only; all of it unless given.",
         unit="m", source="user",
     )  # fmt: skip
+    spout: Spout | None = Field(
+        None, description="Spout that each layer is poured through; all at once unless given."
+    )
     nominal_solid_fraction: float | None = quantity(
         None,
         "Solid fraction that turns a layer's height into grains; 0.80 in 2D and 0.58 in 3D "

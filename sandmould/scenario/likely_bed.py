@@ -16,6 +16,7 @@ from sandmould.scenario.placement import (
     filled_measure,
     nominal_fraction,
     plan_counts,
+    portion_of,
 )
 from sandmould.scenario.scenario import Scenario
 
@@ -88,7 +89,8 @@ def likely_bed(s: Scenario, cut_m: float | None = None) -> LikelyBed:
             for diameters_m, n, end in zip(drawn_m, counts, ends.tolist(), strict=True)
         ]
     )
-    layer = np.repeat(np.arange(1, len(counts) + 1), counts)
+    numbers = [portion_of(s, number)[0] for number in range(1, len(counts) + 1)]
+    layer = np.repeat(numbers, counts)
     return LikelyBed(_apart(s, start_m, radius_m, low, high), radius_m, layer, total, slice_m)
 
 

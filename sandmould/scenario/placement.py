@@ -69,15 +69,15 @@ def _mean_grain_measure(s: Scenario) -> float:
 def plan_counts(s: Scenario) -> list[int]:
     """Number of grains of each layer, from its height, mass or count.
 
-    Grains placed by hand are the first layer. A height counts over the whole floor: obstacles only
-    lift the bed.
+    Grains placed by hand are the first layer; each portion of a spout counts by itself. A height
+    counts over the whole floor: obstacles only lift the bed.
     """
     mean_measure = _mean_grain_measure(s)
     mean_mass = sum(
         c.count_fraction * s.sand.grain_mass_kg(c.diameter_m, s.dimension)
         for c in s.sand.classes(s.dimension)
     )
-    counts = [len(s.fill.grains)] if s.fill.grains else []
+    counts: list[int] = []
     for layer in s.fill.each_layer():
         if layer.count is not None:
             counts.append(layer.count)
@@ -86,7 +86,23 @@ def plan_counts(s: Scenario) -> list[int]:
         else:
             solid = (layer.height_m or 0.0) * s.floor_measure * nominal_fraction(s)
             counts.append(round(solid / mean_measure))
-    return counts
+    if s.fill.spout is not None:
+        counts = [n for count in counts for n in _portions(count, s.fill.spout.portions)]
+    return [len(s.fill.grains), *counts] if s.fill.grains else counts
+
+
+def _portions(count: int, portions: int) -> list[int]:
+    """Grains of each portion of a layer, which differ by one at most."""
+    return [count * (i + 1) // portions - count * i // portions for i in range(portions)]
+
+
+def portion_of(s: Scenario, number: int) -> tuple[int, int]:
+    """Layer, from 1, and portion of it, from 0, that is the one of a number to be dropped."""
+    by_hand, spout = int(bool(s.fill.grains)), s.fill.spout
+    if spout is None or number <= by_hand:
+        return number, 0
+    layer, portion = divmod(number - 1 - by_hand, spout.portions)
+    return by_hand + 1 + layer, portion
 
 
 def filled_measure(s: Scenario, counts: list[int] | None = None) -> float:
@@ -126,7 +142,10 @@ def _gate_under_sand_m(s: Scenario) -> float:
 
 def loose_height_m(s: Scenario, count: int) -> float:
     """Height of the falling column of a layer, before it is placed."""
-    return count * _mean_grain_measure(s) / s.floor_measure / LOOSE_FRACTION[s.dimension]
+    over = s.floor_measure
+    if s.fill.spout is not None:
+        over = s.fill.spout.width_m ** (s.dimension - 1)
+    return count * _mean_grain_measure(s) / over / LOOSE_FRACTION[s.dimension]
 
 
 def fall_s(s: Scenario, count: int) -> float:
@@ -166,7 +185,7 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     ----------
     s : Scenario
     number : int
-        Layer number, starting at 1; with the seed it fixes the draw.
+        Number of the layer, or of the portion of one, from 1; with the seed it fixes the draw.
     count : int
 
     Returns
@@ -179,7 +198,9 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     drawn = np.sort(_draw_classes(s, count, rng))[::-1]
     diameters = {c.number: c.diameter_m for c in s.sand.classes(s.dimension)}
     radius = np.array([diameters[c] for c in drawn]) / 2
-    low, high = np.array(s.pouring_m).T
+    spout = s.fill.spout
+    over = s.pouring_m if spout is None else spout.window_m(portion_of(s, number)[1])
+    low, high = np.array(over).T
     height = max(loose_height_m(s, count), 2.2 * radius[0])
     while (position := _add_sequentially(radius, high - low, height, rng)) is None:
         height *= 1.15

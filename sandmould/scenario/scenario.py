@@ -11,7 +11,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field
 
-from sandmould.scenario.box import Box, Obstacle, Plate, build_scene, piston_wall
+from sandmould.scenario.box import Box, Obstacle, Piston, Plate, build_scene, piston_wall
 from sandmould.scenario.cavities import CavityKey, cavity_space
 from sandmould.scenario.contact import BackgroundDamping, Contact
 from sandmould.scenario.discharge import Discharge
@@ -111,6 +111,9 @@ class Scenario(Section):
         BackgroundDamping(), description="Damping of free grains."
     )
     fill: Fill = Field(Fill(), description="How the sand is filled in.")
+    piston: Piston | None = Field(
+        None, description="A wall of the box that presses on the filled sand; absent unless given."
+    )
     discharge: Discharge | None = Field(
         None, description="Flow of the filled sand through an opened gate, before any vibration."
     )
@@ -152,11 +155,11 @@ class Scenario(Section):
         A piston stands where it has gone to once it has moved, from the discharge on there is no
         gate. While it moves it counts as where it is farther out.
         """
-        scene, piston = self.scene, self.box.piston
+        scene, piston = self.scene, self.piston
         if stage and is_filling(stage):
             return scene
         if piston is not None and (piston.way_m < 0.0 or stage != StageKind.PRESS.value):
-            scene = scene.with_wall(piston_wall(self.box, self.dimension, piston.way_m))
+            scene = scene.with_wall(piston_wall(piston, self.box, self.dimension, piston.way_m))
         if self.discharge is None or stage in (StageKind.PRESS.value, StageKind.HOLD.value):
             return scene
         return scene.without(self.discharge.gate)

@@ -11,7 +11,7 @@ class StageKind(Enum):
     SETTLE = "settle"
     """A layer falls and comes to rest."""
     POUR = "pour"
-    """A layer falls into the vibrating box."""
+    """A layer falls into the vibrating box, or a portion of it out of a spout."""
     BETWEEN = "between"
     """The box vibrates before the next layer falls."""
     PRESS = "press"

@@ -64,7 +64,7 @@ def run_through(session: LammpsSession | LiggghtsSession) -> None:
     [
         tube_scene(frame="box", fill=FILL),
         tube_scene(frame="laboratory", fill=FILL),
-        tube_scene(frame="laboratory", fill=FILL | VIBRATED, vibration=[]),
+        tube_scene(frame="box", fill=FILL | VIBRATED, vibration=[]),
         hopper_scene("lammps", **SHORT),
         hopper_scene("lammps", **SHORT | TIMED),
     ],

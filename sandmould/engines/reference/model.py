@@ -62,9 +62,9 @@ def surfaces_of(scenario: Scenario) -> Surfaces:
     surfaces = Surfaces(scenario.dimension)
     for wall in scene.walls:
         surfaces.add_plane(wall.name, wall.point_m, wall.normal)
-    piston = scenario.box.piston
+    piston = scenario.piston
     if piston is not None and piston.wall == "top":
-        lid = piston_wall(scenario.box, scenario.dimension, -LID_WAITS_M)
+        lid = piston_wall(piston, scenario.box, scenario.dimension, -LID_WAITS_M)
         surfaces.add_plane(lid.name, lid.point_m, lid.normal)
     for block in scene.blocks:
         surfaces.add_facets(block.name, block.corners(), block.facets())

@@ -103,11 +103,11 @@ class ReferenceSession(StagedSession):
 
     def _press(self, time_s: float) -> None:
         """Let the piston go its way from where the wall stands; a lid is put on the box first."""
-        box, d = self._scenario.box, self._scenario.dimension
-        assert box.piston is not None
-        rows = self._vertices_of(box.piston.wall)
-        self.solver.surfaces.arrays.vertices[rows] = piston_wall(box, d, 0.0).point_m
-        end = piston_wall(box, d, box.piston.velocity_m_s * time_s)
+        s, piston = self._scenario, self._scenario.piston
+        assert piston is not None
+        begin = piston_wall(piston, s.box, s.dimension, 0.0)
+        end = piston_wall(piston, s.box, s.dimension, piston.velocity_m_s * time_s)
+        self.solver.surfaces.arrays.vertices[self._vertices_of(begin.name)] = begin.point_m
         self.move_surface(end.name, end.point_m[None], time_s)
 
     def _restore(self, checkpoint: Path) -> None:

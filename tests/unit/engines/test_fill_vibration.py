@@ -197,3 +197,32 @@ def test_the_shipped_bracket_is_poured_into_a_vibrating_box() -> None:
         assert problems(run.scenario) == []
         stages = [stage.name for stage in build_program(run.scenario).stages]
         assert stages == ["pour_1", "pour_2", "pour_3", "pour_4", "settle"]
+
+
+@pytest.mark.parametrize("engine", ["reference", "lammps"])
+def test_a_run_goes_on_from_the_middle_of_a_pour(engine: str, tmp_path: Path) -> None:
+    sand = tube_scene(
+        engine={"name": engine},
+        fill={"layers": [{"count": 20, "repeat": 2}], "vibration": SHAKE | {"layer_s": 0.15}},
+    )
+    stages = build_program(sand).stages
+    straight = open_engine(sand, tmp_path)
+    for stage in stages[:2]:
+        straight.insert_layer(stage.layer)
+        straight.start_stage(stage)
+        while not straight.stage_over and straight.time_s < 0.2:
+            straight.advance()
+        if stage is stages[0]:
+            straight.end_stage()
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    straight.write_checkpoint(kept)
+    (tmp_path / "again").mkdir()
+    resumed = open_engine(sand, tmp_path / "again", kept)
+    ends = []
+    for session in (straight, resumed):
+        session.advance(0.05)
+        assert session.stage.name == "pour_2"
+        ends.append(session.snapshot().position_m)
+        session.close()
+    np.testing.assert_allclose(*ends, rtol=0, atol=0.0 if engine == "reference" else 1e-9)

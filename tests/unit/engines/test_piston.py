@@ -32,14 +32,16 @@ def column(wall: str, dimension: int, frame: str = "box") -> Scenario:
     places[:, axis] = RADIUS_M * (1 + 2 * np.arange(GRAINS))
     if wall == "left":
         places[:, axis] += GAP_M
-    box = {"width_m": size_m[0], "height_m": size_m[-1], "depth_m": size_m[dimension - 2],
-           "piston": {"wall": wall, "velocity_m_s": SPEED_M_S, "duration_s": TIME_S}}  # fmt: skip
+    box = {"width_m": size_m[0], "height_m": size_m[-1], "depth_m": size_m[dimension - 2]}
+    piston = {"wall": wall, "velocity_m_s": SPEED_M_S, "duration_s": TIME_S}
     given = scene("reference", dimension, step_s=1e-5, frame=frame,
                   pair=law(dimension, damping_ratio=1.0),
                   wall=law(dimension, damping_ratio=1.0, normal=WALL_OVER_GRAIN))  # fmt: skip
     grains = [{"position_m": x.tolist(), "diameter_m": 2 * RADIUS_M} for x in places]
     fill = given.fill.model_dump() | {"grains": grains, "layers": []}
-    return Scenario.model_validate(given.model_dump() | {"box": box, "fill": fill})
+    return Scenario.model_validate(
+        given.model_dump() | {"box": box, "fill": fill, "piston": piston}
+    )
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -77,7 +79,7 @@ def test_a_pressed_column_bears_the_load_of_springs_in_series(wall: str, dimensi
 
 def test_the_filled_sand_is_pressed_and_comes_to_rest() -> None:
     piston = {"wall": "top", "velocity_m_s": 0.02, "duration_s": 0.5}
-    sand = tube_scene(engine={"name": "reference"}, box={"piston": piston})
+    sand = tube_scene(engine={"name": "reference"}, piston=piston)
     program = build_program(sand)
     names = [stage.name for stage in program.stages]
     assert names == ["settle_1", "settle_2", "press", "hold", "vibrate_1", "rest"]
@@ -91,14 +93,14 @@ def test_the_filled_sand_is_pressed_and_comes_to_rest() -> None:
 def test_measures_know_where_the_piston_stands() -> None:
     for velocity_m_s, while_it_moves in ((0.02, 0.08), (-0.02, 0.09)):
         piston = {"wall": "right", "velocity_m_s": velocity_m_s, "duration_s": 0.5}
-        sand = tube_scene(obstacles=[], box={"piston": piston})
+        sand = tube_scene(obstacles=[], piston=piston)
         for stage, width_m in (
             ("settle_2", 0.08), ("press", while_it_moves), ("hold", 0.08 - 0.5 * velocity_m_s),
             ("vibrate_1", 0.08 - 0.5 * velocity_m_s),
         ):  # fmt: skip
             (right,) = (w for w in sand.scene_in(stage).walls if w.name == "right")
             assert right.point_m[0] == pytest.approx(width_m), stage
-    lid = tube_scene(box={"piston": {"wall": "top", "velocity_m_s": 0.02, "duration_s": 0.5}})
+    lid = tube_scene(piston={"wall": "top", "velocity_m_s": 0.02, "duration_s": 0.5})
     assert "top" not in [wall.name for wall in lid.scene_in("settle_2").walls]
     (top,) = (wall for wall in lid.scene_in("hold").walls if wall.name == "top")
     assert top.point_m[1] == pytest.approx(0.07)
@@ -114,25 +116,25 @@ def test_measures_know_where_the_piston_stands() -> None:
 )
 def test_what_cannot_be_is_said(piston: dict[str, Any], key: str, valid: str) -> None:
     whole = {"wall": "top", "velocity_m_s": 0.02, "duration_s": 0.5} | piston
-    found = problems(tube_scene(box={"piston": whole}))
-    assert {problem.key for problem in found} == {f"box.piston.{key}"}
+    found = problems(tube_scene(piston=whole))
+    assert {problem.key for problem in found} == {f"piston.{key}"}
     assert valid in found[0].valid
 
 
 @pytest.mark.parametrize("engine", ["lammps", "liggghts"])
 def test_engines_whose_walls_stand_refuse_it(engine: str) -> None:
-    given = tube_scene(engine={"name": engine}, box={"piston": {
-        "wall": "top", "velocity_m_s": 0.02, "duration_s": 0.5}})  # fmt: skip
+    given = tube_scene(engine={"name": engine}, piston={
+        "wall": "top", "velocity_m_s": 0.02, "duration_s": 0.5})  # fmt: skip
     refused = engine_problem(given)
     assert refused is not None
-    assert (refused.key, refused.value) == ("box.piston.velocity_m_s", 0.02)
+    assert (refused.key, refused.value) == ("piston.velocity_m_s", 0.02)
     assert "engine reference has it" in refused.valid
 
 
 def test_a_run_goes_on_from_the_middle_of_the_way(tmp_path: Path) -> None:
     piston = {"wall": "top", "velocity_m_s": 0.5, "duration_s": 0.1}
     sand = tube_scene(engine={"name": "reference"}, fill={"layers": [{"count": 60}]},
-                      box={"piston": piston})  # fmt: skip
+                      piston=piston)  # fmt: skip
     program = build_program(sand)
     straight = ReferenceSession(program)
     straight.insert_layer(1)
