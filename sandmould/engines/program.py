@@ -23,9 +23,16 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 from sandmould.scenario.vibration import RestStage, VibrationStage
 
-OUTFLOW = 0.6
-"""Solid measure that flows through an outlet of width w in the time w^(1/2 - d) / sqrt(g): about
-0.65 measured in 2D with an outlet of seven largest grains; only used to foretell times."""
+OUTFLOW = {2: 0.78, 3: 0.43}
+"""Solid measure that flows through an outlet in the time w^(1/2 - d) / sqrt(g), w its width less
+``EDGE`` grains; only used to foretell times. In 2D measured, 0.65 without the edge at seven largest
+grains; in 3D the 0.58 of Beverloo et al., Chem. Eng. Sci. 15 (1961) 260, for bulk measure and a
+round outlet, as 0.74 of the area of a square one, times a solid fraction of 0.58."""
+EDGE = 1.4
+"""Median grains along the edge of an outlet through which nothing flows (Beverloo et al. 1961)."""
+REST_AFTER_FLOW_S = 0.7
+"""Guess of the time until the last grains of a heap have rolled out: with it six recorded studies
+of hoppers needed 0.75 to 1.22 times what is foretold for the whole run."""
 REST_AFTER_FALL_S = 0.3
 """Guess of the time a bed needs to come to rest after the last grain has landed."""
 
@@ -160,9 +167,11 @@ def _outflow_s(scenario: Scenario, discharge: Discharge) -> float:
     gate, g, d = scenario.gate, scenario.gravity_m_s2, scenario.dimension
     if gate is None or g == 0.0:
         return discharge.settling.longest_s
-    width = max(gate.size_m)
-    flow = OUTFLOW * math.sqrt(g) * width ** (d - 0.5)
-    guess = filled_measure(scenario) / flow + REST_AFTER_FALL_S
+    width = max(gate.size_m) - EDGE * scenario.sand.mass_median_diameter_m
+    if width <= 0.0:
+        return discharge.settling.longest_s
+    flow = OUTFLOW[d] * math.sqrt(g) * width ** (d - 0.5)
+    guess = filled_measure(scenario) / flow + REST_AFTER_FLOW_S
     return min(max(guess, discharge.settling.shortest_s), discharge.settling.longest_s)
 
 

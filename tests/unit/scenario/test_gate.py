@@ -105,9 +105,13 @@ def test_flow_through_a_wider_outlet_is_foretold_to_be_faster() -> None:
         scene = hopper_scene(obstacles=plates, discharge={"settling": settling})
         return next(s for s in build_program(scene).stages if s.opens).expected_s
 
-    # Flow goes with the width to the power of 3/2, after which sand rests for 0.3 s.
+    # Flow goes with the free width to the power of 3/2, after which the last grains roll for 0.7 s.
+    edge_m = 1.4 * hopper_scene().sand.mass_median_diameter_m
     narrow, wide = foretold_s(0.008), foretold_s(0.016)
-    assert narrow - 0.3 == pytest.approx((wide - 0.3) * 2**1.5)
+    freer = (0.032 - edge_m) / (0.016 - edge_m)
+    assert narrow - 0.7 == pytest.approx((wide - 0.7) * freer**1.5)
+    blocked = 0.4 * edge_m
+    assert foretold_s(blocked, longest_s=9.0) == 9.0
     assert foretold_s(0.008, longest_s=0.4) == 0.4
     assert foretold_s(0.016, shortest_s=5.0) == 5.0
 
