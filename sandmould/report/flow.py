@@ -22,6 +22,7 @@ from sandmould.report.figures import png
 from sandmould.report.flow_film import SHADES, FlowFilm, make_flow_film
 from sandmould.report.flow_map import condition_text, said_of, stability_map
 from sandmould.report.method import Row
+from sandmould.report.next_steps import NextStep
 from sandmould.report.pressure_histories import PressureHistory, pressure_history
 from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
@@ -56,6 +57,7 @@ class FlowPages:
     answer: str
     """Where the metal stays calm, in one sentence."""
     grounds: tuple[Ground, ...]
+    steps: tuple[NextStep, ...]
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,7 @@ def flow_pages(
         answer=next(iter(_hopping(scenario, ranked, collected.keys)), "")
         or _calm(scenario, ranked, collected.keys),
         grounds=_grounds(scenario),
+        steps=_steps(scenario, ranked),
     )  # fmt: skip
 
 
@@ -163,7 +166,7 @@ def _sentences(
     """How many settings hold, and how far their pressure is from rho g h."""
     counts = ranked[CLASSIFICATION].value_counts()
     parts = [f"{counts.get(s.value, 0)} {s.value}" for s in StabilityRating]
-    said = [f"By the rule of figure 6 {listed(parts)}, of {len(ranked)}."]
+    said = [f"By the rule of figure 6: {listed(parts)}, of {len(ranked)} runs."]
     name = scene.deepest(scenario)
     errors = pd.to_numeric(ranked[f"{name}_error_pa"], errors="coerce").dropna() if (
         f"{name}_error_pa" in ranked) else pd.Series(dtype=float)  # fmt: skip
@@ -176,9 +179,9 @@ def _sentences(
         )
         calm = (pd.to_numeric(ranked[f"{name}_window_sd_pa"]) < scenario.quiet_pa).sum()
         said.append(
-            f"The verdicts take the deviation of single steps; of means over "
-            f"{1e3 * scenario.noise_window_s:g} ms it is below {scenario.quiet_pa:g} Pa in {calm} "
-            f"of {len(ranked)} runs. The paper does not say which it takes."
+            "A run is judged by how much the pressure of single steps deviates. Of means over "
+            f"{1e3 * scenario.noise_window_s:g} ms it deviates by less than {scenario.quiet_pa:g} "
+            f"Pa in {calm} of {len(ranked)} runs. The paper does not say which of both it means."
         )
     return tuple(said)
 
@@ -201,6 +204,15 @@ def _calm(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> str
         f"The pressure stays calm at {where} settings, calmest at {calm[0]}: it deviates by "
         f"{number(noise_pa, 2)} Pa there.{broke}"
     )
+
+
+def _steps(scenario: MetalFlow, ranked: pd.DataFrame) -> tuple[NextStep, ...]:
+    """What a calm or restless tank asks for."""
+    if not isinstance(scenario.case, StillTank):
+        return ()
+    if (ranked[CLASSIFICATION] == StabilityRating.EXCELLENT.value).any():
+        return (NextStep("Pour with the calm setting: the study shoulder_pour shows how."),)
+    return (NextStep("Try more relaxations, a smaller c_poi (source_share) or a smaller step."),)
 
 
 def _grounds(scenario: MetalFlow) -> tuple[Ground, ...]:

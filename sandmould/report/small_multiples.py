@@ -20,7 +20,7 @@ _POINTS, _POINTS_BEHIND = 200, 50
 
 
 @dataclass(frozen=True)
-class Panel:
+class SettingPanel:
     """One setting before all others."""
 
     title: str
@@ -31,7 +31,7 @@ class Panel:
 class SmallMultiples:
     """Panels with the same axes, or one chart where all curves lie on each other."""
 
-    panels: tuple[Panel, ...]
+    panels: tuple[SettingPanel, ...]
     together: tuple[Laid, Laid] | None
     """The chart for a wide page and for a phone, without labels."""
     note: str
@@ -66,7 +66,8 @@ def small_multiples(chart: Chart) -> SmallMultiples | None:
     whole = lay_out(chart, PANEL)
     frame = (whole.x.low, whole.x.high), (whole.y.low, whole.y.high)
     panels = tuple(
-        Panel(mean.group, lay_out(_alone(chart, mean, behind, frame), PANEL)) for mean in shown
+        SettingPanel(mean.group, lay_out(_alone(chart, mean, behind, frame), PANEL))
+        for mean in shown
     )
     left_out = len(means) - len(shown)
     note = f"Shown are {len(shown)} of {len(means)} settings." if left_out else ""

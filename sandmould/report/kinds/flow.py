@@ -42,6 +42,7 @@ def _flow_pages(findings: Findings[MetalFlow]) -> KindPages:
         },
         answer=pages.answer,
         grounds=pages.grounds,
+        steps=pages.steps,
     )
 
 

@@ -68,8 +68,10 @@ def test_the_headline_says_what_to_set(
 
 def test_the_best_setting_stands_in_words_of_the_machine() -> None:
     table = summary(CLEAR)
-    other = table[table[KEY] == 50.0].assign(**{PART: CROSS_CHECK, FILL: 0.1})
-    table = pd.concat([table, other.assign(tube_fill_of_bed_fraction=0.1)], ignore_index=True)
+    other = table[table[KEY] == 50.0].copy()
+    other[PART] = CROSS_CHECK
+    other[[FILL, "tube_fill_of_bed_fraction"]] = 0.1
+    table = pd.concat([table, other], ignore_index=True)
     verdict, drives = judged(table)
     (figures,) = choices_of(verdict, table, drives)
     assert [(it.value, it.label) for it in figures] == [

@@ -12,12 +12,14 @@ import pytest
 
 from sandmould.engines.cost import cost_before
 from sandmould.engines.snapshot import Snapshot
+from sandmould.report.estimate_section import _headline
 from sandmould.report.page import write_report
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.box import Box, Plate
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.settings import setting_of
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
 from sandmould.study.definition.run import Run
@@ -92,7 +94,8 @@ def test_one_setting_is_told_beside_what_was_reported(tmp_path: Path) -> None:
     folder = write_planted(tmp_path / "one", {(0.5, 0.1): 29.0}, extra)
     write_report(folder, folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")
-    assert "The heap angle is 29" in text
+    assert '<p class="first">The heap angle is 29' in text
+    assert "Run every setting at least 3 times" in text
     assert "interval of the mean of 2 runs)" in text
     assert "A paper reports 25" in text
     assert "Heap and hopper of run f0p5_a0p1_r1" in text
@@ -133,6 +136,7 @@ def test_a_map_has_its_table_its_picture_and_its_sands(mapped: Path) -> None:
     text = (mapped / "report.html").read_text(encoding="utf-8")
     # Planted from 17 to 37 degrees.
     assert re.search(r"The heap angle goes from 1[67]\.\d° .* to 3[67]\.\d° ", text)
+    assert '<p class="first">Found frictions for sand_26; none for sand_80.</p>' in text
     assert "Contour map of the heap angle" in text
     assert "5.71°" in text  # tan(alpha) = 0.1 as an angle
     assert "sand_26, measured heap angle 26 ± 0.5" in text
@@ -148,3 +152,22 @@ def test_the_sands_that_are_found_become_materials(mapped: Path, tmp_path: Path)
     assert [path.name for path in tmp_path.iterdir()] == ["sand_26.yaml"]
     assert len(not_found) == 1
     assert not_found[0].startswith("sand_80: heap_angle_deg = 80 cannot be calibrated")
+
+
+@pytest.mark.parametrize(
+    ("means", "said"),
+    [
+        ((0.0, 1e-7, 0.1, 0.4, 1.0),
+         "The speed is about 0 m/s up to 12 °, 0.100 m/s at 16 ° and 1 m/s at 24 °."),
+        ((0.2, 0.25, 0.3, 0.8, 0.9),
+         "The speed goes from 0.200 m/s (8 °) to 0.900 m/s (24 °); it changes most between 16 ° "
+         "and 20 °."),
+    ],
+)  # fmt: skip
+def test_a_sweep_says_where_the_value_begins_or_changes_most(
+    means: tuple[float, ...], said: str
+) -> None:
+    settings = [
+        setting_of({"angle_deg": 8.0 + 4 * n}, 1, pd.Series([mean])) for n, mean in enumerate(means)
+    ]
+    assert _headline(settings, (), "speed_m_s", ["angle_deg"]) == said

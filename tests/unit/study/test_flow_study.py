@@ -149,6 +149,10 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     assert "without a free surface" in failed["detail"] or "diverged" in failed["detail"]
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text()
+    first = page[page.index('<p class="first">') : page.index("</p>", page.index('class="first"'))]
+    assert "The pressure stays calm at 1 of 2 settings, calmest at " in first
+    assert first.endswith(" 1 of 2 runs broke down.")
+    assert "Pour with the calm setting" in page
     assert "1 excellent, 0 good and 1 failed" in page
     assert page.count('class="flow-film"') == 2
     assert failed["detail"][:40] in page

@@ -156,6 +156,10 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     assert curves["solidified_fraction"].max() == 1.0
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text()
+    assert (
+        '<p class="first">The cheapest setting within 5' in page
+        or "No setting comes within" in page
+    )
     assert "All settings against element 0.005 m, exchange difference" in page
     assert "The casting is solid after" in page
     assert "Cooling curves" in page
