@@ -97,6 +97,8 @@ WHOLE: dict[str, Any] = {
     "certified": _certified(8, 1.0, 3),
     "short_runs": _stand_in(100),
     "thousand_runs": _stand_in(1000),
+    "one_run": _stand_in(30),
+    "one_run_turns": 3,
 }
 LITTLE: dict[str, Any] = {
     "turns": 1,
@@ -105,6 +107,8 @@ LITTLE: dict[str, Any] = {
     "certified": _certified(12, 0.1, 2),
     "short_runs": _stand_in(10),
     "thousand_runs": _stand_in(20),
+    "one_run": _stand_in(5),
+    "one_run_turns": 1,
 }
 
 
@@ -227,6 +231,25 @@ def _begun_s(python: Path, root: Path, study: Path) -> float:
     return round(wall_s, 2)
 
 
+def _one_run(run: BenchmarkRun) -> dict[str, Any]:
+    """Core time of a run inside a worker, in turns; the first turn, which compiles, is left out."""
+    versions = _versions(run)
+    rows: dict[str, list[float]] = {version: [] for version in versions}
+    for number in range(run.extent["one_run_turns"] + 1):
+        for version, root in versions.items():
+            folder = SCRATCH / "sweeps" / f"one_run_{version}"
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir(parents=True)
+            (folder / "one.yaml").write_text(yaml.safe_dump(run.extent["one_run"]))
+            ran = subprocess.run(
+                [_python(root), Path(__file__).with_name("one_run.py"), "one.yaml"],
+                cwd=folder, capture_output=True, text=True, check=True,
+                env=os.environ | {"PYTHONPATH": str(root)},
+            )  # fmt: skip
+            rows[version] += [float(ran.stdout.split()[-1])] if number else []
+    return {"core_s": rows, "load": round(os.getloadavg()[0], 1), "commits": _commits(versions)}
+
+
 def _alone(name: str, run: BenchmarkRun) -> dict[str, Any]:
     """A study too long for turns, with this version alone; kernels are compiled before."""
     folder = SCRATCH / "sweeps"
@@ -268,6 +291,9 @@ def page(results: dict[str, Any]) -> str:
     values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
     values["same"] = results["same_answer"]
     values["first"] = results["first_step"]
+    one_run = results["one_run"]
+    medians = {version: median(rows) for version, rows in one_run["core_s"].items()}
+    values["one_run"] = {**one_run, "median": medians}
     values["thousand"] = results["thousand_runs"]
     values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)
@@ -285,6 +311,7 @@ BENCHMARK = Benchmark(
         **{name: partial(_in_turns, name) for name in STUDIES},
         "same_answer": _same_answer,
         "first_step": _first_step,
+        "one_run": _one_run,
         "thousand_runs": partial(_alone, "thousand_runs"),
         "origin": lambda run: run.origin,
     },

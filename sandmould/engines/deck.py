@@ -42,7 +42,9 @@ def remark(text: str) -> str:
 
     Line breaks, a ``&`` at the end and triple quotes would do so in LAMMPS and LIGGGHTS.
     """
-    printable = "".join(c if c.isprintable() else " " for c in text)
+    printable = text  # most texts are, and a deck has hundreds
+    if not text.isprintable():
+        printable = "".join(c if c.isprintable() else " " for c in text)
     words = " ".join(printable.replace('"', "'").replace("&", "and").split())
     return words if len(words) <= _LONGEST_REMARK else f"{words[: _LONGEST_REMARK - 3]}..."
 

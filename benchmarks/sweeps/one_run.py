@@ -1,0 +1,55 @@
+"""Core time of a short run as a forked worker computes it: ``python one_run.py STUDY.yaml``.
+
+All runs of the study are rendered, computed and measured in one process, so that neither
+Snakemake's start nor that of Python counts. It is run by its path, in the sources of any version.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+
+from sandmould.study.batch_job import compute_batch
+from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, prepare
+from sandmould.study.plan.lacking import lack_of
+from sandmould.study.plan.plan_files import read_run
+from sandmould.study.simulate import measure, render, simulate
+from sandmould.study.worker import load
+
+WARM_UP = 2
+"""Runs that come first and do not count: they load what all others find loaded."""
+
+
+def main(study: str) -> None:
+    """Print the core time of a run, s, the loop of its engine included."""
+    plan = open_plan(Path(study))
+    announce(plan, RESULTS, 1)
+    prepare(plan, RESULTS)
+    folder = RESULTS / plan.study.name
+    (folder / "logs").mkdir(exist_ok=True)
+    for fill in plan.fills:
+        compute_batch([folder / fill.place], folder / "logs" / "fills", 1, "")
+    load(plan.runs[0].scenario)
+    for run in plan.runs[:WARM_UP]:
+        _do(folder / run.place)
+    begun_s = time.process_time()
+    for run in plan.runs[WARM_UP:]:
+        _do(folder / run.place)
+    print(json.dumps((time.process_time() - begun_s) / len(plan.runs[WARM_UP:])))
+
+
+def _do(folder: Path) -> None:
+    """Do what a worker does for one run."""
+    run = read_run(folder / "scenario.yaml")
+    lack_of(run, folder)
+    render(run, folder)
+    (folder / "work").mkdir(exist_ok=True)
+    simulate(folder, run)
+    measure(run, folder)
+    lack_of(run, folder)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
