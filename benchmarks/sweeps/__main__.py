@@ -98,7 +98,7 @@ WHOLE: dict[str, Any] = {
     "short_runs": _stand_in(100),
     "thousand_runs": _stand_in(1000),
     "one_run": _stand_in(30),
-    "one_run_turns": 5,
+    "one_run_turns": 3,
 }
 LITTLE: dict[str, Any] = {
     "turns": 1,
