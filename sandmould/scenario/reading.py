@@ -28,7 +28,7 @@ def read_planned(path: Path, name: str) -> Tree:
     return _read(path, name, load_planned)
 
 
-def read_yaml(path: Path, name: str) -> Tree:
+def read_yaml(path: Path, name: str, text: str | None = None) -> Tree:
     """Read one YAML file that must hold a mapping.
 
     Parameters
@@ -36,6 +36,8 @@ def read_yaml(path: Path, name: str) -> Tree:
     path : Path
     name : str
         The file's name in messages.
+    text : str, optional
+        What the file will hold, where it is not written yet.
 
     Raises
     ------
@@ -43,8 +45,9 @@ def read_yaml(path: Path, name: str) -> Tree:
         When the file is missing, is no YAML, holds no mapping or is beyond a limit.
     """
     with contextlib.suppress(OSError):  # which reading tells
-        _named(name, YAML_BYTES.problems("file", path.stat().st_size))
-    return _read(path, name, load_users)
+        size = path.stat().st_size if text is None else len(text.encode())
+        _named(name, YAML_BYTES.problems("file", size))
+    return _read(path, name, load_users, text)
 
 
 def _named(name: str, problems: Iterable[Problem]) -> None:
@@ -53,9 +56,9 @@ def _named(name: str, problems: Iterable[Problem]) -> None:
         raise BadInputError(found)
 
 
-def _read(path: Path, name: str, load: Callable[[str], Any]) -> Tree:
+def _read(path: Path, name: str, load: Callable[[str], Any], text: str | None = None) -> Tree:
     try:
-        tree = load(path.read_text(encoding="utf-8"))
+        tree = load(path.read_text(encoding="utf-8") if text is None else text)
     except BadInputError as error:
         _named(name, error.problems)
     except (OSError, UnicodeDecodeError) as error:

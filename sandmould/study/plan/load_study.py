@@ -67,13 +67,15 @@ class _File:
     tree: Tree
 
 
-def open_study(path: Path) -> OpenStudy:
+def open_study(path: Path, text: str | None = None) -> OpenStudy:
     """Read a study with all that it is based on, and check it.
 
     Parameters
     ----------
     path : Path
         Its stem is the study's name.
+    text : str, optional
+        What its file will hold, where it is not written yet.
 
     Returns
     -------
@@ -88,7 +90,7 @@ def open_study(path: Path) -> OpenStudy:
     if not re.fullmatch(NAME, path.stem):
         valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
         raise BadInputError([Problem("file name", path.name, valid, file_name)])
-    files = _files(path)
+    files = _files(path, text)
     kind = _kind(files)
     problems = [p for f in files for p in _wrong_units(kind.study, f)]
     origin = Origin(file={"": file_name})
@@ -147,9 +149,9 @@ def _reported(study: Study) -> Iterator[Problem]:
         yield Problem("objective.reported_best", values, "absent unless one key is swept")
 
 
-def _files(path: Path) -> list[_File]:
+def _files(path: Path, text: str | None) -> list[_File]:
     """The study's file and all it is based on, the deepest base first."""
-    files = [_read(path)]
+    files = [_read(path, text)]
     while (name := files[0].tree.get("based_on")) is not None:
         above = files[0]
         folders = (above.path.parent, *STUDIES)
@@ -196,9 +198,9 @@ def _materials(model: type[BaseModel]) -> str:
     return ", ".join(sorted(names)) or "there is none yet"
 
 
-def _read(path: Path) -> _File:
+def _read(path: Path, text: str | None = None) -> _File:
     name = display_path(path)
-    return _File(path, name, _from_root(read_yaml(path, name), path.parent))
+    return _File(path, name, _from_root(read_yaml(path, name, text), path.parent))
 
 
 def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
