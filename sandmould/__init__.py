@@ -11,8 +11,24 @@ SHIPPED = ROOT if IS_CHECKOUT else ROOT / "sandmould" / "shipped"
 """Where ``config/``, ``templates/``, ``workflow/`` and ``profiles/`` lie."""
 
 
+_PLACES = {
+    "BadInputError": "sandmould.scenario.bad_input",
+    "Result": "sandmould.notebook",
+    "plan": "sandmould.notebook",
+    "run": "sandmould.notebook",
+}
+"""Modules of what users of the package need: loaded when asked, since they take a second."""
+__all__ = ["BadInputError", "Result", "__version__", "plan", "run"]
+
+
 def __getattr__(name: str) -> Any:
-    """``run`` and ``Result`` of :mod:`sandmould.notebook`, which needs all rooms below it."""
-    if name in ("run", "Result"):
-        return getattr(import_module("sandmould.notebook"), name)
+    """What users of the package need, from the rooms below it."""
+    if name in _PLACES:
+        return getattr(import_module(_PLACES[name]), name)
+    if name == "__version__":
+        return import_module("importlib.metadata").version("sandmould")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -7,11 +7,12 @@ process of its own, and shows its lines as they come.
 from __future__ import annotations
 
 import base64
+import contextlib
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -19,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import yaml
 
 from sandmould.cli.study_file import study_file
 from sandmould.engines.snapshot import Snapshot
@@ -30,8 +30,11 @@ from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, read_collected
-from sandmould.study.plan.build_plan import RESULTS, open_plan
-from sandmould.study.plan.plan_files import VERDICT_FILE, read_run
+from sandmould.study.dictionary import study_text, write_study_file
+from sandmould.study.plan.build_plan import RESULTS, open_plan, stored_speeds
+from sandmould.study.plan.handover import checked_plan
+from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run
+from sandmould.study.plan.price import Prices, study_s
 
 AXES = ("x", "z"), ("x", "y", "z")
 """Names of the coordinates in 2D and in 3D; z is up."""
@@ -171,8 +174,17 @@ class Result:
         return f'<p>{escape(self.verdict)} <a href="{escape(page)}">report</a></p>'
 
 
+Study = str | os.PathLike[str] | Mapping[str, Any]
+"""Name of a shipped study, a study's file, or what such a file holds."""
+
+
 def run(
-    study: str | os.PathLike[str] | Mapping[str, Any], *, name: str = "", cores: int | None = None
+    study: Study,
+    *,
+    name: str = "",
+    cores: int | None = None,
+    folder: str | os.PathLike[str] = ".",
+    quiet: bool = False,
 ) -> Result:
     """Compute a study, or what is missing of it, and read its results.
 
@@ -181,10 +193,15 @@ def run(
     study : str, path or mapping
         Name of a shipped study, a study's file, or what such a file holds.
     name : str
-        Of a study that is given as a mapping. It is written to ``<name>.yaml``, so that the command
-        can go on with it.
+        Of a study that is given as a mapping. It is written to ``<name>.yaml`` in the folder, so
+        that the command can go on with it. A changed mapping replaces the file; a file that was
+        written by hand stays as it is.
     cores : int, optional
         All of the machine unless given.
+    folder : str or path
+        Where ``results`` lies; the working folder unless given.
+    quiet : bool
+        Print nothing.
 
     Returns
     -------
@@ -198,31 +215,96 @@ def run(
     RuntimeError
         Where it was stopped, or broke outside its runs.
     """
-    path = _written(study, name) if isinstance(study, Mapping) else study_file(os.fspath(study))
-    folder = RESULTS / open_plan(path).study.name
+    place = Path(folder).absolute()
+    path, text = _file_and_text(study, name, place)
+    with _within(place):
+        plan = checked_plan(path, text)
+        if text is not None:
+            write_study_file(path, text)
     command = [sys.executable, "-m", "sandmould.cli", "run", str(path)]
     command += [] if cores is None else ["--cores", str(cores)]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        command, cwd=place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as process:
         assert process.stdout is not None
         last = ""
         for line in process.stdout:
-            print(line, end="", flush=True)
+            if not quiet:
+                print(line, end="", flush=True)
             last = line.strip() or last
-    if not (folder / VERDICT_FILE).is_file() or process.returncode > 1:
-        raise RuntimeError(f"{path} did not end: {last}")
-    return Result(folder.absolute())
+    results = place / RESULTS / plan.study.name
+    if not _has_ended(process.returncode, path, results):
+        why = f"stopped by signal {-process.returncode}" if process.returncode < 0 else last
+        raise RuntimeError(
+            f"{plan.study.name} did not end ({why}). Call it again to go on with what is missing."
+        )
+    return Result(results)
 
 
-def _written(study: Mapping[str, Any], name: str) -> Path:
-    """A study as a file in the working folder; one that holds another study stays as it is."""
-    if not re.fullmatch(NAME, name):
-        raise BadInputError([Problem("name", name, "small letters, digits and _, a letter first")])
-    path = Path(f"{name}.yaml")
-    text = yaml.safe_dump(dict(study), sort_keys=False, allow_unicode=True)
-    if path.is_file() and yaml.safe_load(path.read_text(encoding="utf-8")) != dict(study):
-        valid = f"another name: {path} holds another study"
-        raise BadInputError([Problem("name", name, valid)])
-    path.write_text(text, encoding="utf-8")
-    return path
+def plan(
+    study: Study,
+    *,
+    name: str = "study",
+    cores: int | None = None,
+    folder: str | os.PathLike[str] = ".",
+) -> pd.DataFrame:
+    """Check a study and foretell what it takes; nothing is computed or written.
+
+    Parameters
+    ----------
+    study, name, cores, folder
+        As of ``run``.
+
+    Returns
+    -------
+    DataFrame
+        A row a run: swept keys, replicate, seed, part of the study, work (such as
+        ``grain_steps``) and ``wall_time_s``. ``attrs["wall_time_s"]`` is that of the whole study
+        on these cores, ``attrs["price"]`` what it rests on.
+
+    Raises
+    ------
+    BadInputError
+        With one sentence a problem.
+    """
+    place = Path(folder).absolute()
+    path, text = _file_and_text(study, name, place)
+    with _within(place):
+        opened = open_plan(path, text=text)
+        prices = Prices(stored_speeds(opened, RESULTS))
+    runs = [*opened.fills, *opened.runs]
+    table = pd.DataFrame(plan_rows(runs, prices))
+    pieces = [prices.piece(each) for each in runs]
+    table.attrs["wall_time_s"] = study_s(pieces, cores or os.cpu_count() or 1)
+    table.attrs["price"] = prices.basis(runs)
+    return table
+
+
+def _file_and_text(study: Study, name: str, folder: Path) -> tuple[Path, str | None]:
+    """A study's file, and its text where that is to be written first."""
+    if isinstance(study, Mapping):
+        if not re.fullmatch(NAME, name):
+            valid = "small letters, digits and _, a letter first, such as name='my_study'"
+            raise BadInputError([Problem("name", name, valid)])
+        return folder / f"{name}.yaml", study_text(study)
+    if not isinstance(study, str | os.PathLike):
+        valid = "the name of a shipped study, the path of a study's file, or a dictionary"
+        raise BadInputError([Problem("study", study, valid)])
+    return study_file(os.fspath(study)).absolute(), None
+
+
+@contextlib.contextmanager
+def _within(folder: Path) -> Iterator[None]:
+    """Be in a folder, since results are owned by files as seen from there."""
+    if not folder.is_dir():
+        raise BadInputError([Problem("folder", str(folder), "a folder that is there")])
+    with contextlib.chdir(folder):
+        yield
+
+
+def _has_ended(status: int, path: Path, results: Path) -> bool:
+    """Whether the command came to its end: a status of 1 is also that of failed runs."""
+    if status not in (0, 1) or not (results / VERDICT_FILE).is_file():
+        return False
+    with contextlib.chdir(results.parents[1]):
+        return status == 0 or not open_plan(path).lacks(RESULTS)

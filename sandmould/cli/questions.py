@@ -39,8 +39,10 @@ def answers(given: Mapping[str, Any], ask: bool) -> NewStudy:
         hold, cavity = (known.get(key, _default(key)) for key in ("hold", "cavity"))
         if not applies(name, hold, cavity):
             if name in known:
-                valid = f"absent with --hold {hold} and --cavity {cavity}"
-                raise BadInputError([Problem(_option(name), known[name], valid)])
+                other = f"--cavity {cavity}" if applies(name, hold, "") else f"--hold {hold}"
+                sentence = f"leave {_option(name)} out with {other}"
+                problem = Problem(_option(name), known[name], "absent", sentence=sentence)
+                raise BadInputError([problem])
         elif ask and name not in known:
             known[name] = _asked(name)
     found = _checked(known)

@@ -31,8 +31,15 @@ def study_file(text: str) -> Path:
     if path.is_file():
         return path
     near = difflib.get_close_matches(path.stem, shipped_studies(), n=3, cutoff=0.5)
-    names = ", ".join(near or shipped_studies())
-    valid = f"the path of a study's file, or the name of a shipped study, such as {names}"
+    if path.suffix in (".yaml", ".yml"):
+        sentence = f"there is no such file in {path.parent.resolve()}"
+        sentence += f" (did you mean the shipped study {' or '.join(near)}?)" if near else ""
+        raise BadInputError([Problem("STUDY", text, "a study's file", path.name, sentence)])
+    names = ", ".join(near or ["tube_demo"])
+    valid = (
+        f"the path of a study's file, or the name of a shipped study, such as {names}; "
+        f"all of them lie in {STUDIES}"
+    )
     raise BadInputError([Problem("STUDY", text, valid)])
 
 

@@ -23,9 +23,13 @@ class Problem:
     valid: str
     """What would be valid, such as 'a number greater than 0'."""
     file: str = ""
+    sentence: str = ""
+    """In place of key, value and what is valid, where these say less."""
 
     def __str__(self) -> str:
         where = f"{self.file}: " if self.file else ""
+        if self.sentence:
+            return f"{where}{self.sentence}."
         value_text = repr(self.value)
         if len(value_text) > 120:
             value_text = value_text[:117] + "..."

@@ -74,3 +74,9 @@ def fields_at(model: type[BaseModel], key: str) -> list[FieldInfo]:
     """Declarations that a key path can mean: several where kinds of obstacles share a key."""
     *parents, last = [p for p in key.split(".") if not p.isdecimal()] or [""]
     return [m.model_fields[last] for m in models_at(model, parents) if last in m.model_fields]
+
+
+def units_at(model: type[BaseModel], key: str) -> list[str]:
+    """Units that a key path can have."""
+    extras = [f.json_schema_extra for f in fields_at(model, key)]
+    return sorted({str(e["unit"]) for e in extras if isinstance(e, dict) and "unit" in e})

@@ -15,8 +15,10 @@ from pydantic import BaseModel, ValidationError
 
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.limits import YAML_BYTES
-from sandmould.scenario.moved_keys import moved_to
+from sandmould.scenario.moved_keys import called, moved_to
+from sandmould.scenario.quantity import units_at
 from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
+from sandmould.scenario.units import number_of
 from sandmould.scenario.yaml_text import fault_of, load_planned, load_users
 
 Tree = dict[str, Any]
@@ -28,7 +30,7 @@ def read_planned(path: Path, name: str) -> Tree:
     return _read(path, name, load_planned)
 
 
-def read_yaml(path: Path, name: str) -> Tree:
+def read_yaml(path: Path, name: str, text: str | None = None) -> Tree:
     """Read one YAML file that must hold a mapping.
 
     Parameters
@@ -36,6 +38,8 @@ def read_yaml(path: Path, name: str) -> Tree:
     path : Path
     name : str
         The file's name in messages.
+    text : str, optional
+        What the file will hold, where it is not written yet.
 
     Raises
     ------
@@ -43,8 +47,9 @@ def read_yaml(path: Path, name: str) -> Tree:
         When the file is missing, is no YAML, holds no mapping or is beyond a limit.
     """
     with contextlib.suppress(OSError):  # which reading tells
-        _named(name, YAML_BYTES.problems("file", path.stat().st_size))
-    return _read(path, name, load_users)
+        size = path.stat().st_size if text is None else len(text.encode())
+        _named(name, YAML_BYTES.problems("file", size))
+    return _read(path, name, load_users, text)
 
 
 def _named(name: str, problems: Iterable[Problem]) -> None:
@@ -53,16 +58,17 @@ def _named(name: str, problems: Iterable[Problem]) -> None:
         raise BadInputError(found)
 
 
-def _read(path: Path, name: str, load: Callable[[str], Any]) -> Tree:
+def _read(path: Path, name: str, load: Callable[[str], Any], text: str | None = None) -> Tree:
     try:
-        tree = load(path.read_text(encoding="utf-8"))
+        tree = load(path.read_text(encoding="utf-8") if text is None else text)
     except BadInputError as error:
         _named(name, error.problems)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8 text"
         raise BadInputError([Problem("file", reason, "a readable YAML file", name)]) from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise BadInputError([Problem("file", fault_of(error), "YAML text", name)]) from error
+        fault = fault_of(error)
+        raise BadInputError([Problem("file", fault, "YAML text", name, fault)]) from error
     if not isinstance(tree, dict):
         stated = "nothing" if tree is None else tree
         raise BadInputError([Problem("file", stated, "a mapping of keys to values", name)])
@@ -258,4 +264,13 @@ def _valid(model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: l
         "union_tag_not_found": f"a mapping with a kind: {', '.join(kinds)}",
         "string_pattern_mismatch": f"text of the pattern {context.get('pattern')}",
     }
-    return words.get(kind, str(item["msg"]))
+    valid = words.get(kind, str(item["msg"]))
+    given = item.get("input")
+    if isinstance(given, str):
+        if kind in ("float_type", "int_type"):
+            units = [unit for unit in units_at(model, ".".join(parts)) if unit != "1"]
+            valid += f" in {' or '.join(units)}" if units else ""
+            valid += f": {told}" if (told := number_of(given, units)) else ""
+        elif kind == "literal_error" and (new := called(parts[-1], given)):
+            valid += f"; {given} is called {new}"
+    return valid

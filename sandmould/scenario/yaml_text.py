@@ -116,10 +116,13 @@ def load_planned(text: str) -> Any:
 
 
 def fault_of(error: Exception) -> str:
-    """What a parser found, with its line, in one line of text."""
+    """What a parser found, with its line, as a sentence without its full stop."""
     mark = getattr(error, "problem_mark", None)
     if isinstance(error, RecursionError):
-        return "nested too deeply"
+        return "it cannot be read as YAML: nested too deeply"
     if mark is None:
-        return " ".join(str(error).split())
-    return f"line {mark.line + 1}: {getattr(error, 'problem', None)}"
+        return f"it cannot be read as YAML: {' '.join(str(error).split())}"
+    problem = str(getattr(error, "problem", None))
+    if "\\t" in problem:
+        problem = "a tab stands there; YAML is indented with spaces"
+    return f"line {mark.line + 1} cannot be read as YAML: {problem}"

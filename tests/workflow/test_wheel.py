@@ -35,6 +35,7 @@ def test_it_holds_every_file_that_a_clone_has_in_git(site: Path) -> None:
     ]
     assert missing == []
     assert not (site / "tests").exists()
+    assert (site / "sandmould" / "py.typed").is_file()
 
 
 @pytest.mark.slow

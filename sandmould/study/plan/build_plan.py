@@ -170,7 +170,7 @@ def study_path(configfiles: Sequence[Path], overrides: Mapping[str, Any]) -> Pat
     return Path(configfiles[0]) if configfiles else DEFAULT_STUDY
 
 
-def open_plan(path: Path, results: Path = RESULTS) -> Plan:
+def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> Plan:
     """Open, validate and expand a study.
 
     Parameters
@@ -178,6 +178,8 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
     path : Path
     results : Path
         Where finished studies lie that this one may rest on.
+    text : str, optional
+        What the study's file will hold, where it is not written yet.
 
     Raises
     ------
@@ -185,7 +187,7 @@ def open_plan(path: Path, results: Path = RESULTS) -> Plan:
         With one sentence a problem; a missing engine is one of them, and results that belong to
         another study file of the same name.
     """
-    study = open_study(path)
+    study = open_study(path, text)
     check_owner(path, results / study.name)
     log = read_rounds(results / study.name, study.study)
     runs = expand(study, log.runs, log.certified_hz)

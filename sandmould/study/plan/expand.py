@@ -96,7 +96,10 @@ def expand(
             if run.run in runs and replicates is not every:
                 continue  # the sweep has come to hold it
             if run.run in runs:
-                twice = Problem("sweep", point, "points that differ", study.file)
+                said = " and ".join(f"{key} = {_short(value)}" for key, value in point.items())
+                twice = Problem(
+                    "sweep", point, "points that differ", study.file, f"sweep: {said} stands twice"
+                )
                 problems[str(twice)] = twice
                 break
             runs[run.run] = run
@@ -333,3 +336,7 @@ def _sources(section: Section, origin: Origin, above: str = "", group: str | Non
             stated = origin.source_of(f"{ROOT_KEY}.{key}")
             # What the user alone can give has no source while it is not given.
             yield key, stated or (declared if declared not in (None, "user") else "default")
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -11,15 +11,21 @@ _PLANS: dict[Path, Plan] = {}
 """Of the next process that is forked, by the study's file."""
 
 
-def checked_plan(path: Path) -> Plan:
+def checked_plan(path: Path, text: str | None = None) -> Plan:
     """Open, validate and expand a study whose runs are to start.
+
+    Parameters
+    ----------
+    path : Path
+    text : str, optional
+        What its file will hold, where it is not written yet.
 
     Raises
     ------
     BadInputError
         With one sentence a problem; a place or a program that is not to be trusted is one.
     """
-    plan = open_plan(path)
+    plan = open_plan(path, text=text)
     check_places(plan.study)
     check_letters(plan.runs)
     check_trust(plan.study, plan.runs)

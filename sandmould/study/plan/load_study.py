@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import os
 import re
 from collections.abc import Iterator
@@ -14,8 +15,9 @@ from pydantic import BaseModel
 
 from sandmould import ROOT, SHIPPED
 from sandmould.scenario.bad_input import BadInputError, Problem, display_path
-from sandmould.scenario.quantity import NAME, fields_at
+from sandmould.scenario.quantity import NAME, units_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
+from sandmould.scenario.units import in_unit
 from sandmould.study.definition import (
     calibration,
     certificate,
@@ -32,6 +34,7 @@ STUDIES = (SHIPPED / "config" / "studies", SHIPPED / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
 """Where studies write the sands that they calibrate."""
 MATERIALS = (SHIPPED / "config" / "materials", CALIBRATED)
+NEAREST = 3
 _OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
 _FILE_KEY = (
     r"(\b(obstacles|cavities|shapes)(\.\d+)+\.file|\bpattern(\.\d+)*\.shape(\.\d+)*\.file"
@@ -67,13 +70,15 @@ class _File:
     tree: Tree
 
 
-def open_study(path: Path) -> OpenStudy:
+def open_study(path: Path, text: str | None = None) -> OpenStudy:
     """Read a study with all that it is based on, and check it.
 
     Parameters
     ----------
     path : Path
         Its stem is the study's name.
+    text : str, optional
+        What its file will hold, where it is not written yet.
 
     Returns
     -------
@@ -88,7 +93,7 @@ def open_study(path: Path) -> OpenStudy:
     if not re.fullmatch(NAME, path.stem):
         valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
         raise BadInputError([Problem("file name", path.name, valid, file_name)])
-    files = _files(path)
+    files = _files(path, text)
     kind = _kind(files)
     problems = [p for f in files for p in _wrong_units(kind.study, f)]
     origin = Origin(file={"": file_name})
@@ -147,9 +152,9 @@ def _reported(study: Study) -> Iterator[Problem]:
         yield Problem("objective.reported_best", values, "absent unless one key is swept")
 
 
-def _files(path: Path) -> list[_File]:
+def _files(path: Path, text: str | None) -> list[_File]:
     """The study's file and all it is based on, the deepest base first."""
-    files = [_read(path)]
+    files = [_read(path, text)]
     while (name := files[0].tree.get("based_on")) is not None:
         above = files[0]
         folders = (above.path.parent, *STUDIES)
@@ -161,7 +166,7 @@ def _files(path: Path) -> list[_File]:
                 chain = " on ".join(f.path.stem for f in reversed(files))
                 valid = f"a study that does not lead back here ({chain} on {name})"
             else:
-                valid = f"the name of a study or scenario: {_candidates(folders)}"
+                valid = _valid_base(str(name), folders)
             raise BadInputError([Problem("based_on", name, valid, above.name)])
         files.insert(0, _read(new[0]))
     return files
@@ -196,9 +201,9 @@ def _materials(model: type[BaseModel]) -> str:
     return ", ".join(sorted(names)) or "there is none yet"
 
 
-def _read(path: Path) -> _File:
+def _read(path: Path, text: str | None = None) -> _File:
     name = display_path(path)
-    return _File(path, name, _from_root(read_yaml(path, name), path.parent))
+    return _File(path, name, _from_root(read_yaml(path, name, text), path.parent))
 
 
 def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
@@ -225,17 +230,20 @@ def _places(name: Any, folders: tuple[Path, ...]) -> list[Path]:
     return [p for folder in folders if (p := folder / f"{name}.yaml").is_file()]
 
 
-def _candidates(folders: tuple[Path, ...]) -> str:
-    """Studies and scenarios of some folders; files of another make are passed over."""
+def _valid_base(name: str, folders: tuple[Path, ...]) -> str:
+    """What a study can be based on: the nearest names, and where all of them lie."""
     of_study = {key for kind in KINDS.values() for key in kind.study.model_fields}
-    names = set()
-    for path in _yaml_files(folders):
-        with contextlib.suppress(OSError):
-            # Enough to tell a study by, and much faster than to read all of them.
-            keys = re.findall(rb"^(\w+):", path.read_bytes(), re.MULTILINE)
-            if keys and {key.decode() for key in keys} <= of_study:
-                names.add(path.stem)
-    return ", ".join(sorted(names))
+    places = {path.stem: path for path in _yaml_files(folders)}
+    near = []
+    for stem in difflib.get_close_matches(name, places, n=NEAREST, cutoff=0.6):
+        with contextlib.suppress(BadInputError):
+            if set(read_yaml(places[stem], stem)) <= of_study:
+                near.append(stem)
+    here, *shipped = map(display_path, folders)
+    hint = f" (did you mean {', '.join(near)}?)" if near else ""
+    # A shipped study may lie in a folder that is searched anyway.
+    listed = " and ".join(dict.fromkeys([here, *shipped]))
+    return f"the name of a study or scenario{hint}; they lie in {listed}"
 
 
 def _yaml_files(folders: tuple[Path, ...]) -> Iterator[Path]:
@@ -246,17 +254,20 @@ def _yaml_files(folders: tuple[Path, ...]) -> Iterator[Path]:
 
 def _wrong_units(model: type[BaseModel], file: _File) -> list[Problem]:
     """Units that contradict the key's own."""
-    return [
-        Problem(f"{key}.unit", unit, f"the unit of the key, {' or '.join(declared)}", file.name)
-        for key, unit in _units(file.tree)
-        if (declared := _declared_units(model, key)) and str(unit) not in declared
-    ]
+    problems = []
+    for key, value, unit in _units(file.tree):
+        declared = _declared_units(model, key)
+        if declared and str(unit) not in declared:
+            valid = f"the unit of the key, {' or '.join(declared)}"
+            valid += f": {told}" if (told := in_unit(value, unit, declared)) else ""
+            problems.append(Problem(f"{key}.unit", unit, valid, file.name))
+    return problems
 
 
-def _units(tree: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """Every unit that a file states, with the key path it stands at."""
+def _units(tree: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Every value and its unit that a file states, with the key path they stand at."""
     if isinstance(tree, dict) and {"value", "unit"} <= set(tree):
-        yield key, tree["unit"]
+        yield key, tree["value"], tree["unit"]
     elif isinstance(tree, dict | list):
         for name, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
             yield from _units(value, f"{key}.{name}" if key else str(name))
@@ -264,6 +275,4 @@ def _units(tree: Any, key: str = "") -> Iterator[tuple[str, Any]]:
 
 def _declared_units(model: type[BaseModel], key: str) -> list[str]:
     # The values of a swept key have its unit.
-    path = re.sub(r"^sweep\.(keys|points\.\d+)\.", "scenario.", key)
-    extras = [f.json_schema_extra for f in fields_at(model, path)]
-    return sorted({str(e["unit"]) for e in extras if isinstance(e, dict) and "unit" in e})
+    return units_at(model, re.sub(r"^sweep\.(keys|points\.\d+)\.", "scenario.", key))

@@ -135,6 +135,27 @@ def _table_text(runs: Sequence[Run]) -> str:
     return "".join("\t".join(row) + "\n" for row in rows)
 
 
+def plan_rows(runs: Sequence[Run], prices: Prices) -> list[dict[str, Any]]:
+    """What the runs of a study will take, a row a run; units stand in the names.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        All runs of the study, with the fills that they share.
+    prices : Prices
+    """
+    keys = list(dict.fromkeys(key for run in runs for key in run.parameters))
+    work = kind_of(runs[0].scenario).planning.work_unit.replace("-", "_")
+    return [
+        {
+            "run": run.run, **{key: run.parameters.get(key) for key in keys},
+            "replicate": run.replicate, "seed": run.seed, "part": run.part,
+            work: own_work(run), "wall_time_s": prices.engine_s(run),
+        }
+        for run in runs
+    ]  # fmt: skip
+
+
 def _cell(value: Any) -> str:
     """A value as text of one line and one cell; whole numbers without a decimal point."""
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:

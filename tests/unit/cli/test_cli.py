@@ -90,6 +90,15 @@ def test_unknown_study_gets_the_nearest_names() -> None:
     (sentence,) = said.stderr.splitlines()
     assert sentence.startswith("STUDY = 'tube_dmo' cannot be used: valid is the path of a study's")
     assert "such as tube_demo, " in sentence
+    said = sandmould("plan", "no_such_thing_at_all")
+    assert f"such as tube_demo; all of them lie in {STUDIES}." in said.stderr
+
+
+def test_a_file_that_is_not_there_is_said_to_be_missing(elsewhere: Path) -> None:
+    said = sandmould("plan", "nothere.yaml")
+    assert said.stderr == f"nothere.yaml: there is no such file in {elsewhere}.\n"
+    said = sandmould("plan", "tube_dmo.yaml")
+    assert f"in {elsewhere} (did you mean the shipped study tube_demo or" in said.stderr
 
 
 def test_a_study_is_a_file_or_the_name_of_a_shipped_one(elsewhere: Path) -> None:

@@ -65,7 +65,8 @@ def test_it_asks_what_is_held_first_and_asks_again_what_cannot_be_used() -> None
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--velocity-m-s", "1"], "--velocity-m-s = 1.0 cannot be used: valid is absent with"),
+        (["--velocity-m-s", "1"], "leave --velocity-m-s out with --hold acceleration."),
+        (["--opening-m", "1", "--cavity", "none"], "leave --opening-m out with --cavity none."),
         (["--settings", "1"], "--settings = 1 cannot be used: valid is a number"),
         (["--lowest-hz", "200"], "--lowest-hz = 200.0 cannot be used: valid is less than"),
         (["--opening-m", "0.001"], "scenario.obstacles.0.diameter_m = 0.001 cannot be used"),

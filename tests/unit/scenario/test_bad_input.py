@@ -27,16 +27,17 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "wrong type": (
         'based_on: tube\nscenario: {sand: {density_kg_m3: "heavy"}}',
-        "trial.yaml: scenario.sand.density_kg_m3 = 'heavy' cannot be used: valid is a number.",
+        "trial.yaml: scenario.sand.density_kg_m3 = 'heavy' cannot be used: valid is a number "
+        "in kg/m3.",
     ),
     "number in quotes": (
         'based_on: tube\nscenario: {box: {width_m: "0.2"}}',
-        "trial.yaml: scenario.box.width_m = '0.2' cannot be used: valid is a number.",
+        "trial.yaml: scenario.box.width_m = '0.2' cannot be used: valid is a number in m.",
     ),
     "unknown key": (
         "based_on: tube\nscenario: {box: {widht_m: 0.2}}",
         "trial.yaml: scenario.box.widht_m = 0.2 cannot be used: "
-        "valid is one of the keys depth_m, height_m, width_m (did you mean width_m?).",
+        "valid is one of the keys depth_m, height_m, piston, width_m (did you mean width_m?).",
     ),
     "negative size": (
         "based_on: tube\nscenario: {sand: {size_scale: -4}}",
@@ -235,7 +236,7 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "place with a word": (
         "based_on: plates\nscenario: {box: {low_m: [0, left], high_m: [0.02, 0.02]}}",
-        "trial.yaml: scenario.box.low_m.1 = 'left' cannot be used: valid is a number.",
+        "trial.yaml: scenario.box.low_m.1 = 'left' cannot be used: valid is a number in m.",
     ),
     "place of four numbers": (
         "based_on: plates\nscenario: {box: {low_m: [0, 0, 0, 0], high_m: 3}}",
@@ -246,7 +247,7 @@ CASES: dict[str, tuple[str, str]] = {
     "unit of another key": (
         "based_on: tube\nscenario: {sand: {density_kg_m3: {value: 2.4, unit: g/cm3, source: x}}}",
         "trial.yaml: scenario.sand.density_kg_m3.unit = 'g/cm3' cannot be used: "
-        "valid is the unit of the key, kg/m3.",
+        "valid is the unit of the key, kg/m3: write 2400 (kg/m3).",
     ),
     "table without a mass": (
         TABLE % "moment_kg_m: 0.05, mount_frequency_hz: 8, flask_depth_m: 0.3",

@@ -12,8 +12,8 @@ from sandmould.study.plan.load_study import open_study
 from tests.unit.refusing import refused
 
 SHIPPED = (ROOT / "config" / "studies", ROOT / "config" / "scenarios")
-NAMES = ", ".join(sorted({"trial", *(p.stem for f in SHIPPED for p in f.glob("*.yaml"))}))
-"""What a study can be based on, as the messages list it."""
+PLACES = " and ".join([".", "config/studies", "config/scenarios"])
+"""Where what a study can be based on lies, as the messages list it."""
 CASES: dict[str, tuple[str | bytes, str]] = {
     "yes for a number": (
         "based_on: tube\nreplicates: yes",
@@ -64,13 +64,13 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "missing base": (
         "based_on: tuba",
-        "trial.yaml: based_on = 'tuba' cannot be used: valid is the name of a study or scenario: "
-        f"{NAMES}.",
+        "trial.yaml: based_on = 'tuba' cannot be used: valid is the name of a study or scenario "
+        f"(did you mean tube?); they lie in {PLACES}.",
     ),
     "base that is no name": (
         "based_on: [tube]",
         "trial.yaml: based_on = ['tube'] cannot be used: valid is the name of a study or "
-        f"scenario: {NAMES}.",
+        f"scenario (did you mean tube?); they lie in {PLACES}.",
     ),
     "based on itself": (
         "based_on: trial",
@@ -104,18 +104,43 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "key twice": (
         "based_on: tube\nreplicates: 2\nreplicates: 3",
-        "trial.yaml: file = \"line 3: key 'replicates' stands twice, first in line 2\" "
-        "cannot be used: valid is YAML text.",
+        "trial.yaml: line 3 cannot be read as YAML: key 'replicates' stands twice, first in "
+        "line 2.",
+    ),
+    "tab": (
+        "based_on: tube\n\treplicates: 3",
+        "trial.yaml: line 2 cannot be read as YAML: a tab stands there; YAML is indented with "
+        "spaces.",
+    ),
+    "number with a unit": (
+        "based_on: tube\nscenario: {vibration: [{displacement_m: 0.15 mm}]}",
+        "trial.yaml: scenario.vibration.0.displacement_m = '0.15 mm' cannot be used: valid is a "
+        "number in m: write 0.00015 (m).",
+    ),
+    "number with a unit of another kind": (
+        "based_on: tube\nscenario: {vibration: [{displacement_m: 3 bananas}]}",
+        "trial.yaml: scenario.vibration.0.displacement_m = '3 bananas' cannot be used: valid is "
+        "a number in m.",
+    ),
+    "unit of the same kind": (
+        "based_on: tube\nscenario: {vibration: [{displacement_m: {value: 0.15, unit: mm, source: "
+        "me}}]}",
+        "trial.yaml: scenario.vibration.0.displacement_m.unit = 'mm' cannot be used: valid is the "
+        "unit of the key, m: write 0.00015 (m).",
+    ),
+    "stroke": (
+        "based_on: tube\nscenario: {vibration: [{hold: stroke}]}",
+        "trial.yaml: scenario.vibration.0.hold = 'stroke' cannot be used: valid is one of "
+        "'acceleration', 'velocity', 'displacement' or 'unbalance'; stroke is called displacement.",
     ),
     "key that is no text": (
         "based_on: tube\n5: 2",
-        "trial.yaml: file = 'line 2: key 5 is no text: put it in quotes' cannot be used: "
-        "valid is YAML text.",
+        "trial.yaml: line 2 cannot be read as YAML: key 5 is no text: put it in quotes.",
     ),
     "broken YAML": (
         "based_on: tube\nscenario: {box: [",
-        "trial.yaml: file = \"line 2: expected the node content, but found '<stream end>'\" "
-        "cannot be used: valid is YAML text.",
+        "trial.yaml: line 2 cannot be read as YAML: expected the node content, but found "
+        "'<stream end>'.",
     ),
     "nested without end": (
         "[" * 1500,
@@ -150,10 +175,11 @@ def test_a_base_that_is_missing_is_not_looked_for_among_other_files(
     (tmp_path / "notes.yaml").write_text("shopping: [milk]")
     (tmp_path / "Old Tube.yaml").write_text("based_on: tube")
     (tmp_path / "mine.yaml").write_text("based_on: tube")
-    told = refused(tmp_path, "based_on: tuba", monkeypatch)
-    assert ", mine, " in told
-    assert "notes" not in told
-    assert "Old" not in told
+    (tmp_path / "minde.yaml").write_text("based_on: [")
+    told = refused(tmp_path, "based_on: minee", monkeypatch)
+    assert "(did you mean mine?)" in told
+    assert "notes" not in refused(tmp_path, "based_on: note", monkeypatch)
+    assert "Old" not in refused(tmp_path, "based_on: old_tube", monkeypatch)
 
 
 def test_missing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,7 +217,7 @@ def test_every_misfit_is_told_in_its_own_file(
     )
     (tmp_path / "wet.yaml").write_text("sand: {density_kg_m3: 2000}", encoding="utf-8")
     assert refused(tmp_path, "based_on: other\nreplicates: 0", monkeypatch).splitlines() == [
-        "other.yaml: scenario.box.width_m = 'wide' cannot be used: valid is a number.",
+        "other.yaml: scenario.box.width_m = 'wide' cannot be used: valid is a number in m.",
         "trial.yaml: replicates = 0 cannot be used: valid is a number of at least 1.",
     ]
 

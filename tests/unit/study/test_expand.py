@@ -235,7 +235,7 @@ def test_bad_part_of_a_swept_section_is_named_inside_it(runs_of: Runs) -> None:
 
 def test_same_point_twice_is_refused(runs_of: Runs) -> None:
     assert told(runs_of, sweep=swept(sand__size_scale=[5, 5.0])) == [
-        "trial.yaml: sweep = {'sand.size_scale': 5.0} cannot be used: valid is points that differ."
+        "trial.yaml: sweep: sand.size_scale = 5 stands twice."
     ]
 
 
