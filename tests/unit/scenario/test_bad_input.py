@@ -36,7 +36,7 @@ CASES: dict[str, tuple[str, str]] = {
     "unknown key": (
         "based_on: tube\nscenario: {box: {widht_m: 0.2}}",
         "trial.yaml: scenario.box.widht_m = 0.2 cannot be used: "
-        "valid is one of the keys depth_m, height_m, width_m (did you mean width_m?).",
+        "valid is one of the keys depth_m, height_m, piston, width_m (did you mean width_m?).",
     ),
     "negative size": (
         "based_on: tube\nscenario: {sand: {size_scale: -4}}",
@@ -92,7 +92,7 @@ CASES: dict[str, tuple[str, str]] = {
         "based_on: tube\nscenario: {obstacles: [{kind: cylinder, centre_m: [0, 0, 0], "
         "diameter_m: 0.01, length_m: 0.02}]}",
         "trial.yaml: scenario.obstacles.0.kind = 'cylinder' cannot be used: "
-        "valid is plate, tube or polygon in 2D.",
+        "valid is plate, tube or polygon in 2D; cylinder needs dimension: 3.",
     ),
     "cylinder outside the box": (
         "based_on: bracket\nscenario: {obstacles: [{kind: cylinder, centre_m: [0.07, 0.05, 0.02], "
