@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, get_args
 
 import typer
 
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.reading import Origin, validated
-from sandmould.study.new_study import HELD, WHY_HELD, NewStudy, applies
+from sandmould.study.new_answers import (
+    HELD,
+    WHY_HELD,
+    NewStudy,
+    applies,
+    fault,
+    finer_scale,
+    number_in,
+    plain,
+    sands,
+)
 
 
 def answers(given: Mapping[str, Any], ask: bool) -> NewStudy:
@@ -29,61 +37,80 @@ def answers(given: Mapping[str, Any], ask: bool) -> NewStudy:
     BadInputError
         When an option cannot be used, or belongs to another answer.
     """
-    known = {name: value for name, value in given.items() if value is not None}
-    _checked(known)
+    options = {name: value for name, value in given.items() if value is not None}
     if ask:
         typer.echo(WHY_HELD)
         for held, drive in HELD.items():
             typer.echo(f"  {held:12}  {drive}")
+    known: dict[str, Any] = {}
     for name in NewStudy.model_fields:
-        hold, cavity = (known.get(key, _default(key)) for key in ("hold", "cavity"))
-        if not applies(name, hold, cavity):
-            if name in known:
+        of = {key: known.get(key, options.get(key, _default(key))) for key in ("hold", "cavity")}
+        if not applies(name, **of):
+            if name in options:
+                hold, cavity = of["hold"], of["cavity"]
                 other = f"--cavity {cavity}" if applies(name, hold, "") else f"--hold {hold}"
                 sentence = f"leave {_option(name)} out with {other}"
-                problem = Problem(_option(name), known[name], "absent", sentence=sentence)
+                problem = Problem(_option(name), options[name], "absent", sentence=sentence)
                 raise BadInputError([problem])
-        elif ask and name not in known:
-            known[name] = _asked(name)
-    found = _checked(known)
-    if found.lowest_hz >= found.highest_hz:
-        raise BadInputError([Problem("--lowest-hz", found.lowest_hz, "less than --highest-hz")])
-    return found
+        elif name in options:
+            value, valid = _tried(name, str(options[name]), known)
+            if valid:
+                raise BadInputError([Problem(_option(name), options[name], valid)])
+            known[name] = value
+        elif ask:
+            known[name] = _asked(name, known)
+        elif valid := fault(name, plain(known)):
+            default = _proposed(name, plain(known))
+            raise BadInputError([Problem(f"{_option(name)} (its default)", default, valid)])
+    return plain(known)
 
 
-def _asked(name: str) -> Any:
-    field = NewStudy.model_fields[name]
-    extra: Any = field.json_schema_extra
-    unit = "" if extra["unit"] == "1" else f", in {extra['unit']}"
-    among = f" ({', '.join(_choices(name))})" if _choices(name) else ""
+def _asked(name: str, known: Mapping[str, Any]) -> Any:
+    field, before = NewStudy.model_fields[name], plain(known)
+    among = sands() if name == "material" else _choices(name)
+    unit = "" if _unit(name) == "1" else f", {_unit(name)}"
+    listed = f" ({', '.join(among)})" if among else ""
+    if name == "size_scale" and (finer := finer_scale(before)):
+        typer.echo(f"The hole is five of the largest grains wide, or more, up to {finer:g}.")
+
+    def checked(text: str) -> Any:
+        value, valid = _tried(name, text, known)
+        if valid:
+            raise typer.BadParameter(f"valid is {valid}")
+        return value
+
+    proposed = _proposed(name, before)
     return typer.prompt(
-        f"{field.description}{unit}{among}",
-        default="" if field.default is None else field.default,
-        show_default=field.default is not None,
-        value_proc=lambda text: _value(name, text),
+        f"{field.description}{unit}{listed}",
+        default="" if proposed is None else f"{proposed}",
+        show_default=proposed is not None,
+        value_proc=checked,
     )
 
 
-def _value(name: str, text: str) -> Any:
-    """An answer with its type; what cannot be used is asked again."""
-    if text == "":
-        return None
+def _proposed(name: str, before: NewStudy) -> Any:
+    """What is taken unless something else is answered."""
+    follow = {"hole_height_mm": before.middle_mm, "sand_height_mm": before.level_mm}
+    return f"{follow[name]:.6g}" if name in follow else _default(name)
+
+
+def _tried(name: str, text: str, known: Mapping[str, Any]) -> tuple[Any, str]:
+    """An answer with its type, and what is valid where it cannot be used."""
+    if text == "" and _default(name) is None:
+        return None, ""
     value: Any = text
     if not _choices(name) and str not in _types(name):
         with contextlib.suppress(ValueError):
-            value = int(text) if int in _types(name) else float(text)
+            value = number_in(text, _unit(name))
+            if int in _types(name) and value == int(value):
+                value = int(value)
     try:
-        _checked({name: value})
+        found = plain({**known, name: value})
     except BadInputError as error:
-        raise typer.BadParameter(f"valid is {error.problems[0].valid}") from None
-    return value
-
-
-def _checked(known: Mapping[str, Any]) -> NewStudy:
-    try:
-        return validated(NewStudy, dict(known), Origin())
-    except BadInputError as error:
-        raise BadInputError([replace(p, key=_option(p.key)) for p in error.problems]) from None
+        valid = error.problems[0].valid
+        example = _unit(name) in ("mm", "mm/s") and valid.startswith("a number")
+        return value, valid + (" or with its unit" if example else "")
+    return value, fault(name, found)
 
 
 def _types(name: str) -> tuple[Any, ...]:
@@ -93,6 +120,11 @@ def _types(name: str) -> tuple[Any, ...]:
 
 def _choices(name: str) -> list[str]:
     return [part for part in _types(name) if isinstance(part, str)]
+
+
+def _unit(name: str) -> str:
+    extra: Any = NewStudy.model_fields[name].json_schema_extra
+    return str(extra["unit"])
 
 
 def _default(name: str) -> Any:

@@ -73,6 +73,8 @@ def _obstacles(s: Scenario) -> Iterator[Problem]:
         kinds = KINDS[s.dimension]
         if obstacle.kind not in kinds:
             valid = f"{', '.join(kinds[:-1])} or {kinds[-1]} in {s.dimension}D"
+            if s.dimension == 2:
+                valid += f"; {obstacle.kind} needs dimension: 3"
             yield Problem(f"{key}.kind", obstacle.kind, valid)
         elif isinstance(obstacle, Plate):
             yield from _plate(s, obstacle, key)

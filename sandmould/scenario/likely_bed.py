@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.scenario.geometry import Array
+from sandmould.scenario.geometry import Array, distance_within
 from sandmould.scenario.placement import (
     filled_measure,
     nominal_fraction,
@@ -105,19 +105,30 @@ def _lattice(
     numbers = np.meshgrid(np.arange(levels), *map(np.arange, steps), indexing="ij")
     cells = np.stack(numbers, -1).reshape(-1, len(steps) + 1) + 0.5
     point_m = np.column_stack([low + (high - low) * cells[:, 1:] / steps, spacing_m * cells[:, 0]])
-    room_m = s.scene.clearance_m(point_m, s.largest_diameter_m)
+    room_m = _room_m(s, point_m, s.largest_diameter_m)
     free = room_m > 0.25 * spacing_m
-    for bore in s.scene.bores:
-        depth_m, across_m = bore.local(point_m)
-        reach_m = float(np.linalg.norm(bore.section_m, axis=1).max())
-        in_bore = (depth_m > 0.0) & (depth_m < bore.length_m)
-        free &= ~(in_bore & (np.linalg.norm(across_m, axis=1) < reach_m))
     # sand comes from above: not under a closed gate, nor under a plank as wide as the box
     parts, _ = ndimage.label(free.reshape(levels, *steps))
     reached = np.isin(parts, np.unique(parts[-1][parts[-1] > 0])).ravel()
     chosen = np.flatnonzero(reached)[:count]
     jitter_m = rng.uniform(-0.3, 0.3, (len(chosen), len(steps) + 1)) * spacing_m
     return point_m[chosen] + jitter_m, room_m[chosen]
+
+
+def _room_m(s: Scenario, position_m: Array, reach_m: float) -> Array:
+    """Distance of points from solids and from cavities, (n,) float64, m; below 0 inside.
+
+    Cavities are still empty when the box has been filled, so they hold grains off as solids do.
+    """
+    room_m = s.scene.clearance_m(position_m, reach_m)
+    for bore in s.scene.bores:
+        depth_m, across_m = bore.local(position_m)
+        beside_m = np.linalg.norm(across_m, axis=1) - np.linalg.norm(bore.section_m, axis=1).max()
+        along_m = np.maximum(-depth_m, depth_m - bore.length_m)
+        room_m = np.minimum(room_m, np.maximum(beside_m, along_m))
+    for cavity in s.scene.cavities:
+        room_m = np.minimum(room_m, distance_within(cavity.space, position_m, reach_m))
+    return room_m
 
 
 def _sized(radius_m: Array, room_m: Array, rng: np.random.Generator) -> Array:
@@ -146,7 +157,7 @@ def _apart(s: Scenario, position_m: Array, radius_m: Array, low: Array, high: Ar
             gap_m = np.linalg.norm(position_m[pairs[:, 0]] - position_m[pairs[:, 1]], axis=1)
             near = gap_m < radius_m[pairs].sum(axis=1) + skin_m
             a, b = pairs[near].T
-            room_m = s.scene.clearance_m(position_m, reach_m)
+            room_m = _room_m(s, position_m, reach_m)
             beside = np.flatnonzero(room_m < radius_m + skin_m)
         apart_m = position_m[a] - position_m[b]
         distance_m = np.linalg.norm(apart_m, axis=1)
@@ -167,14 +178,14 @@ def _out_of_solids(s: Scenario, position_m: Array, radius_m: Array) -> Array:
     """Moves, (n, d) float64, m, that take grains to the surface of the solids they overlap."""
     reach_m = 2.0 * float(radius_m.max(initial=0.0))
     moves = np.zeros_like(position_m)
-    deep_m = radius_m - s.scene.clearance_m(position_m, reach_m)
+    deep_m = radius_m - _room_m(s, position_m, reach_m)
     inside = np.flatnonzero(deep_m > 0.0)
     step_m = 0.02 * radius_m[inside]
     slope = np.zeros((len(inside), position_m.shape[1]))
     for axis in range(position_m.shape[1]):
         shifted = position_m[inside].copy()
         shifted[:, axis] += step_m
-        slope[:, axis] = (radius_m - deep_m)[inside] - s.scene.clearance_m(shifted, reach_m)
+        slope[:, axis] = (radius_m - deep_m)[inside] - _room_m(s, shifted, reach_m)
     length = np.maximum(np.linalg.norm(slope, axis=1), 1e-12)
     moves[inside] = -slope / length[:, None] * deep_m[inside, None]
     return moves

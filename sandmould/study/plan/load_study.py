@@ -181,7 +181,8 @@ def _material(files: list[_File], kind: Kind[Any]) -> _File | None:
     places = _places(name, folders)
     if places and set((found := _read(places[0])).tree) & set(kind.material.model_fields):
         return found
-    valid = f"the name of a material of kind {kind.name}: {_materials(kind.material)}"
+    names = ", ".join(materials(kind.material)) or "there is none yet"
+    valid = f"the name of a material of kind {kind.name}: {names}"
     raise BadInputError([Problem("material", name, valid, stated[-1].name)])
 
 
@@ -191,14 +192,20 @@ def _check_material(material: _File, model: type[BaseModel]) -> None:
     validated(model, merge({}, material.tree, alone, material.name), alone)
 
 
-def _materials(model: type[BaseModel]) -> str:
-    """Materials that a kind of study can use, by name."""
+def materials(model: type[BaseModel]) -> list[str]:
+    """Names of the materials that a kind of study can use.
+
+    Parameters
+    ----------
+    model : type
+        What a material of that kind states.
+    """
     names = set()
     for path in _yaml_files(MATERIALS):
         with contextlib.suppress(BadInputError):
             _check_material(_read(path), model)
             names.add(path.stem)
-    return ", ".join(sorted(names)) or "there is none yet"
+    return sorted(names)
 
 
 def _read(path: Path, text: str | None = None) -> _File:

@@ -93,7 +93,7 @@ CASES: dict[str, tuple[str, str]] = {
         "based_on: tube\nscenario: {obstacles: [{kind: cylinder, centre_m: [0, 0, 0], "
         "diameter_m: 0.01, length_m: 0.02}]}",
         "trial.yaml: scenario.obstacles.0.kind = 'cylinder' cannot be used: "
-        "valid is plate, tube or polygon in 2D.",
+        "valid is plate, tube or polygon in 2D; cylinder needs dimension: 3.",
     ),
     "cylinder outside the box": (
         "based_on: bracket\nscenario: {obstacles: [{kind: cylinder, centre_m: [0.07, 0.05, 0.02], "

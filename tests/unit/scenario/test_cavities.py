@@ -19,6 +19,7 @@ from sandmould.scenario.cavities import (
     PolygonCavity,
     cavity_space,
 )
+from sandmould.scenario.cavity_checks import cavity_problems, free_share
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand.measures import MEASURES
 from sandmould.study.kinds.sand.planning import resolved
@@ -217,7 +218,7 @@ def test_a_lid_shuts_a_hole_and_an_obstacle_fills_it(
     full = refused(tmp_path, f"{head}obstacles: [{core}], cavities: [{HOLE % ''}]}}", monkeypatch)
     assert full == (
         "trial.yaml: scenario.cavities.0.centre_m = 'hole' cannot be used: valid is a cavity in "
-        "free space; about 49 % of this one lies in obstacles."
+        "free space; about 50 % of this one lies in obstacles."
     )
 
 
@@ -226,3 +227,63 @@ def test_a_bad_side_is_told_by_whatever_asks_for_the_scene(tmp_path: Path) -> No
     path.write_text(f"based_on: tube\nscenario: {{cavities: [{HOLE % ', opens: back'}]}}")
     with pytest.raises(BadInputError, match="valid is up, down, left or right"):
         measures_text(open_study(path))
+
+
+def round_hole(sides: int, centre_x_m: float = 0.06) -> Scenario:
+    """A pipe whose hole has so many sides, and a round cavity of 20 mm drawn into it."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    rings = [
+        np.column_stack([radius_m * circle + [0.06, 0.025], np.full(sides, z_m)])
+        for z_m in (0.01, 0.05)
+        for radius_m in (0.02, 0.01)
+    ]
+    i, j = np.arange(sides), np.roll(np.arange(sides), -1)
+    triangles: list[list[tuple[int, np.ndarray]]] = []
+    # outer side, upper end, inner side, lower end
+    for a, b in ((0, 2), (2, 3), (3, 1), (1, 0)):
+        triangles += [[(a, i), (a, j), (b, j)], [(a, i), (b, j), (b, i)]]
+    corners = [[list(ring * sides + at) for ring, at in t] for t in triangles]
+    return Scenario.model_validate(
+        {
+            "dimension": 3,
+            "box": {"width_m": 0.12, "depth_m": 0.05, "height_m": 0.11},
+            "sand": {"size_scale": 6},
+            "obstacles": [
+                {
+                    "kind": "triangles",
+                    "name": "pipe",
+                    "vertices_m": np.concatenate(rings).tolist(),
+                    "triangles": np.array(corners).transpose(0, 2, 1).reshape(-1, 3).tolist(),
+                }
+            ],
+            "cavities": [
+                {
+                    "kind": "cylinder",
+                    "name": "hole",
+                    "centre_m": [centre_x_m, 0.025, 0.03],
+                    "diameter_m": 0.02,
+                    "length_m": 0.04,
+                }
+            ],
+        }
+    )
+
+
+def test_facets_of_a_round_hole_may_lie_in_a_cavity_which_is_smaller_then() -> None:
+    # a circle has pi r^2, a polygon in it n/2 sin(2 pi/n) r^2
+    twelve = round_hole(12)
+    assert not list(cavity_problems(twelve))
+    assert free_share(twelve, 0) == pytest.approx(3.0 / np.pi, abs=0.005)
+    (problem,) = cavity_problems(round_hole(8))
+    assert problem.valid.startswith(
+        "a cavity whose facets fit those of the part: about 10 % of this one lies in the part"
+    )
+    assert problem.valid.endswith("with finer facets, or make the cavity a little smaller")
+    (problem,) = cavity_problems(round_hole(12, centre_x_m=0.064))
+    assert (problem.key, problem.value) == ("cavities.0.centre_m", "hole")
+    assert "free space" in problem.valid
+
+
+def test_a_cavity_among_no_meshes_is_free() -> None:
+    assert free_share(Scenario(cavities=(box(),)), 0) == 1.0

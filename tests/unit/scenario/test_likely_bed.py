@@ -64,6 +64,18 @@ def test_planned_grains_lie_in_the_box_out_of_solids_and_cavities(dimension: int
     )
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_cavity_that_is_named_stays_empty(dimension: int) -> None:
+    size_m = [0.03, 0.02] if dimension == 2 else [0.03, 0.02, 0.02]
+    centre_m = [0.05, 0.02] if dimension == 2 else [0.05, 0.025, 0.02]
+    hole = {"kind": "box", "name": "hole", "centre_m": centre_m, "size_m": size_m}
+    bed = likely_bed(scene(dimension, cavities=[hole]))
+    away_m = np.abs(bed.position_m - centre_m) - np.array(size_m) / 2
+    # the middle of a grain may be pushed no farther than to its border
+    assert (away_m.max(axis=1) > 0.0).all()
+    assert (bed.position_m[:, -1] < 0.015).any()
+
+
 def test_sand_lies_on_what_it_cannot_pass() -> None:
     plank = {"kind": "plate", "centre_m": [0.05, 0.03], "size_m": [0.1, 0.01]}
     assert likely_bed(scene(2, plank)).position_m[:, 1].min() > 0.035

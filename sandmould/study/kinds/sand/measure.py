@@ -30,6 +30,7 @@ from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.runs.columns import OVERLAP_P99_FRACTION
 from sandmould.runs.files import replaced
+from sandmould.scenario.cavity_checks import free_share
 from sandmould.scenario.geometry import Cavity, Scene
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import LAST_MEASURED
@@ -75,8 +76,9 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
     packed = row["solid_fraction"]
-    for cavity in scene.cavities:
-        row |= _measure_cavity(scenario, snapshot, scene, cavity, packed)
+    for number, cavity in enumerate(scene.cavities):
+        free = free_share(scenario, number)
+        row |= _measure_cavity(scenario, snapshot, scene, cavity, packed, free)
     for bore in scenario.scene.bores:
         filled = row[f"{bore.name}_fill_fraction"]
         row[f"{bore.name}_fill_of_bed_fraction"] = filled / packed if packed else math.nan
@@ -86,22 +88,28 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
 
 
 def _measure_cavity(
-    scenario: Scenario, snapshot: Snapshot, scene: Scene, cavity: Cavity, packed: float
+    scenario: Scenario,
+    snapshot: Snapshot,
+    scene: Scene,
+    cavity: Cavity,
+    packed: float,
+    free: float,
 ) -> dict[str, float]:
-    """Columns of one cavity, beside sand of a bed's solid fraction."""
+    """Columns of one cavity, beside sand of a bed's solid fraction; a share of it is free."""
     position, radius, name = snapshot.position_m, snapshot.radius_m, cavity.name
     grain_m = scenario.sand.mass_median_diameter_m
     unit = "m2" if scenario.dimension == 2 else "m3"
     fill = cavity_fill(position, radius, cavity, grain_m, packed)
+    filled = fill.fill_fraction / free
     voids = cavity_voids(position, radius, cavity, scene, grain_m)
     return {
-        f"{name}_fill_fraction": fill.fill_fraction,
-        f"{name}_fill_of_bed_fraction": fill.fill_fraction / packed if packed else math.nan,
+        f"{name}_fill_fraction": filled,
+        f"{name}_fill_of_bed_fraction": filled / packed if packed else math.nan,
         f"{name}_sand_{unit}": fill.sand_measure,
         f"{name}_grains": fill.grains_inside,
         f"{name}_filled_depth_m": fill.filled_depth_m,
         f"{name}_voids": voids.count,
-        f"{name}_void_fraction": voids.void_fraction,
+        f"{name}_void_fraction": voids.void_fraction / free,
         f"{name}_largest_void_{unit}": voids.largest_measure,
     }
 
