@@ -141,8 +141,8 @@ def _held(scenario: Scenario) -> list[Ground]:
     held = {
         "acceleration": "the acceleration stays the same when the frequency changes",
         "velocity": "the velocity stays the same when the frequency changes",
-        "displacement": "the stroke stays the same when the frequency changes, as with an "
-        "eccentric",
+        "displacement": "the amplitude (half of peak to peak) stays the same when the frequency "
+        "changes, as with an eccentric",
         "unbalance": "rotating masses shake the table, as with an unbalance motor",
     }[hold]
     return [Ground("Drive", f"{held}. With another drive another frequency may be best.")]

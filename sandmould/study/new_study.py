@@ -12,12 +12,13 @@ from sandmould.study.plan.build_plan import Plan, open_plan
 
 WHY_HELD = (
     "What is held decides most: at 1.5 g held the shipped tube fills best at 76 Hz; with the "
-    "stroke held it is full from 120 Hz on; with the velocity held 60 to 240 Hz fill alike."
+    "amplitude (half of peak to peak) held it is full from 120 Hz on; with the velocity held 60 "
+    "to 240 Hz fill alike."
 )
 HELD = {
     "acceleration": "that of a shaker under control",
     "velocity": "that of a shaker under control",
-    "displacement": "the stroke of a crank or cam",
+    "displacement": "the amplitude (half of peak to peak) of a crank or cam",
     "unbalance": "rotating masses on a table that stands on mounts",
 }
 _TUBE = "config/scenarios/tube.yaml"

@@ -47,8 +47,8 @@ ALIKE = {25.0: (0.58, 0.62, 0.60), 50.0: (0.61, 0.59, 0.63), 100.0: (0.30, 0.31,
 @pytest.mark.parametrize(
     ("fills", "said", "is_sound"),
     [
-        (CLEAR, "Shake at 50 Hz with a stroke of 0.300 mm (1.51 g): there the tube fills best.",
-         True),
+        (CLEAR, "Shake at 50 Hz with an amplitude of 0.150 mm, half of peak to peak (1.51 g): "
+         "there the tube fills best.", True),
         (ALIKE, "Shake at 50 Hz or 25 Hz: these runs cannot tell which of them is best. 100 Hz is "
          "worse.", False),
         ({25.0: (0.5, 0.6), 50.0: (0.6, 0.5)}, "Not resolved: these runs cannot tell which is "
@@ -74,7 +74,7 @@ def test_the_best_setting_stands_in_words_of_the_machine() -> None:
     (figures,) = choices_of(verdict, table, drives)
     assert [(it.value, it.label) for it in figures] == [
         ("50 Hz", "frequency"),
-        ("0.300 mm", "stroke, end to end"),
+        ("0.150 mm", "amplitude (half of peak to peak)"),
         ("1.51 g", "peak acceleration"),
         ("77 %", "of what fits in"),
         ("0.613 ± 0.038", "fill of the tube"),
@@ -86,8 +86,8 @@ def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
     verdict, drives = judged(table)
     shown = choices_table(choices_of(verdict, table, drives))
     assert [[cell.text for cell in row[:2]] for row in shown.rows] == [
-        ["50 Hz", "0.300 mm"],
-        ["25 Hz", "0.300 mm"],
+        ["50 Hz", "0.150 mm"],
+        ["25 Hz", "0.150 mm"],
     ]
     # what holds for both is said once
     assert shown.note == (
