@@ -181,8 +181,8 @@ def run(
     study : str, path or mapping
         Name of a shipped study, a study's file, or what such a file holds.
     name : str
-        Of a study that is given as a mapping. It is written to ``<name>.yaml``, so that the command
-        can go on with it.
+        Of a study that is given as a mapping. Its title where it has none. It is written to
+        ``<name>.yaml``, so that the command can go on with it.
     cores : int, optional
         All of the machine unless given.
 
@@ -220,8 +220,10 @@ def _written(study: Mapping[str, Any], name: str) -> Path:
     if not re.fullmatch(NAME, name):
         raise BadInputError([Problem("name", name, "small letters, digits and _, a letter first")])
     path = Path(f"{name}.yaml")
-    text = yaml.safe_dump(dict(study), sort_keys=False, allow_unicode=True)
-    if path.is_file() and yaml.safe_load(path.read_text(encoding="utf-8")) != dict(study):
+    # the title of the study that it rests on asks another question
+    titled = {"title": name, **study}
+    text = yaml.safe_dump(titled, sort_keys=False, allow_unicode=True)
+    if path.is_file() and yaml.safe_load(path.read_text(encoding="utf-8")) != titled:
         valid = f"another name: {path} holds another study"
         raise BadInputError([Problem("name", name, valid)])
     path.write_text(text, encoding="utf-8")

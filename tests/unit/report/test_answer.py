@@ -91,7 +91,7 @@ def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
     ]
     # what holds for both is said once
     assert shown.note == (
-        "± 0.150 mm; 100 %: the tube packed as densely as the sand round it; 3 runs, ± 95 %."
+        "0.300 mm end to end; 100 %: the tube packed as densely as the sand round it; 3 runs, ± 95 %."
     )
     assert {cell.note for row in shown.rows for cell in row} == {"", "47.1 mm/s", "23.6 mm/s"}
 
