@@ -91,7 +91,8 @@ def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
     ]
     # what holds for both is said once
     assert shown.note == (
-        "0.300 mm end to end; 100 %: the tube packed as densely as the sand round it; 3 runs, ± 95 %."
+        "0.300 mm end to end; 100 %: the tube packed as densely as the sand round it; 3 runs, "
+        "± 95 %."
     )
     assert {cell.note for row in shown.rows for cell in row} == {"", "47.1 mm/s", "23.6 mm/s"}
 
@@ -152,7 +153,10 @@ def test_the_end_of_the_sweep_and_failed_runs_are_next(tmp_path: Path) -> None:
     failed, beyond, few = steps_of(tmp_path, table).steps
     assert failed.command == "sandmould again f100_r2"
     assert beyond.text == "Add a frequency below 25 Hz to the sweep: the best may lie there."
-    assert few.text == "Sweep 4 frequencies or more: fewer show no best one."
+    assert few.text == (
+        "Sweep 4 frequencies or more: with fewer the best frequency cannot be found between those "
+        "that were computed."
+    )
 
 
 def test_how_sure_it_is_names_scatter_springs_drive_and_certificate() -> None:
@@ -164,4 +168,10 @@ def test_how_sure_it_is_names_scatter_springs_drive_and_certificate() -> None:
     assert "the means of 50 Hz and 100 Hz differ by 0.20" in said["Scatter"]
     assert "waves run at 128 m/s" in said["Springs"]
     assert said["Drive"].startswith("the acceleration stays the same when the frequency changes")
-    assert said["Certificate"].startswith("not computed.")
+    assert said["Certificate"].startswith("Three tests of the best frequency have not been run.")
+
+
+def test_few_runs_that_cannot_tell_ask_for_no_thousand_more(tmp_path: Path) -> None:
+    table = summary({25.0: (0.50, 0.62, 0.560), 50.0: (0.51, 0.61, 0.5595)})
+    first = steps_of(tmp_path, table).steps[0]
+    assert first.text.endswith("these few runs cannot show a difference.")
