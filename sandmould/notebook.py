@@ -193,9 +193,9 @@ def run(
     study : str, path or mapping
         Name of a shipped study, a study's file, or what such a file holds.
     name : str
-        Of a study that is given as a mapping. It is written to ``<name>.yaml`` in the folder, so
-        that the command can go on with it. A changed mapping replaces the file; a file that was
-        written by hand stays as it is.
+        Of a study that is given as a mapping. Its title where it has none. It is written to
+        ``<name>.yaml`` in the folder, so that the command can go on with it. A changed mapping
+        replaces the file; a file that was written by hand stays as it is.
     cores : int, optional
         All of the machine unless given.
     folder : str or path
@@ -286,7 +286,8 @@ def _file_and_text(study: Study, name: str, folder: Path) -> tuple[Path, str | N
         if not re.fullmatch(NAME, name):
             valid = "small letters, digits and _, a letter first, such as name='my_study'"
             raise BadInputError([Problem("name", name, valid)])
-        return folder / f"{name}.yaml", study_text(study)
+        # The title of the study that it rests on asks another question.
+        return folder / f"{name}.yaml", study_text({"title": name, **study})
     if not isinstance(study, str | os.PathLike):
         valid = "the name of a shipped study, the path of a study's file, or a dictionary"
         raise BadInputError([Problem("study", study, valid)])

@@ -25,7 +25,7 @@ GROUPS = {
     "frequency_hz": "frequency f",
     "acceleration_g": "acceleration",
     "velocity_m_s": "velocity",
-    "displacement_m": "stroke",
+    "displacement_m": "amplitude",
     "in_modes": "f over c/(4 H)",
 }
 """What the fill may go with, as the page calls it. Amplitudes are peaks of the box's motion."""
@@ -36,7 +36,7 @@ EXPLANATIONS: dict[str, tuple[str, ...]] = {
         "in_modes",
     ),
     "how fast it lands": ("velocity_m_s",),
-    "sag of the bed under its weight, g H²/(2 c²), over the stroke": ("sag_over_stroke",),
+    "sag of the bed under its weight, g H²/(2 c²), over the amplitude": ("sag_over_stroke",),
     "strain of a landing, velocity over c, and 2 H/c in periods": ("strain", "in_modes"),
     "velocity over that of a fall through the bed, sqrt(g H), and 2 H/c in periods": (
         "over_fall",

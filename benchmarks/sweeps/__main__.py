@@ -64,7 +64,7 @@ def _sweep(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
 
 
 def _certified(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
-    """One like ``tube_certified``: a stroke held, a round, and two controls."""
+    """One like ``tube_certified``: an amplitude held, a round, and two controls."""
     held = {**_SHAKE, "hold": "displacement", "reference_frequency_hz": 50}
     scenario = {
         "sand": {"size_scale": scale, "disc_thickness_m": 0.1},

@@ -139,11 +139,12 @@ def demo(
     ] = False,
     cores: Cores = None,
 ) -> None:
-    """Compute the demonstration: a tube at four frequencies."""
+    """Compute the demonstration: a tube at four frequencies, or at two accelerations (quick)."""
     from sandmould.study.run_study import run_study
 
     study = study_file("tube_quick" if quick else "tube_demo")
-    raise typer.Exit(run_study(study, _cores_option(cores)))
+    opening = "The installation works." if quick else ""
+    raise typer.Exit(run_study(study, _cores_option(cores), opening))
 
 
 @app.command(epilog="Example: sandmould again tube_demo/frequency_25_r1_45f4dc")

@@ -144,7 +144,10 @@ def optimum_headline(
 def _motion(drive: BoxDrive | None) -> str:
     if drive is None:
         return ""
-    return f" with a stroke of {number(1e3 * drive.stroke_m)} mm ({number(drive.acceleration_g)} g)"
+    return (
+        f" with an amplitude of {number(1e3 * drive.displacement_m)} mm, half of peak to peak "
+        f"({number(drive.acceleration_g)} g)"
+    )
 
 
 def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
@@ -290,9 +293,9 @@ def _motion_figures(drive: BoxDrive | None) -> list[KeyNumber]:
         return []
     return [
         KeyNumber(
-            f"{number(1e3 * drive.stroke_m)} mm",
-            "stroke, end to end",
-            f"± {number(1e3 * drive.displacement_m)} mm",
+            f"{number(1e3 * drive.displacement_m)} mm",
+            "amplitude (half of peak to peak)",
+            f"{number(1e3 * drive.end_to_end_m)} mm end to end",
         ),
         KeyNumber(
             f"{number(drive.acceleration_g)} g",

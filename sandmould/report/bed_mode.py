@@ -29,6 +29,8 @@ class BedMode:
     """Wave speed of a row of grains."""
     measured_hz: float
     """By a small shake, the mean of its fillings; NaN where it was not measured."""
+    depth_is: str = "measured"
+    """Whether its depth was measured, or is the planned one."""
 
     @property
     def is_measured(self) -> bool:
@@ -58,8 +60,9 @@ class BedMode:
             )
         return (
             f"{said}{number(frequency_hz / self.estimate_hz, 2)} times c/(4 H) = "
-            f"{number(self.estimate_hz)} Hz, an estimate of the bed's first mode, which was not "
-            "measured."
+            f"{number(self.estimate_hz)} Hz at the {self.depth_is} depth H of "
+            f"{number(1e3 * self.depth_m)} mm. This is only an estimate of the lowest frequency at "
+            "which the bed swings by itself: no small shake has measured it."
         )
 
 
@@ -88,4 +91,5 @@ def bed_mode(
         depth_m if depth_m > 0.0 else hardness.depth_m,
         hardness.wave_speed_m_s,
         float(np.mean(finite_hz)) if finite_hz else math.nan,
+        "measured" if depth_m > 0.0 else "planned",
     )

@@ -36,10 +36,10 @@ _NO_TENSION = {
     "elastic": "only the spring is kept from pulling; the dashpot may pull as grains part",
 }
 _DAMPING = {
-    "viscous": "viscous, eqs. (36) and (37)",
-    "nonviscous_isotropic": "non-viscous and isotropic, eqs. (38) and (39)",
+    "viscous": "viscous, Rojek 2004, eqs. (36) and (37)",
+    "nonviscous_isotropic": "non-viscous and isotropic, Rojek 2004, eqs. (38) and (39)",
     "nonviscous_componentwise": "non-viscous, each component of force by itself; the paper's own "
-    "form, eq. (38), is isotropic",
+    "form, Rojek 2004, eq. (38), is isotropic",
 }
 
 
@@ -81,7 +81,7 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
         Row("Grain on grain", _law(contact.grain_grain)),
         Row("Grain on wall", _law(contact.grain_wall)),
         *([Row("Hardness", hardness_text(hardness))] if hardness else []),
-        Row("No tension, eq. (18)", _NO_TENSION[contact.no_tension]),
+        Row("No tension, Rojek 2004, eq. (18)", _NO_TENSION[contact.no_tension]),
         Row("Background damping", _damping(scenario)),
         Row("Filling", _filling(scenario)),
         *(Row("Vibration", _vibration(s, scenario, keys)) for s in scenario.vibrations),

@@ -16,7 +16,7 @@ from sandmould.report.robustness import RobustnessPages, follows_springs
 from sandmould.runs.columns import RUN, finished
 from sandmould.runs.formatting import listed, name_of, value_text
 from sandmould.statistics.config import fewest_points
-from sandmould.statistics.verdict import FEW, Verdict, further_replicates
+from sandmould.statistics.verdict import FEW, MANY, MOST_NAMED, Verdict, further_replicates
 from sandmould.study.collect import Collected
 from sandmould.study.definition.certificate import frequency_key
 from sandmould.study.definition.study import Study
@@ -24,6 +24,7 @@ from sandmould.study.plan.ownership import owner_of, shipped_name
 
 WORTH = 30
 """More replicates than that of each setting are not worth the difference that they would show."""
+_FEW_SHOW_NOTHING = "these few runs cannot show a difference"
 _STILL = 0.02
 """Share by which a measure may still change in the last quarter of a vibration."""
 _OWN_FILE = "my_study.yaml"
@@ -184,9 +185,7 @@ def _replicates(study: Study, verdict: Verdict) -> list[NextStep]:
     more = further_replicates(verdict.comparisons, best)
     open_ = [best.label, *(c.other for c in verdict.comparisons if not c.separated)]
     if more is None or more > WORTH:
-        needed = f" It would take {_about(more)} more runs of each to tell." if more else ""
-        text = f"Choose between {listed(open_)} by what suits your machine: no difference shows."
-        return [NextStep(f"{text}{needed}")]
+        return [NextStep(_undecided(listed(open_), best.n, more))]
     wanted = study.replicates + max(1, more)
     return [
         NextStep(
@@ -197,8 +196,12 @@ def _replicates(study: Study, verdict: Verdict) -> list[NextStep]:
     ]
 
 
-def _about(more: int) -> str:
-    return f"about {more}" if more < 1000 else "more than 1000"
+def _undecided(open_: str, runs: int, more: int | None) -> str:
+    """Say what to do with settings that a sensible number of runs does not tell apart."""
+    if runs < MANY:
+        return f"Choose between {open_} by what suits your machine: {_FEW_SHOW_NOTHING}."
+    needed = f" About {more} more runs of each would tell." if more and more <= MOST_NAMED else ""
+    return f"Choose between {open_} by what suits your machine: no difference shows.{needed}"
 
 
 def _beyond(verdict: Verdict, study: Study) -> list[NextStep]:
@@ -246,7 +249,11 @@ def _certificate(study: Study, verdict: Verdict) -> list[NextStep]:
         return []
     fewest = fewest_points(1)
     if study.sweep.number_of_points < fewest:
-        return [NextStep(f"Sweep {fewest} frequencies or more: fewer show no best one.")]
+        text = (
+            f"Sweep {fewest} frequencies or more: with fewer the best frequency cannot be found "
+            "between those that were computed."
+        )
+        return [NextStep(text)]
     text = (
         "Before you trust a frequency in Hz, test whether it goes with the model's springs or "
         "with what the table holds:"

@@ -192,7 +192,16 @@ def _role_text(role: str, verdict: Verdict, summary: pd.DataFrame) -> str:
     if role == "longest":
         none = "none gives a value that can be used" if finished(summary).any() else "none finished"
         return f"which got farthest: {none}"
-    return f"the {role} run by {name_of(verdict.measure)}"
+    most = _value_words(verdict).get(role, role)
+    if role == "median":
+        return f"the one in the middle by the {name_of(verdict.measure)} of single runs"
+    return f"the one with the {most} {name_of(verdict.measure)} of all single runs"
+
+
+def _value_words(verdict: Verdict) -> dict[str, str]:
+    """What the values of the best and the worst run are: a run is not its setting."""
+    words = ("highest", "lowest") if verdict.better == "larger" else ("lowest", "highest")
+    return dict(zip(("best", "worst"), words, strict=True))
 
 
 def _chosen(moments: Sequence[Moment], scenario: Scenario) -> list[tuple[str, Moment]]:
@@ -320,6 +329,8 @@ def _density_conclusion(median_kg_m3: Sequence[float]) -> str:
     if len(finite) < 2:
         return ""
     first, last = finite[0], finite[-1]
+    if number(first, 4) == number(last, 4):
+        return f"The median over all grains stayed at {number(last, 4)} kg/m³ during the vibration."
     way = "rose" if last > first else "fell"
     return (
         f"The median over all grains {way} from {number(first, 4)} to {number(last, 4)} kg/m³ "

@@ -95,8 +95,8 @@ def certificate_ground(study: Study, robustness: RobustnessPages | None) -> tupl
     if robustness is not None:
         return (Ground("Certificate", robustness.assessment.sentences[0]),)
     text = (
-        "not computed. Whether the best frequency goes with the springs, the depth of the bed or "
-        "the time step was not tested."
+        "Three tests of the best frequency have not been run. They show whether it changes with "
+        "the model's springs, with what the table holds constant, and with the time step."
     )
     return (Ground("Certificate", text),)
 
@@ -141,8 +141,8 @@ def _held(scenario: Scenario) -> list[Ground]:
     held = {
         "acceleration": "the acceleration stays the same when the frequency changes",
         "velocity": "the velocity stays the same when the frequency changes",
-        "displacement": "the stroke stays the same when the frequency changes, as with an "
-        "eccentric",
+        "displacement": "the amplitude (half of peak to peak) stays the same when the frequency "
+        "changes, as with an eccentric",
         "unbalance": "rotating masses shake the table, as with an unbalance motor",
     }[hold]
     return [Ground("Drive", f"{held}. With another drive another frequency may be best.")]

@@ -35,7 +35,7 @@ _NAMES = {
     "pattern_tip_filled_m": "deflection of the pattern's tip after filling",
     "pattern_tip_recovered_m": "what vibration gave back of the tip's deflection",
     "pattern_under_fraction": "sand in the space under the pattern",
-    "apparent_density_raw_kg_m3": "apparent density, as eq. (55) prints it",
+    "apparent_density_raw_kg_m3": "apparent density by the printed formula, Rojek 2004, eq. (55)",
     "apparent_density_corrected_kg_m3": "apparent density, corrected for walls",
 }
 

@@ -28,10 +28,10 @@ class BoxDrive:
 
     frequency_hz: float
     displacement_m: float
-    """Amplitude: half of the stroke."""
+    """Amplitude: half of peak to peak."""
 
     @property
-    def stroke_m(self) -> float:
+    def end_to_end_m(self) -> float:
         """From one end of the motion to the other."""
         return 2.0 * self.displacement_m
 

@@ -59,7 +59,12 @@ class Shaking(Section):
         None, "Velocity amplitude.", unit="m/s", source=ARGUED, gt=0, le=10
     )
     displacement_m: float | None = quantity(
-        None, "Displacement amplitude.", unit="m", source=ARGUED, gt=0, le=0.1
+        None,
+        "Amplitude of the displacement, half of peak to peak.",
+        unit="m",
+        source=ARGUED,
+        gt=0,
+        le=0.1,
     )
     reference_frequency_hz: float | None = quantity(
         None,

@@ -12,7 +12,6 @@ import pandas as pd
 from sandmould.runs.columns import RUN, finished
 from sandmould.runs.formatting import listed, name_of, number, value_text, with_margin
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.statistics.equivalence import MOST_REPLICATES
 from sandmould.statistics.evidence import one_way_caveat, reasons_sentence, usable_values
 from sandmould.statistics.settings import (
     Comparison,
@@ -27,6 +26,10 @@ from sandmould.statistics.settings import (
 Better = Literal["larger", "smaller", "neither"]
 FEW = 3
 """Replicates from which on a setting's own interval tells something."""
+MANY = 10
+"""Runs of a setting from which on a difference that does not show is said to be small."""
+MOST_NAMED = 100
+"""More further runs are named nowhere: their estimate is as uncertain as the difference."""
 NOT_TESTED = (
     "Whether the optimum belongs to the sand or to the model's springs is not tested here: its "
     "robustness checks (springs, bed depth, grain size, time step) have not been run."
@@ -114,7 +117,7 @@ def compare_settings(
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
     caveats = [
         *_run_caveats(settings, summary, measure, seeks_best),
-        *(_edge_caveats(best, settings, keys) if seeks_best else ()),
+        *(_edge_caveats(best, settings, keys, resolved) if seeks_best else ()),
         *_identical([c.other for c in comparisons if _is_identical(c, of_setting, best)]),
         *(_spread_caveat(spread, settings) if spread else ()),
         *notes,
@@ -234,7 +237,7 @@ def _run_caveats(
 
 
 def _edge_caveats(
-    best: Setting | None, settings: Sequence[Setting], keys: Sequence[str]
+    best: Setting | None, settings: Sequence[Setting], keys: Sequence[str], resolved: bool
 ) -> list[str]:
     """Say where the best lies at the end of a swept range: the true best may lie beyond."""
     caveats = []
@@ -245,8 +248,10 @@ def _edge_caveats(
         mine = best.values[key] if best else None
         if min(values) < max(values) and mine in (min(values), max(values)):
             end = "lowest" if mine == min(values) else "highest"
+            name = name_of(key)
+            what = f"best {name}" if resolved else f"{name} with the best mean"
             caveats.append(
-                f"The best {name_of(key)}, {value_text(key, mine)}, is the {end} one swept: the "
+                f"The {what}, {value_text(key, mine)}, is the {end} one swept: the "
                 "true best may lie beyond it."
             )
     return caveats
@@ -323,8 +328,8 @@ def _more_sentence(comparisons: Sequence[Comparison], best: Setting) -> str:
     more = further_replicates(comparisons, best)
     if more is None:
         return ""
-    if more > MOST_REPLICATES:
-        return f" More than {MOST_REPLICATES} further replicates would be needed to decide."
+    if more > MOST_NAMED:
+        return " These few runs cannot show a difference." if best.n < MANY else ""
     return (
         f" If the differences are as large as they seem, about {more} more replicates of each "
         "of these settings decide."

@@ -16,12 +16,12 @@ from sandmould.study.plan.load_study import MATERIALS, materials
 
 WHY_HELD = (
     "What is held decides most: at 1.5 g held the shipped tube fills best at 76 Hz; with the "
-    "stroke held it is full from 120 Hz on; with the velocity held 60 to 240 Hz fill alike."
+    "amplitude held it is full from 120 Hz on; with the velocity held 60 to 240 Hz fill alike."
 )
 HELD = {
     "acceleration": "the acceleration in g stays: a shaker whose controller holds it",
     "velocity": "the velocity in mm/s stays: a shaker whose controller holds it",
-    "displacement": "the amplitude in mm stays: the stroke of a crank or cam",
+    "displacement": "the amplitude in mm stays: that of a crank or cam",
     "unbalance": "rotating masses on a table that stands on mounts",
 }
 WALL_MM = 3.0

@@ -29,7 +29,7 @@ from sandmould.study.standby import standing_by
 from sandmould.study.stopping import run_in_group, until_stopped
 
 
-def run_study(path: Path, options: Sequence[str]) -> int:
+def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
     """Compute a study, all its rounds and its robustness checks.
 
     Parameters
@@ -38,6 +38,8 @@ def run_study(path: Path, options: Sequence[str]) -> int:
         The study's file.
     options : sequence of str
         Of Snakemake, such as ``--cores 4`` or ``--workflow-profile profiles/slurm``.
+    opening : str, optional
+        What the last line begins with where all went well.
 
     Returns
     -------
@@ -50,10 +52,10 @@ def run_study(path: Path, options: Sequence[str]) -> int:
     BadInputError
         Before anything starts.
     """
-    return until_stopped(partial(_run_study, path, options), path.stem)
+    return until_stopped(partial(_run_study, path, options, opening), path.stem)
 
 
-def _run_study(path: Path, options: Sequence[str]) -> int:
+def _run_study(path: Path, options: Sequence[str], opening: str) -> int:
     plan = checked_plan(path)
     folder, study = RESULTS / plan.study.name, plan.study.study
     with _standing_by(plan, options):
@@ -70,7 +72,7 @@ def _run_study(path: Path, options: Sequence[str]) -> int:
                 break
         status = _snakemake(plan, options, [])
     if starts_jobs(options) and (said := last_line(folder)):
-        print(said)
+        print(said if status else f"{opening} {said}".strip())
     return status
 
 

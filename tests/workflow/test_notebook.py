@@ -109,6 +109,8 @@ def test_what_is_no_study_is_told_before_anything_starts(
         sandmould.run("tube_dem")
     with pytest.raises(BadInputError, match=r"replicates = 0"):
         sandmould.run(STUDY | {"replicates": 0}, name="wrong")
+    # a study without a title does not ask what the one that it rests on asks
+    assert yaml.safe_load(Path("wrong.yaml").read_text(encoding="utf-8"))["title"] == "wrong"
     assert not Path("results").exists()
 
 

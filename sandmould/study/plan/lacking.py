@@ -100,7 +100,7 @@ def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
     if manifest is None:
         why = _empty(folder, _OF_ANY_MEASURED)
     elif "measured" not in manifest:
-        why = "it is not measured"
+        why = "computed, but its measures are not taken yet"
     else:
         why = damage(folder, manifest["measured"])
     if why and manifest and LEFT_OUT in manifest:

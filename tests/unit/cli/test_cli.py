@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from pathlib import Path
 
@@ -151,6 +152,25 @@ def test_run_hands_options_on_to_snakemake(monkeypatch: pytest.MonkeyPatch) -> N
     assert sandmould("run", "tube_demo").exit_code == 7
     file = STUDIES / "tube_demo.yaml"
     assert calls == [(file, ["--cores", "2", "--quiet", "rules", "host"]), (file, [])]
+
+
+def test_the_quick_demo_says_that_the_installation_works(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from sandmould.study import run_study
+
+    folder = tmp_path / "results" / "tube_quick"
+    folder.mkdir(parents=True)
+    (folder / "report.html").write_text("")
+    (folder / "verdict.txt").write_text("Use 6 g: there the tube fills best.\n")
+    monkeypatch.chdir(tmp_path)
+    for status, opening in ((0, "The installation works. Use 6 g"), (1, "Use 6 g")):
+        monkeypatch.setattr(run_study, "_snakemake", lambda *_, status=status: status)
+        monkeypatch.setattr(run_study, "_standing_by", lambda *_: contextlib.nullcontext())
+        with pytest.raises(SystemExit) as ended:
+            app(["demo", "--quick", "--cores", "1"])
+        assert ended.value.code == status
+        assert capsys.readouterr().out.splitlines()[-1].startswith(opening)
 
 
 VERBS = (

@@ -47,8 +47,8 @@ ALIKE = {25.0: (0.58, 0.62, 0.60), 50.0: (0.61, 0.59, 0.63), 100.0: (0.30, 0.31,
 @pytest.mark.parametrize(
     ("fills", "said", "is_sound"),
     [
-        (CLEAR, "Shake at 50 Hz with a stroke of 0.300 mm (1.51 g): there the tube fills best.",
-         True),
+        (CLEAR, "Shake at 50 Hz with an amplitude of 0.150 mm, half of peak to peak (1.51 g): "
+         "there the tube fills best.", True),
         (ALIKE, "Shake at 50 Hz or 25 Hz: these runs cannot tell which of them is best. 100 Hz is "
          "worse.", False),
         ({25.0: (0.5, 0.6), 50.0: (0.6, 0.5)}, "Not resolved: these runs cannot tell which is "
@@ -76,7 +76,7 @@ def test_the_best_setting_stands_in_words_of_the_machine() -> None:
     (figures,) = choices_of(verdict, table, drives)
     assert [(it.value, it.label) for it in figures] == [
         ("50 Hz", "frequency"),
-        ("0.300 mm", "stroke, end to end"),
+        ("0.150 mm", "amplitude (half of peak to peak)"),
         ("1.51 g", "peak acceleration"),
         ("77 %", "of what fits in"),
         ("0.613 ± 0.038", "fill of the tube"),
@@ -88,12 +88,13 @@ def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
     verdict, drives = judged(table)
     shown = choices_table(choices_of(verdict, table, drives))
     assert [[cell.text for cell in row[:2]] for row in shown.rows] == [
-        ["50 Hz", "0.300 mm"],
-        ["25 Hz", "0.300 mm"],
+        ["50 Hz", "0.150 mm"],
+        ["25 Hz", "0.150 mm"],
     ]
     # what holds for both is said once
     assert shown.note == (
-        "± 0.150 mm; 100 %: the tube packed as densely as the sand round it; 3 runs, ± 95 %."
+        "0.300 mm end to end; 100 %: the tube packed as densely as the sand round it; 3 runs, "
+        "± 95 %."
     )
     assert {cell.note for row in shown.rows for cell in row} == {"", "47.1 mm/s", "23.6 mm/s"}
 
@@ -154,7 +155,10 @@ def test_the_end_of_the_sweep_and_failed_runs_are_next(tmp_path: Path) -> None:
     failed, beyond, few = steps_of(tmp_path, table).steps
     assert failed.command == "sandmould again f100_r2"
     assert beyond.text == "Add a frequency below 25 Hz to the sweep: the best may lie there."
-    assert few.text == "Sweep 4 frequencies or more: fewer show no best one."
+    assert few.text == (
+        "Sweep 4 frequencies or more: with fewer the best frequency cannot be found between those "
+        "that were computed."
+    )
 
 
 def test_how_sure_it_is_names_scatter_springs_drive_and_certificate() -> None:
@@ -166,4 +170,10 @@ def test_how_sure_it_is_names_scatter_springs_drive_and_certificate() -> None:
     assert "the means of 50 Hz and 100 Hz differ by 0.20" in said["Scatter"]
     assert "waves run at 128 m/s" in said["Springs"]
     assert said["Drive"].startswith("the acceleration stays the same when the frequency changes")
-    assert said["Certificate"].startswith("not computed.")
+    assert said["Certificate"].startswith("Three tests of the best frequency have not been run.")
+
+
+def test_few_runs_that_cannot_tell_ask_for_no_thousand_more(tmp_path: Path) -> None:
+    table = summary({25.0: (0.50, 0.62, 0.560), 50.0: (0.51, 0.61, 0.5595)})
+    first = steps_of(tmp_path, table).steps[0]
+    assert first.text.endswith("these few runs cannot show a difference.")

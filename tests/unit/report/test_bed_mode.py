@@ -32,8 +32,9 @@ def test_a_frequency_over_the_estimate_is_named_as_one() -> None:
     mode = BedMode(0.08, 128.0, math.nan)
     assert mode.estimate_hz == pytest.approx(400.0)
     assert mode.beside(100.0) == (
-        "100 Hz is 0.25 times c/(4 H) = 400 Hz, an estimate of the bed's first mode, which was not "
-        "measured."
+        "100 Hz is 0.25 times c/(4 H) = 400 Hz at the measured depth H of 80 mm. This is only an "
+        "estimate of the lowest frequency at which the bed swings by itself: no small shake has "
+        "measured it."
     )
     assert mode.wave_speed.speed_m_s == 128.0
     assert "estimate" in mode.wave_speed.how
@@ -53,6 +54,7 @@ def test_the_mode_is_the_mean_of_the_fillings_that_show_one() -> None:
     assert not silent.is_measured
     bare = bed_mode(scenario(50.0), pd.DataFrame())
     assert bare is not None
+    assert (bare.depth_is, found.depth_is) == ("planned", "measured")
     assert bare.depth_m == pytest.approx(0.0935, rel=0.01)
     still = scenario(50.0).model_copy(update={"vibration": ()})
     assert bed_mode(still, summary) is None
@@ -71,7 +73,7 @@ def test_soft_sand_is_told_beside_the_verdict_and_hard_sand_is_not(tmp_path: Pat
     folder = write_study(tmp_path / "overlaps", count=8, grains=60)
     hard = said_beside_the_verdict(folder)
     assert "Soft sand" not in hard
-    assert "50 Hz is 0.13 times c/(4 H) = 389 Hz, an estimate of the bed's first mode" in hard
+    assert "50 Hz is 0.13 times c/(4 H) = 389 Hz at the measured depth H of " in hard
     for path in folder.glob("runs/*/measures.tsv"):
         measures = pd.read_csv(path, sep="\t")
         measures.assign(overlap_p99_fraction=0.081).to_csv(path, sep="\t", index=False)

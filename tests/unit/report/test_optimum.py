@@ -126,11 +126,11 @@ def test_the_drive_at_the_optimum_is_told_in_mm_and_g(tmp_path: Path) -> None:
     verdict = compare_settings(summary, [KEY], "tube_fill_fraction")
     shown = optimum_choice(pages, summary.assign(tube_fill_of_bed_fraction=0.5), verdict, False)
     figures = {it.label: it.value for it in shown}
-    assert figures["stroke, end to end"] == "0.200 mm"
+    assert figures["amplitude (half of peak to peak)"] == "0.100 mm"
     share = 100 * 0.5 * pages.optimum.value[0] / float(summary["tube_fill_fraction"].mean())
     assert figures["of what fits in, about"] == f"{share:.0f} %"
     said, _ = optimum_headline(pages, None, verdict, summary, has_speed=False)
-    assert " with a stroke of 0.200 mm (" in said
+    assert " with an amplitude of 0.100 mm, half of peak to peak (" in said
 
 
 def test_wider_than_asked_is_not_sound_and_the_cost_is_told(tmp_path: Path) -> None:

@@ -149,7 +149,9 @@ def test_headings_link_to_sections(text: str) -> None:
 
 
 def test_first_sentence_recommends_what_is_resolved(text: str) -> None:
-    assert first_sentence(text).startswith("Shake at 50 Hz with a stroke of 0.298 mm (1.50 g): the")
+    assert first_sentence(text).startswith(
+        "Shake at 50 Hz with an amplitude of 0.149 mm, half of peak to peak (1.50 g): the"
+    )
     assert "50 Hz is best: it gives the highest fill of the tube" in Page(text).text
 
 
@@ -330,7 +332,7 @@ def test_cross_check_stands_beside_a_verdict_that_it_does_not_touch(tmp_path: Pa
     folder = write_cross_check(tmp_path / "demo")
     text = report(folder)
     # the other engine's runs at 50 Hz are 0.3 higher
-    assert first_sentence(text).startswith("Shake at 50 Hz with a stroke of ")
+    assert first_sentence(text).startswith("Shake at 50 Hz with an amplitude of ")
     assert "50 Hz is best: it gives the highest fill of the tube, 0.5" in text
     page = Page(text)
     assert "The verdict above uses the sweep's own engine alone" in page.text

@@ -90,7 +90,7 @@ def test_tie_is_not_resolved() -> None:
     assert verdict.sentences[0].startswith("Not resolved:")
     assert "cannot be told apart from 25 Hz at 95 %" in verdict.sentences[0]
     assert verdict.sentences[0].endswith(
-        "Ruled out: 100 Hz. More than 1000 further replicates would be needed to decide."
+        "Ruled out: 100 Hz. These few runs cannot show a difference."
     )
     assert verdict.ci[0] < 0 < verdict.ci[1]
 
@@ -296,3 +296,16 @@ def test_means_are_tested_as_scipy_tests_them(paired: bool) -> None:
     assert is_paired is paired
     assert (test.pvalue, test.df) == pytest.approx((result.pvalue, result.df))
     assert test.confidence_interval(0.9) == pytest.approx(result.confidence_interval(0.9))
+
+
+def test_an_open_comparison_names_no_best_frequency() -> None:
+    verdict = compare_settings(table({25: [0.50, 0.62, 0.56], 50: [0.51, 0.6, 0.54]}), [KEY], FILL)
+    assert not verdict.resolved
+    assert any("frequency with the best mean, 25 Hz, is the lowest" in c for c in verdict.caveats)
+    assert not any("The best frequency" in c for c in verdict.caveats)
+
+
+def test_no_large_number_of_further_runs_is_named() -> None:
+    alike = table({25: [0.50, 0.62, 0.560], 50: [0.51, 0.61, 0.5595]})
+    said = compare_settings(alike, [KEY], FILL).sentences[0]
+    assert said.endswith("These few runs cannot show a difference.")

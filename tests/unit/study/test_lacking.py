@@ -143,7 +143,7 @@ def test_a_killed_measurement_is_done_again(plan: Plan) -> None:
     tree = json.loads(path.read_text())
     del tree["measured"]
     path.write_text(json.dumps(tree))
-    assert lack(plan) == Lack(Need.MEASURE, "it is not measured")
+    assert lack(plan) == Lack(Need.MEASURE, "computed, but its measures are not taken yet")
 
 
 def test_notes_ask_for_what_is_lacking_and_go_when_nothing_is(plan: Plan) -> None:

@@ -41,7 +41,10 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
             Measure("grains", "Grains in the box."),
             Measure("bed_height_m", "Mean height of the bed's surface."),
             Measure("solid_fraction", "Share of grains in the space from the floor to there."),
-            Measure("apparent_density_raw_kg_m3", "Apparent density, as eq. (55) prints it."),
+            Measure(
+                "apparent_density_raw_kg_m3",
+                "Apparent density by the formula as printed: Rojek 2004, eq. (55).",
+            ),
             Measure(
                 "apparent_density_corrected_kg_m3",
                 "The same, corrected for the space that walls and obstacles take.",
