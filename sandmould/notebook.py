@@ -228,10 +228,15 @@ def run(
     ) as process:
         assert process.stdout is not None
         last = ""
-        for line in process.stdout:
-            if not quiet:
-                print(line, end="", flush=True)
-            last = line.strip() or last
+        try:
+            for line in process.stdout:
+                if not quiet:
+                    print(line, end="", flush=True)
+                last = line.strip() or last
+        except KeyboardInterrupt:
+            process.terminate()  # a notebook interrupts this process alone
+            process.wait()
+            raise
     results = place / RESULTS / plan.study.name
     if not _has_ended(process.returncode, path, results):
         why = f"stopped by signal {-process.returncode}" if process.returncode < 0 else last

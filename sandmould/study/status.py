@@ -78,9 +78,17 @@ def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) ->
         where = f", {owner.text()}" if owner else ""
         return RunStatus(name, "running", f"{said}{where}", cpu_s, share=share)
     with contextlib.suppress(*_DAMAGED):
-        stopped = RunOutcome.read(folder / "work" / "outcome.json").outcome
-        said = f"{said}; {stopped.label}"
+        said = f"{said}; {_why_stopped(folder / 'work' / 'outcome.json', path)}"
     return RunStatus(name, "stopped", said, cpu_s, share=share)
+
+
+def _why_stopped(outcome: Path, progress: Path) -> str:
+    """Why a run was stopped, by the outcome of its last start."""
+    stopped = RunOutcome.read(outcome)
+    is_of_before = outcome.stat().st_mtime_ns < progress.stat().st_mtime_ns
+    if is_of_before or stopped.detail.endswith("the system asked"):
+        return "stopped from outside, as by Ctrl-C"
+    return stopped.outcome.label
 
 
 def _ended(folder: Path) -> RunStatus:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+import sys
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,6 +33,8 @@ from sandmould.study.plan.trust import may_run
 from sandmould.study.rounds.round_log import read_rounds
 
 RESULTS = Path("results")
+MEASURING_S = 10.0
+"""What the measurement of one engine takes on an idle machine, about."""
 DEFAULT_STUDY = SHIPPED / "config" / "studies" / "tube_demo.yaml"
 
 
@@ -342,6 +345,16 @@ def measure_speeds(plan: Plan, results: Path) -> bool:
     speed = plan.kind.planning.speed
     if speed is None or not may_run(plan.study, plan.runs):
         return False
+    slow = sum(
+        any(speed.stored(scenario, results) is None for scenario in alike)
+        for alike in plan.classes.values()
+    )
+    if slow:
+        print(
+            f"Measuring the speed of this machine, once: about {slow * MEASURING_S:g} s, and up "
+            "to 2 min where code is compiled first.",
+            file=sys.stderr, flush=True,
+        )  # fmt: skip
     found = False
     for scenario in chain.from_iterable(plan.classes.values()):
         if speed.stored(scenario, results) is None:

@@ -193,6 +193,7 @@ class Screen:
                 RunView(at, time_left.seconds_of(run, shares[run])) for run, at in running.items()
             ),
             waiting=len([run for run in waiting if run not in self._fills]),
+            filling=len([run for run in running if run in self._fills]),
             passed_s=passed_s,
             left_s=left_s,
             share=passed_s / (passed_s + left_s) if passed_s + left_s else 0.0,

@@ -51,10 +51,13 @@ def counts_text(view: StudyView) -> str:
     parts = [
         f"{number} {what}"
         for number, what in (
-            (view.failed, "failed"), (len(view.running), "running"), (view.waiting, "waiting"),
+            (view.failed, "failed"), (len(view.running) - view.filling, "running"),
+            (view.waiting, "waiting"),
         )
         if number
     ]  # fmt: skip
+    if view.filling:
+        parts.append(f"{view.filling} shared {'fill' if view.filling == 1 else 'fills'} running")
     return ", ".join([f"{view.done} of {view.runs} runs done", *parts])
 
 

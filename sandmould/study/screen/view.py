@@ -27,6 +27,8 @@ class StudyView:
     failed: int
     running: tuple[RunView, ...]
     waiting: int
+    filling: int
+    """Of what is running, the fills that runs share; they are no runs."""
     passed_s: float
     """Since this start."""
     left_s: float

@@ -117,6 +117,22 @@ def test_an_old_answer_is_no_answer_of_a_broken_study(ends_with: Any, code: str,
         sandmould.run(STUDY, name="mine")
 
 
+def test_an_interrupt_ends_the_command(ends_with: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends_with("import os, time; print(os.getpid(), flush=True); time.sleep(600)")
+    seen: list[int] = []
+
+    def interrupt(line: str, **options: Any) -> None:
+        seen.append(int(line))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("builtins.print", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        sandmould.run(STUDY, name="mine")
+    (pid,) = seen
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
 def test_results_go_where_they_are_asked(ends_with: Any) -> None:
     ends_with("import os; print(os.getcwd())")
     there = Path("there")

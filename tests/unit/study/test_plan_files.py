@@ -118,15 +118,18 @@ def price_line(text: str) -> str:
 
 
 def test_plan_is_announced_without_an_engine(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(speed, "_measure_rate", lambda scenario: pytest.fail("an engine started"))
     plan = open_plan(ROOT / "config" / "studies" / "tube_demo.yaml")
     assert price_line(announce(plan, tmp_path, 1)).endswith(", an estimate")
     assert not (tmp_path / speed.STORED).exists()
     monkeypatch.setattr(speed, "_measure_rate", lambda scenario: 1e7)
+    assert capsys.readouterr().err == ""
     assert measure_speeds(plan, tmp_path)
+    assert capsys.readouterr().err.startswith("Measuring the speed of this machine, once: about ")
     assert not measure_speeds(plan, tmp_path)
+    assert capsys.readouterr().err == ""
     assert price_line(announce(plan, tmp_path, 1)).endswith(f", {MEASURED}")
     anew = announce(plan, tmp_path / "anew", 1, measure=True)
     assert price_line(anew).endswith(f", {MEASURED}")

@@ -287,3 +287,15 @@ def test_obstacles_thinner_than_a_grain_are_told(
     assert told[0].startswith("Note: shelf has walls thinner than the smallest grain of ")
     assert "the thinnest measures 0.500 mm" in told[0]
     assert "Note: " not in table(0.01)
+
+
+@pytest.mark.parametrize(("displacement_m", "told"), [(0.05, True), (0.0019, False)])
+def test_a_drive_beyond_reason_is_told(tmp_path: Path, displacement_m: float, told: bool) -> None:
+    # a (2 pi 50 Hz)^2 over 9.80665 m/s2: 503 g for 50 mm, 19.1 g for 1.9 mm
+    stage = {"hold": "displacement", "displacement_m": displacement_m, "frequency_hz": 50}
+    path = tmp_path / "shaken.yaml"
+    stages = [stage | {"duration_s": 0.1}]
+    path.write_text(yaml.safe_dump({"based_on": "tube", "scenario": {"vibration": stages}}))
+    table = plan_table(expand(open_study(path)), Prices(), 1)
+    sentence = "Note: The box shakes at up to 503 g at 50 Hz: check the amplitude and its unit."
+    assert (sentence in table.splitlines()) is told

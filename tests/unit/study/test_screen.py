@@ -21,7 +21,7 @@ from sandmould.study.screen.ending import last_line, trouble
 from sandmould.study.screen.run_watch import Ended, Running, RunWatch
 from sandmould.study.screen.screen import Screen
 from sandmould.study.screen.so_far import so_far_text
-from sandmould.study.screen.table import study_table
+from sandmould.study.screen.table import counts_text, study_table
 from sandmould.study.screen.view import RunView, StudyView
 
 FREQUENCY = "vibration.0.frequency_hz"
@@ -38,6 +38,7 @@ VIEW = StudyView(
         RunView(Running("frequency_25_r1_01aa21"), 200.0),
     ),
     waiting=27,
+    filling=0,
     passed_s=130.0,
     left_s=390.0,
     share=0.25,
@@ -267,3 +268,10 @@ def test_trouble_is_told_once(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_cores_are_read_from_the_options(options: list[str], cores: int | None) -> None:
     assert stated_cores(options) == cores
+
+
+def test_fills_that_are_running_are_no_runs() -> None:
+    view = dataclasses.replace(VIEW, runs=16, done=0, failed=0, waiting=16, filling=2)
+    assert counts_text(view) == "0 of 16 runs done, 16 waiting, 2 shared fills running"
+    view = dataclasses.replace(view, waiting=15, filling=1)
+    assert counts_text(view) == "0 of 16 runs done, 1 running, 15 waiting, 1 shared fill running"

@@ -117,6 +117,14 @@ def test_progress_alone_is_no_run_that_goes_on(plan: Plan) -> None:
     RunOutcome(Outcome.OUT_OF_WALL_TIME, "", 0.5, 1.0).write(folder / "work" / "outcome.json")
     ended = run_status(folder, Lack(Need.COMPUTE), {"8"})
     assert (ended.state, ended.said[-18:]) == ("stopped", "; out of wall time")
+    # Ctrl-C is no lack of time: the run said so itself, or was killed after it had gone on.
+    outside = "; stopped from outside, as by Ctrl-C"
+    detail = "stopped at 0.5 s because the system asked"
+    RunOutcome(Outcome.OUT_OF_WALL_TIME, detail, 0.5, 1.0).write(folder / "work" / "outcome.json")
+    assert run_status(folder, Lack(Need.COMPUTE), {"8"}).said.endswith(outside)
+    RunOutcome(Outcome.OUT_OF_WALL_TIME, "", 0.5, 1.0).write(folder / "work" / "outcome.json")
+    os.utime(folder / "work" / "outcome.json", (1.0, 1.0))
+    assert run_status(folder, Lack(Need.COMPUTE), {"8"}).said.endswith(outside)
     (folder / CLAIM_FILE).unlink()
     (folder / "lock").unlink()
     assert run_status(begun(plan, 1, ago_s=0.0), Lack(Need.COMPUTE)).state == "stopped"

@@ -43,6 +43,8 @@ in a snapshot: measured at 282 discs and 2 000 spheres."""
 PASSES = 4.0
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
 mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
+HIGH_ACCELERATION_G = 20.0
+"""Peak acceleration above which a plan asks whether the amplitude is meant so."""
 COMPILE_S = 25.0
 """Processor time for what a first run compiles: 24 s measured in 2D, 26 s in 3D, 24 s with a
 pattern (fe_column)."""
@@ -236,6 +238,7 @@ def notes(scenario: Scenario) -> list[Note]:
             f"it: about {COMPILE_S:g} s of a core more, once."
         )
         told.append(Note("compiling", text))
+    told += _drive_notes(scenario)
     if scenario.time_step.bed_fraction is not None:
         text = (
             "The price counts the planned time step. What follows the fill takes "
@@ -263,6 +266,19 @@ def notes(scenario: Scenario) -> list[Note]:
                 for n, text in enumerate(drawing_notes(obstacle, key))
             ]
     return [*told, *_pattern_notes(scenario)]
+
+
+def _drive_notes(scenario: Scenario) -> list[Note]:
+    """Accelerations that are hardly meant, such as after a slip in a unit."""
+    return [
+        Note(
+            f"acceleration {n}",
+            f"The box shakes at up to {number(stage.peak_acceleration_g)} g at "
+            f"{number(stage.frequency_hz)} Hz: check the amplitude and its unit.",
+        )
+        for n, stage in enumerate(scenario.vibrations)
+        if stage.unbalance is None and stage.peak_acceleration_g > HIGH_ACCELERATION_G
+    ]
 
 
 def _pattern_notes(scenario: Scenario) -> list[Note]:
