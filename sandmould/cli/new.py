@@ -77,7 +77,7 @@ def new(
     engine: Annotated[Literal["reference", "lammps"] | None, typer.Option(help="Engine.")] = None,
     replicates: Annotated[int | None, typer.Option(help="Repeats of each setting.")] = None,
 ) -> None:
-    """Write a study: it asks for drive, box, hole and sand, lengths in mm."""
+    """Write a study: it asks for drive, box, hole and sand."""
     given = {n: v for n, v in locals().items() if n not in ("file", "yes", "overwrite")}
     from sandmould.cli.questions import answers
     from sandmould.study.new_answers import remarks

@@ -138,7 +138,7 @@ def _draw_bed(scenario: Scenario, ax: Axes, bed: float) -> None:
     ax.add_patch(Patch(sand, facecolor="#F1E5CC", edgecolor="none", zorder=0.5))
     for bore_m in section_of(scenario, scenario.box.height_m).bores_m:
         ax.add_patch(Patch(bore_m * _MM, facecolor="white", edgecolor="none", zorder=0.6))
-    ax.text(0.03 * width, bed + 0.01 * width, f"sand filled to {bed:.0f}", color="#7A4A00",
+    ax.text(0.03 * width, bed + 0.01 * width, f"sand filled to {bed:.0f} mm", color="#7A4A00",
             fontsize=11, va="bottom")  # fmt: skip
 
 
@@ -184,7 +184,7 @@ def _dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], text: s
     ax.text(
         (a[0] + b[0]) / 2,
         (a[1] + b[1]) / 2,
-        text,
+        f"{text} mm",
         rotation=0 if lying else 90,
         ha="center",
         va="center",

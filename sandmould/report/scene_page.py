@@ -110,6 +110,8 @@ def _page(
         films = (frames.planned(bed.of_grains, bed.slice_m),)
         scene = sphere_scene(scenario, scenario.box.height_m)
         scene["marks"] = _arrow(scenario)
+        # stronger than where the sand has moved: what is looked at here is the part
+        scene["solid_tint"] = [0.2, 0.2, 0.24, 0.85]
     layers = range(1, int(bed.layer.max(initial=1)) + 1)
     return (
         page_environment()

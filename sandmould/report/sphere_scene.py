@@ -55,6 +55,7 @@ def sphere_scene(scenario: Scenario, top_m: float) -> dict[str, object]:
         "bores": [np.round(lines_m, 6).ravel().tolist() for lines_m in _cavity_lines(scenario)],
         "layer_colours": list(LAYER_COLOURS),
         "shades": list(SHADES),
+        "solid_tint": [0.55, 0.6, 0.66, 0.4],
     }
 
 

@@ -21,7 +21,7 @@ from sandmould.scenario.cavities import (
     inward,
 )
 from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, cavity_grid
-from sandmould.scenario.geometry import Cavity, Scene
+from sandmould.scenario.geometry import Cavity
 from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.scenario import Scenario
 
@@ -144,7 +144,7 @@ def free_share(s: Scenario, number: int) -> float:
         return 1.0
     gate = s.discharge.gate if s.discharge else ""
     cavity, grain_m = s.cavities[number], s.largest_diameter_m
-    return 1.0 - _tried(s.box, s.obstacles, gate, cavity, s.dimension, grain_m).solid_share
+    return 1.0 - _overlap(s.box, s.obstacles, gate, cavity, s.dimension, grain_m)[0]
 
 
 def _is_skin(s: Scenario, found: _Trial) -> bool:
@@ -195,7 +195,7 @@ def _tried(
         widest_m = min(cavity.diameter_m, cavity.length_m)
     else:
         widest_m = 2.0 * (float(grid.inside_m.max()) + slack_m)
-    solid_share, deepest_m = _overlap(scene, space, grain_m)
+    solid_share, deepest_m = _overlap(box, obstacles, gate, cavity, dimension, grain_m)
     # where the middle of a grain may come
     free = clear_m >= 0.5 * grain_m - slack_m
     way, _ = label(free, structure=np.ones((3,) * dimension))
@@ -208,11 +208,21 @@ def _tried(
     )
 
 
-def _overlap(scene: Scene, space: Cavity, reach_m: float) -> tuple[float, float]:
+@lru_cache(maxsize=64)
+def _overlap(
+    box: Box,
+    obstacles: tuple[AnyObstacle, ...],
+    gate: str,
+    cavity: AnyCavity,
+    dimension: int,
+    reach_m: float,
+) -> tuple[float, float]:
     """Share of a cavity that lies in solids, and how deep it does; deeper than a reach is not told.
 
     Places are drawn at random: a grid lies on facets, or beside them, all along.
     """
+    scene = build_scene(box, obstacles, dimension).without(gate)
+    space = cavity_space(cavity, dimension, "cavities")
     corners_m = space.space.corners()
     low_m, high_m = corners_m.min(axis=0), corners_m.max(axis=0)
     drawn_m = np.random.default_rng(0).uniform(low_m, high_m, (_DRAWN, len(low_m)))

@@ -253,7 +253,7 @@ function sphereView(canvas, scene) {
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
     paintThrough(box.faces, [0.75, 0.78, 0.8, 0.25], [gl.FRONT]);
-    for (const part of standing) paintThrough(part.faces, [0.55, 0.6, 0.66, 0.4], [gl.FRONT, gl.BACK]);
+    for (const part of standing) paintThrough(part.faces, scene.solid_tint, [gl.FRONT, gl.BACK]);
     gl.bindVertexArray(null);
   }
 

@@ -13,7 +13,7 @@ from sandmould.study.plan.load_study import OpenStudy, open_study
 
 
 def drawn_run(path: Path, name: str | None = None) -> tuple[OpenStudy, Run]:
-    """Open a study and choose a run of a scene of sand; no engine is asked for.
+    """Open a study and choose a run of a scene of sand; neither engine nor measures are asked for.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def drawn_run(path: Path, name: str | None = None) -> tuple[OpenStudy, Run]:
     if not isinstance(study.study.scenario, Scenario):
         valid = f"a study of kind sand: one of kind {study.study.kind} has no grains to draw"
         raise BadInputError([Problem("STUDY", study.name, valid)])
-    runs = {run.run: run for run in expand(study)}
+    runs = {run.run: run for run in expand(study, measured=False)}
     if name is None:
         return study, next(iter(runs.values()))
     if name not in runs:

@@ -20,9 +20,9 @@ from sandmould.study.definition.run import Part, Run
 from sandmould.study.definition.sweep import Point, points, value_at
 from sandmould.study.kinds.kind import AnyScenario
 from sandmould.study.kinds.registry import kind_named
-from sandmould.study.plan import measured
 from sandmould.study.plan.labels import Labels, letters
 from sandmould.study.plan.load_study import OpenStudy
+from sandmould.study.plan.measured import problems as measure_problems
 from sandmould.study.plan.trust import outside
 from sandmould.study.robustness.controls import Case, cases, swept_steps
 
@@ -45,6 +45,7 @@ def expand(
     study: OpenStudy,
     more: Sequence[tuple[Point, int]] = (),
     certified_hz: Sequence[float] = (),
+    measured: bool = True,
 ) -> list[Run]:
     """List the runs of a study.
 
@@ -55,6 +56,8 @@ def expand(
         Runs that its rounds have added.
     certified_hz : sequence of float, Hz
         Frequencies of its certificate, the best in the middle; none before that is known.
+    measured : bool, optional
+        Whether the runs must have the measures that the study asks for; not to draw them.
 
     Returns
     -------
@@ -84,7 +87,7 @@ def expand(
     seeds = range(1, certificate.replicates + 1)
     added += [(point, seeds) for point in controlled.values()]
     for point, replicates in (*swept, *added):
-        at_point = _AtPoint(study, base, point, labels)
+        at_point = _AtPoint(study, base, point, labels, measured)
         for problem in at_point.problems:
             problems[str(problem)] = problem
         if len(problems) >= MOST_PROBLEMS:
@@ -137,7 +140,10 @@ def scenes(study: OpenStudy) -> Iterator[AnyScenario]:
 class _AtPoint:
     """The scenario of one point of a sweep."""
 
-    def __init__(self, study: OpenStudy, base: Tree, point: Point, labels: Labels) -> None:
+    def __init__(
+        self, study: OpenStudy, base: Tree, point: Point, labels: Labels, measured: bool = True
+    ) -> None:
+        self.measured = measured
         self.study, self.base, self.point, self.labels = study, base, point, labels
         self.kind = kind_named(study.study.kind)
         self.origin = Origin(dict(study.origin.file), dict(study.origin.source))
@@ -170,7 +176,9 @@ class _AtPoint:
         planning = self.kind.planning
         misfits = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in planning.problems(scenario)]
         # What a scene can be measured by is told of one that can be computed.
-        return misfits or [*measured.problems(self.study.study, self.kind, scenario)]
+        if misfits or not self.measured:
+            return misfits
+        return [*measure_problems(self.study.study, self.kind, scenario)]
 
     def _at_changed_key(self, problem: Problem) -> Problem:
         """A misfit told at the key that the user has to change."""

@@ -254,6 +254,12 @@ def test_a_scene_is_drawn_and_nothing_starts(elsewhere: Path) -> None:
     }  # fmt: skip
 
 
+def test_a_scene_that_lacks_the_measure_asked_for_is_drawn_all_the_same(elsewhere: Path) -> None:
+    (elsewhere / "bare.yaml").write_text(f"{SMALL_TUBE}  obstacles: []\n")
+    assert sandmould("plan", "bare.yaml").exit_code == 1
+    assert sandmould("show", "bare.yaml").exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

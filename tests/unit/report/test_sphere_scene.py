@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import base64
+import json
 import zlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from sandmould.report.figures import dimensioned
+from sandmould.report.scene_page import draw_scene_file
 from sandmould.report.sphere_scene import MOST_TRIANGLES, SIDES, sharp_edges, sphere_scene
 from sandmould.scenario.scenario import Scenario
 from tests.hopper import DEEP, hopper_scene
@@ -96,3 +100,22 @@ def test_a_mesh_of_too_many_triangles_keeps_its_shape() -> None:
     exact = 4 / 3 * np.pi * 0.02**3
     # vertices move by a cell of the grid at most, a 64th of the width
     assert volume_m3(drawn, faces) == pytest.approx(exact, rel=3 / 32)
+
+
+def test_a_scene_before_anything_runs_shows_its_part_and_its_sizes_in_mm(tmp_path: Path) -> None:
+    plate = {"kind": "plate", "centre_m": [0.05, 0.025, 0.02], "size_m": [0.03, 0.02, 0.01]}
+    scenario = Scenario.model_validate(
+        {
+            "dimension": 3,
+            "obstacles": [plate],
+            "sand": {"size_scale": 16},
+            "fill": {"layers": [{"count": 30}]},
+        }
+    )
+    draw_scene_file(scenario, "A plate", "base", tmp_path / "scene.html")
+    page = (tmp_path / "scene.html").read_text()
+    told = page.partition('id="film-scene">')[2].partition("</script>")[0]
+    tint: Any = sphere_scene(scenario, 0.1)["solid_tint"]
+    assert json.loads(told)["solid_tint"][-1] > 0.7 > tint[-1]
+    (ax,) = dimensioned(scenario, None).axes
+    assert {"100 mm"} <= {text.get_text() for text in ax.texts}
