@@ -17,6 +17,7 @@ from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.definition.certificate import frequency_key
 from sandmould.study.definition.study import Study
+from sandmould.study.kinds.sand.narrow import narrow_spaces
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,7 @@ def sand_grounds(scenario: Scenario, study: Study, verdict: Verdict) -> tuple[Gr
             )
             grounds.append(Ground("Springs", text))
         grounds += _held(scenario)
+    grounds += [Ground("Narrow", text) for text in narrow_spaces(scenario).values()]
     scale = scenario.sand.size_scale
     if scale > 1.0:
         text = f"{scale:g} times as large as those of the real sand, to save time."

@@ -216,6 +216,8 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} "
         f"cores with report: {whole}, {prices.basis(runs)}"
     )
+    settings = [alike[0].scenario for alike in points.values() if alike[0].part != FILL]
+    lines += planning.settings_lines(settings)
     lines += [_note_line(told, len(points)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
@@ -250,8 +252,8 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     state_bytes = sum(kind_of(fill.scenario).planning.state_bytes(fill.scenario) for fill in fills)
     number = "1 fill" if len(fills) == 1 else f"{len(fills)} fills"
     return (
-        f"{sharing} runs share {number}, each computed and counted once: "
-        f"about {size_text(state_bytes)} of the disk"
+        f"The {sharing} runs start from {number} of the box. A fill is computed once and serves "
+        f"several runs; together they take about {size_text(state_bytes)} of the disk."
     )
 
 
