@@ -192,7 +192,8 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         scenario = alike[0].scenario
         work_a_run = own_work(alike[0])
         work += work_a_run * len(alike)
-        for note in planning.notes(scenario):
+        # a fill has nothing to tell that its runs have not
+        for note in () if alike[0].part == FILL else planning.notes(scenario):
             notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note))
         if len(rows) <= LISTED_POINTS:
             rows.append(
@@ -218,7 +219,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     )
     settings = [alike[0].scenario for alike in points.values() if alike[0].part != FILL]
     lines += planning.settings_lines(settings)
-    lines += [_note_line(told, len(points)) for told in notes.values()]
+    lines += [_note_line(told, len(settings)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 
