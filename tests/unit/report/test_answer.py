@@ -175,3 +175,20 @@ def test_few_runs_that_cannot_tell_ask_for_no_thousand_more(tmp_path: Path) -> N
     table = summary({25.0: (0.50, 0.62, 0.560), 50.0: (0.51, 0.61, 0.5595)})
     first = steps_of(tmp_path, table).steps[0]
     assert first.text.endswith("these few runs cannot show a difference.")
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [(KEY, "Add a frequency below 25 Hz"), ("acceleration_g", "Add an acceleration above 3 g")],
+)
+def test_the_end_of_a_sweep_is_told_with_its_article(key: str, said: str, tmp_path: Path) -> None:
+    values = {25.0: (0.6, 0.61, 0.62), 50.0: (0.3, 0.31, 0.33)}
+    table = summary(values)
+    if key != KEY:
+        table = table.rename(columns={KEY: key}).assign(**{key: [3.0] * 3 + [1.0] * 3})
+    verdict = compare_settings(table, [key], FILL)
+    study = SandStudy.model_validate({"sweep": {"keys": {KEY: [25, 50]}}, "replicates": 3})
+    named = study.model_copy(
+        update={"sweep": study.sweep.model_copy(update={"keys": {key: [1.0, 3.0]}})}
+    )
+    assert any(step.text.startswith(said) for step in setting_steps(named, verdict))
