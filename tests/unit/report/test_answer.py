@@ -10,7 +10,7 @@ import pytest
 
 from sandmould.report.answer import choices_of, choices_table, headline_of
 from sandmould.report.next_steps import NextSteps, next_steps, setting_steps
-from sandmould.report.sureness import certificate_ground, sand_grounds
+from sandmould.report.sureness import certificate_ground, sand_grounds, weak_ground
 from sandmould.runs.columns import CROSS_CHECK, OUTCOME_CODE, PART, RUN, SWEEP
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.verdict import Verdict, compare_settings
@@ -192,3 +192,14 @@ def test_the_end_of_a_sweep_is_told_with_its_article(key: str, said: str, tmp_pa
         update={"sweep": study.sweep.model_copy(update={"keys": {key: [1.0, 3.0]}})}
     )
     assert any(step.text.startswith(said) for step in setting_steps(named, verdict))
+
+
+def test_settings_below_one_g_are_named_beside_the_answer() -> None:
+    strong = scenario(50.0)
+    (stage,) = strong.vibration[:1]
+    weak = strong.model_copy(
+        update={"vibration": (stage.model_copy(update={"acceleration_g": 0.5}),)}
+    )
+    assert weak_ground({"1.5 g": strong}) == ()
+    (ground,) = weak_ground({"0.5 g": weak, "1.5 g": strong})
+    assert ground.text == "at 0.5 g the box never throws the sand: expect little there."
