@@ -139,7 +139,7 @@ def demo(
     ] = False,
     cores: Cores = None,
 ) -> None:
-    """Compute the demonstration: a tube at four frequencies, or at two accelerations (quick)."""
+    """Compute the demonstration: a coarse tube at a few settings."""
     from sandmould.study.run_study import run_study
 
     study = study_file("tube_quick" if quick else "tube_demo")

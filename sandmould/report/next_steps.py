@@ -118,7 +118,7 @@ def optimum_steps(
         end = optimum.at_end(key)
         if end:
             side = {"lowest": "below", "highest": "above"}.get(end, "on both sides of")
-            text = f"Add a {name_of(key)} {side} what was swept: the best may lie there."
+            text = f"Add {_a(name_of(key))} {side} what was swept: the best may lie there."
             steps.append(NextStep(text))
     low_high = {key: optimum.interval(key) for key in study.refine.interval}
     if any(high - low > study.refine.interval[k] for k, (low, high) in low_high.items()):
@@ -196,6 +196,11 @@ def _replicates(study: Study, verdict: Verdict) -> list[NextStep]:
     ]
 
 
+def _a(name: str) -> str:
+    """A name with its article."""
+    return f"an {name}" if name[0] in "aeio" else f"a {name}"
+
+
 def _undecided(open_: str, runs: int, more: int | None) -> str:
     """Say what to do with settings that a sensible number of runs does not tell apart."""
     if runs < MANY:
@@ -219,7 +224,7 @@ def _beyond(verdict: Verdict, study: Study) -> list[NextStep]:
         if mine in (min(numbers), max(numbers)):
             side = "below" if mine == min(numbers) else "above"
             text = (
-                f"Add a {name_of(key)} {side} {value_text(key, mine)} to the sweep: the best may "
+                f"Add {_a(name_of(key))} {side} {value_text(key, mine)} to the sweep: the best may "
                 "lie there."
             )
             steps.append(NextStep(text))

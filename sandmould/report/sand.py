@@ -257,6 +257,7 @@ def _shown_runs(
 ) -> list[_Shown]:
     """Runs that films are made of: those of the scene's dimension."""
     shown = []
+    words = _value_words(verdict)
     for role, run in roles.items():
         row = collected.summary[collected.summary[RUN] == run].iloc[0]
         setting = setting_text({key: row[key] for key in collected.keys})
@@ -269,7 +270,8 @@ def _shown_runs(
         with contextlib.suppress(BadInputError, OSError):
             own = cast(Scenario, read_run(folder / "scenario.yaml").scenario)
         if own.dimension == scenario.dimension:
-            shown.append(_Shown(folder, own, f"{role}: {setting}", reading))
+            label = f"{words.get(role, role)}: {setting}"
+            shown.append(_Shown(folder, own, label, reading))
     return shown
 
 

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
 
 from sandmould.report.robustness import RobustnessPages
 from sandmould.runs.columns import finished
-from sandmould.runs.formatting import name_of, number
+from sandmould.runs.formatting import listed, name_of, number
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.definition.certificate import frequency_key
 from sandmould.study.definition.study import Study
+from sandmould.study.kinds.sand.narrow import narrow_spaces
+from sandmould.study.kinds.sand.table_motion import throws_no_sand
 
 
 @dataclass(frozen=True)
@@ -126,11 +128,26 @@ def sand_grounds(scenario: Scenario, study: Study, verdict: Verdict) -> tuple[Gr
             )
             grounds.append(Ground("Springs", text))
         grounds += _held(scenario)
+    grounds += [Ground("Narrow", text) for text in narrow_spaces(scenario).values()]
     scale = scenario.sand.size_scale
     if scale > 1.0:
         text = f"{scale:g} times as large as those of the real sand, to save time."
         grounds.append(Ground("Grains", text))
     return tuple(grounds)
+
+
+def weak_ground(by_setting: Mapping[str, Scenario]) -> tuple[Ground, ...]:
+    """Say at which settings the box never throws the sand.
+
+    Parameters
+    ----------
+    by_setting : mapping of label to Scenario
+    """
+    weak = [label for label, scenario in by_setting.items() if throws_no_sand(scenario)]
+    if not weak:
+        return ()
+    text = f"at {listed(weak, most=8)} the box never throws the sand: expect little there."
+    return (Ground("Below 1 g", text),)
 
 
 def _held(scenario: Scenario) -> list[Ground]:

@@ -16,7 +16,7 @@ from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import SandPages, sand_pages
-from sandmould.report.sureness import sand_grounds
+from sandmould.report.sureness import sand_grounds, weak_ground
 from sandmould.report.time_series import curve_figures
 from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, TIME_STEP_S, finished
 from sandmould.runs.formatting import number
@@ -89,7 +89,10 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
         },
         _sand_figures(pages, filling, bending),
         pages.beside,
-        grounds=sand_grounds(scenario, study, verdict),
+        grounds=(
+            *sand_grounds(scenario, study, verdict),
+            *weak_ground(findings.by_setting),
+        ),
         warning=_softness(scenario, of_sweep.summary),
     )
 

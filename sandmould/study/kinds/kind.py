@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -42,6 +42,11 @@ def nothing_beside(scenario: Any) -> float:
 
 def no_notes(scenario: Any) -> Sequence[Note]:
     """Nothing to tell."""
+    return ()
+
+
+def no_lines(scenarios: Any) -> Sequence[str]:
+    """Nothing to list."""
     return ()
 
 
@@ -129,6 +134,8 @@ class Planning(Generic[ScenarioT]):
     """Wall time of a run that does not grow with its work."""
     notes: Callable[[ScenarioT], Sequence[Note]] = no_notes
     """What a user should know of a run before it starts, though it can be run."""
+    settings_lines: Callable[[Iterable[ScenarioT]], Sequence[str]] = no_lines
+    """What the settings of a study ask of a machine, as lines; of one scenario a setting."""
     speed: MachineSpeed[ScenarioT] | None = None
     """None where ``predicted_s`` is all that is known."""
     program: UserProgram[ScenarioT] | None = None

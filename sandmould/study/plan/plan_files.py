@@ -213,7 +213,8 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         scenario = alike[0].scenario
         work_a_run = own_work(alike[0])
         work += work_a_run * len(alike)
-        for note in planning.notes(scenario):
+        # a fill has nothing to tell that its runs have not
+        for note in () if alike[0].part == FILL else planning.notes(scenario):
             notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note))
         if len(rows) <= LISTED_POINTS:
             rows.append(
@@ -237,7 +238,9 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} "
         f"cores with report: {whole}, {prices.basis(runs)}"
     )
-    lines += [_note_line(told, len(points)) for told in notes.values()]
+    settings = [alike[0].scenario for alike in points.values() if alike[0].part != FILL]
+    lines += planning.settings_lines(settings)
+    lines += [_note_line(told, len(settings)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 
@@ -271,8 +274,8 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     state_bytes = sum(kind_of(fill.scenario).planning.state_bytes(fill.scenario) for fill in fills)
     number = "1 fill" if len(fills) == 1 else f"{len(fills)} fills"
     return (
-        f"{sharing} runs share {number}, each computed and counted once: "
-        f"about {size_text(state_bytes)} of the disk"
+        f"The {sharing} runs start from {number} of the box. A fill is computed once and serves "
+        f"several runs; together they take about {size_text(state_bytes)} of the disk."
     )
 
 

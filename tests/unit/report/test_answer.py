@@ -10,7 +10,7 @@ import pytest
 
 from sandmould.report.answer import choices_of, choices_table, headline_of
 from sandmould.report.next_steps import NextSteps, next_steps, setting_steps
-from sandmould.report.sureness import certificate_ground, sand_grounds
+from sandmould.report.sureness import certificate_ground, sand_grounds, weak_ground
 from sandmould.runs.columns import CROSS_CHECK, OUTCOME_CODE, PART, RUN, SWEEP
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.verdict import Verdict, compare_settings
@@ -177,3 +177,31 @@ def test_few_runs_that_cannot_tell_ask_for_no_thousand_more(tmp_path: Path) -> N
     table = summary({25.0: (0.50, 0.62, 0.560), 50.0: (0.51, 0.61, 0.5595)})
     first = steps_of(tmp_path, table).steps[0]
     assert first.text.endswith("these few runs cannot show a difference.")
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [(KEY, "Add a frequency below 25 Hz"), ("acceleration_g", "Add an acceleration above 3 g")],
+)
+def test_the_end_of_a_sweep_is_told_with_its_article(key: str, said: str, tmp_path: Path) -> None:
+    values = {25.0: (0.6, 0.61, 0.62), 50.0: (0.3, 0.31, 0.33)}
+    table = summary(values)
+    if key != KEY:
+        table = table.rename(columns={KEY: key}).assign(**{key: [3.0] * 3 + [1.0] * 3})
+    verdict = compare_settings(table, [key], FILL)
+    study = SandStudy.model_validate({"sweep": {"keys": {KEY: [25, 50]}}, "replicates": 3})
+    named = study.model_copy(
+        update={"sweep": study.sweep.model_copy(update={"keys": {key: [1.0, 3.0]}})}
+    )
+    assert any(step.text.startswith(said) for step in setting_steps(named, verdict))
+
+
+def test_settings_below_one_g_are_named_beside_the_answer() -> None:
+    strong = scenario(50.0)
+    (stage,) = strong.vibration[:1]
+    weak = strong.model_copy(
+        update={"vibration": (stage.model_copy(update={"acceleration_g": 0.5}),)}
+    )
+    assert weak_ground({"1.5 g": strong}) == ()
+    (ground,) = weak_ground({"0.5 g": weak, "1.5 g": strong})
+    assert ground.text == "at 0.5 g the box never throws the sand: expect little there."

@@ -113,7 +113,7 @@ def test_work_of_a_fill_is_counted_once(tmp_path: Path) -> None:
     text = plan_table([*plan.fills, *plan.runs], Prices(), 1)
     assert text.splitlines()[1].startswith("fill ")
     assert "4 runs, " in text
-    assert "4 runs share 2 fills, each computed and counted once" in text
+    assert "The 4 runs start from 2 fills of the box. A fill is computed once" in text
 
 
 def test_a_plan_writes_fills_beside_the_runs(tmp_path: Path) -> None:

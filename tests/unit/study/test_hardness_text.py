@@ -27,7 +27,7 @@ def test_soft_sand_is_told_with_its_figures() -> None:
     assert softness_warning(None) == ""
     assert hardness_text(hard).replace("\u202f", "") == (
         "kappa 682000 (bed), 195000 (walls), wave speed 164 m/s along a row of grains, c/(4 H) "
-        "11300 Hz; 51.3 Pa at the foot of 3.61 mm of sand"
+        "11300 Hz at the planned depth H of 3.61 mm; 51.3 Pa at the foot"
     )
     walls = ContactLaw(normal_stiffness_n_m=50.0)
     soft = bed_hardness(bed(3, contact=Contact(grain_wall=walls, springs_at_size_scale=None)))
@@ -47,7 +47,7 @@ def test_measured_overlaps_are_told_above_five_percent() -> None:
     )
 
 
-def test_the_plan_has_one_line_of_it_and_says_where_sand_is_soft(tmp_path: Path) -> None:
+def test_the_plan_says_what_is_hard_enough_and_where_sand_is_soft(tmp_path: Path) -> None:
     def lines(**sand: Any) -> list[str]:
         study = {
             "based_on": "tube", "scenario": {"engine": {"name": "reference"}, "sand": sand},
@@ -56,14 +56,22 @@ def test_the_plan_has_one_line_of_it_and_says_where_sand_is_soft(tmp_path: Path)
         path = tmp_path / "trial.yaml"
         path.write_text(yaml.safe_dump(study), encoding="utf-8")
         plan = plan_table(expand(open_study(path)), Prices(), 1).splitlines()
-        return [line for line in plan if line.startswith("Hardness: ")]
+        heads = ("Hardness of", "Soft sand: ", "Wave speed c: ")
+        return [line.replace("\u202f", "") for line in plan if line.startswith(heads)]
 
-    (hard,) = lines()
-    assert hard.startswith("Hardness: kappa 17")
-    assert "wave speed 128 m/s along a row of grains, c/(4 H) 341 Hz;" in hard
-    assert hard.endswith(" mm of sand.")
-    (soft,) = lines(disc_thickness_m=0.1)
-    assert "Soft sand: kappa of the bed is 398 and kappa of the walls is 114, where hard" in soft
+    bed_, walls, wave = lines()
+    assert bed_.startswith("Hardness of the bed: hard enough. kappa is 17")
+    assert bed_.endswith("from 1000 on it is good.")
+    assert walls.startswith("Hardness of the walls: hard enough. kappa is 4980;")
+    assert wave.startswith(
+        "Wave speed c: 128 m/s along a row of grains. A bed of the planned depth"
+    )
+    assert wave.endswith(" swings by itself at about 341 Hz: c/(4 H).")
+    soft = lines(disc_thickness_m=0.1)
+    assert soft[0].startswith("Hardness of the bed: too soft. kappa is 398;")
+    assert soft[2] == (
+        "Soft sand: Packing, density, angles and fills are not those of hard grains."
+    )
 
 
 @pytest.mark.parametrize("name", ["tube_demo", "tube_frequency", "tube_certified", "repose_paper",

@@ -5,15 +5,34 @@ from __future__ import annotations
 from sandmould.runs.formatting import listed, number
 from sandmould.scenario.hardness import DEEP_OVERLAP, LEAST_KAPPA, Hardness
 
+_NOT_HARD = "Packing, density, angles and fills are not those of hard grains."
+
 
 def hardness_text(hardness: Hardness) -> str:
     """Figures of a bed before it is filled, without an end stop."""
     return (
         f"kappa {_rounded(hardness.kappa_bed)} (bed), {_rounded(hardness.kappa_walls)} (walls), "
         f"wave speed {_rounded(hardness.wave_speed_m_s)} m/s along a row of grains, c/(4 H) "
-        f"{_rounded(hardness.column_hz)} Hz; {_rounded(hardness.pressure_pa)} Pa at the foot of "
-        f"{_rounded(1e3 * hardness.depth_m)} mm of sand"
+        f"{_rounded(hardness.column_hz)} Hz at the planned depth H of "
+        f"{_rounded(1e3 * hardness.depth_m)} mm; {_rounded(hardness.pressure_pa)} Pa at the foot"
     )
+
+
+def hardness_lines(hardness: Hardness) -> list[tuple[str, str]]:
+    """The same for the plan: heads and plain sentences, good or not first."""
+    said = []
+    for name, kappa in (("bed", hardness.kappa_bed), ("walls", hardness.kappa_walls)):
+        what = "too soft" if name in hardness.soft else "hard enough"
+        text = f"{what}. kappa is {_rounded(kappa)}; from {number(LEAST_KAPPA)} on it is good."
+        said.append((f"Hardness of the {name}", text))
+    if hardness.soft:
+        said.append(("Soft sand", _NOT_HARD))
+    text = (
+        f"{_rounded(hardness.wave_speed_m_s)} m/s along a row of grains. A bed of the planned "
+        f"depth H of {_rounded(1e3 * hardness.depth_m)} mm then swings by itself at about "
+        f"{_rounded(hardness.column_hz)} Hz: c/(4 H)."
+    )
+    return [*said, ("Wave speed c", text)]
 
 
 def softness_warning(hardness: Hardness | None, overlap_fraction: float = 0.0) -> str:
@@ -37,8 +56,7 @@ def softness_warning(hardness: Hardness | None, overlap_fraction: float = 0.0) -
         )
     if not why:
         return ""
-    of_what = "Packing, density, angles and fills are not those of hard grains."
-    return f"Soft sand: {listed(why)}. {of_what}"
+    return f"Soft sand: {listed(why)}. {_NOT_HARD}"
 
 
 def _rounded(value: float) -> str:

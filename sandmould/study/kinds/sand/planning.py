@@ -15,7 +15,7 @@ from sandmould.kernel_cache import are_compiled, cache_folder
 from sandmould.runs.formatting import number
 from sandmould.scenario import checks
 from sandmould.scenario.bad_input import Problem
-from sandmould.scenario.hardness import Hardness, bed_hardness
+from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.limits import FRAMES, RECORDS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.outline import Outline
@@ -26,8 +26,10 @@ from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawing_notes, with
 from sandmould.scenario.wall_thickness import thinnest_wall
 from sandmould.study.kinds.kind import MachineSpeed, Note, Planning, SpeedClass
 from sandmould.study.kinds.sand import speed
-from sandmould.study.kinds.sand.hardness_text import hardness_text, softness_warning
+from sandmould.study.kinds.sand.hardness_text import hardness_lines
 from sandmould.study.kinds.sand.measures import MEASURES
+from sandmould.study.kinds.sand.narrow import narrow_spaces
+from sandmould.study.kinds.sand.table_motion import frequency_rule, table_lines
 
 BASE_MEMORY_MB = 600
 STEPPED_COPIES = 8
@@ -231,7 +233,10 @@ def notes(scenario: Scenario) -> list[Note]:
     """How hard the bed is, obstacles thinner than a grain, and shells that were no cavities."""
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
     hardness = bed_hardness(scenario)
-    told = [_hardness_note(hardness)] if hardness else []
+    told = [Note(head, text, head) for head, text in hardness_lines(hardness)] if hardness else []
+    if rule := frequency_rule(scenario, hardness):
+        told.append(Note("frequency rule", rule, "Frequency"))
+    told += [Note(f"width of {name}", text) for name, text in narrow_spaces(scenario).items()]
     if registry.calls_our_kernels(scenario) and not are_compiled("dem", _kernel_folder()):
         text = (
             "Sandmould's own code is not compiled on this machine yet. The first start compiles "
@@ -295,11 +300,6 @@ def _pattern_notes(scenario: Scenario) -> list[Note]:
     return [Note(f"mesh of the pattern {n}", text) for n, text in enumerate(said)]
 
 
-def _hardness_note(hardness: Hardness) -> Note:
-    said = (f"{hardness_text(hardness)}.", softness_warning(hardness))
-    return Note("hardness", " ".join(filter(None, said)), "Hardness")
-
-
 PLANNING = Planning[Scenario](
     work_unit="grain-steps",
     resolved=resolved,
@@ -323,5 +323,6 @@ PLANNING = Planning[Scenario](
     state_bytes=state_bytes,
     beside_s=beside_s,
     notes=notes,
+    settings_lines=table_lines,
     speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
 )

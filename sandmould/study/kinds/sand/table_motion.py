@@ -1,0 +1,81 @@
+"""What the settings of a study ask of the vibrating table, for the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from sandmould.runs.formatting import number
+from sandmould.scenario.drive import BoxDrive, laid_down_drive
+from sandmould.scenario.hardness import Hardness
+from sandmould.scenario.scenario import Scenario
+
+LISTED_SETTINGS = 12
+LEAST_SHARE = 0.25
+"""Of c/(4 H): from this frequency on the tube of docs/frequency_law.md fills well."""
+_HEADS = ("frequency", "amplitude*", "velocity", "acceleration")
+
+
+def table_lines(scenarios: Iterable[Scenario]) -> list[str]:
+    """Frequency, amplitude, velocity and acceleration of each vibration, as lines of a table.
+
+    Parameters
+    ----------
+    scenarios : iterable of Scenario
+        One a setting.
+    """
+    every = list(scenarios)
+    stages = [stage for scenario in every for stage in scenario.vibrations]
+    rows = list(dict.fromkeys(_row(laid_down_drive(stage)) for stage in stages))
+    if not rows:
+        return []
+    shown = [_HEADS, *rows[:LISTED_SETTINGS]]
+    widths = [max(len(row[i]) for row in shown) for i in range(len(_HEADS))]
+    lines = ["What the settings ask of the table:"]
+    lines += [
+        "  " + "  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in shown
+    ]
+    if len(rows) > LISTED_SETTINGS:
+        lines.append(f"  and {len(rows) - LISTED_SETTINGS} more")
+    empty = ", without sand" if any(stage.unbalance is not None for stage in stages) else ""
+    lines.append(f"  * half of peak to peak{empty}")
+    if any(throws_no_sand(scenario) for scenario in every):
+        lines.append("  Below 1 g the box never throws the sand: expect little.")
+    return lines
+
+
+def throws_no_sand(scenario: Scenario) -> bool:
+    """Whether a box that is shaken up and down never leaves its sand: below 1 g.
+
+    A table with an unbalance counts without sand, which slows it further.
+    """
+    lift_g = [
+        laid_down_drive(stage).acceleration_g * abs(stage.unit_direction(scenario.dimension)[-1])
+        for stage in scenario.vibrations
+    ]
+    return bool(lift_g) and all(0.0 < g < 1.0 - 1e-9 for g in lift_g)  # round-off
+
+
+def _row(drive: BoxDrive) -> tuple[str, str, str, str]:
+    return (
+        f"{number(drive.frequency_hz)} Hz",
+        f"{number(1e3 * drive.displacement_m)} mm",
+        f"{number(1e3 * drive.velocity_m_s)} mm/s",
+        f"{number(drive.acceleration_g)} g",
+    )
+
+
+def frequency_rule(scenario: Scenario, hardness: Hardness | None) -> str:
+    """From which frequency on a bed that is shaken upright should fill a cavity well.
+
+    Empty for other scenes.
+    """
+    scene = scenario.scene
+    if hardness is None or not scenario.vibrations or not (scene.bores or scene.cavities):
+        return ""
+    if any(stage.unit_direction(scenario.dimension)[-1] < 1.0 for stage in scenario.vibrations):
+        return ""
+    from_hz = LEAST_SHARE * hardness.column_hz
+    return (
+        f"From about {number(from_hz, 2)} Hz on (0.25 c/(4 H)) expect good filling at this wave "
+        "speed. The rule comes from one tube in 2D: docs/frequency_law.md."
+    )
