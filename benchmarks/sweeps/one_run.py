@@ -7,10 +7,10 @@ Snakemake's start nor that of Python counts. It is run by its path, in the sourc
 from __future__ import annotations
 
 import json
-import sys
 import time
 from pathlib import Path
 
+from sandmould.scenario.module_main import run_main
 from sandmould.study.batch_job import compute_batch
 from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, prepare
 from sandmould.study.plan.lacking import lack_of
@@ -52,4 +52,4 @@ def _do(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    run_main(main, "python -m benchmarks.sweeps.one_run STUDY.yaml", (1,))

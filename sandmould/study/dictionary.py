@@ -51,7 +51,7 @@ def write_study_file(path: Path, text: str) -> None:
     """
     if path.is_file():
         before = path.read_text(encoding="utf-8", errors="replace")
-        if _same(before, text):
+        if _same(before, text, path.stem):
             return
         if not before.startswith(WRITTEN_LINE):
             valid = (
@@ -62,11 +62,11 @@ def write_study_file(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def _same(before: str, text: str) -> bool:
-    """Whether two texts hold the same study."""
+def _same(before: str, text: str, title: str) -> bool:
+    """Whether two texts hold the same study, one of them perhaps without its title."""
     try:
-        return bool(load_users(before) == load_users(text))
-    except (yaml.YAMLError, ValueError, RecursionError, BadInputError):
+        return bool({"title": title} | load_users(before) == load_users(text))
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError, BadInputError):
         return False
 
 

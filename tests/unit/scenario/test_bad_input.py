@@ -37,7 +37,7 @@ CASES: dict[str, tuple[str, str]] = {
     "unknown key": (
         "based_on: tube\nscenario: {box: {widht_m: 0.2}}",
         "trial.yaml: scenario.box.widht_m = 0.2 cannot be used: "
-        "valid is one of the keys depth_m, height_m, piston, width_m (did you mean width_m?).",
+        "valid is one of the keys depth_m, height_m, width_m (did you mean width_m?).",
     ),
     "negative size": (
         "based_on: tube\nscenario: {sand: {size_scale: -4}}",

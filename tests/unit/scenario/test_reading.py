@@ -105,7 +105,7 @@ def test_rule_of_a_section_is_told_at_the_section() -> None:
 
 
 def test_keys_of_a_path_are_known_from_the_types() -> None:
-    assert keys_at(Scenario, ["box"]) == ["depth_m", "height_m", "piston", "width_m"]
+    assert keys_at(Scenario, ["box"]) == ["depth_m", "height_m", "width_m"]
     assert "facets" in keys_at(Scenario, ["obstacles", "0"])
     assert keys_at(Scenario, ["seed"]) == []
     (thickness,) = fields_at(Scenario, "obstacles.0.wall_thickness_m")
