@@ -75,7 +75,7 @@ def headline_of(
         return f"Not resolved: there are results of {best.label} alone, nothing to compare.", False
     verb = "Shake at" if frequency_among(keys) and len(keys) == 1 else "Use"
     if verdict.resolved:
-        motion = _motion(drives.get(best.label))
+        motion = _motion(drives.get(best.label), keys)
         return f"{verb} {best.label}{motion}: there {_best_text(verdict)}.", True
     alike = _or([best.label, *(c.other for c in others if not c.separated)])
     worse = [c.other for c in others if c.separated]
@@ -131,7 +131,8 @@ def optimum_headline(
         at = value_text(key, float(f"{value:.3g}"))
         places.append(f"{name}{at} ({range_text(key, low, float(f'{high:.3g}'))})")
     verb = "Shake at" if frequency_among(optimum.keys) and len(optimum.keys) == 1 else "Use"
-    motion = _motion(_as_drive(drive_at(summary, optimum.keys, optimum.setting)))
+    drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
+    motion = _motion(drive, optimum.keys)
     if pages.sound:
         return f"{verb} {listed(places)}{motion}: there {_best_text(verdict)}.", True
     return (
@@ -141,12 +142,17 @@ def optimum_headline(
     )
 
 
-def _motion(drive: BoxDrive | None) -> str:
+def _motion(drive: BoxDrive | None, keys: Sequence[str]) -> str:
+    """How the box moves, but for what the swept keys say."""
+    said = {key.rpartition(".")[2] for key in keys}
     if drive is None:
         return ""
-    return (
-        f" with an amplitude of {number(1e3 * drive.displacement_m)} mm, half of peak to peak "
-        f"({number(drive.acceleration_g)} g)"
+    amplitude = (
+        f" with an amplitude of {number(1e3 * drive.displacement_m)} mm, half of peak to peak"
+    )
+    acceleration = f" ({number(drive.acceleration_g)} g)"
+    return (amplitude if "displacement_m" not in said else "") + (
+        acceleration if "acceleration_g" not in said else ""
     )
 
 

@@ -205,3 +205,11 @@ def test_settings_below_one_g_are_named_beside_the_answer() -> None:
     assert weak_ground({"1.5 g": strong}) == ()
     (ground,) = weak_ground({"0.5 g": weak, "1.5 g": strong})
     assert ground.text == "at 0.5 g the box never throws the sand: expect little there."
+
+
+def test_what_is_swept_is_not_said_twice() -> None:
+    verdict, drives = judged(summary(CLEAR))
+    of_acceleration, _ = headline_of(verdict, ["vibration.0.acceleration_g"], drives)
+    assert " with an amplitude of 0.150 mm, half of peak to peak: there" in of_acceleration
+    of_amplitude, _ = headline_of(verdict, ["vibration.0.displacement_m"], drives)
+    assert "Use 50 Hz (1.51 g): there" in of_amplitude
