@@ -250,7 +250,8 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
         That share the runs.
     measure : bool
         Whether the machine's speed is measured first where it is not known, which takes seconds
-        an engine. Without it no engine starts, and the price is an estimate there.
+        an engine. Without it no engine starts, and the price is an estimate there. A program of
+        the user's is never started: that is left to the start of its runs.
 
     Raises
     ------
@@ -262,7 +263,7 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
         write_owner(plan.study.path, folder)
         write_plan([*plan.fills, *plan.runs], folder)
         write_study(plan.study.study, folder)
-    if measure:
+    if measure and plan.kind.planning.program is None:
         measure_speeds(plan, results)
     title = plan.study.study.title or plan.study.name
     return f"\n{title}\n{price(plan, results, cores)}"

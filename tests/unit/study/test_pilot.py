@@ -8,7 +8,13 @@ from pathlib import Path
 import pytest
 
 from sandmould.study.kinds.deck import speed
-from sandmould.study.plan.build_plan import Plan, measure_speeds, open_plan, stored_speeds
+from sandmould.study.plan.build_plan import (
+    Plan,
+    announce,
+    measure_speeds,
+    open_plan,
+    stored_speeds,
+)
 from sandmould.study.plan.price import Prices
 
 LAMMPS = ("lammps", 0)
@@ -35,7 +41,7 @@ def test_a_short_deck_is_computed_whole_once(
     assert all(0.0 < core_s < 20.0 for core_s in ends_s)
     prices = Prices(stored_speeds(plan, tmp_path))
     assert prices.engine_s(plan.runs[0]) == pytest.approx(max(ends_s))
-    assert prices.basis(plan.runs) == "at the speed measured on this machine"
+    assert prices.basis(plan.runs) == "by a pilot run (results/pilots.json)"
     monkeypatch.setattr(speed, "pilot", lambda scenario: pytest.fail("a second pilot"))
     assert not measure_speeds(plan, tmp_path)
 
@@ -65,3 +71,21 @@ def test_a_deck_that_may_not_run_has_no_pilot(
     )
     monkeypatch.setattr(speed, "pilot", lambda scenario: pytest.fail("it ran"))
     assert not measure_speeds(open_plan(tmp_path / "own.yaml", tmp_path), tmp_path)
+
+
+@pytest.mark.parametrize("trusted", [False, True])
+def test_plan_starts_no_deck(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, trusted: bool
+) -> None:
+    monkeypatch.setattr(speed, "pilot", lambda scenario: pytest.fail("it ran"))
+    if trusted:
+        (tmp_path / "own.in.j2").write_text("run {{ number }}\n")
+        (tmp_path / "own.yaml").write_text(
+            "kind: deck\ntrust_deck: true\nscenario: {template: own.in.j2, values: {number: 3}}\n"
+        )
+        plan = open_plan(tmp_path / "own.yaml", tmp_path)
+    else:
+        plan = short(tmp_path, 2000)
+    said = announce(plan, tmp_path, 1, measure=True)
+    assert ", by expected_core_s, an estimate\n" in said
+    assert not (tmp_path / speed.STORED).exists()
