@@ -69,7 +69,10 @@ class MachineSpeed(Generic[ScenarioT]):
     stored: Callable[[ScenarioT, Path], float | None]
     """As measured before; None where it was not. Starts nothing."""
     measured: Callable[[ScenarioT, Path], float | None]
-    """As measured before, or measured now and stored; None where the engine cannot run."""
+    """As measured before, or measured now and stored; None where nothing could be measured.
+
+    A program of the user's that stops with an error is a BadInputError.
+    """
     basis: str = "at the speed measured on this machine"
     """What a price rests on that was reckoned with it."""
 
