@@ -28,9 +28,6 @@ onstart:
     # busy with it. Jobs on this machine need no such limit.
     if workflow.local_exec:
         workflow.scheduler.job_rate_limiter = None
-    # Not where the plan is made: a dry run starts no engine.
-    if workflow.is_main_process and measure_speeds(PLAN, RESULTS):
-        say(price(PLAN, RESULTS, CORES))
 
 
 onerror:

@@ -66,6 +66,9 @@ try:
             say(f"{said}\n")
         for said in SUBMISSION.said:
             say(said)
+        # A dry run starts no engine, and nothing is measured for runs that are all there.
+        if starts_jobs(sys.argv) and LACKING and measure_speeds(PLAN, RESULTS):
+            say(price(PLAN, RESULTS, CORES))
 except BadInputError as error:
     say(str(error))
     sys.exit(BAD_INPUT_EXIT)

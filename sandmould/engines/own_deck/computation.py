@@ -23,7 +23,7 @@ from sandmould.engines.own_deck.deck import (
     names_used,
     render,
 )
-from sandmould.engines.own_deck.thermo import STEP, read_thermo
+from sandmould.engines.own_deck.thermo import STEP, Thermo, read_thermo
 from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -103,8 +103,8 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         missing = missing_columns(scenario, [str(column) for column in thermo.table])
         if is_root:
             keep_found(study_folder, key, run, missing)
-        if missing:
-            outcome, detail = Outcome.BAD_INPUT, missing
+        if said := missing or _wrong_end(scenario, thermo, bool(restart)):
+            outcome, detail = Outcome.BAD_INPUT, said
     cost.version = str(engine_module(scenario.engine.name).installed_version())
     cost.grains = thermo.grains
     cost.steps, cost.grain_steps, cost.engine_wall_s = (
@@ -116,6 +116,23 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     last_s = float(thermo.table[CLOCK].iloc[-1]) if CLOCK in thermo.table else 0.0
     detail = "; ".join([detail, *notes] if detail else notes)
     return Computed(RunOutcome(outcome, detail, last_s, last_s), cost, is_root)
+
+
+def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
+    """Say that a deck did not end at the step that the study states; empty where it did.
+
+    A deck may count its steps anew on the way: unless it went on from a restart file, those of
+    all its runs together may be the stated ones instead.
+    """
+    if scenario.steps is None or thermo.table.empty:
+        return ""
+    last = int(thermo.table[STEP].iloc[-1])
+    if last == scenario.steps or (not went_on and thermo.steps == scenario.steps):
+        return ""
+    said = f"the deck ended at step {last}, not at steps = {scenario.steps}"
+    if went_on:
+        return f"{said}: after a restart write run {scenario.steps} upto"
+    return f"{said}: state the steps that the deck runs, or none"
 
 
 def write_series(scenario: OwnDeck, work: Path) -> None:

@@ -69,7 +69,12 @@ class MachineSpeed(Generic[ScenarioT]):
     stored: Callable[[ScenarioT, Path], float | None]
     """As measured before; None where it was not. Starts nothing."""
     measured: Callable[[ScenarioT, Path], float | None]
-    """As measured before, or measured now and stored; None where the engine cannot run."""
+    """As measured before, or measured now and stored; None where nothing could be measured.
+
+    A program of the user's that stops with an error is a BadInputError.
+    """
+    basis: str = "at the speed measured on this machine"
+    """What a price rests on that was reckoned with it."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +141,8 @@ class Planning(Generic[ScenarioT]):
     """What a user should know of a run before it starts, though it can be run."""
     settings_lines: Callable[[Iterable[ScenarioT]], Sequence[str]] = no_lines
     """What the settings of a study ask of a machine, as lines; of one scenario a setting."""
+    guess: str = "an estimate"
+    """What a price by ``predicted_s`` rests on."""
     speed: MachineSpeed[ScenarioT] | None = None
     """None where ``predicted_s`` is all that is known."""
     program: UserProgram[ScenarioT] | None = None

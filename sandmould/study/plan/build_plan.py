@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import SHIPPED
+from sandmould.runs.words import say
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.definition.certificate import provisional_hz
 from sandmould.study.definition.comparing import ENGINE
@@ -250,7 +251,8 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
         That share the runs.
     measure : bool
         Whether the machine's speed is measured first where it is not known, which takes seconds
-        an engine. Without it no engine starts, and the price is an estimate there.
+        an engine. Without it no engine starts, and the price is an estimate there. A program of
+        the user's is never started: that is left to the start of its runs.
 
     Raises
     ------
@@ -262,7 +264,7 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
         write_owner(plan.study.path, folder)
         write_plan([*plan.fills, *plan.runs], folder)
         write_study(plan.study.study, folder)
-    if measure:
+    if measure and plan.kind.planning.program is None:
         measure_speeds(plan, results)
     title = plan.study.study.title or plan.study.name
     return f"\n{title}\n{price(plan, results, cores)}"
@@ -341,6 +343,12 @@ def measure_speeds(plan: Plan, results: Path) -> bool:
     -------
     bool
         Whether anything was measured, so that the plan has another price.
+
+    Raises
+    ------
+    BadInputError
+        Where the user's program fails at each point that was tried, as all runs then would. A
+        point that fails alone is a run that fails: it is said, and the others are computed.
     """
     speed = plan.kind.planning.speed
     if speed is None or not may_run(plan.study, plan.runs):
@@ -355,8 +363,22 @@ def measure_speeds(plan: Plan, results: Path) -> bool:
             "to 2 min where code is compiled first.",
             file=sys.stderr, flush=True,
         )  # fmt: skip
-    found = False
+    found, failures = False, dict[str, Problem]()
+    runs_somewhere = False
+    tried: list[AnyScenario] = []
     for scenario in chain.from_iterable(plan.classes.values()):
-        if speed.stored(scenario, results) is None:
-            found |= speed.measured(scenario, results) is not None
+        if scenario in tried:
+            continue
+        tried.append(scenario)
+        try:
+            is_stored = speed.stored(scenario, results) is not None
+            is_measured = speed.measured(scenario, results) is not None
+            found |= is_measured and not is_stored
+            runs_somewhere = True
+        except BadInputError as error:
+            failures |= {str(problem): problem for problem in error.problems}
+    if failures and not runs_somewhere:
+        raise BadInputError(list(failures.values())[:1])
+    for said in failures:
+        say(said)
     return found

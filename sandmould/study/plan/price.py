@@ -48,11 +48,13 @@ class Prices:
 
     def basis(self, runs: Iterable[Run]) -> str:
         """What the price of some runs rests on."""
+        runs = list(runs)
         classes = {_class_of(run) for run in runs}
         if classes <= set(self.ratios):
             return "by finished runs"
         known = {*self.ratios, *self.rate_per_s}
-        return "at the speed measured on this machine" if classes <= known else "an estimate"
+        planning = kind_of(runs[0].scenario).planning
+        return planning.speed.basis if planning.speed and classes <= known else planning.guess
 
 
 def foretold_s(run: Run, rate_per_s: Mapping[SpeedClass, float]) -> float:

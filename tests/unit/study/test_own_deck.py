@@ -12,6 +12,7 @@ import yaml
 from sandmould.engines.own_deck.deck import check_unchanged, render, with_hashes
 from sandmould.engines.own_deck.thermo import read_thermo
 from sandmould.report.page import write_report
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import collect
@@ -247,3 +248,51 @@ def test_at_a_time_of_vibration_nothing_is_measured(tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(tree))
     with pytest.raises(BadInputError, match=r"objective\.at_vibration_s = 1\.0"):
         expand(open_study(path))
+
+
+ONE_GRAIN = """\
+units si
+{% if restart %}
+read_restart {{ restart }}
+{% else %}
+atom_style sphere
+region box block 0 1 0 1 0 1
+create_box 1 box
+create_atoms 1 single 0.5 0.5 0.5
+{% endif %}
+pair_style zero 0.1
+pair_coeff * *
+variable speed equal vcm(all,x)
+thermo_style custom step time v_speed
+restart 10 {{ restart_files }}
+run {{ number }} {{ 'upto' if angle_deg > 10 else '' }}
+"""
+
+
+def test_a_deck_that_goes_on_too_far_has_failed(tmp_path: Path) -> None:
+    runs = expand(open_study(opened(tmp_path, ONE_GRAIN, steps=100)))
+    for run in (runs[0], runs[-1]):
+        folder = tmp_path / "runs" / run.run
+        ended = deck_execution.compute(run, folder).outcome
+        assert (ended.outcome, ended.detail) == (Outcome.FINISHED, "")
+        # restart.b holds step 100: what is left to do is nothing, or 100 steps for `run 100`
+        ended = deck_execution.compute(run, folder).outcome
+        if run is runs[-1]:
+            assert ended.outcome is Outcome.FINISHED
+        else:
+            assert ended.outcome is Outcome.BAD_INPUT
+            assert ended.detail == (
+                "the deck ended at step 200, not at steps = 100: after a restart write run 100 upto"
+            )
+
+
+def test_a_deck_that_ends_elsewhere_has_failed(tmp_path: Path) -> None:
+    anew = ONE_GRAIN + "reset_timestep 0\nrun 50\n"
+    for text, steps, said in (
+        (ONE_GRAIN, 90, "the deck ended at step 100, not at steps = 90: state the steps that the "
+         "deck runs, or none"),
+        (anew, 150, ""),
+    ):  # fmt: skip
+        run = expand(open_study(opened(tmp_path, text, steps=steps)))[-1]
+        folder = tmp_path / f"of_{steps}" / "runs" / run.run
+        assert deck_execution.compute(run, folder).outcome.detail == said

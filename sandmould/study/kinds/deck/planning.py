@@ -145,6 +145,9 @@ PLANNING = Planning[OwnDeck](
     planned_s=planned_s,
     speed_class=speed_class,
     plan_cells=plan_cells,
-    speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
+    guess="by expected_core_s, an estimate",
+    speed=MachineSpeed(
+        speed.stored_rate, speed.measured_rate, f"by a pilot run (results/{speed.STORED})"
+    ),
     program=UserProgram[OwnDeck](shipped=DECKS, files=files, foreign=foreign, to_read=to_read),
 )

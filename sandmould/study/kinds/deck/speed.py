@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import math
 import platform
+import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 import time
 from pathlib import Path
 
@@ -17,10 +19,13 @@ from sandmould.engines.own_deck import deck as own_deck
 from sandmould.engines.registry import engine_module
 from sandmould.runs.files import write_text
 from sandmould.runs.parent import end_with_parent
+from sandmould.scenario.bad_input import BadInputError, Problem, display_path
 from sandmould.scenario.module_main import run_main
 from sandmould.scenario.own_deck import OwnDeck
 
 STORED = "pilots.json"
+FAILED_LOG = "pilot_failed.log"
+"""Log of the last pilot that failed, in the folder of all results."""
 PILOT_S = 12.0
 """A shorter run is computed whole; of a longer one its steps are counted."""
 _LOOK_EVERY_S = 0.2
@@ -45,11 +50,16 @@ def measured_rate(scenario: OwnDeck, results: Path) -> float | None:
     Returns
     -------
     float or None
-        None where the deck states no ``steps`` and did not end in time, or could not run.
+        None where the deck states no ``steps`` and did not end in time.
+
+    Raises
+    ------
+    BadInputError
+        With what the engine said, where the pilot failed.
     """
     if (rate := stored_rate(scenario, results)) is not None:
         return rate
-    core_s = pilot(scenario)
+    core_s = pilot(scenario, results)
     if core_s is None:
         return None
     results.mkdir(parents=True, exist_ok=True)
@@ -57,18 +67,25 @@ def measured_rate(scenario: OwnDeck, results: Path) -> float | None:
     return scenario.expected_core_s / core_s
 
 
-def pilot(scenario: OwnDeck, pilot_s: float = PILOT_S) -> float | None:
+def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float | None:
     """Compute the deck for some seconds in a folder of its own; processor time of a whole run.
 
     Parameters
     ----------
     scenario : OwnDeck
         One of several ranks has no pilot.
+    results : Path
+        Folder of all results, which keeps the log of a pilot that failed.
     pilot_s : float, s
 
     Returns
     -------
     float or None
+
+    Raises
+    ------
+    BadInputError
+        Where the deck stopped with an error.
     """
     if scenario.engine.ranks > 1:
         return None
@@ -82,10 +99,29 @@ def pilot(scenario: OwnDeck, pilot_s: float = PILOT_S) -> float | None:
                 stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=end_with_parent,
             )  # fmt: skip
         try:
-            return _watched(process, folder, pilot_s)
+            core_s = _watched(process, folder, pilot_s)
+            if process.returncode is not None and not (folder / "whole.json").exists():
+                raise BadInputError([_failure(scenario, folder, process.returncode, results)])
+            return core_s
         finally:
             process.kill()
             process.wait()
+
+
+def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Problem:
+    """Say why a pilot failed, and keep its log."""
+    why = folder / "why.txt"
+    said = why.read_text(encoding="utf-8") if why.exists() else f"its process ended with {status}"
+    logs = [path for path in (folder / "work" / "engine_1.log", folder / "log") if path.exists()]
+    kept = results / FAILED_LOG
+    results.mkdir(parents=True, exist_ok=True)
+    shutil.copy(logs[0], kept)
+    values = textwrap.shorten(json.dumps(scenario.values, ensure_ascii=False), 120)
+    return Problem(
+        "scenario.template", scenario.template, "a deck that runs",
+        sentence=f"{Path(scenario.template).name} with the values {values} stopped in a short "
+        f"pilot run. {said.rstrip('. ')}. Its log: {display_path(kept)}",
+    )  # fmt: skip
 
 
 def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> float | None:
@@ -131,6 +167,8 @@ def main(name: str) -> int:
     computed = computation.compute(scenario, folder, "pilot", "pilot")
     if computed.outcome.outcome == 0:
         write_text(folder / "whole.json", json.dumps(computed.cost.wall_s))
+    else:
+        write_text(folder / "why.txt", computed.outcome.detail or computed.outcome.outcome.label)
     return 0
 
 
