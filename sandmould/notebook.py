@@ -31,10 +31,10 @@ from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, read_collected
 from sandmould.study.dictionary import study_text, write_study_file
-from sandmould.study.plan.build_plan import RESULTS, open_plan, stored_speeds
+from sandmould.study.plan.build_plan import RESULTS, known_prices, open_plan
 from sandmould.study.plan.handover import checked_plan
 from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run
-from sandmould.study.plan.price import Prices, study_s
+from sandmould.study.plan.price import study_s
 
 AXES = ("x", "z"), ("x", "y", "z")
 """Names of the coordinates in 2D and in 3D; z is up."""
@@ -276,7 +276,7 @@ def plan(
     path, text = _file_and_text(study, name, place)
     with _within(place):
         opened = open_plan(path, text=text)
-        prices = Prices(stored_speeds(opened, RESULTS))
+        prices = known_prices(opened, RESULTS)
     runs = [*opened.fills, *opened.runs]
     table = pd.DataFrame(plan_rows(runs, prices))
     pieces = [prices.piece(each) for each in runs]

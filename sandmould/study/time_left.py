@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
 from collections.abc import Collection, Iterable, Mapping
-from pathlib import Path
 
-from sandmould.runs.columns import WALL_S
-from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
 from sandmould.study.plan.price import END_S, Piece, Prices, ratios_of, spread_s
-
-_DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
 
 
 class TimeLeft:
@@ -79,13 +72,3 @@ class TimeLeft:
     def _rest(self, run: str, share: float) -> Piece:
         whole = self.prices.piece(self._runs[run])
         return Piece((1.0 - min(share, 1.0)) * whole.wall_s, whole.threads)
-
-
-def computed_wall_s(folder: Path) -> float:
-    """Wall time that a finished run's computation took; NaN where it failed or none is written."""
-    from sandmould.study.run_tables import read_costs  # pandas: no start waits for it
-
-    with contextlib.suppress(*_DAMAGED):
-        if RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED:
-            return float(read_costs([folder]).rows[WALL_S].iloc[-1])
-    return math.nan

@@ -59,6 +59,9 @@ def no_fill(scenario: Any) -> None:
     """Nothing that runs could share."""
 
 
+CORE_SECONDS = "core-seconds"
+
+
 @dataclass(frozen=True)
 class MachineSpeed(Generic[ScenarioT]):
     """How fast a core of this machine is; of kinds whose engines differ from machine to machine.
@@ -96,7 +99,7 @@ class Planning(Generic[ScenarioT]):
     """What a kind says of a run before it starts. Functions take its scenario."""
 
     work_unit: str
-    """Unit of ``planned_work``."""
+    """Unit of ``planned_work``; ``CORE_SECONDS`` where work is time and is priced as such."""
     resolved: Callable[[ScenarioT], ScenarioT]
     """The scenario with the hashes of the files that it names."""
     problems: Callable[[ScenarioT], list[Problem]]

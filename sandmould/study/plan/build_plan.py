@@ -29,7 +29,7 @@ from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import later_line, plan_table, write_plan, write_study
-from sandmould.study.plan.price import Prices
+from sandmould.study.plan.price import Prices, computed_wall_s, ratios_of
 from sandmould.study.plan.trust import may_run
 from sandmould.study.rounds.round_log import read_rounds
 
@@ -316,10 +316,23 @@ def writing(folder: Path) -> Iterator[None]:
 
 def price(plan: Plan, results: Path, cores: int) -> str:
     """Say what the runs will take, as far as the machine's speed is known at what was measured."""
-    prices = Prices(stored_speeds(plan, results))
+    prices = known_prices(plan, results)
     return plan_table([*plan.fills, *plan.runs], prices, cores) + later_line(
         plan.later, prices, cores
     )
+
+
+def known_prices(plan: Plan, results: Path) -> Prices:
+    """What runs take, as far as it is known here; starts nothing.
+
+    The plan knows nothing of a program of the user's: its finished runs count, where there are any.
+    """
+    rates = stored_speeds(plan, results)
+    if plan.kind.planning.program is None:
+        return Prices(rates)
+    folder = results / plan.study.name
+    taken = [(run, computed_wall_s(folder / run.place)) for run in plan.runs]
+    return Prices(rates, ratios_of([(run, s) for run, s in taken if s > 0.0], rates))
 
 
 def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:

@@ -21,7 +21,6 @@ from sandmould.study.definition.run import FILL, Part, Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import Note
 from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
-from sandmould.study.plan.fills import own_work
 from sandmould.study.plan.price import Prices, study_s
 
 STUDY_FILE = "study.yaml"
@@ -150,7 +149,7 @@ def plan_rows(runs: Sequence[Run], prices: Prices) -> list[dict[str, Any]]:
         {
             "run": run.run, **{key: run.parameters.get(key) for key in keys},
             "replicate": run.replicate, "seed": run.seed, "part": run.part,
-            work: own_work(run), "wall_time_s": prices.engine_s(run),
+            work: prices.work(run), "wall_time_s": prices.engine_s(run),
         }
         for run in runs
     ]  # fmt: skip
@@ -211,7 +210,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     work = 0.0
     for alike in points.values():
         scenario = alike[0].scenario
-        work_a_run = own_work(alike[0])
+        work_a_run = prices.work(alike[0])
         work += work_a_run * len(alike)
         # a fill has nothing to tell that its runs have not
         for note in () if alike[0].part == FILL else planning.notes(scenario):
@@ -259,7 +258,7 @@ def later_line(later: Sequence[Run], prices: Prices, cores: int) -> str:
     runs = [run for run in later if run.part != FILL]
     of_springs = sum(SPRINGS in run.part for run in runs)
     springs = f", {of_springs} of them with other springs" if of_springs else ""
-    work = sum(own_work(run) for run in later)
+    work = sum(prices.work(run) for run in later)
     unit = kind_of(runs[0].scenario).planning.work_unit
     whole = duration_text(study_s([prices.piece(run) for run in later], cores))
     return (

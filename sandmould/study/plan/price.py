@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import heapq
+import math
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from sandmould.runs.columns import WALL_S
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.kind import CORE_SECONDS, SpeedClass
 from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.fills import own_work, predicted_s
 
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
 BEGIN_S = 5.0
 """What Snakemake takes to read its rules, and the study to be planned."""
 END_S = 8.0
@@ -39,6 +45,13 @@ class Prices:
     def engine_s(self, run: Run) -> float:
         """Wall time of a run's computation alone."""
         return self.ratios.get(_class_of(run), 1.0) * foretold_s(run, self.rate_per_s)
+
+    def work(self, run: Run) -> float:
+        """Work that a run does itself: time is what it is foretold to be, not what was guessed."""
+        planning = kind_of(run.scenario).planning
+        if planning.work_unit != CORE_SECONDS:
+            return own_work(run)
+        return self.engine_s(run) * planning.threads(run.scenario)
 
     def piece(self, run: Run) -> Piece:
         """A run with its process, its deck and its measures."""
@@ -104,3 +117,13 @@ def study_s(pieces: Sequence[Piece], cores: int) -> float:
 
 def _class_of(run: Run) -> SpeedClass:
     return kind_of(run.scenario).planning.speed_class(run.scenario)
+
+
+def computed_wall_s(folder: Path) -> float:
+    """Wall time that a finished run's computation took; NaN where it failed or none is written."""
+    from sandmould.study.run_tables import read_costs  # pandas: no start waits for it
+
+    with contextlib.suppress(*_DAMAGED):
+        if RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED:
+            return float(read_costs([folder]).rows[WALL_S].iloc[-1])
+    return math.nan

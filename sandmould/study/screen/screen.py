@@ -15,10 +15,11 @@ from rich.live import Live
 from sandmould.runs.progress import duration_text
 from sandmould.runs.words import Words
 from sandmould.study.plan.build_plan import Plan, stored_speeds
+from sandmould.study.plan.price import computed_wall_s
 from sandmould.study.screen.run_watch import Ended, Running, RunWatch, failure, file_time_s
 from sandmould.study.screen.table import counts_text, study_table, times_text
 from sandmould.study.screen.view import RunView, StudyView
-from sandmould.study.time_left import TimeLeft, computed_wall_s
+from sandmould.study.time_left import TimeLeft
 
 if TYPE_CHECKING:
     from sandmould.study.screen.so_far import SoFar

@@ -185,7 +185,9 @@ def test_the_plan_is_read_back_and_priced(tmp_path: Path) -> None:
     assert isinstance(back.scenario, OwnDeck)
     lines = plan_table(runs, Prices({("lammps", 0): 3.0}), 2).splitlines()
     assert lines[1].endswith(" 10 s")
-    assert lines[-1].startswith("4 runs, 120 core-seconds, wall time on 2 cores with report: ")
+    # what is used: 30 at three a second, not the 30 that the user expects
+    assert lines[1].split()[-3:] == ["10", "10", "s"]
+    assert lines[-1].startswith("4 runs, 40 core-seconds, wall time on 2 cores with report: ")
 
 
 def test_a_log_is_read_past_warnings(tmp_path: Path) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
 
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.kinds.deck import speed
+from sandmould.study.plan import build_plan
 from sandmould.study.plan.build_plan import (
     Plan,
     announce,
@@ -123,3 +125,16 @@ def test_a_point_that_fails_alone_is_told_and_keeps_nothing_from_running(
 ) -> None:
     assert measure_speeds(failing(tmp_path, "[8, 32]"), tmp_path / "results")
     assert "Unknown command: nonsense here" in capsys.readouterr().err
+
+
+def test_finished_runs_price_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = short(tmp_path, 2000)
+    ended = tmp_path / plan.study.name / plan.runs[0].place
+    monkeypatch.setattr(
+        build_plan, "computed_wall_s", lambda folder: 240.0 if folder == ended else math.nan
+    )
+    prices = build_plan.known_prices(plan, tmp_path)
+    assert prices.basis(plan.runs) == "by finished runs"
+    other = plan.runs[-1]
+    assert prices.engine_s(other) == prices.work(other) == pytest.approx(240.0)
+    assert f"{len(plan.runs) * 240} core-seconds" in announce(plan, tmp_path, 1).replace(",", "")

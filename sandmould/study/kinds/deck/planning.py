@@ -14,7 +14,7 @@ from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.kinds.deck import speed
 from sandmould.study.kinds.deck.measures import MEASURES
-from sandmould.study.kinds.kind import MachineSpeed, Planning, SpeedClass, UserProgram
+from sandmould.study.kinds.kind import CORE_SECONDS, MachineSpeed, Planning, SpeedClass, UserProgram
 
 DECKS = SHIPPED / "config" / "decks"
 """Decks that come with us."""
@@ -127,7 +127,7 @@ def to_read(scenarios: Sequence[OwnDeck]) -> list[str]:
 
 
 PLANNING = Planning[OwnDeck](
-    work_unit="core-seconds",
+    work_unit=CORE_SECONDS,
     resolved=own_deck.with_hashes,
     problems=own_deck.problems,
     engine_problem=engine_problem,
