@@ -72,6 +72,8 @@ def test_a_study_is_computed_and_read(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     result = sandmould.run(STUDY, name="little", cores=2)
+    # a study without a title does not ask what the one that it rests on asks
+    assert yaml.safe_load(Path("little.yaml").read_text(encoding="utf-8"))["title"] == "little"
     assert "little: 2 of 2 runs done" in capsys.readouterr().out
     assert result.verdict.startswith("Not resolved")
     assert undescribed(result.folder) == []
@@ -109,8 +111,7 @@ def test_what_is_no_study_is_told_before_anything_starts(
         sandmould.run("tube_dem")
     with pytest.raises(BadInputError, match=r"replicates = 0"):
         sandmould.run(STUDY | {"replicates": 0}, name="wrong")
-    # a study without a title does not ask what the one that it rests on asks
-    assert yaml.safe_load(Path("wrong.yaml").read_text(encoding="utf-8"))["title"] == "wrong"
+    assert not Path("wrong.yaml").exists()
     assert not Path("results").exists()
 
 

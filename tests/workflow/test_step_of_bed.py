@@ -157,4 +157,4 @@ def test_the_plan_counts_the_planned_step_and_says_so(
     Path("plain.yaml").write_text(yaml.safe_dump(without))
     plain = open_plan(Path("plain.yaml"))
     assert [own_work(run) for run in plain.runs] == [own_work(run) for run in plan.runs]
-    assert "planned" not in plan_table([*plain.fills, *plain.runs], Prices(), 1)
+    assert " s planned" not in plan_table([*plain.fills, *plain.runs], Prices(), 1)
