@@ -1,7 +1,7 @@
 """Which properties of the shaking the fill goes with, over all curves of the law at once.
 
-A curve is told from the other curves alone: were the fill a function of some groups, curves of
-other springs, depths and holds would tell it.
+A curve is predicted from the other curves alone: were the fill a function of some groups, curves of
+other springs, depths and holds would predict it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ EXPLANATIONS: dict[str, tuple[str, ...]] = {
         "in_modes",
     ),
     "how fast it lands": ("velocity_m_s",),
-    "sag of the bed under its weight, g H²/(2 c²), over the amplitude": ("sag_over_stroke",),
+    "sag of the bed under its weight, g H²/(2 c²), over the amplitude": ("sag_over_amplitude",),
     "strain of a landing, velocity over c, and 2 H/c in periods": ("strain", "in_modes"),
     "velocity over that of a fall through the bed, sqrt(g H), and 2 H/c in periods": (
         "over_fall",
@@ -57,10 +57,10 @@ NEAR = 1.3
 
 @dataclass(frozen=True)
 class Collapse:
-    """How well some groups alone tell the fill of a curve that they were not fitted to."""
+    """How well some groups alone predict the fill of a curve that they were not fitted to."""
 
     groups: tuple[str, ...]
-    miss: float
+    error: float
     """Root mean square over all settings."""
 
 
@@ -69,20 +69,20 @@ class HeldOut:
     """What the law says of a study that it was not fitted to."""
 
     settings: pd.DataFrame
-    """With ``told``, the law's fill."""
+    """With ``predicted``, the law's fill."""
 
     @property
     def shift(self) -> float:
-        """Mean of measured less told."""
-        return float((self.settings["fill"] - self.settings["told"]).mean())
+        """Mean of measured less predicted."""
+        return float((self.settings["fill"] - self.settings["predicted"]).mean())
 
     @property
-    def miss(self) -> float:
-        """Root mean square of measured less told, without the shift."""
-        return float((self.settings["fill"] - self.settings["told"]).std(ddof=0))
+    def error(self) -> float:
+        """Root mean square of measured less predicted, without the shift."""
+        return float((self.settings["fill"] - self.settings["predicted"]).std(ddof=0))
 
     def best_in_modes(self, column: str) -> float:
-        """F over c/(4 H) where ``fill`` or ``told`` is largest."""
+        """F over c/(4 H) where ``fill`` or ``predicted`` is largest."""
         return float(self.settings["in_modes"].iloc[int(self.settings[column].argmax())])
 
 
@@ -103,12 +103,12 @@ def settings_of(series: Sequence[Series]) -> pd.DataFrame:
     for curve, one in enumerate(series):
         fills, depth_m, speed_m_s = one.fills, one.depth_m, one.wave_speed_m_s
         gravity_m_s2 = one.scenario.gravity_m_s2
-        velocity_m_s, stroke_m = one.drives["velocity_m_s"], one.drives["displacement_m"]
+        velocity_m_s, amplitude_m = one.drives["velocity_m_s"], one.drives["displacement_m"]
         rows.append(
             one.drives.assign(
                 strain=velocity_m_s / speed_m_s,
                 over_fall=velocity_m_s / math.sqrt(gravity_m_s2 * depth_m),
-                sag_over_stroke=gravity_m_s2 * depth_m**2 / (2 * speed_m_s**2) / stroke_m,
+                sag_over_amplitude=gravity_m_s2 * depth_m**2 / (2 * speed_m_s**2) / amplitude_m,
                 curve=curve,
                 study=one.study,
                 label=one.label,
@@ -124,30 +124,30 @@ def settings_of(series: Sequence[Series]) -> pd.DataFrame:
 def collapses(settings: pd.DataFrame, names: Sequence[str] = tuple(GROUPS)) -> list[Collapse]:
     """Each of these groups and each pair of them: singles first, then best first."""
     found = [
-        Collapse(groups, miss_of(settings, groups))
+        Collapse(groups, error_of(settings, groups))
         for number in (1, 2)
         for groups in itertools.combinations(names, number)
     ]
-    return sorted(found, key=lambda collapse: (len(collapse.groups), collapse.miss))
+    return sorted(found, key=lambda collapse: (len(collapse.groups), collapse.error))
 
 
-def miss_of(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> float:
-    """Root mean square of what other curves tell less what was measured."""
-    return float(np.sqrt(np.mean((told_by_others(settings, groups) - settings["fill"]) ** 2)))
+def error_of(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> float:
+    """Root mean square of what other curves predict less what was measured."""
+    return float(np.sqrt(np.mean((predicted_by_others(settings, groups) - settings["fill"]) ** 2)))
 
 
-def told_by_others(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> Array:
-    """Fill of each setting as all other curves tell it, (n,) float64."""
-    told = np.empty(len(settings))
+def predicted_by_others(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> Array:
+    """Fill of each setting as all other curves predict it, (n,) float64."""
+    predicted = np.empty(len(settings))
     for curve in settings["curve"].unique():
         left_out = (settings["curve"] == curve).to_numpy()
-        told[left_out] = FillLaw(settings[~left_out], groups).at(settings[left_out])
-    return told
+        predicted[left_out] = FillLaw(settings[~left_out], groups).at(settings[left_out])
+    return predicted
 
 
 def held_out(settings: pd.DataFrame, others: pd.DataFrame) -> HeldOut:
     """Ask the law of ``settings`` for those of another study."""
-    return HeldOut(others.assign(told=FillLaw(settings).at(others)))
+    return HeldOut(others.assign(predicted=FillLaw(settings).at(others)))
 
 
 class FillLaw:
@@ -182,8 +182,8 @@ class FillLaw:
     def at(self, settings: pd.DataFrame) -> Array:
         """Fill at settings, (n,) float64."""
         points = np.log(settings[self._groups].to_numpy(dtype=np.float64))
-        told: Array = self._process.predict((points - self._low) / self._span)
-        return told
+        predicted: Array = self._process.predict((points - self._low) / self._span)
+        return predicted
 
 
 def shaken_range(settings: pd.DataFrame, velocity_m_s: float) -> tuple[float, float]:

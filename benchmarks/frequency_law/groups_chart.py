@@ -11,11 +11,11 @@ from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from benchmarks.frequency_law.groups import FillLaw, shaken_range, told_by_others
+from benchmarks.frequency_law.groups import FillLaw, predicted_by_others, shaken_range
 
 
 def draw(settings: pd.DataFrame, velocities_m_s: Sequence[float], path: Path) -> None:
-    """Fill over f/(c/4H) at some velocities, and fill as told by other curves over fill.
+    """Fill over f/(c/4H) at some velocities, and fill as predicted by other curves over fill.
 
     Parameters
     ----------
@@ -36,24 +36,26 @@ def draw(settings: pd.DataFrame, velocities_m_s: Sequence[float], path: Path) ->
     )
     for velocity in velocities_m_s:
         at = np.geomspace(*shaken_range(settings, velocity), 100)
-        told = law.at(pd.DataFrame({"velocity_m_s": velocity, "in_modes": at}))
-        left.plot(at, told, color=colours(norm(velocity)), lw=1.5)
-        left.annotate(f"{1e3 * velocity:g} mm/s", (at[-1], told[-1]), fontsize=8)
+        predicted = law.at(pd.DataFrame({"velocity_m_s": velocity, "in_modes": at}))
+        left.plot(at, predicted, color=colours(norm(velocity)), lw=1.5)
+        left.annotate(f"{1e3 * velocity:g} mm/s", (at[-1], predicted[-1]), fontsize=8)
     left.set(
         xscale="log", xlabel="frequency over c/(4 H)", ylabel="fill of the tube",
         title="all settings, and the law at three velocities",
     )  # fmt: skip
     figure.colorbar(dots, ax=left, label="peak velocity of the box, m/s")
-    told = told_by_others(settings)
+    predicted = predicted_by_others(settings)
     for (study, label), mine in settings.groupby(["study", "label"], sort=False):
         name = f"{str(study).removeprefix('tube_law_')}, {label}"
         right.errorbar(
-            told[mine.index], mine["fill"], yerr=mine["se"], fmt="o", ms=4, lw=1, label=name
+            predicted[mine.index], mine["fill"], yerr=mine["se"], fmt="o", ms=4, lw=1, label=name
         )
     ends = [settings["fill"].min(), settings["fill"].max()]
     right.plot(ends, ends, color="0.5", lw=1)
     right.set(
-        xlabel="fill as the other curves tell it", ylabel="fill of the tube", title="curve by curve"
+        xlabel="fill as predicted from the other curves",
+        ylabel="fill of the tube",
+        title="curve by curve",
     )
     right.legend(fontsize=7)
     for ax in (left, right):

@@ -25,8 +25,8 @@ COLLAPSED = ("tube_law_springs", "tube_law_depth", "tube_law_hold")
 """Studies of one tube and one sand, which differ in springs, depth and what is held."""
 HELD_OUT = ("tube_frequency", "tube_frequency_stroke")
 """Studies of the same tube with finer grains: the law is asked for them, not fitted to them."""
-TOLD_M_S = (0.02, 0.04, 0.08)
-TOLD_IN_MODES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
+PREDICTED_M_S = (0.02, 0.04, 0.08)
+PREDICTED_IN_MODES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 """Where the page tabulates the law."""
 POWERS: dict[str, tuple[str, str, Callable[[Series], float]]] = {
     "tube_law_springs": ("wave speed c", "1", lambda series: series.wave_speed_m_s),
@@ -54,7 +54,7 @@ def page(records: Path = RECORDS, picture: Path | None = None) -> str:
             chart.draw(studies, picture)
         if law:
             groups_chart.draw(
-                law["settings"], TOLD_M_S, picture.with_stem(f"{picture.stem}_groups")
+                law["settings"], PREDICTED_M_S, picture.with_stem(f"{picture.stem}_groups")
             )
     values = {
         "studies": studies,
@@ -93,9 +93,9 @@ def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     asked = pd.DataFrame(
         [
             (velocity, in_modes)
-            for velocity in TOLD_M_S
+            for velocity in PREDICTED_M_S
             for low, high in [groups.shaken_range(settings, velocity)]
-            for in_modes in TOLD_IN_MODES
+            for in_modes in PREDICTED_IN_MODES
             if low <= in_modes <= high
         ],
         columns=list(groups.LAW),
@@ -104,14 +104,14 @@ def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     return {
         "settings": settings,
         "at_rest": len(every) - len(settings),
-        "miss_with_all": groups.miss_of(every),
+        "error_with_all": groups.error_of(every),
         "names": groups.GROUPS,
         "collapses": groups.collapses(settings),
         "explanations": {
-            what: groups.miss_of(settings, needed) for what, needed in groups.EXPLANATIONS.items()
+            what: groups.error_of(settings, needed) for what, needed in groups.EXPLANATIONS.items()
         },
-        "told_in_modes": TOLD_IN_MODES,
-        "told": {
+        "predicted_in_modes": PREDICTED_IN_MODES,
+        "predicted": {
             v: dict(zip(mine["in_modes"], mine["fill"], strict=True))
             for v, mine in asked.groupby("velocity_m_s")
         },

@@ -110,17 +110,17 @@ def test_the_planted_pair_of_groups_collapses_the_curves(
     settings = planted_settings(law)
     pairs = [found for found in collapses(settings, ASKED) if len(found.groups) == 2]
     assert pairs[0].groups == groups
-    assert pairs[0].miss < 0.5 * pairs[1].miss
+    assert pairs[0].error < 0.5 * pairs[1].error
     # The whole is the same for a curve that the law was not fitted to, but for a shift.
     others = settings[settings["curve"] == 0].assign(fill=lambda rows: rows["fill"] + 0.05)
     asked = held_out(settings, others)
     if groups == LAW:
         assert asked.shift == pytest.approx(0.05, abs=0.01)
-        assert asked.best_in_modes("told") == asked.best_in_modes("fill")
+        assert asked.best_in_modes("predicted") == asked.best_in_modes("fill")
 
 
 def test_a_single_group_is_best_where_the_fill_goes_with_it_alone() -> None:
     settings = planted_settings(lambda hz, v, mode: 0.5 + 0.1 * np.log(hz))
     best = collapses(settings, ("velocity_m_s", "frequency_hz"))[0]
     assert best.groups == ("frequency_hz",)
-    assert best.miss < 0.1 * settings["fill"].std()
+    assert best.error < 0.1 * settings["fill"].std()
