@@ -16,17 +16,26 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from sandmould import ROOT
 from sandmould.digest import digest
-from sandmould.runs.columns import ENGINE, OUTCOME, RUN, VERSION, finished
+from sandmould.runs.columns import (
+    ENGINE,
+    OUTCOME,
+    RUN,
+    VERSION,
+    VIBRATION_TIME_S,
+    during_vibration,
+    finished,
+)
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.module_main import run_main
-from sandmould.study.collect import read_summary
+from sandmould.study.collect import read_collected, read_summary
 from sandmould.study.definition.run import Run
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.registry import kind_of
@@ -39,6 +48,9 @@ from sandmould.study.plan.plan_files import CHECKS, FIGURES
 from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
 
 COPIED = ("runs.tsv", "summary.tsv")
+OVER_TIME = "over_time.tsv"
+TIMES = 8
+"""Moments of the vibration, equally far apart, at which a record keeps what the study judges."""
 DEFAULTS = 3
 """Which set of defaults records are computed with; a record without the number has the first. The
 second: rest is decided by checks of its own, sand rests after vibration before it is measured, and
@@ -122,6 +134,10 @@ def record(path: Path, results: Path) -> Path:
     target.mkdir(parents=True, exist_ok=True)
     for name in names:
         shutil.copy(folder / name, target / name)
+    measure = study.study.objective.measure
+    courses = over_time(read_collected(folder).curves, measure)
+    if not courses.empty:
+        courses.to_csv(target / OVER_TIME, sep="\t", index=False, float_format="%.5g")
     shutil.rmtree(target / FIGURES, ignore_errors=True)
     if (folder / FIGURES).exists():
         # without the mark that Snakemake leaves in folders
@@ -130,6 +146,32 @@ def record(path: Path, results: Path) -> Path:
         )
     (target / "record.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     return target
+
+
+def over_time(curves: pd.DataFrame, measure: str) -> pd.DataFrame:
+    """What a study judges at ``TIMES`` moments of the vibration of each run.
+
+    Parameters
+    ----------
+    curves : DataFrame
+        One row a snapshot.
+    measure : str
+
+    Returns
+    -------
+    DataFrame
+        ``RUN``, ``VIBRATION_TIME_S`` and the measure at the snapshots next to those moments; no row
+        where nothing vibrates.
+    """
+    kept = []
+    if VIBRATION_TIME_S in curves and measure in curves:
+        for _, course in during_vibration(curves).groupby(RUN, sort=False):
+            times_s = course[VIBRATION_TIME_S].to_numpy()
+            moments_s = times_s.max() * np.arange(1, TIMES + 1) / TIMES
+            nearest = np.abs(times_s - moments_s[:, None]).argmin(axis=1)
+            kept.append(course.iloc[np.unique(nearest)])
+    columns = [RUN, VIBRATION_TIME_S, measure]
+    return pd.concat(kept)[columns] if kept else pd.DataFrame(columns=columns)
 
 
 def _engines(summary: pd.DataFrame) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import zipfile
 from pathlib import Path
 
@@ -197,6 +198,7 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
         (folder / "runs" / run.run).mkdir(exist_ok=True)
         (folder / "runs" / run.run / "outcome.json").touch()
     pd.DataFrame(rows).to_csv(folder / "summary.tsv", sep="\t", index=False)
+    (folder / "curves.tsv").write_text("run\ttime_s\n")
     for name in ("runs.tsv", "agreement.tsv", "report.html"):
         (folder / name).write_text("")
     (folder / "figures").mkdir()
@@ -217,6 +219,23 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
     record["margins"]["solid_fraction"] = 0.5
     (kept / "record.json").write_text(json.dumps(record))
     assert records.stale_records() == [("engine_twins", "its margins were set after the runs")]
+
+
+def test_a_record_keeps_the_fill_at_eight_moments_of_each_runs_vibration() -> None:
+    times_s = [math.nan, *np.linspace(0, 2, 41), 2.0]
+    one = pd.DataFrame({
+        "vibration_time_s": times_s, "stage": ["settle_1", *["vibrate_1"] * 41, "vibrate_1_rest"],
+        "tube_fill_fraction": np.arange(43.0), "other": 0.0,
+    })  # fmt: skip
+    # A run that was stopped has its own moments.
+    curves = pd.concat([one.assign(run="whole"), one.iloc[:22].assign(run="stopped")])
+    kept = records.over_time(curves, "tube_fill_fraction")
+    assert list(kept.columns) == ["run", "vibration_time_s", "tube_fill_fraction"]
+    whole = kept[kept.run == "whole"]
+    assert list(whole.vibration_time_s) == pytest.approx(list(np.arange(1, 9) / 4))
+    assert list(whole.tube_fill_fraction) == [6, 11, 16, 21, 26, 31, 36, 41]
+    assert kept[kept.run == "stopped"].vibration_time_s.max() == pytest.approx(1.0)
+    assert records.over_time(curves.drop(columns="vibration_time_s"), "other").empty
 
 
 def test_a_record_counts_the_work_of_any_kind() -> None:
