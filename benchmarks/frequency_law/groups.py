@@ -18,7 +18,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from benchmarks.frequency_law.series import Series
+from benchmarks.frequency_law.series import FillCurve
 
 Array = NDArray[np.float64]
 GROUPS = {
@@ -47,7 +47,8 @@ EXPLANATIONS: dict[str, tuple[str, ...]] = {
 """What may move the sand, and the groups that the fill would go with then."""
 LAW = ("velocity_m_s", "in_modes")
 """The pair that the page's last part is about."""
-
+ASKED_OVER_TIME = (LAW, ("velocity_m_s",), ("in_modes",), ("acceleration_g", "velocity_m_s"))
+"""The pair, each of the two alone, and all that is known of the motion without the sand's c."""
 
 THROWN_G = 1.0
 """Below it the box never throws the sand, so nothing of the law can hold."""
@@ -86,12 +87,12 @@ class HeldOut:
         return float(self.settings["in_modes"].iloc[int(self.settings[column].argmax())])
 
 
-def settings_of(series: Sequence[Series]) -> pd.DataFrame:
+def settings_of(series: Sequence[FillCurve]) -> pd.DataFrame:
     """One row a setting.
 
     Parameters
     ----------
-    series : sequence of Series
+    series : sequence of FillCurve
 
     Returns
     -------
@@ -121,6 +122,11 @@ def settings_of(series: Sequence[Series]) -> pd.DataFrame:
     return pd.concat(rows, ignore_index=True)
 
 
+def thrown(settings: pd.DataFrame) -> pd.DataFrame:
+    """Settings whose box throws the sand."""
+    return settings[settings["acceleration_g"] > THROWN_G].reset_index(drop=True)
+
+
 def collapses(settings: pd.DataFrame, names: Sequence[str] = tuple(GROUPS)) -> list[Collapse]:
     """Each of these groups and each pair of them: singles first, then best first."""
     found = [
@@ -146,8 +152,30 @@ def predicted_by_others(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> 
 
 
 def held_out(settings: pd.DataFrame, others: pd.DataFrame) -> HeldOut:
-    """Ask the law of ``settings`` for those of another study."""
-    return HeldOut(others.assign(predicted=FillLaw(settings).at(others)))
+    """Ask the law of ``settings`` for those of another curve, where its box throws the sand."""
+    asked = thrown(others)
+    return HeldOut(asked.assign(predicted=FillLaw(settings).at(asked)))
+
+
+@dataclass(frozen=True)
+class AtTime:
+    """What the fill goes with after some of the vibration."""
+
+    time_s: float
+    fill: float
+    """Mean over all settings."""
+    spread: float
+    """Standard deviation over all settings."""
+    errors: tuple[float, ...]
+    """Of each of ``ASKED_OVER_TIME``."""
+
+
+def at_time(curves: Sequence[FillCurve], time_s: float) -> AtTime:
+    """Ask the groups of ``ASKED_OVER_TIME`` for the fill after ``time_s``, s."""
+    settings = thrown(settings_of(curves))
+    fill = settings["fill"]
+    errors = tuple(error_of(settings, names) for names in ASKED_OVER_TIME)
+    return AtTime(time_s, float(fill.mean()), float(fill.std()), errors)
 
 
 class FillLaw:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import pandas as pd
 
 from benchmarks.frame import render
 from benchmarks.frequency_law import chart, groups, groups_chart
+from benchmarks.frequency_law.controls import RecordedCurves
 from benchmarks.frequency_law.series import FREQUENCY, Power, Series, power_of, series_of
 from sandmould import ROOT
 from sandmould.runs.formatting import number, seconds
@@ -23,8 +24,14 @@ from sandmould.study.records import RECORDS
 STUDIES = ("tube_law_springs", "tube_law_depth", "tube_law_hold", "tube_law_width")
 COLLAPSED = ("tube_law_springs", "tube_law_depth", "tube_law_hold")
 """Studies of one tube and one sand, which differ in springs, depth and what is held."""
-HELD_OUT = ("tube_frequency", "tube_frequency_stroke")
-"""Studies of the same tube with finer grains: the law is asked for them, not fitted to them."""
+HELD_OUT = {
+    "tube_frequency": "grains two thirds as wide",
+    "tube_frequency_stroke": "grains two thirds as wide, amplitude held",
+    "tube_thickness_certified": "discs 10 mm thick instead of 3.42 mm",
+}
+"""Studies of the same tube that the law is asked for, not fitted to; what is special in them."""
+FEWEST_CURVES = 3
+"""Of a study that is asked at several times: a curve is predicted from the others."""
 PREDICTED_M_S = (0.02, 0.04, 0.08)
 PREDICTED_IN_MODES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 """Where the page tabulates the law."""
@@ -44,11 +51,16 @@ def page(records: Path = RECORDS, picture: Path | None = None) -> str:
     """Write the page from the records that are there, and its picture where it is given a place."""
     there = {
         name: _study(records / name)
-        for name in (*STUDIES, *HELD_OUT)
+        for name in STUDIES
         if (records / name / "record.json").is_file()
     }
-    studies = [there[name] for name in STUDIES if name in there]
-    law = _law(there) if all(name in there for name in COLLAPSED) else None
+    others = [
+        RecordedCurves(records / name)
+        for name in HELD_OUT
+        if (records / name / "record.json").is_file()
+    ]
+    law = _law(there, others) if all(name in there for name in COLLAPSED) else None
+    studies = list(there.values())
     if picture is not None:
         if studies:
             chart.draw(studies, picture)
@@ -86,9 +98,9 @@ def _study(folder: Path) -> dict[str, Any]:
     }
 
 
-def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+def _law(there: Mapping[str, dict[str, Any]], others: Sequence[RecordedCurves]) -> dict[str, Any]:
     every = groups.settings_of([s for name in COLLAPSED for s in there[name]["series"]])
-    settings = every[every["acceleration_g"] > groups.THROWN_G].reset_index(drop=True)
+    settings = groups.thrown(every)
     law = groups.FillLaw(settings)
     asked = pd.DataFrame(
         [
@@ -115,11 +127,16 @@ def _law(there: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
             v: dict(zip(mine["in_modes"], mine["fill"], strict=True))
             for v, mine in asked.groupby("velocity_m_s")
         },
-        "held_out": {
-            name: groups.held_out(settings, groups.settings_of(there[name]["series"]))
-            for name in HELD_OUT
-            if name in there
-        },
+        "held_out": [
+            (HELD_OUT[study.name], curve, groups.held_out(settings, groups.settings_of([curve])))
+            for study in others
+            for curve in study.curves
+        ],
+        "over_time": [
+            (study.name, [groups.at_time(study.at(time_s), time_s) for time_s in study.times_s])
+            for study in others
+            if study.times_s and len(study.curves) >= FEWEST_CURVES
+        ],
     }
 
 

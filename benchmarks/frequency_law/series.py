@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -43,8 +43,8 @@ class Rise:
 
 
 @dataclass(frozen=True)
-class Series:
-    """One curve over frequency."""
+class FillCurve:
+    """Fill of one scene over frequency."""
 
     study: str
     label: str
@@ -53,8 +53,6 @@ class Series:
     fillings: int
     depth_m: float
     """Of the bed at rest, mean over its runs."""
-    limbs: CurveLimbs
-    optimum: Optimum
     fills: pd.DataFrame
     """A row a filling, a column a frequency in rising order; NaN where a run failed."""
     drives: pd.DataFrame
@@ -88,6 +86,14 @@ class Series:
     def column_hz(self) -> float:
         """First mode of a column of rows as deep as the bed, c/(4 H)."""
         return column_mode_hz(self.wave_speed_m_s, self.depth_m)
+
+
+@dataclass(frozen=True)
+class Series(FillCurve):
+    """A curve, and where it has its optimum."""
+
+    limbs: CurveLimbs
+    optimum: Optimum
 
     @property
     def best_hz(self) -> float:
@@ -134,26 +140,42 @@ def series_of(
     found = []
     for seed, (value, scenario) in enumerate(scenarios.items()):
         mine = summary if other is None else summary[summary[other] == value]
-        used = mine.loc[usable_values(mine, MEASURE).dropna().index]
-        values = used[MEASURE].to_numpy(dtype=np.float64)
-        hz = used[FREQUENCY].to_numpy(dtype=np.float64)
+        used = _usable(mine)
+        curve = fill_curve(
+            study, "" if other is None else setting_text({other: value}), mine, scenario
+        )
         found.append(
             Series(
-                study,
-                "" if other is None else setting_text({other: value}),
-                scenario,
-                int(used.groupby(FREQUENCY).size().median()),
-                float(used[BED_HEIGHT].mean()),
-                find_limbs(hz, np.asarray(number_blocks(used)), values),
-                # Draws of two curves must not share their random numbers.
-                find_optimum(used, [FREQUENCY], MEASURE, "larger", seed),
-                pd.DataFrame({"hz": hz, "filling": number_blocks(used), "fill": values}).pivot(
-                    index="filling", columns="hz", values="fill"
+                **{field.name: getattr(curve, field.name) for field in fields(curve)},
+                limbs=find_limbs(
+                    used[FREQUENCY].to_numpy(dtype=np.float64),
+                    np.asarray(number_blocks(used)),
+                    used[MEASURE].to_numpy(dtype=np.float64),
                 ),
-                used.groupby(FREQUENCY)[list(DRIVE)].mean().rename(columns=DRIVE),
+                # Draws of two curves must not share their random numbers.
+                optimum=find_optimum(used, [FREQUENCY], MEASURE, "larger", seed),
             )
         )
     return found
+
+
+def fill_curve(study: str, label: str, summary: pd.DataFrame, scenario: Scenario) -> FillCurve:
+    """The curve of the runs of one scene, one row a run."""
+    used = _usable(summary)
+    filling = used.assign(filling=number_blocks(used))
+    return FillCurve(
+        study,
+        label,
+        scenario,
+        int(used.groupby(FREQUENCY).size().median()),
+        float(used[BED_HEIGHT].mean()),
+        filling.pivot(index="filling", columns=FREQUENCY, values=MEASURE),
+        used.groupby(FREQUENCY)[list(DRIVE)].mean().rename(columns=DRIVE),
+    )
+
+
+def _usable(summary: pd.DataFrame) -> pd.DataFrame:
+    return summary.loc[usable_values(summary, MEASURE).dropna().index]
 
 
 @dataclass(frozen=True)

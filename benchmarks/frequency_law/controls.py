@@ -1,0 +1,68 @@
+"""Curves that a certificate computed: other springs, and each amplitude held."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.frequency_law.series import FREQUENCY, MEASURE, FillCurve, fill_curve
+from sandmould import ROOT
+from sandmould.runs.columns import CONTROL, PART, RUN, SWEEP, VIBRATION_TIME_S
+from sandmould.statistics.control_case import SPRINGS
+from sandmould.study.collect import read_summary
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.records import OVER_TIME, runs_in
+
+OF_SPRINGS = f"{CONTROL}{SPRINGS} "
+FEWEST = 5
+"""Frequencies of a curve that the law is asked for."""
+
+
+class RecordedCurves:
+    """The curves of a recorded study: of its sweep, and of the control of the springs.
+
+    Parameters
+    ----------
+    folder : Path
+        Of its record.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
+        study = open_study(ROOT / record["study"])
+        self.name = folder.name
+        self._scenarios = {run.run: run.scenario for run in runs_in(study, folder)}
+        runs = read_summary(folder)
+        is_curve = (runs[PART] == SWEEP) | runs[PART].str.startswith(OF_SPRINGS)
+        self._runs = runs[is_curve]
+        kept = folder / OVER_TIME
+        self._over_time = pd.read_csv(kept, sep="\t") if kept.is_file() else None
+
+    @property
+    def curves(self) -> list[FillCurve]:
+        """One of the sweep, one of each case of the control, at the end of the vibration."""
+        return list(self._curves(self._runs))
+
+    @property
+    def times_s(self) -> list[float]:
+        """Times of vibration at which the record has the fill; none in an older record."""
+        if self._over_time is None:
+            return []
+        return sorted(set(self._over_time[VIBRATION_TIME_S].round(3)))
+
+    def at(self, time_s: float) -> list[FillCurve]:
+        """The same curves after some of the vibration, s."""
+        assert self._over_time is not None
+        mine = self._over_time[self._over_time[VIBRATION_TIME_S].round(3) == time_s]
+        fills = mine.set_index(RUN)[MEASURE]
+        return list(self._curves(self._runs.assign(**{MEASURE: self._runs[RUN].map(fills)})))
+
+    def _curves(self, runs: pd.DataFrame) -> Iterator[FillCurve]:
+        for part, mine in runs.groupby(PART, sort=False):
+            if mine[FREQUENCY].nunique() >= FEWEST:
+                label = "" if part == SWEEP else str(part).removeprefix(CONTROL)
+                scenario = self._scenarios[mine[RUN].iloc[0]]
+                yield fill_curve(self.name, label, mine, scenario)
