@@ -45,10 +45,8 @@ def outside(target: str, page: str) -> str | None:
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Put an entry for each result below their list."""
-    config.nav = [
-        {"Results": [RESULTS, *_results()]} if entry == {"Results": RESULTS} else entry
-        for entry in config.nav or []
-    ]
+    results = {"Results": [{"All results": RESULTS}, *_results()]}
+    config.nav = [results if e == {"Results": RESULTS} else e for e in config.nav or []]
     return config
 
 
