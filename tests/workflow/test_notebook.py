@@ -89,7 +89,11 @@ def test_a_study_is_computed_and_read(
     result = sandmould.run(STUDY, name="little", cores=2)
     # a study without a title does not ask what the one that it rests on asks
     assert yaml.safe_load(Path("little.yaml").read_text(encoding="utf-8"))["title"] == "little"
-    assert "little: 2 of 2 runs done" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "little: 2 of 2 runs done" in said
+    # This folder is new, so the machine's speed is measured; the plan is told once all the same.
+    assert said.count("Measuring the speed of this machine") == 1
+    assert said.count("wall time on 2 cores with report") == 1
     assert result.verdict.startswith("Not resolved")
     assert undescribed(result.folder) == []
     assert sorted(result.summary[FREQUENCY]) == [50, 75]
