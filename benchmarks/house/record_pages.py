@@ -127,14 +127,19 @@ def pages(records: Path = RECORDS) -> list[RecordPage]:
     return [RecordPage(path.parent) for path in sorted(records.glob("*/record.json"))]
 
 
-def index_text(records: list[RecordPage]) -> str:
-    """The list of all, by theme."""
+def by_theme(records: list[RecordPage]) -> dict[str, list[RecordPage]]:
+    """Results under their headings; a heading without results is left out."""
     themes = {
         theme: [page for page in records if page.name.startswith(begins)]
         for theme, begins in THEMES.items()
     }
     others = [page for page in records if not any(page in of for of in themes.values())]
-    return _template("record_list.md.j2").render(themes=themes | {"Others": others})
+    return {theme: of for theme, of in (themes | {"Others": others}).items() if of}
+
+
+def index_text(records: list[RecordPage]) -> str:
+    """The list of all, by theme."""
+    return _template("record_list.md.j2").render(themes=by_theme(records))
 
 
 def _template(name: str) -> jinja2.Template:

@@ -100,7 +100,7 @@ def plan(study: StudyFile, cores: Cores = None, adopt: Adopt = False) -> None:
     if adopt:
         _adopt(study)
     opened = open_plan(study)
-    typer.echo(announce(opened, RESULTS, cores or _all_cores(), measure=True))
+    typer.echo(announce(opened, RESULTS, cores or _all_cores(), measure="engines"))
     if said := reading_help(opened.study, opened.runs):
         typer.echo(said)
 

@@ -106,13 +106,25 @@ def deck_method(scenario: OwnDeck, keys: Sequence[str], summary: pd.DataFrame) -
     )
 
 
-def statistics_method(objective: Objective, ends: str) -> Row:
-    """How the verdict was reached; ``ends`` says when measures are taken without a time."""
+def statistics_method(objective: Objective, ends: str, draws_by_lot: bool) -> Row:
+    """How the verdict was reached.
+
+    Parameters
+    ----------
+    objective : Objective
+    ends : str
+        When measures are taken without a time.
+    draws_by_lot : bool
+        Whether runs of one setting differ by their seeds.
+    """
     at_s = objective.at_vibration_s
     at = ends if at_s is None else f"{at_s:g} s of vibration"
+    compared = f"{name_of(objective.measure)} at {at}, {objective.better} is better"
+    if not draws_by_lot:
+        return Row("Statistics", f"{compared}; nothing is drawn by lot, so a setting is one run.")
     return Row(
         "Statistics",
-        f"{name_of(objective.measure)} at {at}, {objective.better} is better; a setting's ± is the "
+        f"{compared}; a setting's ± is the "
         "95 % interval of its mean (Student). Settings with the same usable replicates are "
         "compared by paired differences, others by Welch's test; intervals and p values of the "
         "best against the others carry Bonferroni's factor.",

@@ -80,6 +80,7 @@ from sandmould.study.collect import Collected, read_collected, read_provenance, 
 from sandmould.study.definition.certificate import frequency_among
 from sandmould.study.definition.study import Study
 from sandmould.study.kinds.kind import AnyScenario
+from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
 
@@ -147,8 +148,9 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
     verdict = compare_settings(
-        summary, keys, objective.measure, objective.better, notes, seeks_best, study.pools_spread
-    )
+        summary, keys, objective.measure, objective.better, notes, seeks_best,
+        pools_spread=study.pools_spread, draws_by_lot=kind_named(study.kind).draws_by_lot,
+    )  # fmt: skip
     pictured_run = next(iter(pictured_runs(study_folder, summary, verdict).values()), "")
     listed = {setting.label for setting in listed_settings(verdict)}
     by_setting = {}
@@ -206,7 +208,9 @@ def _render(
     method: tuple[Row, ...] = (
         *of_kind.method,
         *own_measures_method(page.study.own_measures),
-        statistics_method(page.study.objective, of_kind.ends),
+        statistics_method(
+            page.study.objective, of_kind.ends, kind_named(page.study.kind).draws_by_lot
+        ),
     )
     answer = _answer(page, optimum, agreement, estimate, robustness, of_kind)
     statement = optimum or (agreement if agreement and agreement.is_question else estimate)

@@ -69,6 +69,7 @@ def compare_settings(
     notes: Sequence[str] = (),
     seeks_best: bool = True,
     pools_spread: bool = False,
+    draws_by_lot: bool = True,
 ) -> Verdict:
     """Compare the settings of a study by the mean of the objective.
 
@@ -96,6 +97,9 @@ def compare_settings(
         Compare by one spread that all settings share, instead of by each pair's own: settings of
         two replicates can then be told apart. For studies that give more replicates to the
         settings that may be the best.
+    draws_by_lot : bool
+        Whether runs of one setting differ by their seeds, so that few of them are a reason to
+        doubt.
 
     Returns
     -------
@@ -116,7 +120,7 @@ def compare_settings(
     resolved = first is not None and first.separated
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
     caveats = [
-        *_run_caveats(settings, summary, measure, seeks_best),
+        *_run_caveats(settings, summary, measure, seeks_best, draws_by_lot),
         *(_edge_caveats(best, settings, keys, resolved) if seeks_best else ()),
         *_identical([c.other for c in comparisons if _is_identical(c, of_setting, best)]),
         *(_spread_caveat(spread, settings) if spread else ()),
@@ -218,8 +222,9 @@ def _identical(others: list[str]) -> list[str]:
 
 
 def _run_caveats(
-    settings: Sequence[Setting], summary: pd.DataFrame, measure: str, seeks_best: bool
-) -> list[str]:
+    settings: Sequence[Setting], summary: pd.DataFrame, measure: str, seeks_best: bool,
+    draws_by_lot: bool,
+) -> list[str]:  # fmt: skip
     caveats = []
     planned, used = len(summary), sum(s.n for s in settings)
     if used < planned:
@@ -231,7 +236,7 @@ def _run_caveats(
         so = ": the best may lie there" if seeks_best else ""
         caveats.append(f"No run can be used at {listed(empty)}{so}.")
     few = [s.label for s in settings if 0 < s.n < FEW]
-    if few:
+    if few and draws_by_lot:
         caveats.append(f"Fewer than {FEW} usable replicates at {listed(few)}.")
     return [*caveats, *filter(None, [one_way_caveat(summary)])]
 

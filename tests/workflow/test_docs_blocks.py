@@ -1,4 +1,4 @@
-"""What the pages tell a person to write and to type: it plans, runs and is known to the command."""
+"""What the pages tell a person to write plans, and the command has the options that they show."""
 
 from __future__ import annotations
 
@@ -6,54 +6,21 @@ import re
 import shlex
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from unittest.mock import create_autospec
 
 import pytest
 import typer.main
 import yaml
 
-import sandmould
 from sandmould import ROOT
 from sandmould.cli.commands import app
-from sandmould.cli.study_file import study_file
-from sandmould.notebook import Result
 from sandmould.study.cluster.settings import read_cluster
 from sandmould.study.plan.build_plan import open_plan
+from tests.workflow.pages import BLOCK, PAGES, blocks
 
-PAGES = sorted(
-    page.relative_to(ROOT).as_posix()
-    for page in (
-        ROOT / "README.md",
-        *(ROOT / "docs").glob("*.md"),
-        *(ROOT / "docs/tutorials").glob("*.md"),
-        *(ROOT / "docs/how-to").glob("*.md"),
-    )
-)
-BLOCK = re.compile(
-    r'^(?:<!-- (\w+): (\S+) -->\n)?```(\w*)(?: title="([^"]+)")?\n(.*?)^```$',
-    re.MULTILINE | re.DOTALL,
-)
 INLINE = re.compile(r"`(sandmould [^`]+)`")
 STUDY_KEYS = {"based_on", "scenario", "kind"}
-
-
-@dataclass(frozen=True)
-class Block:
-    """A fenced block of a page; ``note`` is a comment right above it, such as ``with: tube``."""
-
-    note: str
-    noted: str
-    language: str
-    title: str
-    text: str
-
-
-def blocks(page: str) -> list[Block]:
-    found = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
-    return [Block(*groups) for groups in found]
 
 
 def pages_with(note: str = "", language: str = "", titled: bool = False) -> list[str]:
@@ -125,7 +92,7 @@ def commands(page: str) -> list[str]:
     shown = [
         line.strip()
         for block in blocks(page)
-        if block.language in ("sh", "")
+        if block.language == "sh"
         for line in block.text.splitlines()
     ]
     shown = [re.sub(r"^(\.venv/bin/|sand/bin/)", "", line) for line in shown]
@@ -167,24 +134,3 @@ def why_refused(arguments: list[str]) -> str:
 )
 def test_a_wrong_command_would_be_found(line: str, said: str) -> None:
     assert said in why_refused(line.split())
-
-
-@pytest.mark.parametrize("page", pages_with(language="python"))
-def test_python_asks_for_what_a_result_has(
-    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # What it computes is tested in test_notebook.py; here each name and argument is looked up.
-    result = create_autospec(Result, instance=True, runs=["frequency_25_r1_000000"])
-    run = create_autospec(sandmould.run, return_value=result)
-    monkeypatch.setattr(sandmould, "run", run)
-    for block in blocks(page):
-        if block.language == "python" and not block.title:
-            exec(compile(block.text, page, "exec"), {})
-    assert run.call_count == 1
-    study = run.call_args.args[0]
-    if isinstance(study, dict):
-        (tmp_path / "study.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
-        study = tmp_path / "study.yaml"
-    else:
-        study = study_file(study)
-    assert open_plan(study).runs

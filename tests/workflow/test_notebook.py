@@ -15,6 +15,7 @@ from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.contents import undescribed
 from sandmould.study.plan.build_plan import open_plan
+from tests.workflow.pages import PAGES, blocks
 
 FREQUENCY = "vibration.0.frequency_hz"
 STUDY: dict[str, Any] = {
@@ -32,13 +33,29 @@ STUDY: dict[str, Any] = {
 NOTEBOOK = ROOT / "docs" / "first_study.ipynb"
 
 
-def _code_cells() -> list[str]:
+def _cells_of_the_notebook() -> list[str]:
     cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
     return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
 
 
-def _follow_the_notebook(result: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Execute its cells on a study that is computed already: its own takes a minute."""
+def _blocks_of_pages() -> list[str]:
+    """Python that pages have a person type; a file that a page has saved is run elsewhere."""
+    found = [b for page in PAGES for b in blocks(page) if b.language == "python" and not b.title]
+    return [block.text for block in found]
+
+
+def _follow(
+    cells: list[str], result: Any, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> tuple[dict[str, Any], int]:
+    """Execute code on a study that is computed already: its own takes a minute.
+
+    Returns
+    -------
+    dict
+        Its names.
+    int
+        How many runs its own study has.
+    """
     told: list[Path] = []
 
     def run(study: dict[str, Any], name: str) -> Any:
@@ -46,14 +63,12 @@ def _follow_the_notebook(result: Any, folder: Path, monkeypatch: pytest.MonkeyPa
         told[0].write_text(yaml.safe_dump(study))
         return result
 
-    monkeypatch.setattr("sandmould.notebook.run", run)
     names: dict[str, Any] = {}
-    for cell in _code_cells():
-        exec(compile(cell, str(NOTEBOOK), "exec"), names)
-    monkeypatch.undo()
-    monkeypatch.chdir(folder)
-    assert len(open_plan(*told).runs) == 4
-    assert len(names["grains"]) == 20
+    with monkeypatch.context() as patched:
+        patched.setattr("sandmould.notebook.run", run)
+        for cell in cells:
+            exec(compile(cell, "cell", "exec"), names)
+    return names, len(open_plan(*told).runs)
 
 
 def test_the_notebook_is_executed_and_small() -> None:
@@ -74,7 +89,11 @@ def test_a_study_is_computed_and_read(
     result = sandmould.run(STUDY, name="little", cores=2)
     # a study without a title does not ask what the one that it rests on asks
     assert yaml.safe_load(Path("little.yaml").read_text(encoding="utf-8"))["title"] == "little"
-    assert "little: 2 of 2 runs done" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "little: 2 of 2 runs done" in said
+    # This folder is new, so the machine's speed is measured; the plan is told once all the same.
+    assert said.count("Measuring the speed of this machine") == 1
+    assert said.count("wall time on 2 cores with report") == 1
     assert result.verdict.startswith("Not resolved")
     assert undescribed(result.folder) == []
     assert sorted(result.summary[FREQUENCY]) == [50, 75]
@@ -94,7 +113,10 @@ def test_a_study_is_computed_and_read(
         result.grains("other")
     with pytest.raises(BadInputError, match=r"time_s = -1.0 .* at least"):
         result.grains(run, time_s=-1.0)
-    _follow_the_notebook(result, tmp_path, monkeypatch)
+    names, runs = _follow(_cells_of_the_notebook(), result, tmp_path, monkeypatch)
+    assert (len(names["grains"]), runs) == (20, 4)
+    names, runs = _follow(_blocks_of_pages(), result, tmp_path, monkeypatch)
+    assert (names["result"], runs) == (result, 12)
     # The same study again computes nothing, and says nothing where that is asked for.
     capsys.readouterr()
     assert sandmould.run(STUDY, name="little", quiet=True).runs == result.runs

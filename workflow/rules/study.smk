@@ -15,9 +15,7 @@ from sandmould.study.plan.batches import alone
 from sandmould.study.plan.build_plan import (
     RESULTS,
     announce,
-    measure_speeds,
     prepare,
-    price,
     starts_jobs,
     study_path,
 )
@@ -61,14 +59,13 @@ try:
     if workflow.is_main_process and starts_jobs(sys.argv) and goes_to_slurm(sys.argv):
         SUBMISSION.ask(BATCHED)
     if workflow.is_main_process and "--lint" not in sys.argv:
-        say(announce(PLAN, RESULTS, CORES))
+        # A dry run starts no engine, and nothing is measured for runs that are all there.
+        measure = "all" if starts_jobs(sys.argv) and LACKING else "nothing"
+        say(announce(PLAN, RESULTS, CORES, measure))
         if said := prepare(PLAN, RESULTS, BATCHED, LACKING):
             say(f"{said}\n")
         for said in SUBMISSION.said:
             say(said)
-        # A dry run starts no engine, and nothing is measured for runs that are all there.
-        if starts_jobs(sys.argv) and LACKING and measure_speeds(PLAN, RESULTS):
-            say(price(PLAN, RESULTS, CORES))
 except BadInputError as error:
     say(str(error))
     sys.exit(BAD_INPUT_EXIT)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-import sys
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from sandmould import SHIPPED
 from sandmould.runs.words import say
@@ -240,7 +239,9 @@ def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:
     return Problem(key, problem.value, problem.valid, file)
 
 
-def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> str:
+def announce(
+    plan: Plan, results: Path, cores: int, measure: Literal["nothing", "engines", "all"] = "nothing"
+) -> str:
     """Write the plan to disk and say what it will take.
 
     Parameters
@@ -249,22 +250,22 @@ def announce(plan: Plan, results: Path, cores: int, measure: bool = False) -> st
     results : Path
     cores : int
         That share the runs.
-    measure : bool
-        Whether the machine's speed is measured first where it is not known, which takes seconds
-        an engine. Without it no engine starts, and the price is an estimate there. A program of
-        the user's is never started: that is left to the start of its runs.
+    measure : {"nothing", "engines", "all"}
+        What is measured first where this machine's speed is not known, which takes seconds an
+        engine. With "nothing" no engine starts, and the price is an estimate there. With "engines"
+        a program of the user's is not started: that is left to the start of its runs, "all".
 
     Raises
     ------
     BadInputError
-        When the results cannot be written.
+        When the results cannot be written, or as of ``measure_speeds``.
     """
     folder = results / plan.study.name
     with writing(folder):
         write_owner(plan.study.path, folder)
         write_plan([*plan.fills, *plan.runs], folder)
         write_study(plan.study.study, folder)
-    if measure and plan.kind.planning.program is None:
+    if measure == "all" or (measure == "engines" and plan.kind.planning.program is None):
         measure_speeds(plan, results)
     title = plan.study.study.title or plan.study.name
     return f"\n{title}\n{price(plan, results, cores)}"
@@ -347,15 +348,10 @@ def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
     return {each: min(rates) for each, rates in stored.items() if rates}
 
 
-def measure_speeds(plan: Plan, results: Path) -> bool:
+def measure_speeds(plan: Plan, results: Path) -> None:
     """Measure and store how fast this machine is where that is not known: seconds an engine.
 
     A program that the user has not allowed to run is not started for that either.
-
-    Returns
-    -------
-    bool
-        Whether anything was measured, so that the plan has another price.
 
     Raises
     ------
@@ -365,18 +361,17 @@ def measure_speeds(plan: Plan, results: Path) -> bool:
     """
     speed = plan.kind.planning.speed
     if speed is None or not may_run(plan.study, plan.runs):
-        return False
+        return
     slow = sum(
         any(speed.stored(scenario, results) is None for scenario in alike)
         for alike in plan.classes.values()
     )
     if slow:
-        print(
+        say(
             f"Measuring the speed of this machine, once: about {slow * MEASURING_S:g} s, and up "
-            "to 2 min where code is compiled first.",
-            file=sys.stderr, flush=True,
-        )  # fmt: skip
-    found, failures = False, dict[str, Problem]()
+            "to 2 min where code is compiled first."
+        )
+    failures = dict[str, Problem]()
     runs_somewhere = False
     tried: list[AnyScenario] = []
     for scenario in chain.from_iterable(plan.classes.values()):
@@ -384,9 +379,7 @@ def measure_speeds(plan: Plan, results: Path) -> bool:
             continue
         tried.append(scenario)
         try:
-            is_stored = speed.stored(scenario, results) is not None
-            is_measured = speed.measured(scenario, results) is not None
-            found |= is_measured and not is_stored
+            speed.measured(scenario, results)
             runs_somewhere = True
         except BadInputError as error:
             failures |= {str(problem): problem for problem in error.problems}
@@ -394,4 +387,3 @@ def measure_speeds(plan: Plan, results: Path) -> bool:
         raise BadInputError(list(failures.values())[:1])
     for said in failures:
         say(said)
-    return found

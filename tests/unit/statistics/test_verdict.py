@@ -127,6 +127,8 @@ def test_single_replicates_are_not_resolved() -> None:
     assert math.isnan(verdict.p)
     assert "two replicates or more" in verdict.sentences[1]
     assert any("Fewer than 3" in c for c in verdict.caveats)
+    same = compare_settings(table({25: [0.1], 50: [0.9]}), [KEY], FILL, draws_by_lot=False)
+    assert not any("Fewer than 3" in c for c in same.caveats)
 
 
 def test_identical_replicates_are_no_replicates() -> None:
