@@ -131,7 +131,7 @@ core-loop: $(INSTALLED)
 peers: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.calibration $(QUICK)
 
-## what the workflow costs up to 10 000 runs: docs/scaling.md
+## what the workflow costs up to 10 000 runs: docs/workflow_cost.md
 scaling: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.scaling $(QUICK)
 

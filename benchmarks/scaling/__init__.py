@@ -1,1 +1,1 @@
-"""Thousands of runs: docs/scaling.md."""
+"""Thousands of runs: docs/workflow_cost.md."""

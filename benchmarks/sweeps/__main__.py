@@ -1,6 +1,6 @@
 """What whole sweeps cost with an older version and with this one, in turns on one machine.
 
-``python -m benchmarks.sweeps --old FOLDER`` writes docs/sweep_cost.md. FOLDER is a checkout of the
+``python -m benchmarks.sweeps --old FOLDER`` writes docs/scaling.md. FOLDER is a checkout of the
 older version with its own ``.venv``, such as one that ``git worktree add`` makes and
 ``make quick`` sets up.
 """
@@ -44,7 +44,7 @@ def _study(scenario: Mapping[str, Any], hz: list[float], **top: Any) -> dict[str
 
 
 def _stand_in(runs: int) -> dict[str, Any]:
-    """Short runs: those of docs/scaling.md."""
+    """Short runs: those of docs/workflow_cost.md."""
     scenario = {
         "sand": {"size_scale": 12, "size_classes": 3, "disc_thickness_m": 0.1},
         "fill": {"layers": [{"count": 20}]},
@@ -315,7 +315,7 @@ BENCHMARK = Benchmark(
         "thousand_runs": partial(_alone, "thousand_runs"),
         "origin": lambda run: run.origin,
     },
-    pages={"sweep_cost.md": page},
+    pages={"scaling.md": page},
     extent=WHOLE,
     quick=LITTLE,
     add_options=_add_options,

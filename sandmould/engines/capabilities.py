@@ -31,3 +31,5 @@ class Capabilities:
     """Whether the box can stand on a table that rotating masses, mounts and the sand move."""
     moves_walls: bool
     """Whether a gate opens in a stated time, and a wall of the box moves as a piston."""
+    changes_checks: bool
+    """Whether a session goes on from a checkpoint with checks at another interval."""

@@ -202,6 +202,11 @@ def engine_problem(scenario: Scenario) -> Problem | None:
         able = " or ".join(engines_that(lambda can: can.moves_walls))
         valid = f"absent on engine {scenario.engine.name}, whose walls stand; engine {able} has it"
         return Problem(*moved, valid)
+    shaken_s = scenario.rest.shaken_check_every_s
+    if shaken_s is not None and not engine.CAPABILITIES.changes_checks:
+        able = " or ".join(engines_that(lambda can: can.changes_checks))
+        valid = f"absent on engine {scenario.engine.name}, whose deck has one interval of checks"
+        return Problem("rest.shaken_check_every_s", shaken_s, f"{valid}; engine {able} has it")
     try:
         engine.refuse(scenario)
     except RefusedError as refusal:

@@ -130,7 +130,7 @@ def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
         # Sand presses down on the box; the mean of the last layer's rest is its weight.
         weight_n = -float(filled[upward].iloc[-len(filled) // 20 :].mean())
         rigid_n = weight_n / scenario.gravity_m_s2 * SHAKE_G * STANDARD_GRAVITY_M_S2
-        window_s = scenario.record.series_every_s
+        window_s = scenario.from_vibration.record.series_every_s
         shaken, response = [], []
         for place, stage in enumerate(scenario.vibrations, start=1):
             rows = total[total[STAGE] == StageKind.VIBRATE.numbered(place)]

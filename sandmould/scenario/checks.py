@@ -270,13 +270,18 @@ def _time(s: Scenario) -> Iterator[Problem]:
         yield Problem(
             "rest.check_every_s", s.rest.check_every_s, f"at least the time step {s.step_s:.4g} s"
         )
+    shaken_s = s.rest.shaken_check_every_s
+    key, least_s = "rest.check_every_s", s.rest.check_every_s
+    if shaken_s is not None:
+        if not s.step_s <= shaken_s <= least_s:
+            valid = f"from the time step {s.step_s:.4g} s to rest.check_every_s, {least_s:g} s"
+            yield Problem("rest.shaken_check_every_s", shaken_s, valid)
+        elif not s.vibrations:
+            yield Problem("rest.shaken_check_every_s", shaken_s, "absent without vibration")
+        key, least_s = "rest.shaken_check_every_s", s.from_vibration.rest.check_every_s
     loop = None if s.pattern is None else s.pattern.loop
-    if loop is not None and loop.has_windows and loop.window_s > s.rest.check_every_s:
-        yield Problem(
-            "pattern.loop.window_s",
-            loop.window_s,
-            f"at most rest.check_every_s, {s.rest.check_every_s:g} s",
-        )
+    if loop is not None and loop.has_windows and loop.window_s > least_s:
+        yield Problem("pattern.loop.window_s", loop.window_s, f"at most {key}, {least_s:.4g} s")
     if s.record.series_every_s < s.rest.check_every_s:
         yield Problem(
             "record.series_every_s",

@@ -18,6 +18,16 @@ class Rest(Section):
         gt=0,
         le=100,
     )
+    shaken_check_every_s: float | None = quantity(
+        None,
+        "The same from the first vibration on, rounded down to a whole part of check_every_s; "
+        "series and loads are then written at each of these checks. The fill keeps its own, and is "
+        "shared with runs that do without. On engine reference.",
+        unit="s",
+        source="user",
+        gt=0,
+        le=100,
+    )
     checks: int = quantity(
         10, "Checks in a row that must find the sand at rest.", source=ARGUED, ge=1, le=1000
     )
@@ -53,6 +63,26 @@ class Rest(Section):
         ge=1,
         le=100000,
     )
+
+    def while_shaken(self, step_s: float) -> Rest:
+        """Give the checks from the first vibration on; as many as make up the same time find rest.
+
+        Parameters
+        ----------
+        step_s : float, s
+            Time step.
+        """
+        asked_s = self.shaken_check_every_s
+        if asked_s is None:
+            return self
+        # A fill ends at one of its checks, and the next ones must go on from there as a whole.
+        sample_s = self.load_every_steps * step_s
+        samples = max(1, round(self.check_every_s / sample_s))
+        parts = (n for n in range(1, samples + 1) if samples % n == 0)
+        of_one = max((n for n in parts if n * sample_s <= asked_s), default=1)
+        return self.model_copy(
+            update={"check_every_s": of_one * sample_s, "checks": self.checks * samples // of_one}
+        )
 
     def speed_limit_m_s(self, *, flows: bool) -> float:
         """The limit of a bed, or of sand that has flowed out."""

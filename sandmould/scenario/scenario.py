@@ -183,8 +183,21 @@ class Scenario(Section):
         )
         rests_alone = type(self).model_fields["measure_at_rest"].default
         return self.model_copy(
-            update={"vibration": self.vibration[:first], "measure_at_rest": rests_alone}
+            update={
+                "vibration": self.vibration[:first],
+                "measure_at_rest": rests_alone,
+                "rest": self.rest.model_copy(update={"shaken_check_every_s": None}),
+            }
         )
+
+    @property
+    def from_vibration(self) -> Scenario:
+        """The scene with the checks and records that it has from its first vibration on."""
+        if self.rest.shaken_check_every_s is None:
+            return self
+        rest = self.rest.while_shaken(self.step_s)
+        record = self.record.model_copy(update={"series_every_s": rest.check_every_s})
+        return self.model_copy(update={"rest": rest, "record": record})
 
     @property
     def largest_diameter_m(self) -> float:

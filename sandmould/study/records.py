@@ -261,8 +261,7 @@ def _recompute(name: str, study: str, results: Path) -> list[str]:
     if (RECORDS / name / ROUNDS_FILE).exists():
         (results / name).mkdir(parents=True)
         shutil.copy(RECORDS / name / ROUNDS_FILE, results / name / ROUNDS_FILE)
-    snakemake = Path(sys.executable).parent / "snakemake"
-    command = [str(snakemake), "--cores", "all", "--configfile", study, "--quiet", "rules"]
+    command = [str(Path(sys.executable).parent / "sandmould"), "run", study]
     subprocess.run(command, cwd=ROOT, check=True)
     old, new = read_summary(RECORDS / name), read_summary(results / name)
     return [

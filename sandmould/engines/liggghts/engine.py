@@ -28,6 +28,7 @@ CAPABILITIES = Capabilities(
     checkpoints_at_setups=True,
     moves_tables=False,
     moves_walls=False,
+    changes_checks=False,
 )
 
 

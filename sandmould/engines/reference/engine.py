@@ -37,6 +37,7 @@ CAPABILITIES = Capabilities(
     checkpoints_at_setups=False,
     moves_tables=True,
     moves_walls=True,
+    changes_checks=True,
 )
 
 

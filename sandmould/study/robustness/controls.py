@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.engines.registry import engine_of
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
 from sandmould.scenario.vibration import VibrationStage
@@ -227,12 +228,23 @@ def _shaken(scenario: Scenario) -> Scenario:
         )
         for f in SHAKEN_HZ
     )
+    # what is read of it is the load on the floor while it is shaken
+    changed = {"vibration": stages, "measure_at_rest": False}
+    return scenario.model_copy(update=changed | _often(scenario))
+
+
+def _often(scenario: Scenario) -> dict[str, Any]:
+    """Loads, which are means over checks, often enough for the highest frequency.
+
+    The fill keeps its checks where the engine can change them, and is shared with the sweep.
+    """
     window_s = float(f"{1.0 / (WINDOWS_A_PERIOD * SHAKEN_HZ[-1]):.2g}")
-    record = scenario.record.model_copy(update={"series_every_s": window_s})
-    # Loads are means over checks; as many of the shorter ones as make up the same time.
     rest = scenario.rest
+    if engine_of(scenario).CAPABILITIES.changes_checks:
+        shaken_s = min(window_s, rest.check_every_s)
+        return {"rest": rest.model_copy(update={"shaken_check_every_s": shaken_s})}
+    # As many of the shorter checks as make up the same time.
     checks = max(rest.checks, round(rest.checks * rest.check_every_s / window_s))
     rest = rest.model_copy(update={"check_every_s": window_s, "checks": checks})
-    # what is read of it is the load on the floor while it is shaken
-    changed = {"vibration": stages, "record": record, "rest": rest, "measure_at_rest": False}
-    return scenario.model_copy(update=changed)
+    record = scenario.record.model_copy(update={"series_every_s": window_s})
+    return {"rest": rest, "record": record}

@@ -26,6 +26,7 @@ BARE = Capabilities(
     checkpoints_at_setups=False,
     moves_tables=False,
     moves_walls=False,
+    changes_checks=False,
 )
 
 

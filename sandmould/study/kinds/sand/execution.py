@@ -16,6 +16,7 @@ from sandmould.runs.products import SAND_PRODUCTS, Computed
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import FILL, Run
 from sandmould.study.kinds.kind import Execution
+from sandmould.study.kinds.sand.fill_apart import fill_apart
 from sandmould.study.kinds.sand.shared_fill import lay_fill
 
 
@@ -40,6 +41,11 @@ def compute(run: Run, folder: Path) -> Computed:
         from pattern_fe.coupling.opening import open_coupled
 
         opening = open_coupled
+    if run.scenario.rest.shaken_check_every_s is not None:
+        stopped = fill_apart(run, folder, program, opening)
+        if stopped is not None:
+            return stopped
+        program = build_program(run.scenario.from_vibration)
     run_hash, is_fill = scenario_hash(run.scenario), run.part == FILL
 
     def write_deck(program: Program) -> None:
