@@ -96,19 +96,19 @@ def _time_to_fill(summary: pd.DataFrame, shaken: pd.DataFrame, best: Setting, me
         times_s.append(first_reach_s(time_s, value, FULL_SHARE * full))
         lasts_s.append(time_s[-1])
         ends.append(value[-1] / full)
-    what = "what the cavity holds when it is packed as densely as the bed"
+    what = "what fits into the cavity at the density of the bed"
     reached = [t for t in times_s if math.isfinite(t)]
     if not times_s:
-        return "How long the cavity takes to fill cannot be told."
+        return "The runs do not show how long the cavity takes to fill."
     if len(reached) < len(times_s):
         return (
             f"{len(reached)} of {len(times_s)} runs at {best.label} reach "
-            f"{100 * FULL_SHARE:.0f} % of {what}; after {number(max(lasts_s))} s it holds "
+            f"{100 * FULL_SHARE:.0f} % of {what}. After {number(max(lasts_s))} s it holds "
             f"{100 * float(np.mean(ends)):.0f} % of it in the mean."
         )
     mean = setting_of({}, len(reached), pd.Series(reached))
     reach = with_margin(mean.mean, mean.ci_half_width)
-    return f"{100 * FULL_SHARE:.0f} % of {what} are reached at {best.label} after {reach} s."
+    return f"The sand reaches {100 * FULL_SHARE:.0f} % of {what} at {best.label} after {reach} s."
 
 
 @dataclass(frozen=True)

@@ -141,10 +141,10 @@ class Contact(Section):
 
     slip_normal: Literal["half_step", "full_step"] | None = quantity(
         None,
-        "Normal in whose plane the slip of two grains is taken in 3D: that of half a step ago, "
-        "when the velocities are, or that of the whole step, which traps small grains between "
-        "large ones; by default half_step on the reference engine and full_step on LAMMPS, where "
-        "the other costs 1.16 times as much. LIGGGHTS has full_step alone.",
+        "In 3D the slip of two grains is taken in the plane of a normal. half_step: the normal of "
+        "half a step ago, as the velocities. full_step: that of the whole step, which traps small "
+        "grains between large ones. By default half_step on the reference engine and full_step on "
+        "LAMMPS, where the other costs 1.16 times as much. LIGGGHTS has full_step alone.",
         source=ARGUED,
     )
 

@@ -153,14 +153,14 @@ class Loop(Section):
     )  # fmt: skip
     scheme: Scheme = quantity(
         "aitken",
-        "How far the surface is moved to where the last loads bend the pattern: not at all, a "
-        "fixed share to where those at the end of the last layer or stage bend it, or to where "
-        "the last window's do: a fixed share, one of the limit that a measured gain sets (not on "
-        "LIGGGHTS), Aitken's, or by a quasi-Newton step over the last windows (IQN-ILS, with "
-        "repeats above 0 alone, so not on LIGGGHTS). Or no windows: in_step steps the pattern, "
-        "condensed on its surface, inside every step of the engine; monolithic "
-        "steps all of it after every step of the grains, slow, what the others are "
-        "compared with, reference engine.",
+        "How the pattern follows the loads of the sand. one_way: it bends, but the sand does not "
+        "feel it. per_layer: one solve after each layer or stage, with a fixed share. With "
+        "windows: fixed, a fixed share; measured, a share of the limit that a measured gain sets "
+        "(not on LIGGGHTS); aitken, Aitken's share; quasi_newton, a quasi-Newton step over the "
+        "last windows (IQN-ILS, only with repeats above 0, so not on LIGGGHTS). Without windows: "
+        "in_step steps the pattern, condensed on its surface, inside every step of the engine; "
+        "monolithic steps all of it after every step of the grains: slow, reference engine, "
+        "what the others are compared with.",
         source=ARGUED,
     )
     factor: float = quantity(

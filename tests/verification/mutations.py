@@ -233,7 +233,7 @@ def section(found: list[list[str]]) -> str:
         "broken by 5 % (or in its structure, where that is said), the exact values are not. "
         f"{sum(map(bool, found))} of {len(found)} mutations are noticed.\n\n"
         f"{table(['broken', 'equation', 'noticed by'], rows)}\n"
-        f"Cases that notice no broken law, for they hold under any: {idle}."
+        f"Cases that notice no wrong law, since they hold under any law: {idle}."
     )
 
 

@@ -60,8 +60,10 @@ def test_limbs_and_time_are_found_again(tmp_path: Path) -> None:
 
 def test_a_cavity_that_does_not_fill_is_told(tmp_path: Path) -> None:
     found = pages(tmp_path / "slow", 0.5, 0.002)
-    assert found.advice[0].startswith("0 of 3 runs at 40 Hz reach 95 % of what the cavity holds")
-    assert "after 2 s it holds 61 % of it" in found.advice[0]
+    assert found.advice[0].startswith(
+        "0 of 3 runs at 40 Hz reach 95 % of what fits into the cavity"
+    )
+    assert "After 2 s it holds 61 % of it" in found.advice[0]
 
 
 def test_the_chart_has_a_curve_a_time_and_what_others_found(tmp_path: Path) -> None:
