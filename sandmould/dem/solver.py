@@ -10,15 +10,22 @@ import numpy as np
 
 from sandmould.dem.barrier import new_barrier
 from sandmould.dem.broad_phase import Candidates, find_candidates
+from sandmould.dem.chunks import split
 from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.kinds import find_kinds
 from sandmould.dem.motion import kick
 from sandmould.dem.moving_state import from_arrays, to_arrays
-from sandmould.dem.near_pairs import Contacts, contacts_of, moved_contacts, new_near_pairs
+from sandmould.dem.near_pairs import (
+    Contacts,
+    contacts_of,
+    moved_contacts,
+    near_gap,
+    new_near_pairs,
+)
 from sandmould.dem.neighbours import Pairs, list_pairs, make_grid, sort_into_cells
-from sandmould.dem.pairs import split
 from sandmould.dem.steps import (
     LIST_IS_OLD,
+    NO_ROOM,
     NOT_A_NUMBER,
     DemScene,
     Moving,
@@ -87,7 +94,7 @@ class Solver:
         candidates = Candidates(none, np.zeros(1, dtype=np.int64), none.copy())
         chunks = split(grains, pairs)
         history = new_history(self._dim, 0)
-        near = new_near_pairs(self._dim, pairs, 0, Contacts.none(d))
+        near = new_near_pairs(self._dim, chunks, grains, pairs, Contacts.none(d), 0.0)
         walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
         kinds = find_kinds(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
@@ -108,7 +115,7 @@ class Solver:
     def contacts(self) -> Contacts:
         """Touching pairs of grains and their history, a copy."""
         moving = self.moving
-        return contacts_of(self._dim, moving.chunks.bound, moving.pairs, moving.near)
+        return contacts_of(self._dim, moving.chunks.bound, moving.near)
 
     @property
     def orientation(self) -> Floats:
@@ -195,7 +202,9 @@ class Solver:
         pairs = list_pairs(grains, start, grid, self._skin)
         chunks = split(grains, pairs)
         contacts = moved_contacts(self._dim, self.contacts, place)
-        near = new_near_pairs(self._dim, pairs, len(chunks.grain), contacts)
+        way = self.scene.dt * float(np.linalg.norm(grains.velocity, axis=1).max())
+        gap_m = near_gap(self._skin, way)
+        near = new_near_pairs(self._dim, chunks, grains, pairs, contacts, gap_m)
         candidates = find_candidates(
             self._dim,
             grains.position,
@@ -226,6 +235,14 @@ class Solver:
         )
         self.lists += 1
 
+    def _make_room(self) -> None:
+        """Choose the near pairs anew, with room for all of them."""
+        moving, gap_m = self.moving, float(self.moving.near.gap[0])
+        near = new_near_pairs(
+            self._dim, moving.chunks, moving.grains, moving.pairs, self.contacts, gap_m
+        )
+        self.moving = moving._replace(near=near)
+
     def advance(self, displacement_m: Floats) -> None:
         """Compute as many steps as displacements are given, less two.
 
@@ -245,8 +262,10 @@ class Solver:
             self.steps += more
             if state == NOT_A_NUMBER:
                 raise NotANumberError(self.steps)
-            drifted = state == LIST_IS_OLD
-            if drifted:
+            drifted = state in (LIST_IS_OLD, NO_ROOM)
+            if state == NO_ROOM:
+                self._make_room()
+            if state == LIST_IS_OLD:
                 shift = 0.0 if self.scene.box_frame else displacement_m[done + 2]
                 self._list(shift * np.array(self.scene.direction))
 
