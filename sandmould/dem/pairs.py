@@ -25,6 +25,7 @@ from sandmould.dem.vectors import (
     times,
 )
 
+
 @njit(**OPTIONS)
 def pair_forces(
     dim: Any,

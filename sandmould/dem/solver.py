@@ -218,6 +218,7 @@ class Solver:
             old.grains.id[old.walls.candidates.rows],
             old.walls.history,
             grains.id[candidates.rows],
+            candidates.start,
         )
         walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
         walls.loads[0] = old.walls.loads.sum(axis=0)

@@ -32,7 +32,7 @@ from sandmould.dem.vectors import (
     store,
     times,
 )
-from sandmould.dem.wall_history import WallHistory, recall, slots, swap
+from sandmould.dem.wall_history import WallHistory, recall, swap
 
 ONE_FACE = math.cos(math.radians(10.0))
 """Contacts with normals nearer than this are one: facets of a curved wall."""
@@ -128,10 +128,10 @@ def surface_forces(
     rows, start, part = candidates.rows, candidates.start, candidates.part
     vertices, vertex_velocity = arrays.vertices, arrays.vertex_velocity
     planes, shape, corner = arrays.planes[0], arrays.shape, arrays.corner
-    slots_used, slot_normal = history.used, history.normal
+    first_slot, slots_used, slot_normal = history.first_slot, history.used, history.normal
     slot_friction, slot_rolling = history.friction, history.rolling
     # Scratch: what one grain touches.
-    d, n_slots = len(dim), slots(dim)
+    d = len(dim)
     f_distance, f_part = np.empty(_MOST), np.empty(_MOST, dtype=np.int64)
     f_normal, f_weights = np.empty((_MOST, d)), np.empty((_MOST, d))
     f_inside, f_state = np.empty(_MOST, dtype=np.bool_), np.empty(_MOST, dtype=np.int8)
@@ -159,7 +159,8 @@ def surface_forces(
             f_state[c] = _WAITS
             store(n, f_normal, c)
             store(weights, f_weights, c)
-        old, base = slots_used[row], row * n_slots
+        old, base = slots_used[row], first_slot[row]
+        n_slots = first_slot[row + 1] - base
         if touched == 0:
             if keep and old:
                 slots_used[row] = 0

@@ -83,6 +83,7 @@ class Bridge(NamedTuple):
     """See ``Candidates``; longer than needed."""
     row_ids: IntLine
     """(n,) int64: ids of the grains of the rows."""
+    first_slot: IntLine
     used: IntLine
     normal: Rows
     friction: Rows
