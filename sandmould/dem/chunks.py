@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandmould.arrays import Places
 from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.neighbours import Pairs
@@ -27,10 +28,10 @@ class Chunks(NamedTuple):
     """(c + 1,) int64: first grain of each chunk."""
     first_slot: Ints
     """(c + 1,) int64: first slot of each chunk."""
-    grain: Ints
-    """(q,) int64: the grain of a later chunk that a slot belongs to."""
-    incoming: Ints
-    """(q,) int64: slots in the order of the chunks of their grains."""
+    grain: Places
+    """(q,) uint32: the grain of a later chunk that a slot belongs to."""
+    incoming: Places
+    """(q,) uint32: slots in the order of the chunks of their grains."""
     first_incoming: Ints
     """(c + 1,) int64: where the slots for each chunk begin in that order."""
     force: Floats
@@ -50,9 +51,9 @@ def chunk_bounds(grains: int) -> Ints:
 
 
 @njit(**OPTIONS)
-def _crossing(bound: Ints, pairs: Pairs) -> tuple[Ints, Ints]:
+def _crossing(bound: Ints, pairs: Pairs) -> tuple[Ints, Places]:
     first_slot = np.zeros(len(bound), dtype=np.int64)
-    grain = np.empty(len(pairs.other), dtype=np.int64)
+    grain = np.empty(len(pairs.other), dtype=np.uint32)
     slots = 0
     for c in range(len(bound) - 1):
         end = bound[c + 1]
@@ -70,7 +71,7 @@ def split(grains: Grains, pairs: Pairs) -> Chunks:
     bound = chunk_bounds(n)
     first_slot, grain = _crossing(bound, pairs)
     chunk = np.searchsorted(bound, grain, side="right") - 1
-    incoming = np.argsort(chunk, kind="stable")
+    incoming = np.argsort(chunk, kind="stable").astype(np.uint32)
     first_incoming = np.searchsorted(chunk[incoming], np.arange(len(bound)))
     force = np.zeros((len(grain), d))
     moment = np.zeros((len(grain), grains.spin.shape[1]))

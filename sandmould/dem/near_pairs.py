@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.arrays import Places
 from sandmould.compiled import njit
 from sandmould.dem.chunks import Chunks
 from sandmould.dem.grains import Floats, Grains, Ints
@@ -60,10 +61,10 @@ class NearPairs(NamedTuple):
 
     first: Ints
     """(c + 1,) int64: where the room of each chunk begins."""
-    stop: Ints
-    """(n,) int64: where the pairs of a grain end; they begin where those of the grain before end,
+    stop: Places
+    """(n,) uint32: where the pairs of a grain end; they begin where those of the grain before end,
     or, for the first grain of a chunk, where the room of the chunk begins."""
-    other: NDArray[np.uint32]
+    other: Places
     """(p,) uint32: the second grain."""
     touching: NDArray[np.uint8]
     """(p,) uint8: whether the pair touched at the last step."""
@@ -71,8 +72,8 @@ class NearPairs(NamedTuple):
     """(p, s) float64, N: as in ``Contacts``; zero where a pair does not touch."""
     rolling: Floats
     """(p, s) float64, N m: likewise."""
-    slot: Ints
-    """(q,) int64: slots of those pairs that cross to a later chunk, from its first slot on."""
+    slot: Places
+    """(q,) uint32: slots of those pairs that cross to a later chunk, from its first slot on."""
     left: Floats
     """(1,) float64, m: how far any grain can still go before a look is due."""
     gap: Floats
@@ -189,12 +190,12 @@ def new_near_pairs(
     room = int(first[-1])
     near = NearPairs(
         first,
-        np.repeat(first[:-1], np.diff(bound)),
+        np.repeat(first[:-1], np.diff(bound)).astype(np.uint32),
         np.empty(room, dtype=np.uint32),
         np.empty(room, dtype=np.uint8),
         np.empty((room, 1 if len(dim) == 2 else 3)),
         np.empty((room, 1 if len(dim) == 2 else 3)),
-        np.empty(len(chunks.grain), dtype=np.int64),
+        np.empty(len(chunks.grain), dtype=np.uint32),
         np.full(1, 0.5 * gap_m),
         np.full(1, gap_m),
         np.zeros(1, dtype=np.int64),

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Places
 from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.vectors import OPTIONS, dim_of, dot, load, plus
@@ -20,15 +20,15 @@ from sandmould.dem.vectors import OPTIONS, dim_of, dot, load, plus
 class Pairs(NamedTuple):
     """Pairs of grains nearer than the skin; the first of a pair is the one stored earlier."""
 
-    start: Ints
-    """(n + 1,) int64: pairs of grain i are start[i] to start[i + 1]."""
-    other: NDArray[np.uint32]
+    start: Places
+    """(n + 1,) uint32: pairs of grain i are start[i] to start[i + 1]."""
+    other: Places
     """(p,) uint32: the second grain."""
 
     @classmethod
     def none(cls) -> Pairs:
         """No pair yet."""
-        return cls(np.zeros(1, dtype=np.int64), np.zeros(0, np.uint32))
+        return cls(np.zeros(1, np.uint32), np.zeros(0, np.uint32))
 
 
 class Grid(NamedTuple):
@@ -104,7 +104,7 @@ def sort_into_cells(position: Floats, grid: Grid) -> tuple[Ints, Ints]:
 @njit(**OPTIONS)
 def find_pairs(
     dim: Any, position: Floats, radius: Floats, skin: float, start: Ints, grid: Grid
-) -> tuple[Ints, NDArray[np.uint32]]:
+) -> tuple[Places, Places]:
     """List the pairs of grains whose surfaces are nearer than the skin.
 
     Parameters
@@ -121,12 +121,12 @@ def find_pairs(
 
     Returns
     -------
-    first : (n + 1,) int64
+    first : (n + 1,) uint32
         Where the pairs of each grain begin.
     other : (p,) uint32
     """
     n = len(position)
-    first = np.zeros(n + 1, dtype=np.int64)
+    first = np.zeros(n + 1, dtype=np.uint32)
     other = np.empty(6 * n + 64, dtype=np.uint32)
     p = 0
     nx, ny, nz = grid.counts[0], grid.counts[1], grid.counts[2]
