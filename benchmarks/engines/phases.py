@@ -32,12 +32,13 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
         for c in range(len(chunks.bound) - 1):
             first, last = chunks.bound[c], chunks.bound[c + 1]
             pair_forces(
-                dim, c, chunks, grains, moving.kinds, moving.near, scene.grain_law, scene.dt
+                dim, c, chunks, grains, moving.coefficients, moving.near, scene.grain_law, scene.dt
             )
             if parts > 1:
                 surface_forces(
                     dim, walls.first_row[c], walls.first_row[c + 1], walls.candidates,
-                    grains.position, grains.velocity, grains.spin, grains.radius, grains.mass,
+                    grains.position, grains.velocity, grains.spin, grains.kind,
+                    grains.radius_of, grains.mass_of,
                     grains.force, grains.moment, walls.arrays, no_vector(dim), no_vector(dim),
                     scene.wall_law, scene.dt, True, walls.history, walls.loads[c],
                 )  # fmt: skip

@@ -97,7 +97,6 @@ def bytes_of(solver: Solver) -> dict[str, int]:
     moving = solver.moving
     parts: dict[str, Any] = {
         "grains": moving.grains,
-        "kinds": moving.kinds,
         "pairs": moving.pairs,
         "near": moving.near,
         "chunks": moving.chunks,

@@ -11,7 +11,7 @@ from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.chunks import split
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
-from sandmould.dem.kinds import find_kinds
+from sandmould.dem.kinds import pair_up
 from sandmould.dem.near_pairs import Contacts, contacts_of, new_near_pairs
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.steps import Moving, new_walls
@@ -62,7 +62,7 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
     )
     return Moving(
         grains,
-        find_kinds(grains, grain_law),
+        pair_up(grains, grain_law),
         pairs,
         near,
         chunks,

@@ -149,14 +149,15 @@ def _carry(dim: Any, contacts: Contacts, bound: Ints, near: NearPairs) -> None:
 @njit(**OPTIONS)
 def _count(dim: Any, bound: Ints, grains: Grains, pairs: Pairs, gap: float) -> Ints:
     """Near pairs of each chunk."""
-    position, radius, start, other = grains.position, grains.radius, pairs.start, pairs.other
+    position, kind, radius = grains.position, grains.kind, grains.radius_of
+    start, other = pairs.start, pairs.other
     counts = np.zeros(len(bound) - 1, dtype=np.int64)
     for c in range(len(counts)):
         for i in range(bound[c], bound[c + 1]):
-            x, reach = load(dim, position, i), radius[i] + gap
+            x, reach = load(dim, position, i), radius[kind[i]] + gap
             for p in range(index(start[i]), index(start[i + 1])):
                 apart = plus(load(dim, position, other[p]), -1.0, x)
-                far = reach + radius[other[p]]
+                far = reach + radius[kind[other[p]]]
                 counts[c] += dot(apart, apart) < far * far
     return counts
 
@@ -260,7 +261,7 @@ def look(
     near : NearPairs
         Of this chunk written to.
     """
-    position, radius, gap = grains.position, grains.radius, near.gap[0]
+    position, kind, radius, gap = grains.position, grains.kind, grains.radius_of, near.gap[0]
     begin, end = bound[c], bound[c + 1]
     first, room = near.first[c], near.first[c + 1]
     last = near.stop[end - 1] if end > begin else first
@@ -286,11 +287,11 @@ def look(
     # Both lists are in the order of the listed pairs, so history is merged in as they pass.
     k, q, full = first, 0, False
     for i in range(begin, end):
-        x, reach = load(dim, position, i), radius[i] + gap
+        x, reach = load(dim, position, i), radius[kind[i]] + gap
         for p in range(index(pairs.start[i]), index(pairs.start[i + 1])):
             j = pairs.other[p]
             apart = plus(load(dim, position, j), -1.0, x)
-            far = reach + radius[j]
+            far = reach + radius[kind[j]]
             held = q < touched and owner[q] == i and other[q] == j
             if dot(apart, apart) < far * far:
                 full = k == room

@@ -103,7 +103,7 @@ def sort_into_cells(position: Floats, grid: Grid) -> tuple[Ints, Ints]:
 
 @njit(**OPTIONS)
 def find_pairs(
-    dim: Any, position: Floats, radius: Floats, skin: float, start: Ints, grid: Grid
+    dim: Any, grains: Grains, skin: float, start: Ints, grid: Grid
 ) -> tuple[Places, Places]:
     """List the pairs of grains whose surfaces are nearer than the skin.
 
@@ -111,9 +111,8 @@ def find_pairs(
     ----------
     dim : tuple
         ``PLANE`` or ``SPACE``.
-    position : (n, d) float64, m
+    grains : Grains
         In the order of the cells.
-    radius : (n,) float64, m
     skin : float, m
     start : (c + 1,) int64
         Of ``sort_into_cells``.
@@ -125,6 +124,7 @@ def find_pairs(
         Where the pairs of each grain begin.
     other : (p,) uint32
     """
+    position, kind, radius = grains.position, grains.kind, grains.radius_of
     n = len(position)
     first = np.zeros(n + 1, dtype=np.uint32)
     other = np.empty(6 * n + 64, dtype=np.uint32)
@@ -136,7 +136,7 @@ def find_pairs(
                 here = (cz * ny + cy) * nx + cx
                 left, right = max(cx - 1, 0), min(cx + 1, nx - 1)
                 for i in range(start[here], start[here + 1]):
-                    x, reach = load(dim, position, i), radius[i] + skin
+                    x, reach = load(dim, position, i), radius[kind[i]] + skin
                     # this row from the grain on, then whole rows ahead: three cells each lie
                     # one after the other in memory
                     for row in range(5):
@@ -154,7 +154,7 @@ def find_pairs(
                             other = longer
                         for j in range(begin, end):
                             apart = plus(load(dim, position, j), -1.0, x)
-                            far = reach + radius[j]
+                            far = reach + radius[kind[j]]
                             if dot(apart, apart) < far * far:
                                 other[p] = j
                                 p += 1
@@ -165,4 +165,4 @@ def find_pairs(
 def list_pairs(grains: Grains, start: Ints, grid: Grid, skin: float) -> Pairs:
     """List near pairs of sorted grains."""
     dim = dim_of(grains.position.shape[1])
-    return Pairs(*find_pairs(dim, grains.position, grains.radius, skin, start, grid))
+    return Pairs(*find_pairs(dim, grains, skin, start, grid))

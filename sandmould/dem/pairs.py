@@ -8,8 +8,8 @@ from typing import Any
 from sandmould.compiled import njit
 from sandmould.dem.chunks import Chunks
 from sandmould.dem.contact_law import Law, contact
-from sandmould.dem.grains import Grains
-from sandmould.dem.kinds import Kinds, pair_coefficients_of
+from sandmould.dem.grains import Floats, Grains
+from sandmould.dem.kinds import pair_coefficients_of
 from sandmould.dem.near_pairs import NearPairs
 from sandmould.dem.vectors import (
     OPTIONS,
@@ -32,7 +32,7 @@ def pair_forces(
     c: int,
     chunks: Chunks,
     grains: Grains,
-    kinds: Kinds,
+    coefficients: Floats,
     near: NearPairs,
     law: Law,
     dt: float,
@@ -47,16 +47,15 @@ def pair_forces(
         The chunk.
     chunks : Chunks
     grains : Grains
-    kinds : Kinds
-        Of the grains, for this law.
+    coefficients : (k, k, 3) float64
+        Of two kinds, for this law: see ``pair_up``.
     near : NearPairs
     law : Law
     dt : float, s
     """
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     position, velocity, spin = grains.position, grains.velocity, grains.spin
-    radius, force, moment = grains.radius, grains.force, grains.moment
-    kind, coefficients = kinds.of_grain, kinds.coefficients
+    kind, radius, force, moment = grains.kind, grains.radius_of, grains.force, grains.moment
     stop, other, touching, slots = near.stop, near.other, near.touching, near.slot
     friction, rolling = near.friction, near.rolling
     slot_force, slot_moment = chunks.force, chunks.moment
@@ -65,11 +64,13 @@ def pair_forces(
     first = near.first[c]
     for i in range(begin, chunks.bound[c + 1]):
         x, v, w = load(dim, position, i), load(dim, velocity, i), load_spin(dim, spin, i)
-        r, kind_i = radius[i], index(kind[i])
+        kind_i = index(kind[i])
+        r = radius[kind_i]
         force_i, moment_i = no_vector(dim), no_spin(dim)
         for k in range(index(first), index(stop[i])):
             j = index(other[k])
-            r_j = radius[j]
+            kind_j = index(kind[j])
+            r_j = radius[kind_j]
             apart = plus(load(dim, position, j), -1.0, x)
             distance2 = dot(apart, apart)
             reach = r + r_j
@@ -85,7 +86,7 @@ def pair_forces(
                     r - 0.5 * overlap,
                     r_j - 0.5 * overlap,
                     law.lead_s * closeness,
-                    pair_coefficients_of(coefficients, kind_i, index(kind[j])),
+                    pair_coefficients_of(coefficients, kind_i, kind_j),
                     law,
                     dt,
                     load_spin(dim, friction, k),

@@ -12,7 +12,7 @@ from sandmould.dem.barrier import new_barrier
 from sandmould.dem.broad_phase import Candidates, find_candidates
 from sandmould.dem.chunks import split
 from sandmould.dem.grains import Floats, Grains
-from sandmould.dem.kinds import find_kinds
+from sandmould.dem.kinds import pair_up
 from sandmould.dem.motion import kick
 from sandmould.dem.moving_state import from_arrays, to_arrays
 from sandmould.dem.near_pairs import (
@@ -96,9 +96,11 @@ class Solver:
         history = new_history(self._dim, 0)
         near = new_near_pairs(self._dim, chunks, grains, pairs, Contacts.none(d), 0.0)
         walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
-        kinds = find_kinds(grains, self.scene.grain_law)
+        coefficients = pair_up(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
-        return Moving(grains, kinds, pairs, near, chunks, walls, upright, listed, np.zeros(1))
+        return Moving(
+            grains, coefficients, pairs, near, chunks, walls, upright, listed, np.zeros(1)
+        )
 
     def _upright(self, n: int) -> Floats:
         """Orientations of grains not turned yet."""
@@ -192,7 +194,7 @@ class Solver:
         """Sort the grains by place and list what is near what, history carried over."""
         old = self.moving
         n = len(old.grains.id)
-        size = 2 * float(old.grains.radius.max()) + self._skin
+        size = 2 * float(old.grains.radius_of.max()) + self._skin
         position = old.grains.position
         grid = make_grid(position.min(axis=0), position.max(axis=0), size, n)
         order, start = sort_into_cells(position, grid)
@@ -225,7 +227,7 @@ class Solver:
         orientation = old.orientation[order] if self._orientations else old.orientation
         self.moving = Moving(
             grains,
-            find_kinds(grains, self.scene.grain_law),
+            pair_up(grains, self.scene.grain_law),
             pairs,
             near,
             chunks,

@@ -13,7 +13,6 @@ from sandmould.dem.broad_phase import Candidates
 from sandmould.dem.chunks import Chunks
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Grains, Ints
-from sandmould.dem.kinds import Kinds
 from sandmould.dem.motion import Damping, drift, kick, turn
 from sandmould.dem.near_pairs import NearPairs, look, watch
 from sandmould.dem.neighbours import Pairs
@@ -70,7 +69,8 @@ class Moving(NamedTuple):
     """What the loop moves."""
 
     grains: Grains
-    kinds: Kinds
+    coefficients: Floats
+    """See ``pair_up``."""
     pairs: Pairs
     near: NearPairs
     chunks: Chunks
@@ -111,7 +111,7 @@ def _add_forces(
 ) -> None:
     """Add all forces on the grains of a chunk but those of earlier chunks."""
     grains, walls, chunks = moving.grains, moving.walls, moving.chunks
-    pair_forces(dim, c, chunks, grains, moving.kinds, moving.near, scene.grain_law, dt)
+    pair_forces(dim, c, chunks, grains, moving.coefficients, moving.near, scene.grain_law, dt)
     surface_forces(
         dim,
         walls.first_row[c],
@@ -120,8 +120,9 @@ def _add_forces(
         grains.position,
         grains.velocity,
         grains.spin,
-        grains.radius,
-        grains.mass,
+        grains.kind,
+        grains.radius_of,
+        grains.mass_of,
         grains.force,
         grains.moment,
         walls.arrays,

@@ -84,6 +84,7 @@ def surface_forces(
     position: Floats,
     velocity: Floats,
     spin: Floats,
+    kind: NDArray[Any],
     radius: Floats,
     mass: Floats,
     force: Floats,
@@ -107,7 +108,9 @@ def surface_forces(
     candidates : Candidates
     position, velocity : (n, d or 3) float64, m and m/s
     spin : (n, 1 or 3) float64, rad/s
-    radius, mass : (n,) float64, m and kg
+    kind : (n,) integers
+        Places of the grains in the next two.
+    radius, mass : (k,) float64, m and kg
     force, moment : (n, d or 3) and (n, 1 or 3) float64, N and N m
         Added to.
     arrays : SurfaceArrays
@@ -138,7 +141,7 @@ def surface_forces(
     lapse = dt if keep else 0.0
     for row in range(first_row, last_row):
         i = rows[row]
-        r = radius[i]
+        r = radius[kind[i]]
         x = plus(load(dim, position, i), -1.0, shift)
         touched = 0
         for k in range(start[row], start[row + 1]):
@@ -205,7 +208,7 @@ def surface_forces(
                 taken += 1
             on_grain, moment_1, _, friction, rolling, _ = contact(
                 n, r - distance, v, w, no_spin(dim), max(distance, 0.0), 0.0, 0.0,
-                pair_coefficients(law, mass[i], r, r), law, lapse, friction, rolling,
+                pair_coefficients(law, mass[kind[i]], r, r), law, lapse, friction, rolling,
             )  # fmt: skip
             total = plus(total, 1.0, on_grain)
             turning = plus(turning, 1.0, moment_1)

@@ -89,6 +89,8 @@ class Bridge(NamedTuple):
     friction: Rows
     rolling: Rows
     """See ``WallHistory``; longer than needed."""
+    kind: IntLine
+    """(n,) int64: 0, 1, ...: each grain is of a kind of its own."""
     loads: Rows
     """(nv, d) float64, N: sum over the samples of a window."""
     step_loads: Rows

@@ -227,6 +227,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         position,
         _vectors(bridge, VELOCITY, n),
         _vectors(bridge, SPIN, n),
+        bridge.kind,
         radius,
         _numbers(bridge, MASS, n),
         added,

@@ -91,6 +91,7 @@ class SurfaceKernel:
             part=np.zeros(4 * n + 64, dtype=np.int64),
             row_ids=np.zeros(n, dtype=np.int64),
             **memory._asdict(),
+            kind=np.arange(n),
             loads=np.zeros_like(arrays.vertices),
             step_loads=np.zeros_like(arrays.vertices),
             mover_load=np.zeros((0, d)),

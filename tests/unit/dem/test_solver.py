@@ -51,7 +51,7 @@ def cloud(dimension: int, n: int, seed: int = 1, fall_m_s: float = 0.5) -> tuple
     velocity += rng.normal(0, 0.05, velocity.shape)
     spin = rng.normal(0, 20, (n, spins))
     return (
-        Grains(
+        Grains.of(
             np.arange(1, n + 1),
             position,
             velocity,
@@ -59,8 +59,6 @@ def cloud(dimension: int, n: int, seed: int = 1, fall_m_s: float = 0.5) -> tuple
             radius,
             mass,
             0.4 * mass * radius**2,
-            np.zeros((n, dimension)),
-            np.zeros((n, spins)),
         ),
         across * 4.1e-3,
     )

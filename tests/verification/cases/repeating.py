@@ -116,9 +116,9 @@ def _lone_grain(dimension: int, step_s: float) -> Solver:
     spins = 1 if dimension == 2 else 3
     zeros, one = np.zeros((1, dimension)), np.ones(1)
     solver.add(
-        Grains(
+        Grains.of(
             np.ones(1, dtype=np.int64), zeros.copy(), zeros.copy(), np.zeros((1, spins)),
-            RADIUS_M * one, one.copy(), one.copy(), zeros.copy(), np.zeros((1, spins)),
+            RADIUS_M * one, one.copy(), one.copy(),
         )
     )  # fmt: skip
     return solver
