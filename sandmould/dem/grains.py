@@ -90,9 +90,10 @@ class Grains(NamedTuple):
         kind, example = _tell_apart(radius, mass, inertia)
         if len(id) and not len(example):
             raise ValueError(_TOO_MANY)
-        of_kinds = (of_grains[example] for of_grains in (radius, mass, inertia))
-        resting = np.zeros_like(position), np.zeros_like(spin)
-        return cls(id, position, velocity, spin, kind, *of_kinds, *resting)
+        return cls(
+            id, position, velocity, spin, kind, radius[example], mass[example], inertia[example],
+            np.zeros_like(position), np.zeros_like(spin),
+        )  # fmt: skip
 
     @classmethod
     def none(cls, dimension: int) -> Grains:
