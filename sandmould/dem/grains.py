@@ -135,4 +135,4 @@ class Grains(NamedTuple):
     def ordered(self, order: Ints) -> Grains:
         """The same grains in another order of storage."""
         fields = self._asdict().items()
-        return self._replace(**{k: a[order] for k, a in fields if k not in _OF_KINDS})
+        return self._replace(**{k: a.take(order, axis=0) for k, a in fields if k not in _OF_KINDS})

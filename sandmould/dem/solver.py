@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -196,7 +197,8 @@ class Solver:
         n = len(old.grains.id)
         size = 2 * float(old.grains.radius_of.max()) + self._skin
         position = old.grains.position
-        grid = make_grid(position.min(axis=0), position.max(axis=0), size, n)
+        spans = [(column.min(), column.max()) for column in position.T]  # far faster than by rows
+        grid = make_grid(*np.array(spans).T, size, n)
         order, start = sort_into_cells(position, grid)
         place = np.empty_like(order)
         place[order] = np.arange(n)
@@ -204,8 +206,8 @@ class Solver:
         pairs = list_pairs(grains, start, grid, self._skin)
         chunks = split(grains, pairs)
         contacts = moved_contacts(self._dim, self.contacts, place)
-        way = self.scene.dt * float(np.linalg.norm(grains.velocity, axis=1).max())
-        gap_m = near_gap(self._skin, way)
+        speed2 = float(np.einsum("ij,ij->i", grains.velocity, grains.velocity).max())
+        gap_m = near_gap(self._skin, self.scene.dt * math.sqrt(speed2))
         near = new_near_pairs(self._dim, chunks, grains, pairs, contacts, gap_m)
         candidates = find_candidates(
             self._dim,
