@@ -109,25 +109,20 @@ def contacts_of(dim: Any, bound: Ints, near: NearPairs) -> Contacts:
 
 
 @njit(**OPTIONS)
-def moved_contacts(dim: Any, old: Contacts, place: Ints) -> Contacts:
-    """Contacts of grains that are stored in new places; ``place`` gives them, (n,) int64."""
-    new = Contacts(
-        np.empty_like(old.first),
-        np.empty_like(old.first),
-        np.empty_like(old.friction),
-        np.empty_like(old.rolling),
-    )
-    for k in range(len(old.first)):
-        a, b = place[old.first[k]], place[old.second[k]]
-        swapped = a > b
-        # what acts on the other grain is opposite; so is the tangent of 2D
-        turned_round = swapped and len(dim) == 3
-        new.first[k], new.second[k] = min(a, b), max(a, b)
-        store(
-            times(load_spin(dim, old.friction, k), -1.0 if turned_round else 1.0), new.friction, k
-        )
-        store(times(load_spin(dim, old.rolling, k), -1.0 if swapped else 1.0), new.rolling, k)
-    return new
+def move_contacts(dim: Any, contacts: Contacts, order: Ints) -> None:
+    """Tell contacts that their grains are stored in another order, (n,) int64."""
+    place = np.empty(len(order), dtype=np.uint32)
+    for i in range(len(order)):
+        place[order[i]] = i
+    first, second = contacts.first, contacts.second
+    friction, rolling = contacts.friction, contacts.rolling
+    for k in range(len(first)):
+        a, b = place[first[k]], place[second[k]]
+        first[k], second[k] = min(a, b), max(a, b)
+        if a > b:  # what acts on the other grain is opposite; the tangent of 2D turns round with it
+            store(times(load_spin(dim, rolling, k), -1.0), rolling, k)
+            if len(dim) == 3:
+                store(times(load_spin(dim, friction, k), -1.0), friction, k)
 
 
 @njit(**OPTIONS)

@@ -19,7 +19,7 @@ from sandmould.dem.moving_state import from_arrays, to_arrays
 from sandmould.dem.near_pairs import (
     Contacts,
     contacts_of,
-    moved_contacts,
+    move_contacts,
     near_gap,
     new_near_pairs,
 )
@@ -85,7 +85,8 @@ class Solver:
         self._threads = min(threads, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(max(1, self._threads - 1))
         self._orientations = orientations
-        self.moving = self._empty()
+        self._nothing = self._empty()
+        self.moving = self._nothing
         """All that the step loop moves; replaced whenever pairs are listed."""
 
     def _empty(self) -> Moving:
@@ -193,19 +194,28 @@ class Solver:
 
     def _list(self, shift: Floats) -> None:
         """Sort the grains by place and list what is near what, history carried over."""
-        old = self.moving
+        old, nothing = self.moving, self._nothing
         n = len(old.grains.id)
         size = 2 * float(old.grains.radius_of.max()) + self._skin
-        position = old.grains.position
-        spans = [(column.min(), column.max()) for column in position.T]  # far faster than by rows
+        spans = [(x.min(), x.max()) for x in old.grains.position.T]  # far faster than by rows
         grid = make_grid(*np.array(spans).T, size, n)
-        order, start = sort_into_cells(position, grid)
-        place = np.empty_like(order)
-        place[order] = np.arange(n)
+        order, start = sort_into_cells(old.grains.position, grid)
+        contacts = self.contacts
+        move_contacts(self._dim, contacts, order)
+        ids = old.grains.id[old.walls.candidates.rows]
         grains = old.grains.ordered(order)
+        orientation = old.orientation[order] if self._orientations else old.orientation
+        # What is made anew is let go first: it is most of the memory.
+        self.moving = old = old._replace(
+            grains=grains,
+            pairs=nothing.pairs,
+            near=nothing.near,
+            chunks=nothing.chunks,
+            orientation=orientation,
+            listed=nothing.listed,
+        )
         pairs = list_pairs(grains, start, grid, self._skin)
         chunks = split(grains, pairs)
-        contacts = moved_contacts(self._dim, self.contacts, place)
         speed2 = float(np.einsum("ij,ij->i", grains.velocity, grains.velocity).max())
         gap_m = near_gap(self._skin, self.scene.dt * math.sqrt(speed2))
         near = new_near_pairs(self._dim, chunks, grains, pairs, contacts, gap_m)
@@ -219,14 +229,13 @@ class Solver:
         )
         history = carry_wall_history(
             self._dim,
-            old.grains.id[old.walls.candidates.rows],
+            ids,
             old.walls.history,
             grains.id[candidates.rows],
             candidates.start,
         )
         walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
         walls.loads[0] = old.walls.loads.sum(axis=0)
-        orientation = old.orientation[order] if self._orientations else old.orientation
         self.moving = Moving(
             grains,
             pair_up(grains, self.scene.grain_law),
