@@ -5,4 +5,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Places = NDArray[np.uint32]
+"""Places in long arrays, in half the memory."""
 Flags = NDArray[np.bool_]

@@ -32,13 +32,13 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
         for c in range(len(chunks.bound) - 1):
             first, last = chunks.bound[c], chunks.bound[c + 1]
             pair_forces(
-                dim, c, chunks, grains, moving.kinds, moving.pairs, moving.near,
-                scene.grain_law, scene.dt,
-            )  # fmt: skip
+                dim, c, chunks, grains, moving.coefficients, moving.near, scene.grain_law, scene.dt
+            )
             if parts > 1:
                 surface_forces(
                     dim, walls.first_row[c], walls.first_row[c + 1], walls.candidates,
-                    grains.position, grains.velocity, grains.spin, grains.radius, grains.mass,
+                    grains.position, grains.velocity, grains.spin, grains.kind,
+                    grains.radius_of, grains.mass_of,
                     grains.force, grains.moment, walls.arrays, no_vector(dim), no_vector(dim),
                     scene.wall_law, scene.dt, True, walls.history, walls.loads[c],
                 )  # fmt: skip
@@ -57,8 +57,7 @@ def _with_near(moving: Moving, chosen: np.ndarray) -> Moving:
         name: getattr(near, name).copy() for name in ("other", "touching", "friction", "rolling")
     }
     stop = near.stop.copy()
-    for begin, end in pairwise(bound):
-        first = moving.pairs.start[begin]
+    for first, (begin, end) in zip(near.first, pairwise(bound), strict=False):
         before = np.concatenate([[0], np.cumsum(chosen[first : near.stop[end - 1]])])
         stop[begin:end] = first + before[near.stop[begin:end] - first]
         kept = first + np.flatnonzero(chosen[first : near.stop[end - 1]])

@@ -40,8 +40,8 @@ QUOTIENTS_PER_GRAIN = 2
 CHAINED_PER_CONTACT = {2: 1, 3: 2}
 """Of these, what waits for each other: distance, then the limit of friction."""
 TRAFFIC = {
-    "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains radius": 1,
-    "kinds of_grain": 1, "grains mass": 1, "grains inertia": 1, "grains force": 2,
+    "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains kind": 1,
+    "grains force": 2,
     "grains moment": 2, "near stop": 1, "near other": 1, "near touching": 2,
     "near friction": 2, "near rolling": 2, "chunks grain": 1, "chunks incoming": 1,
     "chunks force": 2, "chunks moment": 2, "walls candidates rows": 1,

@@ -89,7 +89,7 @@ def near_of(solver: Solver) -> int:
     """Near pairs now."""
     moving = solver.moving
     last = moving.near.stop[moving.chunks.bound[1:] - 1]
-    return int((last - moving.pairs.start[moving.chunks.bound[:-1]]).sum())
+    return int((last - moving.near.first[:-1]).sum())
 
 
 def bytes_of(solver: Solver) -> dict[str, int]:
@@ -97,7 +97,6 @@ def bytes_of(solver: Solver) -> dict[str, int]:
     moving = solver.moving
     parts: dict[str, Any] = {
         "grains": moving.grains,
-        "kinds": moving.kinds,
         "pairs": moving.pairs,
         "near": moving.near,
         "chunks": moving.chunks,
@@ -109,10 +108,6 @@ def bytes_of(solver: Solver) -> dict[str, int]:
         for part, arrays in parts.items()
         for field, array in arrays._asdict().items()
     }
-    # Near pairs fill the front of their places; what lies behind is never touched.
-    share = near_of(solver) / max(1, len(moving.pairs.other))
-    for field in ("other", "touching", "friction", "rolling"):
-        sizes[f"near {field}"] = round(share * sizes[f"near {field}"])
     return sizes | {"walls loads": moving.walls.loads.nbytes, "listed": moving.listed.nbytes}
 
 

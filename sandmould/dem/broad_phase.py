@@ -186,7 +186,8 @@ def find_candidates(
     reach = skin
     for i in range(grains):
         reach = max(reach, skin + radius[i])
-    low, high = _bounds(dim, position)
+    sort = len(corner) > first_facet
+    low, high = _bounds(dim, position) if sort else _bounds(dim, vertices)
     facet_low, facet_high = _bounds(dim, vertices)
     moved = (shift[0], shift[1], shift[2] if len(dim) == 3 else 0.0)
     low = (
@@ -199,7 +200,6 @@ def find_candidates(
         min(high[1] - moved[1], facet_high[1] + reach),
         min(high[2] - moved[2], facet_high[2] + reach),
     )
-    sort = len(corner) > first_facet
     for k in range(3):
         sort = sort and low[k] <= high[k]
     if not sort:
@@ -208,6 +208,9 @@ def find_candidates(
     grid = _sort_facets(dim, vertices, corner[:last], first_facet, reach, low, high)
     size, (n_x, n_y, n_z) = grid.size, grid.cells
     cell_start, cell_part = grid.start, grid.part
+    height = np.empty(planes)
+    for p in range(planes):
+        height[p] = dot(load(dim, vertices, corner[p, 0]), load(dim, shape, p))
     for i in range(grains):
         x = plus(load(dim, position, i), -1.0, shift)
         near = radius[i] + skin
@@ -219,9 +222,14 @@ def find_candidates(
             i_z = math.floor((x[2] - low[2]) / size) if len(dim) == 3 else 0
             if 0 <= i_x < n_x and 0 <= i_y < n_y and 0 <= i_z < n_z:
                 cell = (int(i_x) * n_y + int(i_y)) * n_z + int(i_z)
+        # most grains are near no plane
+        first_part = planes
+        for p in range(planes):
+            if dot(x, load(dim, shape, p)) - height[p] <= near:
+                first_part = 0
         sorted_first = cell_start[cell] if cell >= 0 else 0
         in_cell = cell_start[cell + 1] - sorted_first if cell >= 0 else 0
-        for k in range(first_facet + in_cell):
+        for k in range(first_part, first_facet + in_cell):
             p = k if k < first_facet else cell_part[sorted_first + k - first_facet]
             distance = nearest(dim, vertices, planes, shape, corner, p, x, near)[0]
             if distance <= near:

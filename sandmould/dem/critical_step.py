@@ -102,9 +102,9 @@ def _pair_ends(solver: Solver) -> _Ends:
 def _wall_ends(solver: Solver) -> _Ends:
     """Contacts with surfaces; the arm is the radius, the longest that it can be."""
     grains, walls = solver.grains, solver.moving.walls
-    used, d = walls.history.used, solver.dimension
-    slots = 2 * d
-    in_use = (np.arange(slots) < used[:, None]).ravel()
+    used, first_slot = walls.history.used, walls.history.first_slot
+    slots = np.diff(first_slot)
+    in_use = np.arange(first_slot[-1]) < np.repeat(first_slot[:-1] + used, slots)
     i = np.repeat(walls.candidates.rows, slots)[in_use]
     radius = grains.radius[i]
     arms = np.column_stack([radius, np.zeros(len(i))])

@@ -79,13 +79,13 @@ def kick(
         Negative for half a step back to the time of the positions.
     """
     velocity, spin, force, moment = grains.velocity, grains.spin, grains.force, grains.moment
-    mass, inertia = grains.mass, grains.inertia
+    kind, mass, inertia = grains.kind, grains.mass_of, grains.inertia_of
     for i in range(first, last):
-        m, v = mass[i], load(dim, velocity, i)
+        m, v = mass[kind[i]], load(dim, velocity, i)
         push = plus(load(dim, force, i), m, body)
         push = damped(push, v, m, damping.form, damping.translation)
         store(plus(v, dt / m, push), velocity, i)
-        inert, w = inertia[i], load_spin(dim, spin, i)
+        inert, w = inertia[kind[i]], load_spin(dim, spin, i)
         torque = damped(load_spin(dim, moment, i), w, inert, damping.form, damping.rotation)
         store(plus(w, dt / inert, torque), spin, i)
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from sandmould.dem.broad_phase import Candidates
+from sandmould.dem.chunks import split
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
-from sandmould.dem.kinds import find_kinds
+from sandmould.dem.kinds import pair_up
 from sandmould.dem.near_pairs import Contacts, contacts_of, new_near_pairs
 from sandmould.dem.neighbours import Pairs
-from sandmould.dem.pairs import split
 from sandmould.dem.steps import Moving, new_walls
 from sandmould.dem.surfaces import SurfaceArrays
 from sandmould.dem.vectors import dim_of
@@ -26,7 +26,7 @@ def to_arrays(moving: Moving) -> dict[str, np.ndarray]:
     parts: dict[str, Any] = {
         "grains": moving.grains,
         "pairs": moving.pairs,
-        "contacts": contacts_of(dim, moving.chunks.bound, moving.pairs, moving.near),
+        "contacts": contacts_of(dim, moving.chunks.bound, moving.near),
         "candidates": walls.candidates,
         "history": walls.history,
         "surfaces": walls.arrays,
@@ -53,7 +53,7 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
     grains, pairs = part(Grains, "grains"), part(Pairs, "pairs")
     chunks = split(grains, pairs)
     dim = dim_of(grains.position.shape[1])
-    near = new_near_pairs(dim, pairs, len(chunks.grain), part(Contacts, "contacts"))
+    near = new_near_pairs(dim, chunks, grains, pairs, part(Contacts, "contacts"), 0.0)
     walls = new_walls(
         part(SurfaceArrays, "surfaces"),
         chunks.bound,
@@ -62,7 +62,7 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
     )
     return Moving(
         grains,
-        find_kinds(grains, grain_law),
+        pair_up(grains, grain_law),
         pairs,
         near,
         chunks,

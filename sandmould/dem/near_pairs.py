@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.arrays import Places
 from sandmould.compiled import njit
+from sandmould.dem.chunks import Chunks
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.vectors import (
@@ -55,12 +57,14 @@ class Contacts(NamedTuple):
 
 
 class NearPairs(NamedTuple):
-    """Near pairs; each chunk fills the front of the places that its listed pairs would take."""
+    """Near pairs; those of a chunk fill the front of the room that the chunk has."""
 
-    stop: Ints
-    """(n,) int64: where the pairs of a grain end; they begin where those of the grain before end,
-    or, for the first grain of a chunk, at the place of its first listed pair."""
-    other: NDArray[np.uint32]
+    first: Ints
+    """(c + 1,) int64: where the room of each chunk begins."""
+    stop: Places
+    """(n,) uint32: where the pairs of a grain end; they begin where those of the grain before end,
+    or, for the first grain of a chunk, where the room of the chunk begins."""
+    other: Places
     """(p,) uint32: the second grain."""
     touching: NDArray[np.uint8]
     """(p,) uint8: whether the pair touched at the last step."""
@@ -68,25 +72,31 @@ class NearPairs(NamedTuple):
     """(p, s) float64, N: as in ``Contacts``; zero where a pair does not touch."""
     rolling: Floats
     """(p, s) float64, N m: likewise."""
-    slot: Ints
-    """(q,) int64: slots of those pairs that cross to a later chunk, from its first slot on."""
+    slot: Places
+    """(q,) uint32: slots of those pairs that cross to a later chunk, from its first slot on."""
     left: Floats
     """(1,) float64, m: how far any grain can still go before a look is due."""
     gap: Floats
     """(1,) float64, m: largest gap of near pairs where a look is due in this step, or negative."""
+    full: Ints
+    """(1,) int64: whether a look found more near pairs than a chunk has room for."""
 
 
 @njit(**OPTIONS)
-def contacts_of(dim: Any, bound: Ints, pairs: Pairs, near: NearPairs) -> Contacts:
+def contacts_of(dim: Any, bound: Ints, near: NearPairs) -> Contacts:
     """Touching pairs of grains, ``bound`` being the first grains of the chunks."""
     stop, other, touching = near.stop, near.other, near.touching
-    most = len(touching)  # flags behind the near pairs of a chunk are of no meaning
-    first, second = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
-    friction = np.empty((most, len(no_spin(dim))))
-    rolling = np.empty((most, len(no_spin(dim))))
+    contacts = 0
+    for c in range(len(bound) - 1):
+        if bound[c + 1] > bound[c]:
+            for k in range(near.first[c], stop[bound[c + 1] - 1]):
+                contacts += touching[k]
+    first, second = np.empty(contacts, dtype=np.int64), np.empty(contacts, dtype=np.int64)
+    friction = np.empty((contacts, len(no_spin(dim))))
+    rolling = np.empty((contacts, len(no_spin(dim))))
     filled = 0
     for c in range(len(bound) - 1):
-        k = pairs.start[bound[c]]
+        k = near.first[c]
         for i in range(bound[c], bound[c + 1]):
             while k < stop[i]:
                 if touching[k]:
@@ -95,75 +105,108 @@ def contacts_of(dim: Any, bound: Ints, pairs: Pairs, near: NearPairs) -> Contact
                     store(load_spin(dim, near.rolling, k), rolling, filled)
                     filled += 1
                 k += 1
-    return Contacts(
-        first[:filled].copy(),
-        second[:filled].copy(),
-        friction[:filled].copy(),
-        rolling[:filled].copy(),
-    )
+    return Contacts(first, second, friction, rolling)
 
 
 @njit(**OPTIONS)
-def moved_contacts(dim: Any, old: Contacts, place: Ints) -> Contacts:
-    """Contacts of grains that are stored in new places; ``place`` gives them, (n,) int64."""
-    new = Contacts(
-        np.empty_like(old.first),
-        np.empty_like(old.first),
-        np.empty_like(old.friction),
-        np.empty_like(old.rolling),
-    )
-    for k in range(len(old.first)):
-        a, b = place[old.first[k]], place[old.second[k]]
-        swapped = a > b
-        # what acts on the other grain is opposite; so is the tangent of 2D
-        turned_round = swapped and len(dim) == 3
-        new.first[k], new.second[k] = min(a, b), max(a, b)
-        store(
-            times(load_spin(dim, old.friction, k), -1.0 if turned_round else 1.0), new.friction, k
-        )
-        store(times(load_spin(dim, old.rolling, k), -1.0 if swapped else 1.0), new.rolling, k)
-    return new
+def move_contacts(dim: Any, contacts: Contacts, order: Ints) -> None:
+    """Tell contacts that their grains are stored in another order, (n,) int64."""
+    place = np.empty(len(order), dtype=np.uint32)
+    for i in range(len(order)):
+        place[order[i]] = i
+    first, second = contacts.first, contacts.second
+    friction, rolling = contacts.friction, contacts.rolling
+    for k in range(len(first)):
+        a, b = place[first[k]], place[second[k]]
+        first[k], second[k] = min(a, b), max(a, b)
+        if a > b:  # what acts on the other grain is opposite; the tangent of 2D turns round with it
+            store(times(load_spin(dim, rolling, k), -1.0), rolling, k)
+            if len(dim) == 3:
+                store(times(load_spin(dim, friction, k), -1.0), friction, k)
 
 
 @njit(**OPTIONS)
-def _carry(dim: Any, contacts: Contacts, pairs: Pairs, near: NearPairs) -> None:
-    """Give near pairs that are all the listed ones the history of the contacts among them."""
+def _carry(dim: Any, contacts: Contacts, bound: Ints, near: NearPairs) -> None:
+    """Give near pairs the history of the contacts among them."""
+    other, stop = near.other, near.stop
     for k in range(len(contacts.first)):
-        i = contacts.first[k]
-        for q in range(pairs.start[i], pairs.start[i + 1]):
-            if pairs.other[q] == contacts.second[k]:
+        i, j = contacts.first[k], contacts.second[k]
+        c = np.searchsorted(bound, i, side="right") - 1
+        begin = near.first[c] if i == bound[c] else stop[i - 1]
+        for q in range(begin, stop[i]):
+            if other[q] == j:
                 near.touching[q] = 1
                 store(load_spin(dim, contacts.friction, k), near.friction, q)
                 store(load_spin(dim, contacts.rolling, k), near.rolling, q)
                 break
 
 
-def new_near_pairs(dim: Any, pairs: Pairs, slots: int, contacts: Contacts) -> NearPairs:
-    """Near pairs before the first look: all that are listed, with history from contacts.
+@njit(**OPTIONS)
+def _count(dim: Any, bound: Ints, grains: Grains, pairs: Pairs, gap: float) -> Ints:
+    """Near pairs of each chunk."""
+    position, kind, radius = grains.position, grains.kind, grains.radius_of
+    start, other = pairs.start, pairs.other
+    counts = np.zeros(len(bound) - 1, dtype=np.int64)
+    for c in range(len(counts)):
+        for i in range(bound[c], bound[c + 1]):
+            x, reach = load(dim, position, i), radius[kind[i]] + gap
+            for p in range(index(start[i]), index(start[i + 1])):
+                apart = plus(load(dim, position, other[p]), -1.0, x)
+                far = reach + radius[kind[other[p]]]
+                counts[c] += dot(apart, apart) < far * far
+    return counts
+
+
+def new_near_pairs(
+    dim: Any, chunks: Chunks, grains: Grains, pairs: Pairs, contacts: Contacts, gap_m: float
+) -> NearPairs:
+    """Choose near pairs among the listed ones, with history from contacts.
+
+    Each chunk has room for the pairs that it has now and a sixteenth more: in 3D a history is the
+    largest of all arrays.
 
     Parameters
     ----------
     dim : tuple of d floats
+    chunks : Chunks
+        What their slots hold is cleared.
+    grains : Grains
+        Where the forces are found next.
     pairs : Pairs
-        Newly listed.
-    slots : int
-        Pairs that cross between chunks.
     contacts : Contacts
-        Those that are not listed are forgotten.
+        Those that are not near are forgotten: they touch no more.
+    gap_m : float
+        Not negative.
     """
-    history = np.zeros((len(pairs.other), 1 if len(dim) == 2 else 3))
+    bound = chunks.bound
+    counts = _count(dim, bound, grains, pairs, gap_m)
+    listed = np.diff(pairs.start[bound])
+    first = np.zeros(len(bound), dtype=np.int64)
+    first[1:] = np.minimum(counts + counts // 16 + 16, listed).cumsum()
+    room = int(first[-1])
     near = NearPairs(
-        pairs.start[1:].copy(),
-        pairs.other.copy(),
-        np.zeros(len(pairs.other), dtype=np.uint8),
-        history,
-        history.copy(),
-        np.arange(slots),
-        np.zeros(1),
-        np.full(1, -1.0),
+        first,
+        np.repeat(first[:-1], np.diff(bound)).astype(np.uint32),
+        np.empty(room, dtype=np.uint32),
+        np.empty(room, dtype=np.uint8),
+        np.empty((room, 1 if len(dim) == 2 else 3)),
+        np.empty((room, 1 if len(dim) == 2 else 3)),
+        np.empty(len(chunks.grain), dtype=np.uint32),
+        np.full(1, 0.5 * gap_m),
+        np.full(1, gap_m),
+        np.zeros(1, dtype=np.int64),
     )
-    _carry(dim, contacts, pairs, near)
+    for c in range(len(counts)):
+        look(dim, c, bound, chunks.first_slot, grains, pairs, near, chunks.force, chunks.moment)
+    near.gap[0] = -1.0
+    _carry(dim, contacts, bound, near)
     return near
+
+
+@njit(**OPTIONS)
+def near_gap(skin: float, way: float) -> float:
+    """Largest gap of near pairs, m, where grains go a way in a step and pairs have a skin."""
+    return min(GAP_FACTOR * math.sqrt(skin * way), skin)
 
 
 @njit(**OPTIONS)
@@ -181,7 +224,7 @@ def watch(near: NearPairs, way: float, skin: float) -> None:
     near.left[0] -= way
     near.gap[0] = -1.0
     if near.left[0] < 0.0:
-        near.gap[0] = min(GAP_FACTOR * math.sqrt(skin * way), skin)
+        near.gap[0] = near_gap(skin, way)
         near.left[0] = 0.5 * near.gap[0]
 
 
@@ -199,6 +242,8 @@ def look(
 ) -> None:
     """Choose the near pairs of a chunk anew among the listed ones, and keep their history.
 
+    Where the chunk has too little room, its contacts alone are left and ``near.full`` is set.
+
     Parameters
     ----------
     dim : tuple of d floats
@@ -211,9 +256,10 @@ def look(
     near : NearPairs
         Of this chunk written to.
     """
-    position, radius, gap = grains.position, grains.radius, near.gap[0]
+    position, kind, radius, gap = grains.position, grains.kind, grains.radius_of, near.gap[0]
     begin, end = bound[c], bound[c + 1]
-    first, last = pairs.start[begin], near.stop[end - 1] if end > begin else pairs.start[begin]
+    first, room = near.first[c], near.first[c + 1]
+    last = near.stop[end - 1] if end > begin else first
     touched = 0
     for k in range(first, last):
         touched += near.touching[k]
@@ -234,15 +280,18 @@ def look(
         store(no_vector(dim), slot_force, s)
         store(no_spin(dim), slot_moment, s)
     # Both lists are in the order of the listed pairs, so history is merged in as they pass.
-    k, q = first, 0
+    k, q, full = first, 0, False
     for i in range(begin, end):
-        x, reach = load(dim, position, i), radius[i] + gap
+        x, reach = load(dim, position, i), radius[kind[i]] + gap
         for p in range(index(pairs.start[i]), index(pairs.start[i + 1])):
             j = pairs.other[p]
             apart = plus(load(dim, position, j), -1.0, x)
-            far = reach + radius[j]
+            far = reach + radius[kind[j]]
             held = q < touched and owner[q] == i and other[q] == j
             if dot(apart, apart) < far * far:
+                full = k == room
+                if full:
+                    break
                 near.other[k] = j
                 near.touching[k] = held
                 store(load_spin(dim, friction, q) if held else no_spin(dim), near.friction, k)
@@ -255,4 +304,16 @@ def look(
                 q += 1
             if j >= end:
                 slot += 1
+        if full:
+            break
         near.stop[i] = k
+    if full:
+        near.full[0] = 1
+        q = 0
+        for i in range(begin, end):
+            while q < touched and owner[q] == i:
+                near.other[first + q], near.touching[first + q] = other[q], 1
+                store(load_spin(dim, friction, q), near.friction, first + q)
+                store(load_spin(dim, rolling, q), near.rolling, first + q)
+                q += 1
+            near.stop[i] = first + q

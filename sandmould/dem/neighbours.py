@@ -10,25 +10,28 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sandmould.arrays import Places
 from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains, Ints
-from sandmould.dem.vectors import OPTIONS, dim_of, dot, load, plus
+from sandmould.dem.vectors import INLINED, OPTIONS, dim_of, dot, index, load, plus
+
+_ROUNDED = 1.0 + 1e-9
+"""Of a squared distance: where a grain lies in its cell is known but for round-off."""
 
 
 class Pairs(NamedTuple):
     """Pairs of grains nearer than the skin; the first of a pair is the one stored earlier."""
 
-    start: Ints
-    """(n + 1,) int64: pairs of grain i are start[i] to start[i + 1]."""
-    other: NDArray[np.uint32]
+    start: Places
+    """(n + 1,) uint32: pairs of grain i are start[i] to start[i + 1]."""
+    other: Places
     """(p,) uint32: the second grain."""
 
     @classmethod
     def none(cls) -> Pairs:
         """No pair yet."""
-        return cls(np.zeros(1, dtype=np.int64), np.zeros(0, np.uint32))
+        return cls(np.zeros(1, np.uint32), np.zeros(0, np.uint32))
 
 
 class Grid(NamedTuple):
@@ -101,19 +104,28 @@ def sort_into_cells(position: Floats, grid: Grid) -> tuple[Ints, Ints]:
     return order, start
 
 
+@njit(**INLINED)
+def _to_sides(
+    position: Floats, i: int | np.uint64, grid: Grid, a: int, cell: int
+) -> tuple[float, float]:
+    """How far a grain is from the cells before and after its own along an axis of the grid."""
+    axis = grid.axes[a]
+    far = position[i, axis] - grid.low[axis] - cell * grid.size
+    return max(far, 0.0), max(grid.size - far, 0.0)
+
+
 @njit(**OPTIONS)
 def find_pairs(
-    dim: Any, position: Floats, radius: Floats, skin: float, start: Ints, grid: Grid
-) -> tuple[Ints, NDArray[np.uint32]]:
+    dim: Any, grains: Grains, skin: float, start: Ints, grid: Grid
+) -> tuple[Places, Places]:
     """List the pairs of grains whose surfaces are nearer than the skin.
 
     Parameters
     ----------
     dim : tuple
         ``PLANE`` or ``SPACE``.
-    position : (n, d) float64, m
+    grains : Grains
         In the order of the cells.
-    radius : (n,) float64, m
     skin : float, m
     start : (c + 1,) int64
         Of ``sort_into_cells``.
@@ -121,43 +133,53 @@ def find_pairs(
 
     Returns
     -------
-    first : (n + 1,) int64
+    first : (n + 1,) uint32
         Where the pairs of each grain begin.
     other : (p,) uint32
     """
+    position, kind, radius = grains.position, grains.kind, grains.radius_of
     n = len(position)
-    first = np.zeros(n + 1, dtype=np.int64)
+    first = np.zeros(n + 1, dtype=np.uint32)
     other = np.empty(6 * n + 64, dtype=np.uint32)
     p = 0
     nx, ny, nz = grid.counts[0], grid.counts[1], grid.counts[2]
+    largest = radius.max() if n else 0.0
     for cz in range(nz):
         for cy in range(ny):
             for cx in range(nx):
                 here = (cz * ny + cy) * nx + cx
-                left, right = max(cx - 1, 0), min(cx + 1, nx - 1)
                 for i in range(start[here], start[here + 1]):
-                    x, reach = load(dim, position, i), radius[i] + skin
+                    x, reach = load(dim, position, i), radius[kind[i]] + skin
+                    most2 = (reach + largest) ** 2 * _ROUNDED
+                    to_left, to_right = _to_sides(position, i, grid, 0, cx)
+                    to_below, to_above = _to_sides(position, i, grid, 1, cy)
+                    to_next = _to_sides(position, i, grid, 2, cz)[1] if len(dim) == 3 else 0.0
                     # this row from the grain on, then whole rows ahead: three cells each lie
                     # one after the other in memory
                     for row in range(5):
-                        if row == 0:
-                            begin, end = i + 1, start[here - cx + right + 1]
-                        else:
-                            y, z = cy + (1, -1, 0, 1)[row - 1], cz + (0, 1, 1, 1)[row - 1]
-                            if y < 0 or y >= ny or z >= nz:
-                                continue
-                            base = (z * ny + y) * nx
-                            begin, end = start[base + left], start[base + right + 1]
+                        y, z = cy + (0, 1, -1, 0, 1)[row], cz + (0, 0, 1, 1, 1)[row]
+                        if y < 0 or y >= ny or z >= nz:
+                            continue
+                        beside = (0.0, to_above, to_below, 0.0, to_above)[row]
+                        ahead = (0.0, 0.0, to_next, to_next, to_next)[row]
+                        across2 = beside * beside + ahead * ahead
+                        if across2 > most2:
+                            continue
+                        base = (z * ny + y) * nx + cx
+                        left = cx > 0 and across2 + to_left * to_left <= most2
+                        right = cx < nx - 1 and across2 + to_right * to_right <= most2
+                        begin = start[base - left] if row else i + 1
+                        end = start[base + 1 + right]
                         if p + end - begin > len(other):
                             longer = np.empty(2 * (p + end - begin), dtype=np.uint32)
                             longer[:p] = other[:p]
                             other = longer
                         for j in range(begin, end):
                             apart = plus(load(dim, position, j), -1.0, x)
-                            far = reach + radius[j]
-                            if dot(apart, apart) < far * far:
-                                other[p] = j
-                                p += 1
+                            far = reach + radius[kind[j]]
+                            # Written at all events: a branch here is guessed wrong too often.
+                            other[index(p)] = j
+                            p += dot(apart, apart) < far * far
                     first[i + 1] = p
     return first, other[:p].copy()
 
@@ -165,4 +187,4 @@ def find_pairs(
 def list_pairs(grains: Grains, start: Ints, grid: Grid, skin: float) -> Pairs:
     """List near pairs of sorted grains."""
     dim = dim_of(grains.position.shape[1])
-    return Pairs(*find_pairs(dim, grains.position, grains.radius, skin, start, grid))
+    return Pairs(*find_pairs(dim, grains, skin, start, grid))

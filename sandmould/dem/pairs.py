@@ -1,23 +1,16 @@
-"""Forces between grains, chunk by chunk of grains stored one after the other.
-
-A chunk writes to its own grains alone. What it puts on grains of later chunks goes to slots of its
-own and is added by their chunk afterwards, in a fixed order: results do not depend on how threads
-are scheduled, nor on their number.
-"""
+"""Forces between grains, chunk by chunk."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from sandmould.compiled import njit
+from sandmould.dem.chunks import Chunks
 from sandmould.dem.contact_law import Law, contact
-from sandmould.dem.grains import Floats, Grains, Ints
-from sandmould.dem.kinds import Kinds, pair_coefficients_of
+from sandmould.dem.grains import Floats, Grains
+from sandmould.dem.kinds import pair_coefficients_of
 from sandmould.dem.near_pairs import NearPairs
-from sandmould.dem.neighbours import Pairs
 from sandmould.dem.vectors import (
     OPTIONS,
     add_to,
@@ -32,66 +25,6 @@ from sandmould.dem.vectors import (
     times,
 )
 
-CHUNK = 4096
-"""Grains of a chunk."""
-
-
-class Chunks(NamedTuple):
-    """Parts of the grains that are computed side by side, and what crosses between them."""
-
-    bound: Ints
-    """(c + 1,) int64: first grain of each chunk."""
-    first_slot: Ints
-    """(c + 1,) int64: first slot of each chunk."""
-    grain: Ints
-    """(q,) int64: the grain of a later chunk that a slot belongs to."""
-    incoming: Ints
-    """(q,) int64: slots in the order of the chunks of their grains."""
-    first_incoming: Ints
-    """(c + 1,) int64: where the slots for each chunk begin in that order."""
-    force: Floats
-    """(q, d) float64, N."""
-    moment: Floats
-    """(q, s) float64, N m."""
-
-
-def chunk_bounds(grains: int) -> Ints:
-    """Split grains into chunks of about ``CHUNK``; how many depends on the scene alone.
-
-    A chunk fits into a core's own cache, and few of its pairs cross to another. Their number is
-    even, so that two threads share them evenly.
-    """
-    chunks = max(1, 2 * round(grains / (2 * CHUNK)))
-    return np.linspace(0, grains, chunks + 1).astype(np.int64)
-
-
-@njit(**OPTIONS)
-def _crossing(bound: Ints, pairs: Pairs) -> tuple[Ints, Ints]:
-    first_slot = np.zeros(len(bound), dtype=np.int64)
-    grain = np.empty(len(pairs.other), dtype=np.int64)
-    slots = 0
-    for c in range(len(bound) - 1):
-        end = bound[c + 1]
-        for k in range(pairs.start[bound[c]], pairs.start[end]):
-            if pairs.other[k] >= end:
-                grain[slots] = pairs.other[k]
-                slots += 1
-        first_slot[c + 1] = slots
-    return first_slot, grain[:slots].copy()
-
-
-def split(grains: Grains, pairs: Pairs) -> Chunks:
-    """Make the chunks of a list of pairs."""
-    n, d = grains.position.shape
-    bound = chunk_bounds(n)
-    first_slot, grain = _crossing(bound, pairs)
-    chunk = np.searchsorted(bound, grain, side="right") - 1
-    incoming = np.argsort(chunk, kind="stable")
-    first_incoming = np.searchsorted(chunk[incoming], np.arange(len(bound)))
-    force = np.zeros((len(grain), d))
-    moment = np.zeros((len(grain), grains.spin.shape[1]))
-    return Chunks(bound, first_slot, grain, incoming, first_incoming, force, moment)
-
 
 @njit(**OPTIONS)
 def pair_forces(
@@ -99,8 +32,7 @@ def pair_forces(
     c: int,
     chunks: Chunks,
     grains: Grains,
-    kinds: Kinds,
-    pairs: Pairs,
+    coefficients: Floats,
     near: NearPairs,
     law: Law,
     dt: float,
@@ -115,31 +47,30 @@ def pair_forces(
         The chunk.
     chunks : Chunks
     grains : Grains
-    kinds : Kinds
-        Of the grains, for this law.
-    pairs : Pairs
+    coefficients : (k, k, 3) float64
+        Of two kinds, for this law: see ``pair_up``.
     near : NearPairs
-        Of these.
     law : Law
     dt : float, s
     """
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     position, velocity, spin = grains.position, grains.velocity, grains.spin
-    radius, force, moment = grains.radius, grains.force, grains.moment
-    kind, coefficients = kinds.of_grain, kinds.coefficients
+    kind, radius, force, moment = grains.kind, grains.radius_of, grains.force, grains.moment
     stop, other, touching, slots = near.stop, near.other, near.touching, near.slot
     friction, rolling = near.friction, near.rolling
     slot_force, slot_moment = chunks.force, chunks.moment
     begin, end = chunks.bound[c], index(chunks.bound[c + 1])
     crossing = chunks.first_slot[c]
-    first = pairs.start[begin]
+    first = near.first[c]
     for i in range(begin, chunks.bound[c + 1]):
         x, v, w = load(dim, position, i), load(dim, velocity, i), load_spin(dim, spin, i)
-        r, kind_i = radius[i], index(kind[i])
+        kind_i = index(kind[i])
+        r = radius[kind_i]
         force_i, moment_i = no_vector(dim), no_spin(dim)
         for k in range(index(first), index(stop[i])):
             j = index(other[k])
-            r_j = radius[j]
+            kind_j = index(kind[j])
+            r_j = radius[kind_j]
             apart = plus(load(dim, position, j), -1.0, x)
             distance2 = dot(apart, apart)
             reach = r + r_j
@@ -155,7 +86,7 @@ def pair_forces(
                     r - 0.5 * overlap,
                     r_j - 0.5 * overlap,
                     law.lead_s * closeness,
-                    pair_coefficients_of(coefficients, kind_i, index(kind[j])),
+                    pair_coefficients_of(coefficients, kind_i, kind_j),
                     law,
                     dt,
                     load_spin(dim, friction, k),

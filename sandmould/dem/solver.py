@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -10,15 +11,22 @@ import numpy as np
 
 from sandmould.dem.barrier import new_barrier
 from sandmould.dem.broad_phase import Candidates, find_candidates
+from sandmould.dem.chunks import split
 from sandmould.dem.grains import Floats, Grains
-from sandmould.dem.kinds import find_kinds
+from sandmould.dem.kinds import pair_up
 from sandmould.dem.motion import kick
 from sandmould.dem.moving_state import from_arrays, to_arrays
-from sandmould.dem.near_pairs import Contacts, contacts_of, moved_contacts, new_near_pairs
+from sandmould.dem.near_pairs import (
+    Contacts,
+    contacts_of,
+    move_contacts,
+    near_gap,
+    new_near_pairs,
+)
 from sandmould.dem.neighbours import Pairs, list_pairs, make_grid, sort_into_cells
-from sandmould.dem.pairs import split
 from sandmould.dem.steps import (
     LIST_IS_OLD,
+    NO_ROOM,
     NOT_A_NUMBER,
     DemScene,
     Moving,
@@ -77,7 +85,8 @@ class Solver:
         self._threads = min(threads, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(max(1, self._threads - 1))
         self._orientations = orientations
-        self.moving = self._empty()
+        self._nothing = self._empty()
+        self.moving = self._nothing
         """All that the step loop moves; replaced whenever pairs are listed."""
 
     def _empty(self) -> Moving:
@@ -87,11 +96,13 @@ class Solver:
         candidates = Candidates(none, np.zeros(1, dtype=np.int64), none.copy())
         chunks = split(grains, pairs)
         history = new_history(self._dim, 0)
-        near = new_near_pairs(self._dim, pairs, 0, Contacts.none(d))
+        near = new_near_pairs(self._dim, chunks, grains, pairs, Contacts.none(d), 0.0)
         walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
-        kinds = find_kinds(grains, self.scene.grain_law)
+        coefficients = pair_up(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
-        return Moving(grains, kinds, pairs, near, chunks, walls, upright, listed, np.zeros(1))
+        return Moving(
+            grains, coefficients, pairs, near, chunks, walls, upright, listed, np.zeros(1)
+        )
 
     def _upright(self, n: int) -> Floats:
         """Orientations of grains not turned yet."""
@@ -108,7 +119,7 @@ class Solver:
     def contacts(self) -> Contacts:
         """Touching pairs of grains and their history, a copy."""
         moving = self.moving
-        return contacts_of(self._dim, moving.chunks.bound, moving.pairs, moving.near)
+        return contacts_of(self._dim, moving.chunks.bound, moving.near)
 
     @property
     def orientation(self) -> Floats:
@@ -183,19 +194,31 @@ class Solver:
 
     def _list(self, shift: Floats) -> None:
         """Sort the grains by place and list what is near what, history carried over."""
-        old = self.moving
+        old, nothing = self.moving, self._nothing
         n = len(old.grains.id)
-        size = 2 * float(old.grains.radius.max()) + self._skin
-        position = old.grains.position
-        grid = make_grid(position.min(axis=0), position.max(axis=0), size, n)
-        order, start = sort_into_cells(position, grid)
-        place = np.empty_like(order)
-        place[order] = np.arange(n)
+        size = 2 * float(old.grains.radius_of.max()) + self._skin
+        spans = [(x.min(), x.max()) for x in old.grains.position.T]  # far faster than by rows
+        grid = make_grid(*np.array(spans).T, size, n)
+        order, start = sort_into_cells(old.grains.position, grid)
+        contacts = self.contacts
+        move_contacts(self._dim, contacts, order)
+        ids = old.grains.id[old.walls.candidates.rows]
         grains = old.grains.ordered(order)
+        orientation = old.orientation[order] if self._orientations else old.orientation
+        # What is made anew is let go first: it is most of the memory.
+        self.moving = old = old._replace(
+            grains=grains,
+            pairs=nothing.pairs,
+            near=nothing.near,
+            chunks=nothing.chunks,
+            orientation=orientation,
+            listed=nothing.listed,
+        )
         pairs = list_pairs(grains, start, grid, self._skin)
         chunks = split(grains, pairs)
-        contacts = moved_contacts(self._dim, self.contacts, place)
-        near = new_near_pairs(self._dim, pairs, len(chunks.grain), contacts)
+        speed2 = float(np.einsum("ij,ij->i", grains.velocity, grains.velocity).max())
+        gap_m = near_gap(self._skin, self.scene.dt * math.sqrt(speed2))
+        near = new_near_pairs(self._dim, chunks, grains, pairs, contacts, gap_m)
         candidates = find_candidates(
             self._dim,
             grains.position,
@@ -206,16 +229,16 @@ class Solver:
         )
         history = carry_wall_history(
             self._dim,
-            old.grains.id[old.walls.candidates.rows],
+            ids,
             old.walls.history,
             grains.id[candidates.rows],
+            candidates.start,
         )
         walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
         walls.loads[0] = old.walls.loads.sum(axis=0)
-        orientation = old.orientation[order] if self._orientations else old.orientation
         self.moving = Moving(
             grains,
-            find_kinds(grains, self.scene.grain_law),
+            pair_up(grains, self.scene.grain_law),
             pairs,
             near,
             chunks,
@@ -225,6 +248,14 @@ class Solver:
             np.array([0.5 * self._skin]),
         )
         self.lists += 1
+
+    def _make_room(self) -> None:
+        """Choose the near pairs anew, with room for all of them."""
+        moving, gap_m = self.moving, float(self.moving.near.gap[0])
+        near = new_near_pairs(
+            self._dim, moving.chunks, moving.grains, moving.pairs, self.contacts, gap_m
+        )
+        self.moving = moving._replace(near=near)
 
     def advance(self, displacement_m: Floats) -> None:
         """Compute as many steps as displacements are given, less two.
@@ -245,8 +276,10 @@ class Solver:
             self.steps += more
             if state == NOT_A_NUMBER:
                 raise NotANumberError(self.steps)
-            drifted = state == LIST_IS_OLD
-            if drifted:
+            drifted = state in (LIST_IS_OLD, NO_ROOM)
+            if state == NO_ROOM:
+                self._make_room()
+            if state == LIST_IS_OLD:
                 shift = 0.0 if self.scene.box_frame else displacement_m[done + 2]
                 self._list(shift * np.array(self.scene.direction))
 

@@ -10,19 +10,19 @@ import numpy as np
 from sandmould.compiled import njit
 from sandmould.dem.barrier import wait_for_all
 from sandmould.dem.broad_phase import Candidates
+from sandmould.dem.chunks import Chunks
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Grains, Ints
-from sandmould.dem.kinds import Kinds
 from sandmould.dem.motion import Damping, drift, kick, turn
 from sandmould.dem.near_pairs import NearPairs, look, watch
 from sandmould.dem.neighbours import Pairs
-from sandmould.dem.pairs import Chunks, gather_incoming, pair_forces
+from sandmould.dem.pairs import gather_incoming, pair_forces
 from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
 from sandmould.dem.vectors import INLINED, OPTIONS, dot, load, no_vector, plus, times
 from sandmould.dem.wall_history import WallHistory
 
-DONE, LIST_IS_OLD, NOT_A_NUMBER = 0, 1, 2
+DONE, LIST_IS_OLD, NOT_A_NUMBER, NO_ROOM = 0, 1, 2, 3
 """Why the loop returned."""
 
 
@@ -69,7 +69,8 @@ class Moving(NamedTuple):
     """What the loop moves."""
 
     grains: Grains
-    kinds: Kinds
+    coefficients: Floats
+    """See ``pair_up``."""
     pairs: Pairs
     near: NearPairs
     chunks: Chunks
@@ -110,13 +111,7 @@ def _add_forces(
 ) -> None:
     """Add all forces on the grains of a chunk but those of earlier chunks."""
     grains, walls, chunks = moving.grains, moving.walls, moving.chunks
-    pairs, near = moving.pairs, moving.near
-    if near.gap[0] >= 0.0:
-        look(
-            dim, c, chunks.bound, chunks.first_slot, grains, pairs, near,
-            chunks.force, chunks.moment,
-        )  # fmt: skip
-    pair_forces(dim, c, chunks, grains, moving.kinds, pairs, near, scene.grain_law, dt)
+    pair_forces(dim, c, chunks, grains, moving.coefficients, moving.near, scene.grain_law, dt)
     surface_forces(
         dim,
         walls.first_row[c],
@@ -125,8 +120,9 @@ def _add_forces(
         grains.position,
         grains.velocity,
         grains.spin,
-        grains.radius,
-        grains.mass,
+        grains.kind,
+        grains.radius_of,
+        grains.mass_of,
         grains.force,
         grains.moment,
         walls.arrays,
@@ -228,7 +224,7 @@ def advance(
     threads: int,
     team: Team,
 ) -> tuple[int, int]:
-    """Compute steps until they are done, pairs must be listed again, or numbers go wrong.
+    """Compute steps until they are done, lists must be made anew, or numbers go wrong.
 
     Parameters
     ----------
@@ -236,7 +232,7 @@ def advance(
         ``PLANE`` or ``SPACE``.
     steps : int
     drifted : bool
-        Whether the first step has already moved the grains and waited for a new list.
+        Whether the first step has already moved the grains and waited for new lists.
     scene : DemScene
     moving : Moving
     displacement : (steps + 2,) float64, m
@@ -251,10 +247,11 @@ def advance(
     done : int
         Whole steps done.
     state : int
-        ``DONE``, ``LIST_IS_OLD`` (the next step has drifted) or ``NOT_A_NUMBER``.
+        ``DONE``, ``NOT_A_NUMBER``, or, the next step having drifted, ``LIST_IS_OLD`` where pairs
+        must be listed again and ``NO_ROOM`` where the near ones need more room.
     """
-    chunks = len(moving.chunks.bound) - 1
-    mine = range(thread, chunks, threads)
+    near, bound = moving.near, moving.chunks.bound
+    mine = range(thread, len(bound) - 1, threads)
     barrier, speeds2, state = team.barrier, team.speeds2, team.state
     for k in range(1 if drifted else 0, steps + 1):
         if k == 0:
@@ -281,4 +278,13 @@ def advance(
         wait_for_all(barrier, threads)
         if state[0] != DONE:
             return k, state[0]
+        if near.gap[0] >= 0.0:
+            for c in mine:
+                look(
+                    dim, c, bound, moving.chunks.first_slot, moving.grains, moving.pairs, near,
+                    moving.chunks.force, moving.chunks.moment,
+                )  # fmt: skip
+            wait_for_all(barrier, threads)
+            if near.full[0]:
+                return k, NO_ROOM
     return steps, DONE

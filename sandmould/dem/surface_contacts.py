@@ -32,7 +32,7 @@ from sandmould.dem.vectors import (
     store,
     times,
 )
-from sandmould.dem.wall_history import WallHistory, recall, slots, swap
+from sandmould.dem.wall_history import WallHistory, recall, swap
 
 ONE_FACE = math.cos(math.radians(10.0))
 """Contacts with normals nearer than this are one: facets of a curved wall."""
@@ -84,6 +84,7 @@ def surface_forces(
     position: Floats,
     velocity: Floats,
     spin: Floats,
+    kind: NDArray[Any],
     radius: Floats,
     mass: Floats,
     force: Floats,
@@ -107,7 +108,9 @@ def surface_forces(
     candidates : Candidates
     position, velocity : (n, d or 3) float64, m and m/s
     spin : (n, 1 or 3) float64, rad/s
-    radius, mass : (n,) float64, m and kg
+    kind : (n,) integers
+        Places of the grains in the next two.
+    radius, mass : (k,) float64, m and kg
     force, moment : (n, d or 3) and (n, 1 or 3) float64, N and N m
         Added to.
     arrays : SurfaceArrays
@@ -128,17 +131,17 @@ def surface_forces(
     rows, start, part = candidates.rows, candidates.start, candidates.part
     vertices, vertex_velocity = arrays.vertices, arrays.vertex_velocity
     planes, shape, corner = arrays.planes[0], arrays.shape, arrays.corner
-    slots_used, slot_normal = history.used, history.normal
+    first_slot, slots_used, slot_normal = history.first_slot, history.used, history.normal
     slot_friction, slot_rolling = history.friction, history.rolling
     # Scratch: what one grain touches.
-    d, n_slots = len(dim), slots(dim)
+    d = len(dim)
     f_distance, f_part = np.empty(_MOST), np.empty(_MOST, dtype=np.int64)
     f_normal, f_weights = np.empty((_MOST, d)), np.empty((_MOST, d))
     f_inside, f_state = np.empty(_MOST, dtype=np.bool_), np.empty(_MOST, dtype=np.int8)
     lapse = dt if keep else 0.0
     for row in range(first_row, last_row):
         i = rows[row]
-        r = radius[i]
+        r = radius[kind[i]]
         x = plus(load(dim, position, i), -1.0, shift)
         touched = 0
         for k in range(start[row], start[row + 1]):
@@ -159,7 +162,8 @@ def surface_forces(
             f_state[c] = _WAITS
             store(n, f_normal, c)
             store(weights, f_weights, c)
-        old, base = slots_used[row], row * n_slots
+        old, base = slots_used[row], first_slot[row]
+        n_slots = first_slot[row + 1] - base
         if touched == 0:
             if keep and old:
                 slots_used[row] = 0
@@ -204,7 +208,7 @@ def surface_forces(
                 taken += 1
             on_grain, moment_1, _, friction, rolling, _ = contact(
                 n, r - distance, v, w, no_spin(dim), max(distance, 0.0), 0.0, 0.0,
-                pair_coefficients(law, mass[i], r, r), law, lapse, friction, rolling,
+                pair_coefficients(law, mass[kind[i]], r, r), law, lapse, friction, rolling,
             )  # fmt: skip
             total = plus(total, 1.0, on_grain)
             turning = plus(turning, 1.0, moment_1)

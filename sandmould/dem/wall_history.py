@@ -20,16 +20,18 @@ SAME_CONTACT = math.cos(math.radians(30.0))
 
 
 class WallHistory(NamedTuple):
-    """Memory of m grains; slot k of row i lies in row i slots + k of the last three."""
+    """Memory of m grains; slot k of row i lies in row first_slot[i] + k of the last three."""
 
+    first_slot: Ints
+    """(m + 1,) int64: where the slots of each row begin."""
     used: Ints
     """(m,) int64: slots in use."""
     normal: Floats
-    """(m slots, d) float64: normal from the grain to the surface."""
+    """(s, d) float64: normal from the grain to the surface."""
     friction: Floats
-    """(m slots, 1 or 3) float64, N: friction on the grain as a tangent."""
+    """(s, 1 or 3) float64, N: friction on the grain as a tangent."""
     rolling: Floats
-    """(m slots, 1 or 3) float64, N m: rolling moment on the grain."""
+    """(s, 1 or 3) float64, N m: rolling moment on the grain."""
 
 
 @njit(**OPTIONS)
@@ -69,19 +71,39 @@ def swap(
 
 
 @njit(**OPTIONS)
-def new_history(dim: Any, m: int) -> WallHistory:
-    """Empty memory of m grains."""
-    rows = m * slots(dim)
+def _empty(dim: Any, first_slot: Ints) -> WallHistory:
+    n = first_slot[-1]
     return WallHistory(
-        np.zeros(m, dtype=np.int64),
-        np.zeros((rows, len(dim))),
-        np.zeros((rows, len(no_spin(dim)))),
-        np.zeros((rows, len(no_spin(dim)))),
+        first_slot,
+        np.zeros(len(first_slot) - 1, dtype=np.int64),
+        np.zeros((n, len(dim))),
+        np.zeros((n, len(no_spin(dim)))),
+        np.zeros((n, len(no_spin(dim)))),
     )
 
 
 @njit(**OPTIONS)
-def carry_history(dim: Any, old_ids: Ints, old: WallHistory, new_ids: Ints) -> WallHistory:
+def new_history(dim: Any, m: int) -> WallHistory:
+    """Empty memory of m grains, each with all slots."""
+    return _empty(dim, np.arange(m + 1) * slots(dim))
+
+
+@njit(**OPTIONS)
+def _room(dim: Any, parts: int, used: int) -> int:
+    """Slots that a grain near some parts needs, of which some are used.
+
+    A contact takes over a used slot or moves it behind the others, where the next contact of the
+    same step finds it. A grain near one part has one contact.
+    """
+    if parts == 1:
+        return max(1, used)
+    return min(slots(dim), parts + max(parts, used))
+
+
+@njit(**OPTIONS)
+def carry_history(
+    dim: Any, old_ids: Ints, old: WallHistory, new_ids: Ints, start: Ints
+) -> WallHistory:
     """Memory in the order of new rows.
 
     Parameters
@@ -91,23 +113,28 @@ def carry_history(dim: Any, old_ids: Ints, old: WallHistory, new_ids: Ints) -> W
         Which grain, by an identity that outlives sorting, each row stands for; not negative.
     old : WallHistory
         In the order of the old rows.
+    start : (m + 1,) int64
+        Of the ``Candidates`` of the new rows.
     """
-    new = new_history(dim, len(new_ids))
-    if len(old_ids) == 0:
-        return new
-    largest = 0
+    largest = -1
     for row in range(len(old_ids)):
         largest = max(largest, old_ids[row])
     row_of = np.full(largest + 1, -1, dtype=np.int64)
     for row in range(len(old_ids)):
         row_of[old_ids[row]] = row
-    n = slots(dim)
+    first_slot = np.zeros(len(new_ids) + 1, dtype=np.int64)
+    for row in range(len(new_ids)):
+        old_row = row_of[new_ids[row]] if new_ids[row] < len(row_of) else -1
+        used = old.used[old_row] if old_row >= 0 else 0
+        room = _room(dim, start[row + 1] - start[row], used)
+        first_slot[row + 1] = first_slot[row] + room
+    new = _empty(dim, first_slot)
     for row in range(len(new_ids)):
         old_row = row_of[new_ids[row]] if new_ids[row] < len(row_of) else -1
         if old_row >= 0:
             new.used[row] = old.used[old_row]
             for k in range(old.used[old_row]):
-                a, b = old_row * n + k, row * n + k
+                a, b = old.first_slot[old_row] + k, first_slot[row] + k
                 store(load(dim, old.normal, a), new.normal, b)
                 store(load_spin(dim, old.friction, a), new.friction, b)
                 store(load_spin(dim, old.rolling, a), new.rolling, b)

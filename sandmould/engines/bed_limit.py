@@ -42,7 +42,7 @@ def limit_of_snapshot_s(
     factor = inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d)
     solver = solver_of(scenario, stage, scenario.step_s)
     solver.add(
-        Grains(
+        Grains.of(
             snapshot.id,
             snapshot.position_m,
             still,
@@ -50,8 +50,6 @@ def limit_of_snapshot_s(
             snapshot.radius_m,
             mass,
             factor * mass * snapshot.radius_m**2,
-            still.copy(),
-            unturned.copy(),
         )
     )
     for gate in opened:

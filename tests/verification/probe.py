@@ -51,8 +51,9 @@ class Probe:
         found = find_candidates(self.dim, x, radius, 0.0, arrays, still)
         shift_v = still if shift_velocity is None else tuple(shift_velocity)
         surface_forces(
-            self.dim, 0, len(found.rows), found, x, v, w, radius, mass, force, moment, arrays,
-            still, shift_v, self.law, STEP_S, True, self.history, loads,
+            self.dim, 0, len(found.rows), found, x, v, w, np.zeros(1, np.uint8), radius,
+            mass, force, moment, arrays, still, shift_v, self.law, STEP_S, True, self.history,
+            loads,
         )  # fmt: skip
         contacts = int(self.history.used[0]) if len(found.rows) else 0
         return Touch(force[0], moment[0], loads, contacts)

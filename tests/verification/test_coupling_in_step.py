@@ -18,7 +18,7 @@ from pattern_fe.material import Foam
 from pattern_fe.pattern import Pattern
 from pattern_fe.shapes import bar, mesh_of
 from pattern_fe.supports import Supports
-from sandmould.dem import pairs as pairs_module
+from sandmould.dem import chunks as chunks_module
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from sandmould.runs.outcome import Outcome
@@ -194,7 +194,7 @@ def test_a_stopped_session_goes_on_as_if_never_stopped(engine: str, tmp_path: Pa
 
 
 def test_threads_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pairs_module, "CHUNK", 8)
+    monkeypatch.setattr(chunks_module, "CHUNK", 8)
     found = []
     for threads in (1, 2):
         session: Any = open_coupled(build_program(bed_scene()), tmp_path, tmp_path / "engine.log")

@@ -83,11 +83,14 @@ class Bridge(NamedTuple):
     """See ``Candidates``; longer than needed."""
     row_ids: IntLine
     """(n,) int64: ids of the grains of the rows."""
+    first_slot: IntLine
     used: IntLine
     normal: Rows
     friction: Rows
     rolling: Rows
     """See ``WallHistory``; longer than needed."""
+    kind: IntLine
+    """(n,) int64: 0, 1, ...: each grain is of a kind of its own."""
     loads: Rows
     """(nv, d) float64, N: sum over the samples of a window."""
     step_loads: Rows

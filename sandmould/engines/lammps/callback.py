@@ -120,6 +120,13 @@ def _clear(rows: Floats) -> None:
 
 
 @njit(**OPTIONS)
+def _history_of(bridge: Bridge) -> WallHistory:
+    return WallHistory(
+        bridge.first_slot, bridge.used, bridge.normal, bridge.friction, bridge.rolling
+    )
+
+
+@njit(**OPTIONS)
 def _list(
     dim: Any,
     bridge: Bridge,
@@ -142,12 +149,13 @@ def _list(
     new_ids = np.empty(rows, dtype=np.int64)
     for k in range(rows):
         new_ids[k] = ids[near.rows[k]]
-    old = WallHistory(bridge.used, bridge.normal, bridge.friction, bridge.rolling)
-    new = carry_history(dim, bridge.row_ids[:old_rows], old, new_ids)
+    old = _history_of(bridge)
+    new = carry_history(dim, bridge.row_ids[:old_rows], old, new_ids, near.start)
     for k in range(len(new.normal)):
         store(load(dim, new.normal, k), bridge.normal, k)
         store(load_spin(dim, new.friction, k), bridge.friction, k)
         store(load_spin(dim, new.rolling, k), bridge.rolling, k)
+    _copy(new.first_slot, bridge.first_slot)
     _copy(new.used, bridge.used)
     _copy(new_ids, bridge.row_ids)
     _copy(near.rows, bridge.rows)
@@ -219,6 +227,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         position,
         _vectors(bridge, VELOCITY, n),
         _vectors(bridge, SPIN, n),
+        bridge.kind,
         radius,
         _numbers(bridge, MASS, n),
         added,
@@ -229,7 +238,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         law_of(bridge.law),
         dt,
         moves_on,
-        WallHistory(bridge.used, bridge.normal, bridge.friction, bridge.rolling),
+        _history_of(bridge),
         bridge.step_loads,
     )
     if moves_on and step % counts[LOAD_EVERY] == 0:

@@ -12,7 +12,7 @@ from sandmould.dem.addresses import table_of
 from sandmould.dem.contact_law import Law
 from sandmould.dem.surfaces import Surfaces
 from sandmould.dem.vectors import dim_of
-from sandmould.dem.wall_history import WallHistory, new_history
+from sandmould.dem.wall_history import new_history
 from sandmould.engines.box_motion import displacements
 from sandmould.engines.lammps.bridge import (
     COUNTS,
@@ -38,7 +38,7 @@ from sandmould.engines.solid_surfaces import add_solids
 from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.step_mover import StepMover
 
-_PER_ROW, _PER_SLOT = ("row_ids", "used"), [n for n in WallHistory._fields if n != "used"]
+_PER_ROW, _PER_SLOT = ("row_ids", "used"), ("normal", "friction", "rolling")
 """Arrays as long as the rows of the list, or as the slots of all rows; the rest is not in use."""
 _WHOLE = ("vertices", "vertex_velocity", "steps_left", "loads")
 
@@ -91,6 +91,7 @@ class SurfaceKernel:
             part=np.zeros(4 * n + 64, dtype=np.int64),
             row_ids=np.zeros(n, dtype=np.int64),
             **memory._asdict(),
+            kind=np.arange(n),
             loads=np.zeros_like(arrays.vertices),
             step_loads=np.zeros_like(arrays.vertices),
             mover_load=np.zeros((0, d)),
@@ -177,10 +178,11 @@ class SurfaceKernel:
         """Copies of the memory of the contacts, where the surfaces stand, loads of this check."""
         bridge = self._bridge
         rows = bridge.counts[ROWS]
-        slots = len(bridge.normal) // max(len(bridge.used), 1)
+        slots = bridge.first_slot[rows]
         arrays = {
+            "first_slot": bridge.first_slot[: rows + 1],
             **{name: getattr(bridge, name)[:rows] for name in _PER_ROW},
-            **{name: getattr(bridge, name)[: rows * slots] for name in _PER_SLOT},
+            **{name: getattr(bridge, name)[:slots] for name in _PER_SLOT},
             **{name: getattr(bridge, name) for name in _WHOLE},
         }
         copies = {name: array.copy() for name, array in arrays.items()}
@@ -189,7 +191,7 @@ class SurfaceKernel:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from what ``state`` gave."""
         bridge = self._bridge
-        for name in (*_PER_ROW, *_PER_SLOT, *_WHOLE):
+        for name in ("first_slot", *_PER_ROW, *_PER_SLOT, *_WHOLE):
             getattr(bridge, name)[: len(state[name])] = state[name]
         bridge.counts[LAST_STEP] = int(state["last_step"])
         bridge.counts[ROWS] = len(state["row_ids"])

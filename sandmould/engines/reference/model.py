@@ -94,7 +94,7 @@ def grains_of(scenario: Scenario, layer: PlannedLayer, base_m: float, first_id: 
         position[:, -1] += base_m
     mass = scenario.sand.grain_mass_kg(1.0, d) * (2 * radius) ** d
     factor = inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d)
-    return Grains(
+    return Grains.of(
         first_id + np.arange(n),
         position,
         np.zeros((n, d)) if by_hand is None else by_hand.copy(),
@@ -102,6 +102,4 @@ def grains_of(scenario: Scenario, layer: PlannedLayer, base_m: float, first_id: 
         radius.copy(),
         mass,
         factor * mass * radius**2,
-        np.zeros((n, d)),
-        np.zeros((n, spins)),
     )

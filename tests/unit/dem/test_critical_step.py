@@ -46,7 +46,7 @@ def network(positions: list[list[float]] | np.ndarray, law: Law, floor: bool = F
     still = np.zeros_like(position)
     ids = np.arange(1, n + 1)
     radius = np.full(n, RADIUS_M)
-    solver.add(Grains(ids, position, still, spin, radius, mass, inertia, still.copy(), spin.copy()))
+    solver.add(Grains.of(ids, position, still, spin, radius, mass, inertia))
     solver.place(position, still, spin)
     return solver
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sandmould.dem import pairs as pairs_module
+from sandmould.dem import chunks as chunks_module
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import ISOTROPIC, NONE, Damping
@@ -51,7 +51,7 @@ def cloud(dimension: int, n: int, seed: int = 1, fall_m_s: float = 0.5) -> tuple
     velocity += rng.normal(0, 0.05, velocity.shape)
     spin = rng.normal(0, 20, (n, spins))
     return (
-        Grains(
+        Grains.of(
             np.arange(1, n + 1),
             position,
             velocity,
@@ -59,8 +59,6 @@ def cloud(dimension: int, n: int, seed: int = 1, fall_m_s: float = 0.5) -> tuple
             radius,
             mass,
             0.4 * mass * radius**2,
-            np.zeros((n, dimension)),
-            np.zeros((n, spins)),
         ),
         across * 4.1e-3,
     )
@@ -115,14 +113,18 @@ def test_listing_again_changes_nothing(dimension: int) -> None:
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_looks_for_near_pairs_change_no_bit(dimension: int) -> None:
+def test_looks_for_near_pairs_change_no_bit(
+    dimension: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     seldom, always, never = (solver(dimension, 200) for _ in range(3))
-    fewer = 0
+    fewer, make_room, more_room = 0, Solver._make_room, []
+    monkeypatch.setattr(Solver, "_make_room", lambda s: more_room.append(s) or make_room(s))
     for _ in range(1000):
         always.moving.near.left[:] = -1.0
         moving = never.moving
-        slots = len(moving.chunks.grain)
-        whole = new_near_pairs(never._dim, moving.pairs, slots, never.contacts)
+        whole = new_near_pairs(
+            never._dim, moving.chunks, moving.grains, moving.pairs, never.contacts, 1.0
+        )
         whole.left[:] = np.inf
         never.moving = moving._replace(near=whole)
         for s in (seldom, always, never):
@@ -132,6 +134,7 @@ def test_looks_for_near_pairs_change_no_bit(dimension: int) -> None:
         np.testing.assert_array_equal(seldom.grains.position, never.grains.position)
     assert fewer > 500  # some pairs were passed over, and looked at in every step by the other
     assert len(never.contacts.first) > 3
+    assert seldom in more_room  # where a look found more than had room, contacts were kept
     for s in (seldom, always):
         np.testing.assert_array_equal(s.grains.position, never.grains.position)
         np.testing.assert_array_equal(s.contacts.friction, never.contacts.friction)
@@ -139,7 +142,7 @@ def test_looks_for_near_pairs_change_no_bit(dimension: int) -> None:
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_threads_change_no_bit(dimension: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pairs_module, "CHUNK", 40)
+    monkeypatch.setattr(chunks_module, "CHUNK", 40)
     one, two = (solver(dimension, 400, threads=t) for t in (1, 2))
     two._threads = 2  # also where the machine has one core
     for s in (one, two):
@@ -153,7 +156,7 @@ def test_threads_change_no_bit(dimension: int, monkeypatch: pytest.MonkeyPatch) 
 def test_chunks_change_round_off_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = solver(3, 400)
     whole.advance(np.zeros(2002))
-    monkeypatch.setattr(pairs_module, "CHUNK", 40)
+    monkeypatch.setattr(chunks_module, "CHUNK", 40)
     parts = solver(3, 400)
     parts.advance(np.zeros(2002))  # not for long: round-off grows with every collision
     assert np.abs(parts.moving.chunks.force).max() > 0  # pairs touch across chunks

@@ -173,18 +173,24 @@ def test_memory_follows_the_grain_not_the_row(d: int) -> None:
     rng, dim = np.random.default_rng(3), dim_of(d)
     ids = rng.permutation(40)[:10]
     old = new_history(dim, 10)
-    slots = len(old.normal) // 10
-    old.used[:] = rng.integers(0, slots + 1, 10)
+    old.used[:] = rng.integers(0, 2 * d + 1, 10)
     for array in (old.normal, old.friction, old.rolling):
         array[:] = rng.normal(size=array.shape)
     new_ids = np.concatenate([ids[[7, 2, 9, 0]], [39_000, 41]])
-    new = carry_history(dim, ids, old, new_ids)
-    assert new.used.tolist() == [*old.used[[7, 2, 9, 0]], 0, 0]
+    parts = np.array([1, 2, 1, 9, 1, 2])
+    start = np.concatenate([[0], np.cumsum(parts)])
+    new = carry_history(dim, ids, old, new_ids, start)
+    used = [*old.used[[7, 2, 9, 0]], 0, 0]
+    assert new.used.tolist() == used
+    room = [
+        max(1, u) if p == 1 else min(2 * d, p + max(p, u)) for p, u in zip(parts, used, strict=True)
+    ]
+    assert np.diff(new.first_slot).tolist() == room
+    assert len(new.normal) == sum(room)
     for row, was in enumerate((7, 2, 9, 0)):
-        used = old.used[was]
         for a, b in ((new.normal, old.normal), (new.friction, old.friction)):
             np.testing.assert_array_equal(
-                a[row * slots : row * slots + used], b[was * slots : was * slots + used]
+                a[new.first_slot[row] :][: used[row]], b[old.first_slot[was] :][: used[row]]
             )
-    empty = carry_history(dim, ids[:0], new_history(dim, 0), new_ids)
+    empty = carry_history(dim, ids[:0], new_history(dim, 0), new_ids, start)
     assert not empty.used.any()
