@@ -14,7 +14,7 @@ from sandmould.runs.columns import CONTROL, PART, RUN, SWEEP, VIBRATION_TIME_S
 from sandmould.statistics.control_case import SPRINGS
 from sandmould.study.collect import read_summary
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.records import OVER_TIME, runs_in
+from sandmould.study.records import OVER_TIME, TIMES, runs_in
 
 OF_SPRINGS = f"{CONTROL}{SPRINGS} "
 FEWEST = 5
@@ -39,7 +39,11 @@ class RecordedCurves:
         is_curve = (runs[PART] == SWEEP) | runs[PART].str.startswith(OF_SPRINGS)
         self._runs = runs[is_curve]
         kept = folder / OVER_TIME
-        self._over_time = pd.read_csv(kept, sep="\t") if kept.is_file() else None
+        self._over_time = pd.read_csv(kept, sep="\t") if kept.is_file() else pd.DataFrame()
+        if kept.is_file():
+            # Snapshots of two frequencies lie a little apart.
+            times_s = self._over_time[VIBRATION_TIME_S]
+            self._over_time["moment"] = (TIMES * times_s / times_s.max()).round().astype(int)
 
     @property
     def curves(self) -> list[FillCurve]:
@@ -47,16 +51,15 @@ class RecordedCurves:
         return list(self._curves(self._runs))
 
     @property
-    def times_s(self) -> list[float]:
-        """Times of vibration at which the record has the fill; none in an older record."""
-        if self._over_time is None:
-            return []
-        return sorted(set(self._over_time[VIBRATION_TIME_S].round(3)))
+    def moments(self) -> dict[int, float]:
+        """Vibration time, s, by the moment at which the record has the fill; of old ones none."""
+        if self._over_time.empty:
+            return {}
+        return dict(self._over_time.groupby("moment")[VIBRATION_TIME_S].mean())
 
-    def at(self, time_s: float) -> list[FillCurve]:
-        """The same curves after some of the vibration, s."""
-        assert self._over_time is not None
-        mine = self._over_time[self._over_time[VIBRATION_TIME_S].round(3) == time_s]
+    def at(self, moment: int) -> list[FillCurve]:
+        """The same curves at a moment of the vibration."""
+        mine = self._over_time[self._over_time["moment"] == moment]
         fills = mine.set_index(RUN)[MEASURE]
         return list(self._curves(self._runs.assign(**{MEASURE: self._runs[RUN].map(fills)})))
 

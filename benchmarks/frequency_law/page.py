@@ -133,9 +133,9 @@ def _law(there: Mapping[str, dict[str, Any]], others: Sequence[RecordedCurves]) 
             for curve in study.curves
         ],
         "over_time": [
-            (study.name, [groups.at_time(study.at(time_s), time_s) for time_s in study.times_s])
+            (study.name, [groups.at_time(study.at(m), t) for m, t in study.moments.items()])
             for study in others
-            if study.times_s and len(study.curves) >= FEWEST_CURVES
+            if study.moments and len(study.curves) >= FEWEST_CURVES
         ],
     }
 
