@@ -27,12 +27,12 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
 
     Nothing moves: the kick and the drift last for no time, and cost what they always cost.
     """
-    grains, walls, chunks = moving.grains, moving.walls, moving.chunks
+    grains, walls, bound = moving.grains, moving.walls, moving.bound
     for _ in range(times):
-        for c in range(len(chunks.bound) - 1):
-            first, last = chunks.bound[c], chunks.bound[c + 1]
+        for c in range(len(bound) - 1):
+            first, last = bound[c], bound[c + 1]
             pair_forces(
-                dim, c, chunks, grains, moving.coefficients, moving.near, scene.grain_law, scene.dt
+                dim, c, bound, grains, moving.coefficients, moving.near, scene.grain_law, scene.dt
             )
             if parts > 1:
                 surface_forces(
@@ -43,7 +43,7 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
                     scene.wall_law, scene.dt, True, walls.history, walls.loads[c],
                 )  # fmt: skip
             if parts > 2:
-                gather_incoming(dim, c, chunks, grains)
+                gather_incoming(dim, c, moving.near, grains)
             if parts > 3:
                 kick(dim, first, last, grains, scene.gravity, scene.damping, 0.0)
             if parts > 4:
@@ -52,7 +52,7 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
 
 def _with_near(moving: Moving, chosen: np.ndarray) -> Moving:
     """Keep some of the near pairs of grains; those of a chunk move up to its front."""
-    near, bound = moving.near, moving.chunks.bound
+    near, bound = moving.near, moving.bound
     rows = {
         name: getattr(near, name).copy() for name in ("other", "touching", "friction", "rolling")
     }

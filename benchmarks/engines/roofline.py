@@ -43,8 +43,8 @@ TRAFFIC = {
     "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains kind": 1,
     "grains force": 2,
     "grains moment": 2, "near stop": 1, "near other": 1, "near touching": 2,
-    "near friction": 2, "near rolling": 2, "chunks grain": 1, "chunks incoming": 1,
-    "chunks force": 2, "chunks moment": 2, "walls candidates rows": 1,
+    "near friction": 2, "near rolling": 2, "near slot": 1, "near slot_grain": 1,
+    "near slot_force": 2, "near slot_moment": 2, "walls candidates rows": 1,
     "walls candidates start": 1, "walls candidates part": 1, "walls history used": 2,
     "walls history normal": 2, "walls history friction": 2, "walls history rolling": 2,
 }  # fmt: skip

@@ -88,7 +88,7 @@ def measure_threads(extent: Extent) -> dict[str, Any]:
 def near_of(solver: Solver) -> int:
     """Near pairs now."""
     moving = solver.moving
-    last = moving.near.stop[moving.chunks.bound[1:] - 1]
+    last = moving.near.stop[moving.bound[1:] - 1]
     return int((last - moving.near.first[:-1]).sum())
 
 
@@ -99,7 +99,6 @@ def bytes_of(solver: Solver) -> dict[str, int]:
         "grains": moving.grains,
         "pairs": moving.pairs,
         "near": moving.near,
-        "chunks": moving.chunks,
         "walls candidates": moving.walls.candidates,
         "walls history": moving.walls.history,
     }

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.arrays import Floats, Ints
+from sandmould.arrays import Floats, Ints, Places
 from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS
 
@@ -48,8 +48,8 @@ class Grains(NamedTuple):
     are of one kind, such as a sieve class.
     """
 
-    id: Ints
-    """(n,) int64."""
+    id: Places
+    """(n,) uint32."""
     position: Floats
     """(n, d) float64, m."""
     velocity: Floats
@@ -72,7 +72,7 @@ class Grains(NamedTuple):
     @classmethod
     def of(
         cls,
-        id: Ints,
+        id: Ints | Places,
         position: Floats,
         velocity: Floats,
         spin: Floats,
@@ -91,7 +91,8 @@ class Grains(NamedTuple):
         if len(id) and not len(example):
             raise ValueError(_TOO_MANY)
         return cls(
-            id, position, velocity, spin, kind, radius[example], mass[example], inertia[example],
+            id.astype(np.uint32), position, velocity, spin, kind,
+            radius[example], mass[example], inertia[example],
             np.zeros_like(position), np.zeros_like(spin),
         )  # fmt: skip
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sandmould.dem.broad_phase import Candidates
-from sandmould.dem.chunks import split
+from sandmould.dem.chunks import chunk_bounds
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.kinds import pair_up
@@ -26,7 +26,7 @@ def to_arrays(moving: Moving) -> dict[str, np.ndarray]:
     parts: dict[str, Any] = {
         "grains": moving.grains,
         "pairs": moving.pairs,
-        "contacts": contacts_of(dim, moving.chunks.bound, moving.near),
+        "contacts": contacts_of(dim, moving.bound, moving.near),
         "candidates": walls.candidates,
         "history": walls.history,
         "surfaces": walls.arrays,
@@ -51,12 +51,12 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
         return kind(*(arrays[f"{name}_{field}"] for field in kind._fields))
 
     grains, pairs = part(Grains, "grains"), part(Pairs, "pairs")
-    chunks = split(grains, pairs)
+    bound = chunk_bounds(len(grains.id))
     dim = dim_of(grains.position.shape[1])
-    near = new_near_pairs(dim, chunks, grains, pairs, part(Contacts, "contacts"), 0.0)
+    near = new_near_pairs(dim, bound, grains, pairs, part(Contacts, "contacts"), 0.0)
     walls = new_walls(
         part(SurfaceArrays, "surfaces"),
-        chunks.bound,
+        bound,
         part(Candidates, "candidates"),
         part(WallHistory, "history"),
     )
@@ -65,7 +65,7 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
         pair_up(grains, grain_law),
         pairs,
         near,
-        chunks,
+        bound,
         walls._replace(listed=arrays["listed_vertices"]),
         arrays["orientation"],
         arrays["listed"],

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sandmould.arrays import Places
 from sandmould.compiled import njit
-from sandmould.dem.chunks import Chunks
+from sandmould.dem.chunks import chunk_of, farthest_chunk
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.vectors import (
@@ -72,8 +72,19 @@ class NearPairs(NamedTuple):
     """(p, s) float64, N: as in ``Contacts``; zero where a pair does not touch."""
     rolling: Floats
     """(p, s) float64, N m: likewise."""
+    first_slot: Ints
+    """(c + 1,) int64: where the room of each chunk for slots begins."""
+    slot_bound: Ints
+    """(c, f) int64: the slots of a chunk for the chunk t later begin with slot_bound[c, t - 1] and
+    end before slot_bound[c, t]."""
     slot: Places
     """(q,) uint32: slots of those pairs that cross to a later chunk, from its first slot on."""
+    slot_grain: Places
+    """(q,) uint32: the second grain, in the order of slots as the next two."""
+    slot_force: Floats
+    """(q, d) float64, N: what the pair puts on it."""
+    slot_moment: Floats
+    """(q, s) float64, N m."""
     left: Floats
     """(1,) float64, m: how far any grain can still go before a look is due."""
     gap: Floats
@@ -142,34 +153,39 @@ def _carry(dim: Any, contacts: Contacts, bound: Ints, near: NearPairs) -> None:
 
 
 @njit(**OPTIONS)
-def _count(dim: Any, bound: Ints, grains: Grains, pairs: Pairs, gap: float) -> Ints:
-    """Near pairs of each chunk."""
+def _count(dim: Any, bound: Ints, grains: Grains, pairs: Pairs, gap: float) -> tuple[Ints, Ints]:
+    """Near pairs of each chunk, and those of them that cross to a later one."""
     position, kind, radius = grains.position, grains.kind, grains.radius_of
     start, other = pairs.start, pairs.other
     counts = np.zeros(len(bound) - 1, dtype=np.int64)
+    crossing = np.zeros(len(bound) - 1, dtype=np.int64)
     for c in range(len(counts)):
         for i in range(bound[c], bound[c + 1]):
             x, reach = load(dim, position, i), radius[kind[i]] + gap
             for p in range(index(start[i]), index(start[i + 1])):
                 apart = plus(load(dim, position, other[p]), -1.0, x)
                 far = reach + radius[kind[other[p]]]
-                counts[c] += dot(apart, apart) < far * far
-    return counts
+                if dot(apart, apart) < far * far:
+                    counts[c] += 1
+                    crossing[c] += other[p] >= bound[c + 1]
+    return counts, crossing
+
+
+def _room(counts: Ints, most: Ints) -> Ints:
+    """Where the room of each chunk begins: for a few more than there are now, (c + 1,) int64."""
+    return np.concatenate([[0], np.minimum(counts + counts // 32 + 16, most).cumsum()])
 
 
 def new_near_pairs(
-    dim: Any, chunks: Chunks, grains: Grains, pairs: Pairs, contacts: Contacts, gap_m: float
+    dim: Any, bound: Ints, grains: Grains, pairs: Pairs, contacts: Contacts, gap_m: float
 ) -> NearPairs:
     """Choose near pairs among the listed ones, with history from contacts.
-
-    Each chunk has room for the pairs that it has now and a sixteenth more: in 3D a history is the
-    largest of all arrays.
 
     Parameters
     ----------
     dim : tuple of d floats
-    chunks : Chunks
-        What their slots hold is cleared.
+    bound : (c + 1,) int64
+        First grains of the chunks.
     grains : Grains
         Where the forces are found next.
     pairs : Pairs
@@ -178,26 +194,29 @@ def new_near_pairs(
     gap_m : float
         Not negative.
     """
-    bound = chunks.bound
-    counts = _count(dim, bound, grains, pairs, gap_m)
-    listed = np.diff(pairs.start[bound])
-    first = np.zeros(len(bound), dtype=np.int64)
-    first[1:] = np.minimum(counts + counts // 16 + 16, listed).cumsum()
-    room = int(first[-1])
+    counts, crossing = _count(dim, bound, grains, pairs, gap_m)
+    first = _room(counts, np.diff(pairs.start[bound]))
+    first_slot = _room(crossing, np.diff(first))
+    room, slots, spins = first[-1], first_slot[-1], grains.spin.shape[1]
     near = NearPairs(
         first,
         np.repeat(first[:-1], np.diff(bound)).astype(np.uint32),
         np.empty(room, dtype=np.uint32),
         np.empty(room, dtype=np.uint8),
-        np.empty((room, 1 if len(dim) == 2 else 3)),
-        np.empty((room, 1 if len(dim) == 2 else 3)),
-        np.empty(len(chunks.grain), dtype=np.uint32),
+        np.empty((room, spins)),
+        np.empty((room, spins)),
+        first_slot,
+        np.zeros((len(counts), farthest_chunk(bound, pairs) + 1), dtype=np.int64),
+        np.empty(slots, dtype=np.uint32),
+        np.empty(slots, dtype=np.uint32),
+        np.empty((slots, len(dim))),
+        np.empty((slots, spins)),
         np.full(1, 0.5 * gap_m),
         np.full(1, gap_m),
         np.zeros(1, dtype=np.int64),
     )
     for c in range(len(counts)):
-        look(dim, c, bound, chunks.first_slot, grains, pairs, near, chunks.force, chunks.moment)
+        look(dim, c, bound, grains, pairs, near)
     near.gap[0] = -1.0
     _carry(dim, contacts, bound, near)
     return near
@@ -229,16 +248,37 @@ def watch(near: NearPairs, way: float, skin: float) -> None:
 
 
 @njit(**OPTIONS)
+def _give_slots(dim: Any, c: int, bound: Ints, near: NearPairs) -> None:
+    """Give near pairs that cross to later chunks their slots, in the order of those chunks."""
+    other, ends, end = near.other, near.slot_bound[c], bound[c + 1]
+    first, last = near.first[c], near.stop[end - 1]
+    ends[:] = 0
+    for k in range(first, last):
+        if other[k] >= end:
+            ends[chunk_of(bound, other[k]) - c] += 1
+    ends[0] = near.first_slot[c]
+    for t in range(1, len(ends)):
+        ends[t] += ends[t - 1]
+    free, crossing = ends.copy(), near.first_slot[c]
+    for k in range(first, last):
+        if other[k] >= end:
+            later = chunk_of(bound, other[k]) - c - 1
+            slot = free[later]
+            free[later] += 1
+            near.slot[crossing], near.slot_grain[slot] = slot, other[k]
+            store(no_vector(dim), near.slot_force, slot)
+            store(no_spin(dim), near.slot_moment, slot)
+            crossing += 1
+
+
+@njit(**OPTIONS)
 def look(
     dim: Any,
     c: int,
     bound: Ints,
-    first_slot: Ints,
     grains: Grains,
     pairs: Pairs,
     near: NearPairs,
-    slot_force: Floats,
-    slot_moment: Floats,
 ) -> None:
     """Choose the near pairs of a chunk anew among the listed ones, and keep their history.
 
@@ -249,8 +289,8 @@ def look(
     dim : tuple of d floats
     c : int
         The chunk.
-    bound, first_slot, slot_force, slot_moment
-        Of ``Chunks``; what the chunk's own slots hold is cleared.
+    bound : (c + 1,) int64
+        First grains of the chunks.
     grains : Grains
     pairs : Pairs
     near : NearPairs
@@ -275,10 +315,7 @@ def look(
                 store(load_spin(dim, near.rolling, k), rolling, q)
                 q += 1
             k += 1
-    slot, crossing = first_slot[c], first_slot[c]
-    for s in range(first_slot[c], first_slot[c + 1]):
-        store(no_vector(dim), slot_force, s)
-        store(no_spin(dim), slot_moment, s)
+    crossing, slots = 0, near.first_slot[c + 1] - near.first_slot[c]
     # Both lists are in the order of the listed pairs, so history is merged in as they pass.
     k, q, full = first, 0, False
     for i in range(begin, end):
@@ -289,7 +326,8 @@ def look(
             far = reach + radius[kind[j]]
             held = q < touched and owner[q] == i and other[q] == j
             if dot(apart, apart) < far * far:
-                full = k == room
+                crossing += j >= end
+                full = k == room or crossing > slots
                 if full:
                     break
                 near.other[k] = j
@@ -297,13 +335,8 @@ def look(
                 store(load_spin(dim, friction, q) if held else no_spin(dim), near.friction, k)
                 store(load_spin(dim, rolling, q) if held else no_spin(dim), near.rolling, k)
                 k += 1
-                if j >= end:
-                    near.slot[crossing] = slot
-                    crossing += 1
             if held:
                 q += 1
-            if j >= end:
-                slot += 1
         if full:
             break
         near.stop[i] = k
@@ -317,3 +350,5 @@ def look(
                 store(load_spin(dim, rolling, q), near.rolling, first + q)
                 q += 1
             near.stop[i] = first + q
+    elif end > begin:
+        _give_slots(dim, c, bound, near)

@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 from sandmould.compiled import njit
-from sandmould.dem.chunks import Chunks
 from sandmould.dem.contact_law import Law, contact
-from sandmould.dem.grains import Floats, Grains
+from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.kinds import pair_coefficients_of
 from sandmould.dem.near_pairs import NearPairs
 from sandmould.dem.vectors import (
@@ -30,7 +29,7 @@ from sandmould.dem.vectors import (
 def pair_forces(
     dim: Any,
     c: int,
-    chunks: Chunks,
+    bound: Ints,
     grains: Grains,
     coefficients: Floats,
     near: NearPairs,
@@ -45,7 +44,8 @@ def pair_forces(
         ``PLANE`` or ``SPACE``.
     c : int
         The chunk.
-    chunks : Chunks
+    bound : (c + 1,) int64
+        First grains of the chunks.
     grains : Grains
     coefficients : (k, k, 3) float64
         Of two kinds, for this law: see ``pair_up``.
@@ -58,11 +58,11 @@ def pair_forces(
     kind, radius, force, moment = grains.kind, grains.radius_of, grains.force, grains.moment
     stop, other, touching, slots = near.stop, near.other, near.touching, near.slot
     friction, rolling = near.friction, near.rolling
-    slot_force, slot_moment = chunks.force, chunks.moment
-    begin, end = chunks.bound[c], index(chunks.bound[c + 1])
-    crossing = chunks.first_slot[c]
+    slot_force, slot_moment = near.slot_force, near.slot_moment
+    begin, end = bound[c], index(bound[c + 1])
+    crossing = near.first_slot[c]
     first = near.first[c]
-    for i in range(begin, chunks.bound[c + 1]):
+    for i in range(begin, bound[c + 1]):
         x, v, w = load(dim, position, i), load(dim, velocity, i), load_spin(dim, spin, i)
         kind_i = index(kind[i])
         r = radius[kind_i]
@@ -118,9 +118,14 @@ def pair_forces(
 
 
 @njit(**OPTIONS)
-def gather_incoming(dim: Any, c: int, chunks: Chunks, grains: Grains) -> None:
-    """Add what earlier chunks put on the grains of one chunk."""
-    for q in range(chunks.first_incoming[c], chunks.first_incoming[c + 1]):
-        slot = chunks.incoming[q]
-        add_to(load(dim, chunks.force, slot), 1.0, grains.force, chunks.grain[slot])
-        add_to(load_spin(dim, chunks.moment, slot), 1.0, grains.moment, chunks.grain[slot])
+def gather_incoming(dim: Any, c: int, near: NearPairs, grains: Grains) -> None:
+    """Add what earlier chunks put on the grains of one chunk, the earliest first."""
+    slot_bound, grain, force, moment = (
+        near.slot_bound, near.slot_grain, grains.force, grains.moment
+    )  # fmt: skip
+    slot_force, slot_moment = near.slot_force, near.slot_moment
+    for earlier in range(min(c, slot_bound.shape[1] - 1), 0, -1):
+        begin, end = slot_bound[c - earlier, earlier - 1], slot_bound[c - earlier, earlier]
+        for slot in range(begin, end):
+            add_to(load(dim, slot_force, slot), 1.0, force, grain[slot])
+            add_to(load_spin(dim, slot_moment, slot), 1.0, moment, grain[slot])

@@ -11,7 +11,7 @@ import numpy as np
 
 from sandmould.dem.barrier import new_barrier
 from sandmould.dem.broad_phase import Candidates, find_candidates
-from sandmould.dem.chunks import split
+from sandmould.dem.chunks import chunk_bounds
 from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.kinds import pair_up
 from sandmould.dem.motion import kick
@@ -94,15 +94,13 @@ class Solver:
         grains, pairs = Grains.none(d), Pairs.none()
         none = np.zeros(0, dtype=np.int64)
         candidates = Candidates(none, np.zeros(1, dtype=np.int64), none.copy())
-        chunks = split(grains, pairs)
+        bound = chunk_bounds(0)
         history = new_history(self._dim, 0)
-        near = new_near_pairs(self._dim, chunks, grains, pairs, Contacts.none(d), 0.0)
-        walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
+        near = new_near_pairs(self._dim, bound, grains, pairs, Contacts.none(d), 0.0)
+        walls = new_walls(self.surfaces.arrays, bound, candidates, history)
         coefficients = pair_up(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
-        return Moving(
-            grains, coefficients, pairs, near, chunks, walls, upright, listed, np.zeros(1)
-        )
+        return Moving(grains, coefficients, pairs, near, bound, walls, upright, listed, np.zeros(1))
 
     def _upright(self, n: int) -> Floats:
         """Orientations of grains not turned yet."""
@@ -119,7 +117,7 @@ class Solver:
     def contacts(self) -> Contacts:
         """Touching pairs of grains and their history, a copy."""
         moving = self.moving
-        return contacts_of(self._dim, moving.chunks.bound, moving.near)
+        return contacts_of(self._dim, moving.bound, moving.near)
 
     @property
     def orientation(self) -> Floats:
@@ -185,7 +183,7 @@ class Solver:
         moving = self.moving
         walls = new_walls(
             self.surfaces.arrays,
-            moving.chunks.bound,
+            moving.bound,
             moving.walls.candidates,
             moving.walls.history,
         )
@@ -197,8 +195,9 @@ class Solver:
         old, nothing = self.moving, self._nothing
         n = len(old.grains.id)
         size = 2 * float(old.grains.radius_of.max()) + self._skin
-        spans = [(x.min(), x.max()) for x in old.grains.position.T]  # far faster than by rows
-        grid = make_grid(*np.array(spans).T, size, n)
+        columns = old.grains.position.T  # far faster than by rows
+        low, high = np.array([x.min() for x in columns]), np.array([x.max() for x in columns])
+        grid = make_grid(low, high, size, n)
         order, start = sort_into_cells(old.grains.position, grid)
         contacts = self.contacts
         move_contacts(self._dim, contacts, order)
@@ -210,15 +209,14 @@ class Solver:
             grains=grains,
             pairs=nothing.pairs,
             near=nothing.near,
-            chunks=nothing.chunks,
             orientation=orientation,
             listed=nothing.listed,
         )
         pairs = list_pairs(grains, start, grid, self._skin)
-        chunks = split(grains, pairs)
+        bound = chunk_bounds(n)
         speed2 = float(np.einsum("ij,ij->i", grains.velocity, grains.velocity).max())
         gap_m = near_gap(self._skin, self.scene.dt * math.sqrt(speed2))
-        near = new_near_pairs(self._dim, chunks, grains, pairs, contacts, gap_m)
+        near = new_near_pairs(self._dim, bound, grains, pairs, contacts, gap_m)
         candidates = find_candidates(
             self._dim,
             grains.position,
@@ -234,14 +232,14 @@ class Solver:
             grains.id[candidates.rows],
             candidates.start,
         )
-        walls = new_walls(self.surfaces.arrays, chunks.bound, candidates, history)
+        walls = new_walls(self.surfaces.arrays, bound, candidates, history)
         walls.loads[0] = old.walls.loads.sum(axis=0)
         self.moving = Moving(
             grains,
             pair_up(grains, self.scene.grain_law),
             pairs,
             near,
-            chunks,
+            bound,
             walls,
             orientation,
             grains.position - shift,
@@ -253,7 +251,7 @@ class Solver:
         """Choose the near pairs anew, with room for all of them."""
         moving, gap_m = self.moving, float(self.moving.near.gap[0])
         near = new_near_pairs(
-            self._dim, moving.chunks, moving.grains, moving.pairs, self.contacts, gap_m
+            self._dim, moving.bound, moving.grains, moving.pairs, self.contacts, gap_m
         )
         self.moving = moving._replace(near=near)
 
@@ -311,7 +309,7 @@ class Solver:
         done, state : int
             See ``advance``; all threads end alike.
         """
-        chunks = len(self.moving.chunks.bound) - 1
+        chunks = len(self.moving.bound) - 1
         threads = min(self._threads, chunks)
         team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
         others = [

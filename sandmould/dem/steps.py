@@ -10,7 +10,6 @@ import numpy as np
 from sandmould.compiled import njit
 from sandmould.dem.barrier import wait_for_all
 from sandmould.dem.broad_phase import Candidates
-from sandmould.dem.chunks import Chunks
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.motion import Damping, drift, kick, turn
@@ -73,7 +72,8 @@ class Moving(NamedTuple):
     """See ``pair_up``."""
     pairs: Pairs
     near: NearPairs
-    chunks: Chunks
+    bound: Ints
+    """(c + 1,) int64: first grains of the chunks."""
     walls: Walls
     orientation: Floats
     """(n, 1) angles or (n, 9) matrices; no row where orientations are not recorded."""
@@ -110,8 +110,8 @@ def _add_forces(
     dim: Any, c: int, scene: DemScene, moving: Moving, shift: Any, speed: Any, dt: float
 ) -> None:
     """Add all forces on the grains of a chunk but those of earlier chunks."""
-    grains, walls, chunks = moving.grains, moving.walls, moving.chunks
-    pair_forces(dim, c, chunks, grains, moving.coefficients, moving.near, scene.grain_law, dt)
+    grains, walls = moving.grains, moving.walls
+    pair_forces(dim, c, moving.bound, grains, moving.coefficients, moving.near, scene.grain_law, dt)
     surface_forces(
         dim,
         walls.first_row[c],
@@ -147,10 +147,10 @@ def find_forces(dim: Any, scene: DemScene, moving: Moving) -> None:
     moving : Moving
         Its grains' forces are zero before.
     """
-    for c in range(len(moving.chunks.bound) - 1):
+    for c in range(len(moving.bound) - 1):
         _add_forces(dim, c, scene, moving, no_vector(dim), no_vector(dim), 0.0)
-    for c in range(len(moving.chunks.bound) - 1):
-        gather_incoming(dim, c, moving.chunks, moving.grains)
+    for c in range(len(moving.bound) - 1):
+        gather_incoming(dim, c, moving.near, moving.grains)
 
 
 @njit(**INLINED)
@@ -165,7 +165,7 @@ def _box(dim: Any, scene: DemScene, displacement: Floats, k: int) -> Any:
 @njit(**OPTIONS)
 def _move(dim: Any, c: int, scene: DemScene, moving: Moving, displacement: Floats, k: int) -> float:
     """Advance the grains of a chunk by step k; gives their largest squared speed, m2/s2."""
-    first, last = moving.chunks.bound[c], moving.chunks.bound[c + 1]
+    first, last = moving.bound[c], moving.bound[c + 1]
     body = scene.gravity
     if scene.box_frame:
         # The second difference of the walls' own motion: the trajectories of moving walls.
@@ -183,7 +183,7 @@ def _finish(
     dim: Any, c: int, scene: DemScene, moving: Moving, displacement: Floats, k: int, goes_on: bool
 ) -> float:
     """Add what earlier chunks put on a chunk, and move it on where another step follows."""
-    gather_incoming(dim, c, moving.chunks, moving.grains)
+    gather_incoming(dim, c, moving.near, moving.grains)
     return _move(dim, c, scene, moving, displacement, k) if goes_on else 0.0
 
 
@@ -250,7 +250,7 @@ def advance(
         ``DONE``, ``NOT_A_NUMBER``, or, the next step having drifted, ``LIST_IS_OLD`` where pairs
         must be listed again and ``NO_ROOM`` where the near ones need more room.
     """
-    near, bound = moving.near, moving.chunks.bound
+    near, bound = moving.near, moving.bound
     mine = range(thread, len(bound) - 1, threads)
     barrier, speeds2, state = team.barrier, team.speeds2, team.state
     for k in range(1 if drifted else 0, steps + 1):
@@ -280,10 +280,7 @@ def advance(
             return k, state[0]
         if near.gap[0] >= 0.0:
             for c in mine:
-                look(
-                    dim, c, bound, moving.chunks.first_slot, moving.grains, moving.pairs, near,
-                    moving.chunks.force, moving.chunks.moment,
-                )  # fmt: skip
+                look(dim, c, bound, moving.grains, moving.pairs, near)
             wait_for_all(barrier, threads)
             if near.full[0]:
                 return k, NO_ROOM

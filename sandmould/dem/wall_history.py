@@ -7,14 +7,15 @@ on. So the memory belongs to the grain and a direction, not to a facet.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from sandmould.arrays import Floats, Ints
+from sandmould.arrays import Floats, Ints, Places
 from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS, dot, load, load_spin, no_spin, store
 
+Ids: TypeAlias = Ints | Places
 SAME_CONTACT = math.cos(math.radians(30.0))
 """A contact takes over the memory of one whose normal was nearer than this."""
 
@@ -102,14 +103,14 @@ def _room(dim: Any, parts: int, used: int) -> int:
 
 @njit(**OPTIONS)
 def carry_history(
-    dim: Any, old_ids: Ints, old: WallHistory, new_ids: Ints, start: Ints
+    dim: Any, old_ids: Ids, old: WallHistory, new_ids: Ids, start: Ints
 ) -> WallHistory:
     """Memory in the order of new rows.
 
     Parameters
     ----------
     dim : tuple of d floats
-    old_ids, new_ids : (m,) int64
+    old_ids, new_ids : (m,) integers
         Which grain, by an identity that outlives sorting, each row stands for; not negative.
     old : WallHistory
         In the order of the old rows.

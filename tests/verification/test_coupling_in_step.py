@@ -203,7 +203,7 @@ def test_threads_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         session.advance(0.12)
         session.sand.solver._threads = threads  # also where the machine has one core
         session.advance(2e-3)
-        assert len(session.sand.solver.moving.chunks.bound) > 4
+        assert len(session.sand.solver.moving.bound) > 4
         found.append(session.displacement_m)
         session.close()
     assert np.abs(found[0]).max() > 1e-5

@@ -219,7 +219,7 @@ class ReferenceSession(StagedSession):
         spins = np.zeros((self.grains, 3))
         spins[:, 3 - spin.shape[1] :] = spin[order]
         return self._snapshot(
-            grains.id[order],
+            grains.id[order].astype(np.int64),
             grains.position[order],
             velocity[order],
             spins,

@@ -123,7 +123,7 @@ def test_looks_for_near_pairs_change_no_bit(
         always.moving.near.left[:] = -1.0
         moving = never.moving
         whole = new_near_pairs(
-            never._dim, moving.chunks, moving.grains, moving.pairs, never.contacts, 1.0
+            never._dim, moving.bound, moving.grains, moving.pairs, never.contacts, 1.0
         )
         whole.left[:] = np.inf
         never.moving = moving._replace(near=whole)
@@ -147,7 +147,7 @@ def test_threads_change_no_bit(dimension: int, monkeypatch: pytest.MonkeyPatch) 
     two._threads = 2  # also where the machine has one core
     for s in (one, two):
         s.advance(np.zeros(3002))
-    assert len(two.moving.chunks.bound) == 11
+    assert len(two.moving.bound) == 11
     assert len(one.contacts.first) > 10
     np.testing.assert_array_equal(one.grains.position, two.grains.position)
     np.testing.assert_array_equal(one.grains.spin, two.grains.spin)
@@ -159,7 +159,9 @@ def test_chunks_change_round_off_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chunks_module, "CHUNK", 40)
     parts = solver(3, 400)
     parts.advance(np.zeros(2002))  # not for long: round-off grows with every collision
-    assert np.abs(parts.moving.chunks.force).max() > 0  # pairs touch across chunks
+    near = parts.moving.near
+    used = zip(near.first_slot[:-1], near.slot_bound[:, -1], strict=True)
+    assert any(near.slot_force[a:b].any() for a, b in used)  # pairs touch across chunks
     one, two = (s.grains.ordered(np.argsort(s.grains.id)) for s in (whole, parts))
     np.testing.assert_allclose(one.position, two.position, atol=1e-11)
     np.testing.assert_allclose(one.force, two.force, atol=1e-6)
