@@ -93,7 +93,7 @@ def estimate_pages(
     return EstimatePages(
         title="Angle of repose" if verdict.measure == "heap_angle_deg" else what.capitalize(),
         headline=_headline(settings, sands, verdict.measure, keys),
-        sentences=tuple(sentences) or (f"No run has a {what} that could be measured.",),
+        sentences=tuple(sentences) or (f"No run has a usable value: {what}.",),
         sound=bool(settings) and all(sand.posterior for sand in sands),
         heaps=heaps_of(study_folder, summary, verdict, scenario),
         map=_map_table(settings, (keys[0], keys[1])) if is_map and settings else None,
@@ -116,7 +116,7 @@ def _headline(
         said = f"Found frictions for {listed(found)}" if found else "Not resolved"
         return f"{said}; none for {listed(lacking)}." if lacking else f"{said}."
     if not settings:
-        return f"Not resolved: no run has a {what} that could be measured."
+        return f"Not resolved: no run has a usable value: {what}."
     largest = max(abs(s.mean) for s in settings)
 
     def told(value: float) -> str:
