@@ -66,7 +66,7 @@ def page(results: dict[str, Any]) -> str:
         "runs_per_s": 10_000 / whole.wall_s,
         "when_failing": WHEN_FAILING,
         "to_go_on": TO_GO_ON,
-        "others_s": max(general_s, default=math.nan),
+        "others_s": max(general_s, default=None),
     })  # fmt: skip
 
 
