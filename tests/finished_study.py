@@ -1,4 +1,4 @@
-"""A study of castings whose runs are computed in this process, in seconds."""
+"""Studies whose runs are computed in this process, in seconds."""
 
 from __future__ import annotations
 
@@ -11,6 +11,17 @@ from sandmould.study.simulate import measure, render, simulate, write_crash
 
 ELEMENTS_M = (0.01, 0.02)
 EXCHANGES = ("corrected", "faces", "difference")
+FLOW = """\
+based_on: tank
+scenario:
+  case: {particle_m: 0.004, width_m: 0.016, depth_m: 0.032}
+  duration_s: 0.01
+  record_s: 0.005
+  dt_max_s: 0.002
+objective: {measure: h20_sd_pa}
+sweep: {keys: {relaxations: [1]}}
+"""
+"""A study's file: a small tank of metal, one run."""
 
 
 def study_text(

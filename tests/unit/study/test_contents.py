@@ -9,7 +9,7 @@ import pytest
 
 from sandmould.report.page import write_report
 from sandmould.study.contents import undescribed
-from tests.finished_study import finished_study, study_text
+from tests.finished_study import FLOW, finished_study, study_text
 
 SAND = """\
 based_on: tube_quick
@@ -20,16 +20,6 @@ scenario:
   vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 0.04}]
 sweep: {keys: {vibration.0.frequency_hz: [50]}}
 replicates: 1
-"""
-FLOW = """\
-based_on: tank
-scenario:
-  case: {particle_m: 0.004, width_m: 0.016, depth_m: 0.032}
-  duration_s: 0.01
-  record_s: 0.005
-  dt_max_s: 0.002
-objective: {measure: h20_sd_pa}
-sweep: {keys: {relaxations: [1]}}
 """
 STUDIES = {"sand": SAND, "flow": FLOW, "casting": study_text((0.02,), ("faces",))}
 
