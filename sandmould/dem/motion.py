@@ -80,14 +80,17 @@ def kick(
     """
     velocity, spin, force, moment = grains.velocity, grains.spin, grains.force, grains.moment
     kind, mass, inertia = grains.kind, grains.mass_of, grains.inertia_of
+    # Quotients are found once for each kind.
+    per_mass, per_inertia = dt / mass, dt / inertia
     for i in range(first, last):
-        m, v = mass[kind[i]], load(dim, velocity, i)
+        k = kind[i]
+        m, v = mass[k], load(dim, velocity, i)
         push = plus(load(dim, force, i), m, body)
         push = damped(push, v, m, damping.form, damping.translation)
-        store(plus(v, dt / m, push), velocity, i)
-        inert, w = inertia[kind[i]], load_spin(dim, spin, i)
+        store(plus(v, per_mass[k], push), velocity, i)
+        inert, w = inertia[k], load_spin(dim, spin, i)
         torque = damped(load_spin(dim, moment, i), w, inert, damping.form, damping.rotation)
-        store(plus(w, dt / inert, torque), spin, i)
+        store(plus(w, per_inertia[k], torque), spin, i)
 
 
 @njit(**OPTIONS)

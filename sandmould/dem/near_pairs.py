@@ -97,6 +97,7 @@ class NearPairs(NamedTuple):
 def contacts_of(dim: Any, bound: Ints, near: NearPairs) -> Contacts:
     """Touching pairs of grains, ``bound`` being the first grains of the chunks."""
     stop, other, touching = near.stop, near.other, near.touching
+    near_friction, near_rolling = near.friction, near.rolling
     contacts = 0
     for c in range(len(bound) - 1):
         if bound[c + 1] > bound[c]:
@@ -112,8 +113,8 @@ def contacts_of(dim: Any, bound: Ints, near: NearPairs) -> Contacts:
             while k < stop[i]:
                 if touching[k]:
                     first[filled], second[filled] = i, other[k]
-                    store(load_spin(dim, near.friction, k), friction, filled)
-                    store(load_spin(dim, near.rolling, k), rolling, filled)
+                    store(load_spin(dim, near_friction, k), friction, filled)
+                    store(load_spin(dim, near_rolling, k), rolling, filled)
                     filled += 1
                 k += 1
     return Contacts(first, second, friction, rolling)
@@ -139,16 +140,19 @@ def move_contacts(dim: Any, contacts: Contacts, order: Ints) -> None:
 @njit(**OPTIONS)
 def _carry(dim: Any, contacts: Contacts, bound: Ints, near: NearPairs) -> None:
     """Give near pairs the history of the contacts among them."""
-    other, stop = near.other, near.stop
-    for k in range(len(contacts.first)):
-        i, j = contacts.first[k], contacts.second[k]
-        c = np.searchsorted(bound, i, side="right") - 1
-        begin = near.first[c] if i == bound[c] else stop[i - 1]
+    other, stop, first, touching = near.other, near.stop, near.first, near.touching
+    near_friction, near_rolling = near.friction, near.rolling
+    owner, partner = contacts.first, contacts.second
+    friction, rolling = contacts.friction, contacts.rolling
+    for k in range(len(owner)):
+        i, j = owner[k], partner[k]
+        c = chunk_of(bound, i)
+        begin = first[c] if i == bound[c] else stop[i - 1]
         for q in range(begin, stop[i]):
             if other[q] == j:
-                near.touching[q] = 1
-                store(load_spin(dim, contacts.friction, k), near.friction, q)
-                store(load_spin(dim, contacts.rolling, k), near.rolling, q)
+                touching[q] = 1
+                store(load_spin(dim, friction, k), near_friction, q)
+                store(load_spin(dim, rolling, k), near_rolling, q)
                 break
 
 
@@ -160,14 +164,17 @@ def _count(dim: Any, bound: Ints, grains: Grains, pairs: Pairs, gap: float) -> t
     counts = np.zeros(len(bound) - 1, dtype=np.int64)
     crossing = np.zeros(len(bound) - 1, dtype=np.int64)
     for c in range(len(counts)):
-        for i in range(bound[c], bound[c + 1]):
+        near, cross, end = 0, 0, bound[c + 1]
+        for i in range(bound[c], end):
             x, reach = load(dim, position, i), radius[kind[i]] + gap
             for p in range(index(start[i]), index(start[i + 1])):
-                apart = plus(load(dim, position, other[p]), -1.0, x)
-                far = reach + radius[kind[other[p]]]
-                if dot(apart, apart) < far * far:
-                    counts[c] += 1
-                    crossing[c] += other[p] >= bound[c + 1]
+                j = other[p]
+                apart = plus(load(dim, position, j), -1.0, x)
+                far = reach + radius[kind[j]]
+                is_near = dot(apart, apart) < far * far
+                near += is_near
+                cross += is_near & (j >= end)
+        counts[c], crossing[c] = near, cross
     return counts, crossing
 
 
@@ -296,23 +303,27 @@ def look(
     near : NearPairs
         Of this chunk written to.
     """
+    # Names of their own: taking an array out of a tuple inside the loop counts references.
+    near_other, touching, stop = near.other, near.touching, near.stop
+    near_friction, near_rolling = near.friction, near.rolling
+    start, listed = pairs.start, pairs.other
     position, kind, radius, gap = grains.position, grains.kind, grains.radius_of, near.gap[0]
     begin, end = bound[c], bound[c + 1]
     first, room = near.first[c], near.first[c + 1]
-    last = near.stop[end - 1] if end > begin else first
+    last = stop[end - 1] if end > begin else first
     touched = 0
     for k in range(first, last):
-        touched += near.touching[k]
+        touched += touching[k]
     owner, other = np.empty(touched, dtype=np.int64), np.empty(touched, dtype=np.int64)
     friction = np.empty((touched, len(no_spin(dim))))
     rolling = np.empty((touched, len(no_spin(dim))))
     k, q = first, 0
     for i in range(begin, end):
-        while k < near.stop[i]:
-            if near.touching[k]:
-                owner[q], other[q] = i, near.other[k]
-                store(load_spin(dim, near.friction, k), friction, q)
-                store(load_spin(dim, near.rolling, k), rolling, q)
+        while k < stop[i]:
+            if touching[k]:
+                owner[q], other[q] = i, near_other[k]
+                store(load_spin(dim, near_friction, k), friction, q)
+                store(load_spin(dim, near_rolling, k), rolling, q)
                 q += 1
             k += 1
     crossing, slots = 0, near.first_slot[c + 1] - near.first_slot[c]
@@ -320,8 +331,8 @@ def look(
     k, q, full = first, 0, False
     for i in range(begin, end):
         x, reach = load(dim, position, i), radius[kind[i]] + gap
-        for p in range(index(pairs.start[i]), index(pairs.start[i + 1])):
-            j = pairs.other[p]
+        for p in range(index(start[i]), index(start[i + 1])):
+            j = listed[p]
             apart = plus(load(dim, position, j), -1.0, x)
             far = reach + radius[kind[j]]
             held = q < touched and owner[q] == i and other[q] == j
@@ -330,25 +341,25 @@ def look(
                 full = k == room or crossing > slots
                 if full:
                     break
-                near.other[k] = j
-                near.touching[k] = held
-                store(load_spin(dim, friction, q) if held else no_spin(dim), near.friction, k)
-                store(load_spin(dim, rolling, q) if held else no_spin(dim), near.rolling, k)
+                near_other[k] = j
+                touching[k] = held
+                store(load_spin(dim, friction, q) if held else no_spin(dim), near_friction, k)
+                store(load_spin(dim, rolling, q) if held else no_spin(dim), near_rolling, k)
                 k += 1
             if held:
                 q += 1
         if full:
             break
-        near.stop[i] = k
+        stop[i] = k
     if full:
         near.full[0] = 1
         q = 0
         for i in range(begin, end):
             while q < touched and owner[q] == i:
-                near.other[first + q], near.touching[first + q] = other[q], 1
-                store(load_spin(dim, friction, q), near.friction, first + q)
-                store(load_spin(dim, rolling, q), near.rolling, first + q)
+                near_other[first + q], touching[first + q] = other[q], 1
+                store(load_spin(dim, friction, q), near_friction, first + q)
+                store(load_spin(dim, rolling, q), near_rolling, first + q)
                 q += 1
-            near.stop[i] = first + q
+            stop[i] = first + q
     elif end > begin:
         _give_slots(dim, c, bound, near)
