@@ -141,6 +141,11 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
     # again is lost to settling
     assert held["h28_mean_pa"] == pytest.approx(686.0, abs=100.0)
     assert held["h28_error_pa"] == pytest.approx(held["h28_mean_pa"] - 686.0, abs=1e-6)
+    # 30 mm of metal lie over the middle of the bottom row, 736 Pa, less the top half a particle and
+    # what settles; four particles of a calm tank lie under the same weight
+    assert held["end_bottom_pa"] == pytest.approx(736.0, abs=100.0)
+    assert held["end_bottom_sd_pa"] < 10.0
+    assert held["end_highest_pa"] == pytest.approx(held["end_bottom_pa"], rel=0.02)
     mould = len(scene.open_flow(runs[0].scenario).fluid) - 32
     assert held["particle_solves"] == round(6 * (32 + 0.2 * mould)) * held["steps"]
     assert 0.0 < held["solver_fraction"] < 1.0
