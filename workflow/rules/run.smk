@@ -100,6 +100,8 @@ rule measure:
         ),
     log:
         f"{FOLDER}/logs/measure_{{run}}.log",
+    # A run that is computed is measured before the next one begins: its value is seen at once.
+    priority: 1
     conda:
         "../envs/sandmould.yaml"
     threads: 1
