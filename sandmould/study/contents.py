@@ -307,6 +307,12 @@ OF_RUN: tuple[File, ...] = (
         Described("height_m", "Middle of the slab."),
         Described("solid_fraction", "Share of grains in it."),
     )),
+    File("loose_zones.tsv", "A row a zone of loose sand in 3D.", (
+        Described("<axis>_m", "Its middle."),
+        Described("volume_m3", "Its volume."),
+        Described("solid_fraction", "Mean of the local one."),
+        _words("side", "Where it lies: under, over or beside an obstacle, or away from all."),
+    )),
     File("table.tsv", "A row a period of a table on mounts.", _TABLE),
     File("pattern.tsv", "A row a window of the loop between sand and pattern.", _PATTERN),
     File("pattern_shapes.f8", "Time and displacements of the pattern's surface, 64-bit numbers."),

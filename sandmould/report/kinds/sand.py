@@ -13,6 +13,7 @@ from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.hard_limit_text import hard_limit_text
 from sandmould.report.heaps import steepest_heaps
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.loose_sand import LooseSandPages, loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import SandPages, sand_pages
@@ -73,6 +74,7 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
         from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
 
         bending = bending_pages(folder, href, scenario, of_sweep, verdict, pages.pictured_run)
+    loose = loose_sand_pages(folder, pages.pictured_run, of_sweep.summary, scenario)
     limit = hard_limit_text(verdict, collected.keys, findings.by_setting)
     return KindPages(
         "sand.html",
@@ -82,12 +84,13 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
         {
             "pages": pages,
             "bending": bending,
+            "loose": loose,
             "dimension": scenario.dimension,
             "vibrates": bool(scenario.vibrations),
             "ends_at_rest": scenario.ends_at_rest,
             "filling": filling,
         },
-        _sand_figures(pages, filling, bending),
+        _sand_figures(pages, filling, bending, loose),
         pages.beside,
         grounds=(
             *sand_grounds(scenario, study, verdict),
@@ -98,12 +101,17 @@ def _sand_pages(findings: Findings[Scenario]) -> KindPages:
 
 
 def _sand_figures(
-    pages: SandPages, filling: FillingPages | None, bending: BendingPages | None
+    pages: SandPages,
+    filling: FillingPages | None,
+    bending: BendingPages | None,
+    loose: LooseSandPages | None,
 ) -> dict[str, Chart | bytes]:
     """The sand at its moments, the pattern, filling over what is swept, and over time."""
     files: dict[str, Chart | bytes] = {}
     if pages.panels:
         files["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
+    if pages.panels and loose:
+        files["density"] = strip([(panel.heading, panel.by_density) for panel in pages.panels])
     if filling and filling.chart:
         files["filling"] = filling.chart
     if bending:

@@ -19,6 +19,7 @@ from analysis.deflection import fill_under
 from analysis.density import apparent_density
 from analysis.export import solids_to_vtk, to_ovito, to_vtk
 from analysis.layers import mixing_index
+from analysis.loose_zones import LooseSand
 from analysis.plots import draw_by_layer, draw_scene
 from analysis.solid_fraction import (
     bed_surface_height_m,
@@ -35,6 +36,12 @@ from sandmould.scenario.geometry import Cavity, Scene
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.definition.run import LAST_MEASURED
 from sandmould.study.kinds.sand.drive import add_drive
+from sandmould.study.kinds.sand.loose import (
+    LOOSE_ZONES,
+    add_loose_sand,
+    last_loose_sand,
+    write_loose_zones,
+)
 from sandmould.study.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.study.kinds.sand.outflow import add_outflow, measure_outflow
 
@@ -116,7 +123,10 @@ def _measure_cavity(
 
 def measure_sand(scenario: Scenario, folder: Path) -> None:
     """Write all that is measured on the snapshots of a run's folder."""
-    write_measures(scenario, folder, folder / "measures.tsv")
+    loose = last_loose_sand(scenario, folder)
+    if loose is not None:
+        write_loose_zones(loose, folder / LOOSE_ZONES)
+    write_measures(scenario, folder, folder / "measures.tsv", loose)
     write_exports(scenario, folder, folder / "exports")
     write_profile(scenario, folder, folder / "profile.tsv")
     write_picture(scenario, folder, folder / LAST_MEASURED)
@@ -196,8 +206,10 @@ def write_profile(scenario: Scenario, folder: Path, out: Path) -> None:
     pd.DataFrame(rows, columns=columns).to_csv(out, sep="\t", index=False, float_format="%.6g")
 
 
-def write_measures(scenario: Scenario, folder: Path, out: Path) -> None:
-    """Measure all snapshots of a run into a table.
+def write_measures(
+    scenario: Scenario, folder: Path, out: Path, loose: LooseSand | None = None
+) -> None:
+    """Measure all snapshots of a run into a table, and take in what lies loose in the last one.
 
     A snapshot that cannot be read leaves a row of gaps that names it, not an error: the run's
     other rows stay good.
@@ -223,5 +235,6 @@ def write_measures(scenario: Scenario, folder: Path, out: Path) -> None:
     table = add_drive(scenario, add_outflow(table, folder), folder)
     if bent is not None:
         table = add_loop(table, folder, bent.reach_m)
+    table = add_loose_sand(table, loose)
     with replaced(out) as partial:
         table.to_csv(partial, sep="\t", index=False, float_format="%.8g")

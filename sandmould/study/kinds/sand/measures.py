@@ -33,6 +33,11 @@ def _foreseen(scenario: Scenario) -> bool:
     return pattern is not None and scenario.dimension == 2 and pattern.loop.has_windows
 
 
+def seeks_loose_sand(scenario: Scenario) -> bool:
+    """Whether something is buried that sand may lie loose round, and stays."""
+    return scenario.dimension == 3 and bool(scenario.scene.solids) and scenario.gate is None
+
+
 MEASURES: tuple[MeasureGroup[Scenario], ...] = (
     MeasureGroup(
         "every scene",
@@ -135,6 +140,23 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
         (
             Measure("<cavity>_sand_m3", "Volume of the grains in the cavity <cavity>."),
             Measure("<cavity>_largest_void_m3", "Volume of the largest void in <cavity>."),
+        ),
+    ),
+    MeasureGroup(
+        "with obstacles in 3D, and no gate; of the last record",
+        lambda scenario: once(seeks_loose_sand(scenario)),
+        (
+            Measure(
+                "loose_fraction",
+                "Share of the bed where sand lies loose: in a ball of three mass-median grains it "
+                "is below 0.9 of what the bed has as far from a surface.",
+            ),
+            Measure("loose_under_fraction", "The same of the places straight under an obstacle."),
+            Measure("loose_over_fraction", "The same of those straight over one."),
+            Measure("loose_beside_fraction", "The same of those near one, and neither of both."),
+            Measure("loose_away_fraction", "The same of those farther than three grains away."),
+            Measure("loose_zones", "Zones of loose sand at least as large as a grain."),
+            Measure("largest_loose_zone_m3", "Volume of the largest of them."),
         ),
     ),
     MeasureGroup(
