@@ -6,6 +6,7 @@ import fcntl
 import json
 import shutil
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import yaml
 
 from pattern_fe.coupling.interface import with_surface
 from sandmould.engines.snapshot_file import stored_snapshots
-from sandmould.runs.checkpoint_folders import END_CHECKPOINT
+from sandmould.runs.checkpoint_folders import END_CHECKPOINT, read_mark, seal
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.again import _failed_fill
@@ -105,6 +106,10 @@ def test_a_branch_is_bit_for_bit_the_run_that_fills_by_itself(
     assert costs[shorter].fill == fill.name
     assert "fill" not in costs[fill]
     assert lack_of_folder(fill) is Need.NOTHING
+    # what the plan says of the disk
+    ends = [*(fill / END_CHECKPOINT).iterdir(), fill / "snapshots.npz"]
+    taken = sum(path.stat().st_size for path in ends)
+    assert 0.5 < taken / PLANNING.state_bytes(read_run(fill / "scenario.yaml").scenario) < 2.0
     # the longer one knows nothing of the shorter
     assert RunOutcome.read(longer / "outcome.json").simulated_s > costs[straight].steps * (
         costs[straight].time_step_s
@@ -147,25 +152,29 @@ def test_decks_go_on_from_the_end_of_a_fill(scene: Scenario, tmp_path: Path) -> 
 def test_a_fill_that_cannot_be_used_is_told_and_the_run_fills_by_itself(
     harm: str, straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (shorter, _), fill = pair(tube_scene(**REFERENCE), tmp_path)
+    (shorter, longer), fill = pair(tube_scene(**REFERENCE), tmp_path)
     compute(fill)
-    if harm == "torn":
+    if harm == "torn":  # its size is right
         state = fill / END_CHECKPOINT / "solver.npz"
         state.write_bytes(state.read_bytes()[:-100] + bytes(100))
-        assert lack_of_folder(fill) is Need.NOTHING  # its size is right
     elif harm == "missing":
         (fill / "outcome.json").unlink()
-        assert lack_of_folder(fill) is Need.COMPUTE
     else:
         other = tube_scene(**REFERENCE, seed=2)
         (_, _), foreign = pair(other, tmp_path / "other")
         compute(foreign)
         (fill / END_CHECKPOINT).rename(fill / "own")
         (foreign / END_CHECKPOINT).rename(fill / END_CHECKPOINT)
+    # Harmed since the start: its run does not wait for another one.
     assert compute(shorter) is Outcome.FINISHED
     assert f"the fill {fill.name} cannot be used" in capsys.readouterr().err
     assert_same(shorter, straight)
     assert "fill" not in read_costs([shorter]).rows
+    # The next start makes it again, for the runs that are left.
+    assert lack_of_folder(fill) is Need.COMPUTE
+    compute_batch([fill, longer], tmp_path / "log", 1, "")
+    assert lack_of_folder(fill) is Need.NOTHING
+    assert read_costs([longer]).rows["fill"].tolist() == [fill.name]
 
 
 def test_a_checkpoint_of_another_version_is_told_and_left(tmp_path: Path) -> None:
@@ -246,3 +255,16 @@ def test_what_is_lost_of_a_study_is_computed_from_its_fills(
     assert set(plan.lacks(RESULTS)) == {fill.run, run.run}
     again = f"computed again: {fill.run} (end_checkpoint/solver.npz has 0 of "
     assert prepare(plan, RESULTS).startswith(again)
+    compute_batch([folder / fill.place, folder / run.place], logs / "one", 1, "")
+    assert plan.lacks(RESULTS) == {}
+    # One of the right size, and one of another scenario.
+    shutil.rmtree(folder / run.place)
+    announce(plan, RESULTS, 1)
+    end = folder / fill.place / END_CHECKPOINT
+    mark = read_mark(end)
+    (end / "solver.npz").write_bytes(bytes((end / "solver.npz").stat().st_size))
+    why = "end_checkpoint cannot be used: its files do not match their hashes"
+    assert f"computed again: {fill.run} ({why})" in prepare(plan, RESULTS)
+    seal(end, replace(mark, scenario_hash=mark.scenario_hash[::-1]))
+    why = "end_checkpoint is of another scenario"
+    assert f"computed again: {fill.run} ({why})" in prepare(plan, RESULTS)
