@@ -221,7 +221,10 @@ def pack(
         ),
     ] = False,
     checkpoints: Annotated[
-        bool, typer.Option("--checkpoints", help="Take along runs that were stopped.")
+        bool,
+        typer.Option(
+            "--checkpoints", help="Take along runs that were stopped, and states of shared fills."
+        ),
     ] = False,
 ) -> None:  # fmt: skip
     """Pack the finished runs of a study into one file."""
@@ -242,7 +245,8 @@ def unpack(
     checkpoints: Annotated[
         bool,
         typer.Option(
-            "--checkpoints", help="Take stopped runs too; engines read their files unchecked."
+            "--checkpoints",
+            help="Take stopped runs and states of fills too; engines read their files unchecked.",
         ),
     ] = False,
 ) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import fcntl
 import json
+import os
 import shutil
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +18,18 @@ import yaml
 
 from pattern_fe.coupling.interface import with_surface
 from sandmould.engines.snapshot_file import stored_snapshots
-from sandmould.runs.checkpoint_folders import END_CHECKPOINT
+from sandmould.runs.checkpoint_folders import END_CHECKPOINT, read_mark, seal
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.again import _failed_fill
 from sandmould.study.batch_job import compute_batch
-from sandmould.study.definition.run import Run
+from sandmould.study.collect import collect
+from sandmould.study.definition.run import FILLS, Run
 from sandmould.study.kinds.sand.planning import PLANNING
-from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, prepare
+from sandmould.study.packs import recorded
+from sandmould.study.packs.pack import pack
+from sandmould.study.packs.unpack import unpack
+from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan, prepare
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run, write_plan
@@ -105,6 +111,10 @@ def test_a_branch_is_bit_for_bit_the_run_that_fills_by_itself(
     assert costs[shorter].fill == fill.name
     assert "fill" not in costs[fill]
     assert lack_of_folder(fill) is Need.NOTHING
+    # what the plan says of the disk
+    ends = [*(fill / END_CHECKPOINT).iterdir(), fill / "snapshots.npz"]
+    taken = sum(path.stat().st_size for path in ends)
+    assert 0.5 < taken / PLANNING.state_bytes(read_run(fill / "scenario.yaml").scenario) < 2.0
     # the longer one knows nothing of the shorter
     assert RunOutcome.read(longer / "outcome.json").simulated_s > costs[straight].steps * (
         costs[straight].time_step_s
@@ -147,25 +157,29 @@ def test_decks_go_on_from_the_end_of_a_fill(scene: Scenario, tmp_path: Path) -> 
 def test_a_fill_that_cannot_be_used_is_told_and_the_run_fills_by_itself(
     harm: str, straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (shorter, _), fill = pair(tube_scene(**REFERENCE), tmp_path)
+    (shorter, longer), fill = pair(tube_scene(**REFERENCE), tmp_path)
     compute(fill)
-    if harm == "torn":
+    if harm == "torn":  # its size is right
         state = fill / END_CHECKPOINT / "solver.npz"
         state.write_bytes(state.read_bytes()[:-100] + bytes(100))
-        assert lack_of_folder(fill) is Need.NOTHING  # its size is right
     elif harm == "missing":
         (fill / "outcome.json").unlink()
-        assert lack_of_folder(fill) is Need.COMPUTE
     else:
         other = tube_scene(**REFERENCE, seed=2)
         (_, _), foreign = pair(other, tmp_path / "other")
         compute(foreign)
         (fill / END_CHECKPOINT).rename(fill / "own")
         (foreign / END_CHECKPOINT).rename(fill / END_CHECKPOINT)
+    # Harmed since the start: its run does not wait for another one.
     assert compute(shorter) is Outcome.FINISHED
     assert f"the fill {fill.name} cannot be used" in capsys.readouterr().err
     assert_same(shorter, straight)
     assert "fill" not in read_costs([shorter]).rows
+    # The next start makes it again, for the runs that are left.
+    assert lack_of_folder(fill) is Need.COMPUTE
+    compute_batch([fill, longer], tmp_path / "log", 1, "")
+    assert lack_of_folder(fill) is Need.NOTHING
+    assert read_costs([longer]).rows["fill"].tolist() == [fill.name]
 
 
 def test_a_checkpoint_of_another_version_is_told_and_left(tmp_path: Path) -> None:
@@ -222,20 +236,33 @@ def test_two_jobs_never_make_one_fill(tmp_path: Path, capsys: pytest.CaptureFixt
     assert RunOutcome.read(fill / "outcome.json").detail == "by the other job"
 
 
-def test_what_is_lost_of_a_study_is_computed_from_its_fills(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def computed_sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Compute a study of two runs that share a fill."""
+    place, before = tmp_path_factory.mktemp("sweep"), Path.cwd()
+    os.chdir(place)
     tree = {"scenario": {**TUBE_SCENE, **REFERENCE},
             "sweep": {"keys": {"vibration.0.frequency_hz": [50, 100]}}}  # fmt: skip
     Path("small.yaml").write_text(yaml.safe_dump(tree))
-    plan, folder = open_plan(Path("small.yaml")), RESULTS / "small"
+    plan = open_plan(Path("small.yaml"))
     announce(plan, RESULTS, 1)
-    logs = tmp_path / "logs"
-    logs.mkdir()
+    for runs in (plan.fills, plan.runs):
+        compute_batch([RESULTS / "small" / run.place for run in runs], place / "log", 1, "")
+    os.chdir(before)
+    return place
+
+
+@pytest.fixture
+def sweep(computed_sweep: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Plan:
+    """A copy of it, with its plan."""
+    shutil.copytree(computed_sweep, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return open_plan(Path("small.yaml"))
+
+
+def test_what_is_lost_of_a_study_is_computed_from_its_fills(sweep: Plan) -> None:
+    plan, folder = sweep, RESULTS / "small"
     (fill,), (run, _) = plan.fills, plan.runs
-    compute_batch([folder / fill.place], logs / "one", 1, "")
-    compute_batch([folder / each.place for each in plan.runs], logs / "one", 1, "")
     assert plan.lacks(RESULTS) == {}
     assert "2 done of 2 runs\nprocessor time" in status_text(plan, RESULTS, 1)
     # a torn fill matters only to a run that goes on from it
@@ -246,3 +273,63 @@ def test_what_is_lost_of_a_study_is_computed_from_its_fills(
     assert set(plan.lacks(RESULTS)) == {fill.run, run.run}
     again = f"computed again: {fill.run} (end_checkpoint/solver.npz has 0 of "
     assert prepare(plan, RESULTS).startswith(again)
+    compute_batch([folder / fill.place, folder / run.place], Path("log").absolute(), 1, "")
+    assert plan.lacks(RESULTS) == {}
+    # One of the right size, and one of another scenario.
+    shutil.rmtree(folder / run.place)
+    announce(plan, RESULTS, 1)
+    end = folder / fill.place / END_CHECKPOINT
+    mark = read_mark(end)
+    (end / "solver.npz").write_bytes(bytes((end / "solver.npz").stat().st_size))
+    why = "end_checkpoint cannot be used: its files do not match their hashes"
+    assert f"computed again: {fill.run} ({why})" in prepare(plan, RESULTS)
+    seal(end, replace(mark, scenario_hash=mark.scenario_hash[::-1]))
+    why = "end_checkpoint is of another scenario"
+    assert f"computed again: {fill.run} ({why})" in prepare(plan, RESULTS)
+
+
+def test_packed_runs_need_no_fill_and_its_cost_travels(
+    sweep: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, folder = sweep, RESULTS / "small"
+    (fill,), (_, run) = plan.fills, plan.runs
+    collect(folder)
+    summary = (folder / "summary.tsv").read_bytes()
+    assert b"\tfill_cpu_s" in summary
+    end = [*(folder / fill.place / END_CHECKPOINT).iterdir()]
+    small, whole = (pack(plan, RESULTS, Path(f"{name}.tar.xz"), checkpoints=name == "whole").path
+                    for name in ("small", "whole"))  # fmt: skip
+    for path, checkpoints in ((small, False), (whole, False), (whole, True)):
+        shutil.rmtree(RESULTS)
+        assert unpack(path, RESULTS, checkpoints).text() == "small: 2 runs taken"
+        announce(plan, RESULTS, 1)
+        assert plan.lacks(RESULTS) == {}
+        collect(folder)
+        assert (folder / "summary.tsv").read_bytes() == summary
+        # Engines read the state of a fill: it is taken where that is asked for.
+        assert all(file.exists() is checkpoints for file in end)
+    assert unpack(whole, RESULTS).text() == "small: 0 runs taken, 2 here already"
+    # A run that the pack lacks goes on from the fill, or from one that is made again.
+    shutil.rmtree(folder / run.place)
+    announce(plan, RESULTS, 1)
+    assert set(plan.lacks(RESULTS)) == {run.run}
+    shutil.rmtree(folder / FILLS)
+    unpack(small, RESULTS)
+    shutil.rmtree(folder / run.place)
+    announce(plan, RESULTS, 1)
+    assert set(plan.lacks(RESULTS)) == {fill.run, run.run}
+    # The record of a shipped study tells it, too.
+    shipped = Path("config/studies/small.yaml").absolute()
+    shipped.parent.mkdir(parents=True)
+    shutil.copy("small.yaml", shipped)
+    monkeypatch.setattr(recorded, "SHIPPED", Path().absolute())
+    monkeypatch.setattr(recorded, "RECORDS", Path("records").absolute())
+    shutil.rmtree(RESULTS)
+    unpack(small, RESULTS)
+    plan = open_plan(shipped)
+    recorded.record_part(plan, RESULTS)
+    shutil.rmtree(RESULTS)
+    plan, said = recorded.take_up(plan, RESULTS)
+    assert said == "2 runs taken from the record of small"
+    assert plan.lacks(RESULTS) == {}
+    assert (folder / fill.place / "outcome.json").exists()

@@ -114,6 +114,9 @@ def test_a_run_of_two_ranks_gets_two_cores_and_the_time_that_its_partition_allow
         "cluster.yaml: partition = 'shrot' cannot be used: valid is a partition of this cluster: "
         "main, short.\n"
     )
+    # On the command line as well.
+    (folder / "cluster.yaml").unlink()
+    assert call(slurm, folder, *COMMAND, "slurm_partition=shrot").stderr == said
     (folder / "cluster.yaml").write_text("partition: short\n")
     process = start(slurm, folder, log)
     wait_for(lambda: bool(slurm.jobs()), process, log)

@@ -37,6 +37,7 @@ rule fill:
         "../envs/sandmould.yaml"
     threads: threads_of
     resources:
+        **SUBMITTED,
         tasks=ranks_of,
         cpus_per_task=cpus_per_task_of,
         mpi=mpi_of,

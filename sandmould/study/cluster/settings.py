@@ -14,8 +14,15 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_yaml, validated
 
 CLUSTER_FILE = Path("cluster.yaml")
-_WORD = r"^[A-Za-z0-9_.,:@&|+*=\[\]()-]+$"
+WORD = r"^[A-Za-z0-9_.,:@&|+*=\[\]()-]+$"
 """Nothing that a shell takes for more than a word."""
+RESOURCES = {
+    "partition": "slurm_partition",
+    "account": "slurm_account",
+    "qos": "qos",
+    "constraint": "constraint",
+}
+"""What a job is submitted with: option of ``sbatch`` and key here, and resource of Snakemake."""
 _CHOOSES = ("--workflow-profile", "--profile", "--executor", "-e")
 
 
@@ -24,12 +31,12 @@ class Cluster(Section):
 
     partition: str | None = Field(
         None,
-        pattern=_WORD,
+        pattern=WORD,
         description="Partition, or several with commas; Slurm's own unless given.",
     )
-    account: str | None = Field(None, pattern=_WORD, description="Who pays.")
-    qos: str | None = Field(None, pattern=_WORD, description="Quality of service.")
-    constraint: str | None = Field(None, pattern=_WORD, description="Kind of node.")
+    account: str | None = Field(None, pattern=WORD, description="Who pays.")
+    qos: str | None = Field(None, pattern=WORD, description="Quality of service.")
+    constraint: str | None = Field(None, pattern=WORD, description="Kind of node.")
     options: str | None = Field(
         None,
         pattern=r"^-[A-Za-z0-9_.,:@&|+*=\[\]()/ -]+$",
@@ -43,23 +50,13 @@ class Cluster(Section):
 
     def resources(self) -> dict[str, str]:
         """What Snakemake submits each job with."""
-        names = {
-            "slurm_partition": self.partition,
-            "slurm_account": self.account,
-            "qos": self.qos,
-            "constraint": self.constraint,
-        }
-        return {name: value for name, value in names.items() if value is not None}
+        stated = {resource: getattr(self, name) for name, resource in RESOURCES.items()}
+        return {resource: value for resource, value in stated.items() if value is not None}
 
     def sbatch(self) -> list[str]:
         """The same as options of ``sbatch``."""
-        options = {
-            "--partition": self.partition,
-            "--account": self.account,
-            "--qos": self.qos,
-            "--constraint": self.constraint,
-        }
-        stated = [f"{name}={value}" for name, value in options.items() if value is not None]
+        values = {name: getattr(self, name) for name in RESOURCES}
+        stated = [f"--{name}={value}" for name, value in values.items() if value is not None]
         return [*stated, *(self.options or "").split()]
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from sandmould.runs.progress import duration_text
 from sandmould.study.cluster.limits import Demand, check_jobs, longest_min
 from sandmould.study.cluster.queue import Job, cancel, jobs_of
-from sandmould.study.cluster.settings import Cluster, goes_to_slurm, read_cluster
+from sandmould.study.cluster.settings import RESOURCES, WORD, Cluster, goes_to_slurm, read_cluster
 from sandmould.study.plan.batches import Batch, alone
 from sandmould.study.plan.build_plan import Plan
 
@@ -114,9 +116,7 @@ class Submission:
         return " ".join([*(self._cluster.options or "").split(), *wait])
 
 
-def open_submission(
-    plan: Plan, arguments: Sequence[str], stated: Mapping[str, object]
-) -> Submission:
+def open_submission(plan: Plan, arguments: Sequence[str], stated: Mapping[str, Any]) -> Submission:
     """How the jobs of a start go to where its options say.
 
     Parameters
@@ -135,8 +135,15 @@ def open_submission(
     if not goes_to_slurm(arguments):
         return Submission(plan, None)
     cluster = read_cluster()
-    partition = stated.get("slurm_partition")
-    if cluster.partition is None and partition is not None:
-        name = str(getattr(partition, "value", partition)).strip("'\"")
-        cluster = cluster.model_copy(update={"partition": name})
-    return Submission(plan, cluster)
+    given = {
+        name: word
+        for name, resource in RESOURCES.items()
+        if getattr(cluster, name) is None and (word := _word(stated.get(resource)))
+    }
+    return Submission(plan, cluster.model_copy(update=given))
+
+
+def _word(resource: Any) -> str:
+    """A default resource as it was stated; empty for an expression, which Snakemake works out."""
+    text = str(getattr(resource, "raw", None) or "").strip("'\"")
+    return text if re.match(WORD, text) else ""

@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 from sandmould.digest import digest
 from sandmould.runs.manifest import DECK_FILE, MANIFEST_FILE
 from sandmould.scenario.quantity import NAME, Section
-from sandmould.study.definition.run import RUN_NAME
+from sandmould.study.definition.run import FILLS, RUN_NAME
 from sandmould.study.rounds.round_log import ROUNDS_FILE
 
 INDEX_FILE = "pack.json"
@@ -40,10 +40,11 @@ class PackedFile(Section):
 
 
 class PackedRun(Section):
-    """One run of a pack."""
+    """One run of a pack, or a fill that runs of it share."""
 
     at_end: bool
     """Or it is a checkpoint to go on from."""
+    is_fill: bool = False
     scenario_sha256: Annotated[str, Field(max_length=64)] = ""
     template_sha256: Annotated[str, Field(max_length=64)] = ""
     """Both as the provenance has them; of a run at its end."""
@@ -54,6 +55,10 @@ class PackedRun(Section):
     def bytes(self) -> int:
         """Room that its files need."""
         return sum(file.size for file in self.files.values())
+
+    def place(self, name: str) -> str:
+        """Where it lies in the folder of its study."""
+        return f"{FILLS if self.is_fill else 'runs'}/{name}"
 
 
 class PackIndex(Section):
@@ -78,10 +83,10 @@ class PackIndex(Section):
     def members(self) -> Iterator[Member]:
         """All files in order."""
         if self.rounds:
-            yield Member("", ROUNDS_FILE, self.rounds)
+            yield Member("", "", ROUNDS_FILE, self.rounds)
         for name, run in self.runs.items():
             for path, file in run.files.items():
-                yield Member(name, path, file)
+                yield Member(name, run.place(name), path, file)
 
 
 class Member(NamedTuple):
@@ -89,12 +94,14 @@ class Member(NamedTuple):
 
     run: str
     """Empty for a file of the study."""
+    place: str
+    """Of the run in the folder of the study."""
     path: str
     file: PackedFile
 
     def name(self, study: str) -> str:
         """As the archive has it."""
-        return f"{study}/runs/{self.run}/{self.path}" if self.run else f"{study}/{self.path}"
+        return "/".join(filter(None, (study, self.place, self.path)))
 
 
 def index_text(index: PackIndex) -> str:

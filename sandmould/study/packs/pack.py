@@ -14,10 +14,13 @@ from PIL import Image
 from sandmould.engines.snapshot_file import OLDER, SNAPSHOTS, SnapshotFile, stored_snapshots
 from sandmould.runs.formatting import size_text
 from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, Manifest, read_manifest, read_origin
+from sandmould.runs.outcome import RunOutcome
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.definition.run import LAST_MEASURED
+from sandmould.study.definition.run import FILLS, LAST_MEASURED
 from sandmould.study.packs.archive import Archive, Source, write_archive
 from sandmould.study.packs.index import (
+    AT_END,
+    OUTCOME_FILE,
     WORK,
     Member,
     PackedRun,
@@ -26,7 +29,7 @@ from sandmould.study.packs.index import (
     same_computation,
 )
 from sandmould.study.plan.build_plan import Plan
-from sandmould.study.plan.lacking import WHOLE, Need
+from sandmould.study.plan.lacking import UNREADABLE, WHOLE, Need
 from sandmould.study.process import is_locked
 from sandmould.study.rounds.round_log import ROUNDS_FILE
 
@@ -46,8 +49,8 @@ class Packed:
 
     def text(self) -> str:
         """What a person should know."""
-        at_end = sum(run.at_end for run in self.index.runs.values())
-        more = len(self.index.runs) - at_end
+        ends = [run.at_end for run in self.index.runs.values() if not run.is_fill]
+        at_end, more = sum(ends), ends.count(False)
         checkpoints = f" and {more} checkpoints" if more else ""
         size = f"{size_text(self.path.stat().st_size)}, unpacked {size_text(self.index.bytes)}"
         lines = [f"{self.path}: {at_end} runs{checkpoints}, {size}"]
@@ -81,7 +84,8 @@ def pack(
         moments are not to be had from such a run any more, its tables are. Its own picture has
         few colours.
     checkpoints : bool
-        Whether runs that were stopped go along.
+        Whether runs that were stopped go along, and with the fills that runs share the states that
+        other runs go on from. Of a fill its cost goes along in any case.
 
     Raises
     ------
@@ -111,11 +115,18 @@ def pack(
         most = max(left_out.values(), key=list(left_out.values()).count)
         valid = f"a study with runs to pack: those of {folder} are not ({most})"
         raise BadInputError([Problem("STUDY", plan.study.name, valid)])
+    for fill in {run.fill for run in plan.runs if run.fill and run.run in runs}:
+        place = folder / FILLS / fill
+        files = _files_of_fill(place, checkpoints)
+        if not files or (fill in there and same_computation(there[fill], read_origin(place))):
+            continue
+        runs[fill] = _packed_run(place, True, files, is_fill=True)
+        sources |= {(fill, path): source for path, source in files.items()}
     rounds = Source(folder / ROUNDS_FILE)
     index = PackIndex(
         study=plan.study.name,
         rounds=rounds.packed() if (folder / ROUNDS_FILE).is_file() else None,
-        runs=runs,
+        runs=dict(sorted(runs.items())),
     )
     if target.is_dir():
         target = target / f"{plan.study.name}_{index.digest[:_DIGITS]}{SUFFIX}"
@@ -146,10 +157,13 @@ def packed_in(folder: Path, study: str) -> dict[str, PackedRun]:
     return found
 
 
-def _packed_run(place: Path, at_end: bool, files: Mapping[str, Source]) -> PackedRun:
+def _packed_run(
+    place: Path, at_end: bool, files: Mapping[str, Source], is_fill: bool = False
+) -> PackedRun:
     origin = read_origin(place) if at_end else {}
     return PackedRun(
         at_end=at_end,
+        is_fill=is_fill,
         scenario_sha256=origin.get("scenario_sha256", ""),
         template_sha256=origin.get("template_sha256", ""),
         files={path: files[path].packed() for path in sorted(files)},
@@ -177,6 +191,22 @@ def _files(
         return "being computed", {}
     files = dict(_found(place, at_end=False))
     return ("", files) if files else ("not begun", {})
+
+
+def _files_of_fill(place: Path, checkpoints: bool) -> dict[str, Source]:
+    """What tells the cost of a fill, and all that runs go on from where that is asked for.
+
+    Nothing of a fill that is not at its end or is damaged: its runs do not need it any more.
+    """
+    try:
+        RunOutcome.read(place / OUTCOME_FILE)
+        read_origin(place)
+    except UNREADABLE:
+        return {}
+    files = dict(_found(place, at_end=True))
+    if any(name not in files for name in AT_END):
+        return {}
+    return files if checkpoints else {name: files[name] for name in AT_END}
 
 
 def _found(place: Path, at_end: bool) -> Iterator[tuple[str, Source]]:

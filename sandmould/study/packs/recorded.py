@@ -8,7 +8,13 @@ from sandmould import ROOT, SHIPPED
 from sandmould.runs.hashing import scenario_hash
 from sandmould.study.packs.index import PackedRun
 from sandmould.study.packs.pack import SUFFIX, Packed, pack
-from sandmould.study.packs.unpack import Unpacked, open_pack, place_runs, take_rounds
+from sandmould.study.packs.unpack import (
+    Unpacked,
+    open_pack,
+    place_runs,
+    take_rounds,
+    wants_fill,
+)
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.lacking import Need, template_hashes
 from sandmould.study.process import is_locked
@@ -71,18 +77,22 @@ class _Wanted:
     """Asks whether a run of a pack is one that its study lacks."""
 
     def __init__(self, plan: Plan, results: Path) -> None:
-        self._runs = {run.run: run for run in plan.runs}
+        self._runs = {run.run: run for run in (*plan.runs, *plan.fills)}
         self._lacks = plan.lacks(results)
-        self._folder = results / plan.study.name / "runs"
+        self._folder = results / plan.study.name
         self._template_hash = template_hashes()
 
     def __call__(self, name: str, packed: PackedRun) -> bool:
-        lack = self._lacks.get(name)
-        if lack is None or lack.need is not Need.COMPUTE or not packed.at_end:
+        run, lack = self._runs.get(name), self._lacks.get(name)
+        if run is None or not packed.at_end:
             return False
-        run = self._runs[name]
+        place = self._folder / packed.place(name)
+        if packed.is_fill:
+            is_missing = wants_fill(place)
+        else:
+            is_missing = lack is not None and lack.need is Need.COMPUTE and not is_locked(place)
         return (
-            packed.scenario_sha256 == scenario_hash(run.scenario)
+            is_missing
+            and packed.scenario_sha256 == scenario_hash(run.scenario)
             and packed.template_sha256 == self._template_hash(run)
-            and not is_locked(self._folder / name)
         )

@@ -19,6 +19,7 @@ from sandmould.runs.outcome import RunOutcome
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.packs.archive import Archive
 from sandmould.study.packs.index import (
+    AT_END,
     OUTCOME_FILE,
     WORK,
     Member,
@@ -42,6 +43,8 @@ class Unpacked:
 
     study: str
     taken: list[str] = field(default_factory=list)
+    fills: list[str] = field(default_factory=list)
+    """Those that runs share, each for its cost or whole."""
     checkpoints: list[str] = field(default_factory=list)
     there: list[str] = field(default_factory=list)
     """At their end here before."""
@@ -101,9 +104,12 @@ def unpack(path: Path, results: Path, checkpoints: bool = False) -> Unpacked:
             unpacked = Unpacked(archive.index.study)
 
             def wanted(name: str, run: PackedRun) -> bool:
-                return _is_wanted(folder / "runs" / name, run, checkpoints, unpacked)
+                place = folder / run.place(name)
+                if run.is_fill:
+                    return wants_fill(place)
+                return _is_wanted(place, run, checkpoints, unpacked)
 
-            place_runs(archive, folder, wanted, unpacked)
+            place_runs(archive, folder, wanted, unpacked, checkpoints)
             return unpacked
         finally:
             if turn:
@@ -126,6 +132,7 @@ def place_runs(
     folder: Path,
     wanted: Callable[[str, PackedRun], bool],
     unpacked: Unpacked,
+    checkpoints: bool = False,
 ) -> None:
     """Put runs into the results of a study, each once all of its files are whole.
 
@@ -138,6 +145,8 @@ def place_runs(
         Whether a run is taken, from its name and what the pack holds of it.
     unpacked : Unpacked
         Takes what became of each run.
+    checkpoints : bool
+        Whether a fill is taken with the state that runs go on from, or for its cost alone.
 
     Raises
     ------
@@ -155,7 +164,10 @@ def place_runs(
         raise BadInputError([Problem("results", str(folder), valid)])
     for run, files in itertools.groupby(archive.members(), lambda item: item[0].run):
         if run in chosen:
-            _take(folder / "runs" / run, index.runs[run], files, unpacked)
+            packed = index.runs[run]
+            if packed.is_fill and not checkpoints:
+                files = _of_its_cost(files)
+            _take(folder / packed.place(run), packed, files, unpacked)
             chosen.remove(run)
             continue
         for _, chunks in files:
@@ -173,6 +185,17 @@ def take_rounds(archive: Archive, folder: Path) -> bool:
         _, chunks = next(archive.members())
         merge_rounds(b"".join(chunks), folder)
     return archive.index.rounds is not None
+
+
+def _of_its_cost(
+    files: Iterator[tuple[Member, Iterator[bytes]]],
+) -> Iterator[tuple[Member, Iterator[bytes]]]:
+    """Files of a fill that no engine reads."""
+    for member, chunks in files:
+        if member.path in AT_END:
+            yield member, chunks
+        else:
+            collections.deque(chunks, maxlen=0)
 
 
 def _take(
@@ -195,7 +218,8 @@ def _take(
             unpacked.left[place.name] = _BUSY
         else:
             _move(part, place)
-            (unpacked.taken if run.at_end else unpacked.checkpoints).append(place.name)
+            ended = unpacked.fills if run.is_fill else unpacked.taken
+            (ended if run.at_end else unpacked.checkpoints).append(place.name)
     finally:
         shutil.rmtree(part, ignore_errors=True)
         with contextlib.suppress(OSError):
@@ -262,6 +286,11 @@ def _is_wanted(place: Path, run: PackedRun, checkpoints: bool, unpacked: Unpacke
     else:
         return True
     return False
+
+
+def wants_fill(place: Path) -> bool:
+    """Whether a fill is taken: one that is here, or on its way, stays."""
+    return not (_at_end(place) or (place / WORK).exists() or is_locked(place))
 
 
 def _at_end(place: Path) -> bool:

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from enum import IntEnum
 from pathlib import Path
 
+from sandmould.runs.checkpoint_folders import END_CHECKPOINT, read_mark
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import (
@@ -20,7 +21,7 @@ from sandmould.runs.manifest import (
     read_manifest,
     read_origin,
 )
-from sandmould.runs.outcome import RunOutcome
+from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.definition.run import FILL, LAST_MEASURED, Run
 from sandmould.study.kinds.registry import kind_of
 
@@ -86,7 +87,20 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     except UNREADABLE:
         return Lack(Need.COMPUTE, f"{MANIFEST_FILE} cannot be read")
     lack = _lack_of_files(folder, manifest)
-    return WHOLE if run.part == FILL and lack.need is Need.MEASURE else lack
+    return lack if run.part != FILL or lack.need is Need.COMPUTE else _lack_of_end(run, folder)
+
+
+def _lack_of_end(fill: Run, folder: Path) -> Lack:
+    """What is wrong with the state that runs go on from; a fill that failed has none."""
+    if RunOutcome.read(folder / "outcome.json").outcome is not Outcome.FINISHED:
+        return WHOLE
+    try:
+        mark = read_mark(folder / END_CHECKPOINT)
+    except ValueError as error:
+        return Lack(Need.COMPUTE, f"{END_CHECKPOINT} cannot be used: {error}")
+    if mark.scenario_hash != scenario_hash(fill.scenario):
+        return Lack(Need.COMPUTE, f"{END_CHECKPOINT} is of another scenario")
+    return WHOLE
 
 
 def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:

@@ -13,8 +13,8 @@ from benchmarks.frame import Benchmark, BenchmarkRun, Parts, benchmark, table
 from sandmould import ROOT
 
 PAGED = (
-    "agreement", "arpm", "at_rest", "calibration", "engines", "frequency_law", "mps", "scaling",
-    "stability",
+    "agreement", "arpm", "at_rest", "calibration", "engines", "frequency_law", "mps", "prices",
+    "scaling", "stability",
 )  # fmt: skip
 ORIGIN = {"commit": "abc", "machine": {"processor": "a core"}, "versions": {}}
 

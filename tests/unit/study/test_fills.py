@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, total_s
+from sandmould.runs.formatting import size_text
 from sandmould.study.definition.run import FILL
 from sandmould.study.fill_costs import shares_of_fills
 from sandmould.study.kinds.sand.planning import PLANNING
@@ -114,6 +115,8 @@ def test_work_of_a_fill_is_counted_once(tmp_path: Path) -> None:
     assert text.splitlines()[1].startswith("fill ")
     assert "4 runs, " in text
     assert "The 4 runs start from 2 fills of the box. A fill is computed once" in text
+    room = size_text(sum(PLANNING.state_bytes(fill.scenario) for fill in plan.fills))
+    assert f"together they take about {room} of the disk." in text
 
 
 def test_a_plan_writes_fills_beside_the_runs(tmp_path: Path) -> None:

@@ -42,9 +42,10 @@ IN_3D = 0.4
 STATE_BYTES, SNAPSHOT_BYTES = {2: 230, 3: 560}, {2: 75, 3: 97}
 """Disk that a grain at rest takes in a checkpoint of the reference engine, with its contacts, and
 in a snapshot: measured at 282 discs and 2 000 spheres."""
-PASSES = 4.0
+PASSES = 5.5
 """Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
-mean on the L while it is filled, in windows of 2 to 20 ms (study l_judged)."""
+mean on the L in soft sand while it is filled, in windows of 2 to 20 ms (study l_judged), 5.7 to 7.2
+in hard sand that is shaken, too (record of l_depth)."""
 HIGH_ACCELERATION_G = 20.0
 """Peak acceleration above which a plan asks whether the amplitude is meant so."""
 COMPILE_S = 25.0

@@ -1,0 +1,1 @@
+"""Whether the price that a plan tells is right."""
