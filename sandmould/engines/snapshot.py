@@ -60,8 +60,10 @@ class Snapshot:
     def of_arrays(cls, arrays: Mapping[str, Any]) -> Snapshot:
         """The snapshot that such values are of; a KeyError or TypeError where some are missing."""
         values = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays}
-        kinds = {"time_s": float, "vibration_time_s": vibration_time_of, "stage": str}
-        return cls(**values | {name: kind(values[name]) for name, kind in kinds.items()})
+        values["time_s"] = float(values["time_s"])
+        values["vibration_time_s"] = vibration_time_of(values["vibration_time_s"])
+        values["stage"] = str(values["stage"])
+        return cls(**values)
 
     @classmethod
     def load(cls, path: Path) -> Snapshot:
