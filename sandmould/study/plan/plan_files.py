@@ -235,7 +235,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     whole = duration_text(study_s([prices.piece(run) for run in runs], cores))
     lines.append(
         f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}. Wall time on {cores} "
-        f"cores with report: {whole}, {prices.basis(runs)}."
+        f"cores with report: {whole}, {prices.basis(runs)}"
     )
     settings = [alike[0].scenario for alike in points.values() if alike[0].part != FILL]
     lines += planning.settings_lines(settings)
@@ -263,7 +263,7 @@ def later_line(later: Sequence[Run], prices: Prices, cores: int) -> str:
     whole = duration_text(study_s([prices.piece(run) for run in later], cores))
     return (
         f"Then, once the optimum is known, its controls: about {len(runs)} runs{springs}, "
-        f"{work:.3g} {unit}. Wall time on {cores} cores: {whole}.\n"
+        f"{work:.3g} {unit}. Wall time on {cores} cores: {whole}\n"
     )
 
 
