@@ -24,6 +24,12 @@ HELD = {
     "displacement": "the amplitude in mm stays: that of a crank or cam",
     "unbalance": "rotating masses on a table that stands on mounts",
 }
+HOLES = {
+    "tube": "a blind horizontal hole, closed at the right wall of the box",
+    "hole_up": "a blind hole that opens upwards",
+    "hole_down": "a blind hole that opens downwards",
+    "none": "no hole: the study asks how densely the sand packs",
+}
 WALL_MM = 3.0
 """Thickness of the walls round a hole."""
 _LEAST_GRAINS_WIDE = 5
@@ -93,9 +99,7 @@ class NewStudy(Section):
     )
     cavity: Literal["tube", "hole_up", "hole_down", "none"] = quantity(
         "tube",
-        "Hole to fill. tube: a blind horizontal hole, closed at the right wall of the box. "
-        "hole_up: a blind hole that opens upwards. hole_down: one that opens downwards. none: no "
-        "hole; how densely does the sand pack",
+        "Hole to fill",
         source=_TUBE,
     )
     opening_mm: float = quantity(
