@@ -43,7 +43,7 @@ def to_vtk(snapshot: Snapshot, path: Path) -> None:
             "velocity_m_s": _in_space(snapshot.velocity_m_s),
             "spin_rad_s": snapshot.spin_rad_s,
             "time_s": np.full(n, snapshot.time_s),
-            "vibration_time_s": np.full(n, snapshot.clock_s),
+            "vibration_time_s": np.full(n, snapshot.vibration_time_s),
         },
     )
     with replaced(path) as partial:

@@ -20,8 +20,8 @@ KEEPS = is_own(FOLDER)
 """Whether machine code is kept for the next process."""
 if not KEEPS:
     print(
-        f"kernels are compiled anew in every process: {FOLDER} cannot be made, or others can "
-        "write to it; XDG_CACHE_HOME names a folder of your own",
+        f"Sandmould compiles its own code anew in every process, which takes time. {FOLDER} cannot "
+        "be made, or others can write to it. Set XDG_CACHE_HOME to a folder of your own.",
         file=sys.stderr,
     )
 # Numba reads it where a function is decorated: nothing else may set it.

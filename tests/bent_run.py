@@ -34,9 +34,9 @@ def write_bent_run(folder: Path, body: FoamBody, share: float = 1.0) -> None:
     load, bent = tip_load(body)
     one = np.array([1])
     place_m, none = np.array([[0.01, 0.002]]), np.zeros((1, 2))
-    moments = [(0.02, -1.0, 0.0), (0.04, -1.0, 1.0), (0.04, 0.0, 1.0), (0.06, 0.02, 0.5)]
+    moments = [(0.02, np.nan, 0.0), (0.04, np.nan, 1.0), (0.04, 0.0, 1.0), (0.06, 0.02, 0.5)]
     for number, (time_s, shaken_s, part) in enumerate(moments):
-        stage = "settle_1" if shaken_s < 0.0 else "vibrate_1"
+        stage = "settle_1" if np.isnan(shaken_s) else "vibrate_1"
         moved_m = body.vertices_m + part * share * bent
         Snapshot(
             time_s, shaken_s, stage, one, one, place_m, none, np.zeros((1, 3)), np.array([0.002]),

@@ -97,7 +97,7 @@ def grains_at(
     n = len(position_m)
     one = np.ones(n, dtype=np.int64)
     return Snapshot(
-        0.5, -1.0, stage, np.arange(1, n + 1), one, position_m, np.zeros_like(position_m),
+        0.5, np.nan, stage, np.arange(1, n + 1), one, position_m, np.zeros_like(position_m),
         np.zeros((n, 3)), np.broadcast_to(radius_m, n).copy(),
     )  # fmt: skip
 

@@ -73,11 +73,26 @@ def beds(run: BenchmarkRun) -> list[dict[str, dict[str, float]]]:
     ]
 
 
+def _apart(rows: list[Row]) -> float:
+    """Largest difference of a mean from that of two grains on the reference engine."""
+    first = {_setting(row): row for row in reversed(rows) if row["where"] == "pair"}
+    return max(
+        abs(row[name][0] - first[_setting(row)][name][0])
+        for row in rows
+        for name in ("restitution", "peak_overlap", "contact_time")
+    )
+
+
+def _setting(row: Row) -> tuple[float, float, str]:
+    return row["damping_ratio"], row["step"], row["dashpot"]
+
+
 def page(results: dict[str, Any]) -> str:
     """The page of the results."""
     return render(Path(__file__).with_name("page.md.j2"), {
         **results,
         "phases": PHASES,
+        "apart": _apart(results["impacts"]),
         "compared": compared(results["beds"]),
         "number": number,
         "interval_text": interval_text,

@@ -11,6 +11,7 @@ import typer
 from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.study.new_answers import (
     HELD,
+    HOLES,
     WHY_HELD,
     NewStudy,
     applies,
@@ -20,6 +21,9 @@ from sandmould.study.new_answers import (
     plain,
     sands,
 )
+
+_MEANINGS = {"hold": HELD, "cavity": HOLES}
+"""What each choice of a question means, printed before it."""
 
 
 def answers(given: Mapping[str, Any], ask: bool) -> NewStudy:
@@ -40,8 +44,6 @@ def answers(given: Mapping[str, Any], ask: bool) -> NewStudy:
     options = {name: value for name, value in given.items() if value is not None}
     if ask:
         typer.echo(WHY_HELD)
-        for held, drive in HELD.items():
-            typer.echo(f"  {held:12}  {drive}")
     known: dict[str, Any] = {}
     for name in NewStudy.model_fields:
         of = {key: known.get(key, options.get(key, _default(key))) for key in ("hold", "cavity")}
@@ -66,6 +68,8 @@ def answers(given: Mapping[str, Any], ask: bool) -> NewStudy:
 
 
 def _asked(name: str, known: Mapping[str, Any]) -> Any:
+    for choice, meaning in _MEANINGS.get(name, {}).items():
+        typer.echo(f"  {choice:12}  {meaning}")
     field, before = NewStudy.model_fields[name], plain(known)
     among = sands() if name == "material" else _choices(name)
     unit = "" if _unit(name) == "1" else f", {_unit(name)}"

@@ -61,7 +61,7 @@ class Recorder:
 
         Loads are means over the checks since the last row.
         """
-        when = (f"{snapshot.time_s:.9g}", f"{snapshot.clock_s:.9g}", snapshot.stage)
+        when = (f"{snapshot.time_s:.9g}", f"{snapshot.vibration_time_s:.9g}", snapshot.stage)
         measured = (health.kinetic_energy_j, health.rms_speed_m_s, health.largest_overlap_fraction)
         row = (*when, str(len(snapshot.id)), *(f"{x:.6g}" for x in measured))
         self._series.write("\t".join(row) + "\n")

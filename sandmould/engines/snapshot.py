@@ -23,7 +23,7 @@ class Snapshot:
     time_s: float
     """Simulated time since the first grain was inserted."""
     vibration_time_s: float
-    """Time since the first vibration stage began; negative before it."""
+    """Time since the first vibration stage began; NaN before it."""
     stage: str
     id: NDArray[np.int64]
     """(n,) int64, starting at 1."""
@@ -54,20 +54,15 @@ class Snapshot:
     def arrays(self) -> dict[str, Any]:
         """Values by name, as files hold them."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        values["vibration_time_s"] = self.clock_s
         return {name: value for name, value in values.items() if value is not None}
-
-    @property
-    def clock_s(self) -> float:
-        """Time of vibration as files have it: NaN before it began."""
-        return self.vibration_time_s if self.vibration_time_s >= 0.0 else math.nan
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, Any]) -> Snapshot:
         """The snapshot that such values are of; a KeyError or TypeError where some are missing."""
         values = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays}
-        for scalar, kind in (("time_s", float), ("vibration_time_s", clock_of), ("stage", str)):
-            values[scalar] = kind(values[scalar])
+        values["time_s"] = float(values["time_s"])
+        values["vibration_time_s"] = vibration_time_of(values["vibration_time_s"])
+        values["stage"] = str(values["stage"])
         return cls(**values)
 
     @classmethod
@@ -86,10 +81,10 @@ class Snapshot:
             raise ValueError(f"{path}: not a readable snapshot ({error})") from error
 
 
-def clock_of(stored: Any) -> float:
-    """Time of vibration that a file has: -1 where it is absent, as older files say themselves."""
+def vibration_time_of(stored: Any) -> float:
+    """Time of vibration that a file has; older files have -1 where it is absent."""
     value = float(stored)
-    return -1.0 if math.isnan(value) else value
+    return value if value >= 0.0 else math.nan
 
 
 def scene_at(scenario: Scenario, snapshot: Snapshot) -> Scene:

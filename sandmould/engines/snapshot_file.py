@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from sandmould.engines.snapshot import Snapshot, clock_of
+from sandmould.engines.snapshot import Snapshot, vibration_time_of
 from sandmould.runs.files import replaced
 
 SNAPSHOTS = "snapshots.npz"
@@ -87,7 +87,7 @@ class StoredSnapshot:
         else:
             with np.load(self.path, allow_pickle=False) as arrays:
                 time_s, vibration_s = (arrays[n] for n in names)
-        return float(time_s), clock_of(vibration_s)
+        return float(time_s), vibration_time_of(vibration_s)
 
 
 def stored_snapshots(folder: Path) -> list[StoredSnapshot]:

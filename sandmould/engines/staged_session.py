@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import json
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
@@ -239,7 +240,7 @@ class StagedSession(ABC):
         shaken = self._stage_start if self.stage.kind is StageKind.REST else self.steps
         return Snapshot(
             time_s=self.time_s,
-            vibration_time_s=-1.0 if start is None else (shaken - start) * self.step_s,
+            vibration_time_s=math.nan if start is None else (shaken - start) * self.step_s,
             stage=self.stage.name,
             id=ids,
             layer=self._layer_of_id[: self.grains],

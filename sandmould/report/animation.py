@@ -8,8 +8,9 @@ frame to frame, low bytes before high bytes, deflated: still grains cost next to
 from __future__ import annotations
 
 import base64
+import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -37,7 +38,8 @@ class Film:
     label: str
     grains: int
     time_s: tuple[float, ...]
-    vibration_time_s: tuple[float, ...]
+    vibration_time_s: tuple[float | None, ...]
+    """None before the first vibration."""
     stage: tuple[str, ...]
     reading: tuple[float | None, ...]
     """The objective at each frame, if known."""
@@ -127,7 +129,7 @@ def _pack(
         label=label,
         grains=len(ids),
         time_s=tuple(time_s.round(6).tolist()),
-        vibration_time_s=tuple(round(f.vibration_time_s, 6) for f in frames),
+        vibration_time_s=rounded(f.vibration_time_s for f in frames),
         stage=tuple(f.stage for f in frames),
         reading=readings_at(time_s, reading),
         origin_m=tuple(origin_m.tolist()),
@@ -155,6 +157,11 @@ def changes(place: NDArray[np.uint16]) -> NDArray[np.uint16]:
 def split_bytes(values: NDArray[np.uint16]) -> bytes:
     """All low bytes, then all high bytes."""
     return (values & 0xFF).astype(np.uint8).tobytes() + (values >> 8).astype(np.uint8).tobytes()
+
+
+def rounded(times_s: Iterable[float]) -> tuple[float | None, ...]:
+    """Times to a microsecond; None where there is none."""
+    return tuple(None if math.isnan(time_s) else round(time_s, 6) for time_s in times_s)
 
 
 def readings_at(

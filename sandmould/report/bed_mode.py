@@ -62,7 +62,7 @@ class BedMode:
             f"{said}{number(frequency_hz / self.estimate_hz, 2)} times c/(4 H) = "
             f"{number(self.estimate_hz)} Hz at the {self.depth_is} depth H of "
             f"{number(1e3 * self.depth_m)} mm. This is only an estimate of the lowest frequency at "
-            "which the bed swings by itself: no small shake has measured it."
+            "which the bed swings by itself. No small shake has measured it."
         )
 
 

@@ -41,9 +41,10 @@ from sandmould.study.kinds.sand.bending import convergence_log_of, verdict_of
 TIP = "pattern_tip_deflection_m"
 RECOVERED = "pattern_tip_recovered_m"
 ROJEK = (
-    "Rojek et al. (2004, section 4.3) state of their L, in experiment and computation: filling "
-    "distorts it and leaves loose sand below its horizontal part; vibration lets sand flow in "
-    "there, and the distortion is then slightly reduced. They print no sizes and no numbers."
+    "Rojek et al. (2004, section 4.3) state this of their L, in experiment and computation: "
+    "filling distorts it and leaves loose sand below its horizontal part. Vibration lets sand "
+    "flow in there, and the distortion is then slightly reduced. They print no sizes and no "
+    "numbers."
 )
 _RECOVERS = 0.02
 """Share of the deflection that must come back before the page says so."""
@@ -195,8 +196,8 @@ def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str)
     else:
         so = "whether the tip comes back is not told by so few fillings"
     return ROJEK, (
-        f"Here vibration gave back {with_margin(mean, reach)} mm of the tip's sinking{where}, the "
-        f"mean of {fillings.n} fillings with its 95 % interval: {so}."
+        f"Here vibration gave back {with_margin(mean, reach)} mm of the tip's sinking{where} (mean "
+        f"of {fillings.n} fillings, 95 % interval): {so}."
     )
 
 

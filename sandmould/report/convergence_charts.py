@@ -45,8 +45,9 @@ def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceC
         (
             "displacement, mm",
             (_Curve("displacement_m", "shown", 1e3, "mean"), _Curve("residual_m", "residual", 1e3)),
-            "Root mean square over the surface's vertices of the displacement that the sand saw, "
-            "and of the one that its loads give less that.",
+            "Root mean square over the surface's vertices: of the displacement that the sand saw, "
+            "and of the residual. The residual is the displacement that the sand's loads give, "
+            "less the one it saw.",
         ),
         (
             "energy, J",
@@ -57,7 +58,7 @@ def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceC
                 _Curve("kinetic_j", "kinetic"),
                 _Curve("damped_j", "damped"),
             ),
-            "Work of the sand on the surface since the run began, and what became of it: stored "
+            "Work of the sand on the surface since the run began, and where it went. Stored "
             "energy above the work came from the loop itself.",
         ),
     ]
@@ -67,8 +68,8 @@ def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceC
             (
                 "share of the residual",
                 (_Curve("factor", "gone"), _Curve("limit", "limit")),
-                "Share of the residual that is gone next, and, where the gain was measured, the "
-                "limit 2 / (1 + gain) of a fixed share.",
+                "Share of the residual that is gone next. Where the gain was measured, the limit "
+                "of a fixed share, 2 / (1 + gain), stands beside it.",
             )
         )
     return tuple(

@@ -121,13 +121,12 @@ def statistics_method(objective: Objective, ends: str, draws_by_lot: bool) -> Ro
     at = ends if at_s is None else f"{at_s:g} s of vibration"
     compared = f"{name_of(objective.measure)} at {at}, {objective.better} is better"
     if not draws_by_lot:
-        return Row("Statistics", f"{compared}; nothing is drawn by lot, so a setting is one run.")
+        return Row("Statistics", f"{compared}. Nothing is drawn by lot, so a setting is one run.")
     return Row(
         "Statistics",
-        f"{compared}; a setting's ± is the "
-        "95 % interval of its mean (Student). Settings with the same usable replicates are "
-        "compared by paired differences, others by Welch's test; intervals and p values of the "
-        "best against the others carry Bonferroni's factor.",
+        f"{compared}. A setting's ± is the 95 % interval of its mean (Student). Settings with the "
+        "same usable replicates are compared by paired differences, others by Welch's test. "
+        "Intervals and p values of the best against the others carry Bonferroni's factor.",
     )
 
 
@@ -153,8 +152,8 @@ def _model(scenario: Scenario) -> str:
         return f"distinct elements in 3D: spheres; {gravity}"
     return (
         f"distinct elements in 2D: discs {number(1e3 * scenario.sand.thickness_m)} mm long across "
-        "the plane, a length the paper leaves open (only stiffness over thickness matters); "
-        f"{gravity}"
+        f"the plane; {gravity}. The paper leaves this length open: only stiffness over thickness "
+        "matters"
     )
 
 
@@ -278,9 +277,9 @@ def _step_of_bed(summary: pd.DataFrame) -> str:
         return ""
     step_s, bed_s, least_s, moments = (found[column] for column in columns)
     return (
-        f"; after the fill {len(found)} runs take {_range(step_s / bed_s)} of the exact limit of "
-        f"the filled bed, {_range(1e6 * bed_s)} µs; the least one of the shaken bed, over "
-        f"{_range(moments)} moments of a run, is {_range(1e6 * least_s)} µs, "
+        f". After the fill, {len(found)} runs take {_range(step_s / bed_s)} of the exact limit of "
+        f"the filled bed, {_range(1e6 * bed_s)} µs. The least limit of the shaken bed, over "
+        f"{_range(moments)} moments of a run, is {_range(1e6 * least_s)} µs: "
         f"{_range(least_s / step_s)} times the step"
     )
 
@@ -296,7 +295,7 @@ def _seeds(summary: pd.DataFrame) -> str:
     if (summary.groupby(REPLICATE)[SEED].nunique() == 1).all():
         return (
             "a replicate has the same seed at every setting, so that settings are compared on the "
-            "same sand; other replicates have other seeds"
+            "same sand. Other replicates have other seeds"
         )
     return "every run has a seed of its own"
 

@@ -170,12 +170,12 @@ def _column(mode: BedMode, is_shaken: bool) -> str:
     """Frequency of a column of springs as deep as the bed, beside the bed's own."""
     said = (
         f"A column of the model's springs, {number(1e3 * mode.depth_m)} mm high, would resonate at "
-        f"about {number(mode.estimate_hz, 2)} Hz, c/(4 H) with c = {number(mode.row_speed_m_s)} "
-        "m/s of a row of grains, and at odd multiples"
+        f"about {number(mode.estimate_hz, 2)} Hz and at odd multiples. That is c/(4 H) with c = "
+        f"{number(mode.row_speed_m_s)} m/s of a row of grains"
     )
     if mode.is_measured:
         own_hz = number(mode.measured_hz)
-        return f"{said}; shaken weakly, the bed's own first resonance is at {own_hz} Hz."
+        return f"{said}. Shaken weakly, the bed's own first resonance is at {own_hz} Hz."
     return f"{said}; shaken weakly, the bed shows no resonance." if is_shaken else f"{said}."
 
 

@@ -165,7 +165,7 @@ def sand_pages(
 
 def _clock_s(moment: Moment) -> float:
     """Time of vibration, or of the run where nothing vibrates."""
-    return moment.vibration_time_s if moment.vibration_time_s >= 0.0 else moment.time_s
+    return moment.time_s if math.isnan(moment.vibration_time_s) else moment.vibration_time_s
 
 
 def pictured_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:

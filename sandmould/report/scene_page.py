@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +77,7 @@ def _as_snapshot(bed: LikelyBed) -> Snapshot:
     n = len(bed.radius_m)
     return Snapshot(
         time_s=0.0,
-        vibration_time_s=-1.0,
+        vibration_time_s=math.nan,
         stage=StageKind.SETTLE.value,
         id=np.arange(1, n + 1),
         layer=bed.layer,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from analysis.density import apparent_density
 from sandmould.engines.snapshot import Snapshot, scene_at
-from sandmould.report.animation import ABSENT, changes, evenly, readings_at, split_bytes
+from sandmould.report.animation import ABSENT, changes, evenly, readings_at, rounded, split_bytes
 from sandmould.report.figures import DensityScale
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import is_filling
@@ -51,7 +51,8 @@ class SphereFilm:
     vertices: int
     """Points after the grains: vertices of the pattern that bends, 0 without one."""
     time_s: tuple[float, ...]
-    vibration_time_s: tuple[float, ...]
+    vibration_time_s: tuple[float | None, ...]
+    """None before the first vibration."""
     stage: tuple[str, ...]
     is_filling: tuple[bool, ...]
     reading: tuple[float | None, ...]
@@ -248,7 +249,7 @@ def sphere_frames(
         of_grains=n,
         vertices=vertices,
         time_s=tuple(time_s.round(6).tolist()),
-        vibration_time_s=tuple(round(shaken_s, 6) for _, shaken_s, _ in clock),
+        vibration_time_s=rounded(shaken_s for _, shaken_s, _ in clock),
         stage=tuple(stage for _, _, stage in clock),
         is_filling=filling,
         reading=readings_at(time_s, reading),

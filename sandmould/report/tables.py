@@ -333,13 +333,13 @@ class DataFile:
 _FILES = (
     (STUDY_FILE, "the study as planned"),
     ("runs.tsv", "the plan: every run, its parameters, replicate and seed"),
-    (SUMMARY, "one row a run of the sweep: parameters, outcome, final measures, cost"),
-    (CURVES, "one row a snapshot of the sweep: all measures against time"),
-    (CHECKS[0], "the runs that check the sweep, on another engine or as controls: a row a run"),
-    (CHECKS[1], "the same runs: a row a snapshot"),
+    (SUMMARY, "one row per run of the sweep: parameters, outcome, final measures, cost"),
+    (CURVES, "one row per snapshot of the sweep: all measures against time"),
+    (CHECKS[0], "the runs that check the sweep, on another engine or as controls: one row per run"),
+    (CHECKS[1], "the same runs: one row per snapshot"),
     (FIGURES, "main figures as files: charts as SVG, sand as PNG"),
-    ("agreement.tsv", "one row a pair of settings and measure that the study compares"),
-    ("runs", "a folder a run: scenario, deck, outcome, provenance, time series, wall loads, "
+    ("agreement.tsv", "one row per compared pair of settings and measure"),
+    ("runs", "one folder per run: scenario, deck, outcome, provenance, time series, wall loads, "
      "snapshots; exports.zip holds some of them for ParaView (.vtu) and OVITO (.dump)"),
 )  # fmt: skip
 

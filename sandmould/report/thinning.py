@@ -61,8 +61,8 @@ def drawn_note(collected: Collected, verdict: Verdict) -> str:
         return ""
     settings = f"{len(of.settings)} of {len(verdict.settings)} settings"
     return (
-        f"Charts show {settings}, evenly over the sweep with the two best, and "
-        f"{len(drawn.summary)} of {len(collected.summary)} runs; means and intervals of settings "
+        f"Charts show {settings}, evenly over the sweep with the two best. They draw "
+        f"{len(drawn.summary)} of {len(collected.summary)} runs. Means and intervals of settings "
         "are those of all their runs."
     )
 

@@ -125,7 +125,8 @@ class CastPicture(Section):
     kind: Literal["image"]
     file: str = quantity(
         ...,
-        "Picture, seen from the file that names it; in a resolved scenario, from the repository.",
+        "Picture. Its path is relative to the file that names it, in a resolved scenario to the "
+        "repository.",
         source="user",
         min_length=1,
     )

@@ -103,11 +103,11 @@ def _of_place(s: Scenario, cavity: AnyCavity, space: Cavity, key: str) -> Iterat
             found.solid_share > _MOST_SKIN
             or found.deepest_m > _SKIN_OF_GRAIN * s.sand.classes(s.dimension)[0].diameter_m
         ):
-            overlap = f"about {100 * found.solid_share:.0f} % of this one"
+            overlap = f"About {100 * found.solid_share:.0f} % of this one"
             valid = (
-                f"a cavity whose facets fit those of the part: {overlap} lies in the part, up to "
-                f"{1e3 * found.deepest_m:.2g} mm deep, since the facets of the two drawings "
-                "differ. Export both with finer facets, or make the cavity a little smaller"
+                f"a cavity whose facets fit those of the part. {overlap} lies in the part, up to "
+                f"{1e3 * found.deepest_m:.2g} mm deep. Export both drawings with finer facets, or "
+                "make the cavity a little smaller"
             )
             if isinstance(cavity, MeshCavity):
                 yield Problem(f"{key}.file", cavity.file, valid)

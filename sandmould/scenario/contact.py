@@ -104,17 +104,17 @@ class Contact(Section):
     grain_wall: ContactLaw = Field(WALL_LAW, description="Law between a grain and a rigid wall.")
     springs_at_size_scale: float | None = quantity(
         4.0,
-        "sand.size_scale that the springs belong to. At another one all springs are multiplied by "
-        "size_scale over it, in 3D and with discs as thick as a grain, so that sand stays as hard "
-        "when grains are coarsened. null: springs are used as they are given.",
+        "sand.size_scale that the springs belong to. At another scale all springs are multiplied "
+        "by size_scale over it, so that coarser grains make sand as hard. This holds in 3D and "
+        "for discs as thick as a grain. null: springs are used as given.",
         source=PAPER,
         gt=0,
         le=100,
     )
     wave_speed_m_s: float | None = quantity(
         None,
-        "Speed of a compression wave along a row of mass-median grains in contact; given, all "
-        "springs are multiplied alike so that it comes out.",
+        "Speed of a compression wave along a row of mass-median grains in contact. If it is "
+        "given, all springs are multiplied by one factor so that it comes out.",
         unit="m/s",
         source="user",
         ge=1.0,
@@ -127,24 +127,26 @@ class Contact(Section):
     )
     rolling_axes: Literal["tangent", "all"] = quantity(
         "tangent",
-        "Relative spins that the rolling moment resists in 3D: those that roll, or, as eq. (31) "
-        "reads, twist about the normal too.",
+        "Relative spins that the rolling moment resists in 3D. tangent: those that roll. all: the "
+        "twist about the normal too, as eq. (31) reads.",
         source=ARGUED,
     )
 
     dashpot: Literal["corrected", "plain"] = quantity(
         "corrected",
-        "Whether dashpots make up for the half step by which they see the velocity late, "
-        "c' = c/(1 + c dt/(4 m)), so that the mean restitution does not depend on the time step.",
+        "A dashpot sees the velocity of half a step ago. corrected: its coefficient is c' = c/(1 "
+        "+ c dt/(4 m)), so that the mean restitution does not depend on the time step. plain: c "
+        "as given.",
         source=ARGUED,
     )
 
     slip_normal: Literal["half_step", "full_step"] | None = quantity(
         None,
         "In 3D the slip of two grains is taken in the plane of a normal. half_step: the normal of "
-        "half a step ago, as the velocities. full_step: that of the whole step, which traps small "
-        "grains between large ones. By default half_step on the reference engine and full_step on "
-        "LAMMPS, where the other costs 1.16 times as much. LIGGGHTS has full_step alone.",
+        "half a step ago, as old as the velocities. full_step: that of the whole step; it traps "
+        "small grains between large ones. Unless given, half_step on engine reference and "
+        "full_step on LAMMPS, where half_step costs 1.16 times as much. LIGGGHTS has full_step "
+        "alone.",
         source=ARGUED,
     )
 

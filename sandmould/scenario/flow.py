@@ -72,8 +72,8 @@ class PressureProbe(Section):
     name: str = quantity(..., "Its column is <name>_pa.", source="user", pattern=NAME)
     at_m: tuple[float, float] = quantity(
         ...,
-        "Of a tank x and height; of a cylinder distance from the axis, round which eight places "
-        "are averaged, and height.",
+        "In a tank: x and height. In a cylinder: distance from the axis and height; the mean of "
+        "eight places round the axis counts.",
         unit="m",
         source="user",
     )
@@ -107,8 +107,9 @@ class MetalFlow(Section):
         "density", "divergence", "corrected_divergence", "higher_order", "error_compensating"
     ] = quantity(
         "density",
-        "Source of the Poisson equation; the paper's is density. corrected_divergence is exact off "
-        "the lattice, for flow without a free surface: nothing but shifting keeps the volume.",
+        "Source of the Poisson equation; the paper's is density. corrected_divergence is exact "
+        "off the lattice, for flow without a free surface. Nothing but shifting keeps the volume "
+        "then.",
         source=PAPER,
     )
     gradient: Literal["least", "difference", "sum", "corrected", "printed"] = quantity(
@@ -138,14 +139,14 @@ class MetalFlow(Section):
     )  # fmt: skip
     shifting: float = quantity(
         0.0,
-        "Share of r0^2 by which inner particles move on to where fewer are, with the velocity "
-        "found there; 0 for none.",
+        "Share of r0^2 by which inner particles move on to where fewer are; 0 for none. They take "
+        "the velocity found there.",
         source=ARGUED, ge=0, le=0.5,
     )  # fmt: skip
     collision_distance: float = quantity(
         0.0,
-        "Over the particle size: nearer than this particles that approach collide; 0 for none. "
-        "Metal that is poured needs it.",
+        "Distance over the particle size below which particles that approach each other collide; "
+        "0 for none. Metal that is poured needs it.",
         source=PAPER, ge=0, le=1,
     )  # fmt: skip
     restitution: float = quantity(0.2, "Of these collisions.", source=ARGUED, ge=0, le=1)
@@ -165,7 +166,7 @@ class MetalFlow(Section):
     )
     noise_window_s: float = quantity(
         0.01,
-        "A second deviation is taken of means over windows of this length: with c_poi = 1 fluid "
+        "A second deviation is taken of means over windows of this length. With c_poi = 1 fluid "
         "is thrown up in one step and falls in the next.",
         unit="s",
         source=ARGUED,
@@ -173,7 +174,8 @@ class MetalFlow(Section):
     )
     probes: tuple[PressureProbe, ...] = Field(
         (),
-        description="Where pressure is recorded; the paper's places of the case unless given: at "
-        "3/8, 5/8 and 7/8 of a tank's depth, at the bottom of a cylinder and under its shoulder.",
+        description="Where pressure is recorded. Unless given, at the places of the paper: in a "
+        "tank at 3/8, 5/8 and 7/8 of its depth; in a cylinder at its bottom and under its "
+        "shoulder.",
     )
     seed: int = quantity(1, "Nothing is drawn by lot: it changes no result.", source=ARGUED, ge=0)

@@ -201,7 +201,7 @@ def facing(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Ints, Sequenc
             turn[number] *= -1
         elif not solid.all():
             raise MeshFileError(
-                "shells that face inwards only where they are cavities; one faces inwards and "
+                "shells that face inwards only where they are cavities. One faces inwards and "
                 f"sticks out of the shells round it, {at(place[shell == number][~solid][0])}"
             )
     facing_out = np.flatnonzero(way * turn > 0)

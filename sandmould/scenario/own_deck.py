@@ -32,8 +32,8 @@ class OwnDeck(Section):
     engine: DeckEngine = Field(DeckEngine(), description="The engine.")
     template: str = quantity(
         ...,
-        "Jinja template of the deck, seen from the file that names it; in a resolved run, from "
-        "the repository.",
+        "Jinja template of the deck. Its path is relative to the file that names it, in a "
+        "resolved run to the repository.",
         source="user",
         min_length=1,
     )

@@ -54,7 +54,8 @@ class MeshFile(Section):
     kind: Literal["file"]
     file: str = quantity(
         ...,
-        "Mesh file, seen from the file that names it; in a resolved scenario, from the repository.",
+        "Mesh file. Its path is relative to the file that names it, in a resolved scenario to the "
+        "repository.",
         source="user",
         min_length=1,
     )
@@ -154,13 +155,13 @@ class Loop(Section):
     scheme: Scheme = quantity(
         "aitken",
         "How the pattern follows the loads of the sand. one_way: it bends, but the sand does not "
-        "feel it. per_layer: one solve after each layer or stage, with a fixed share. With "
-        "windows: fixed, a fixed share; measured, a share of the limit that a measured gain sets "
-        "(not on LIGGGHTS); aitken, Aitken's share; quasi_newton, a quasi-Newton step over the "
-        "last windows (IQN-ILS, only with repeats above 0, so not on LIGGGHTS). Without windows: "
-        "in_step steps the pattern, condensed on its surface, inside every step of the engine; "
-        "monolithic steps all of it after every step of the grains: slow, reference engine, "
-        "what the others are compared with.",
+        "feel it. per_layer: one solve after each layer or stage, with a fixed share. The next "
+        "four solve once a window. fixed: a fixed share. measured: a share of the limit that a "
+        "measured gain sets; not on LIGGGHTS. aitken: Aitken's share. quasi_newton: a "
+        "quasi-Newton step over the last windows (IQN-ILS); it needs repeats above 0, so not on "
+        "LIGGGHTS. The last two have no windows. in_step: the pattern, condensed on its surface, "
+        "is stepped inside every step of the engine. monolithic: all of it is stepped after every "
+        "step of the grains. That is slow, on engine reference only, and serves for comparison.",
         source=ARGUED,
     )
     factor: float = quantity(
@@ -177,8 +178,8 @@ class Loop(Section):
     )
     exchange: Literal["memory", "files"] = quantity(
         "memory",
-        "How sand and pattern tell each other loads and displacements: at once, or by files in "
-        "the run's folder exchange, where the run stops until another program has answered.",
+        "How sand and pattern exchange loads and displacements. memory: at once. files: by files "
+        "in the run's folder exchange; the run stops until another program has answered.",
         source=ARGUED,
     )
     repeats: int = quantity(
@@ -194,8 +195,8 @@ class Loop(Section):
     )
     mass_scale: float | None = quantity(
         None,
-        "Factor of the pattern's masses in the monolithic and in-step schemes; just large enough "
-        "for the step of the grains and for their contacts unless given.",
+        "Factor of the pattern's masses in the schemes monolithic and in_step. Unless given, it "
+        "is just large enough for the step of the grains and for their contacts.",
         source=ARGUED, gt=0,
     )  # fmt: skip
     damping_ratio: float = quantity(

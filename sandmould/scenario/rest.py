@@ -11,8 +11,8 @@ class Rest(Section):
 
     check_every_s: float = quantity(
         0.005,
-        "Interval of the checks, and of the guards; loads are means over it, and no engine is cut "
-        "at other steps. Series and snapshots are written at whole checks.",
+        "Interval of the checks and of the guards. Loads are means over it, and the engine runs "
+        "without a stop in between. Series and snapshots are written at whole checks.",
         unit="s",
         source=ARGUED,
         gt=0,
@@ -20,9 +20,9 @@ class Rest(Section):
     )
     shaken_check_every_s: float | None = quantity(
         None,
-        "The same from the first vibration on, rounded down to a whole part of check_every_s; "
-        "series and loads are then written at each of these checks. The fill keeps its own, and is "
-        "shared with runs that do without. On engine reference.",
+        "The same from the first vibration on, rounded down to a whole part of check_every_s. "
+        "Series and loads are then written at each of these checks. The fill keeps check_every_s, "
+        "so runs with and without this key share it. On engine reference.",
         unit="s",
         source="user",
         gt=0,
@@ -49,16 +49,16 @@ class Rest(Section):
     )
     load_tolerance: float | None = quantity(
         0.01,
-        "Share of the sand's weight by which the vertical loads on all surfaces together may "
-        "differ from it; null asks the speed alone.",
+        "Largest difference between the vertical loads on all surfaces together and the sand's "
+        "weight, over that weight. null: only the speed is checked.",
         source=ARGUED,
         gt=0,
         le=10,
     )
     load_every_steps: int = quantity(
         20,
-        "Steps between the samples of loads that checks and the coupling take means of, on LAMMPS "
-        "and LIGGGHTS; a check holds whole samples.",
+        "Steps between two samples of the loads on LAMMPS and LIGGGHTS. Checks and the coupling "
+        "take means of these samples. A check holds whole samples.",
         source=ARGUED,
         ge=1,
         le=100000,

@@ -56,8 +56,8 @@ class Recording(Section):
     )
     checkpoint_every_s: float = quantity(
         0.1,
-        "Interval of checkpoints in simulated time, so that a run does not depend on the clock; on "
-        "LAMMPS and LIGGGHTS rounded to whole times of 20 checks.",
+        "Interval of checkpoints in simulated time, so that a run does not depend on the clock. "
+        "On LAMMPS and LIGGGHTS it is rounded to whole times of 20 checks.",
         unit="s",
         source=ARGUED,
         gt=0,
@@ -122,9 +122,8 @@ class Scenario(Section):
     )
     measure_at_rest: bool = quantity(
         True,
-        "Whether the box stops and the sand comes to rest after the last stage of vibration, where "
-        "packing and fill are then measured. Otherwise the run ends, and is measured, at full "
-        "speed.",
+        "true: after the last vibration the box stops, the sand comes to rest, and packing and "
+        "fill are measured then. false: the run ends, and is measured, at full speed.",
         source=ARGUED,
     )
     frame: Literal["box", "laboratory"] = quantity(

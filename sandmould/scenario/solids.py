@@ -57,8 +57,8 @@ Named = TypeVar("Named", bound=NamesFile)
 
 DRAWING_FILE: Any = quantity(
     ...,
-    "STL or STEP file (.step, .stp), seen from the file that names it; in a resolved scenario, "
-    "from the repository.",
+    "STL or STEP file (.step, .stp). Its path is relative to the file that names it, in a "
+    "resolved scenario to the repository.",
     source="user",
     min_length=1,
 )

@@ -26,8 +26,8 @@ class TimeStep(Section):
     )
     rotational_inertia: Literal["physical", "scaled"] = quantity(
         "physical",
-        "Moments of inertia as they are, or raised to m r^2 k_T / k_n so that rotation does not "
-        "set the critical step.",
+        "Moments of inertia. physical: as they are. scaled: raised to m r^2 k_T / k_n, so that "
+        "rotation does not set the critical step.",
         source=ARGUED,
     )
     step_s: float | None = quantity(
@@ -36,9 +36,9 @@ class TimeStep(Section):
     )  # fmt: skip
     bed_fraction: float | None = quantity(
         None,
-        "Time step after the fill over the exact limit of the filled bed, found once when the fill "
-        "is at rest; 0.7 leaves room for a bed that vibration packs. Unless given, the planned "
-        "step stays.",
+        "Time step after the fill over the exact limit of the filled bed. The limit is found "
+        "once, when the fill is at rest; 0.7 leaves room for a bed that vibration packs. Unless "
+        "given, the planned step stays.",
         source="user",
         ge=1e-3,
         le=1,

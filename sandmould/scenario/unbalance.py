@@ -60,8 +60,8 @@ class Unbalance(Section):
     )
     flask_depth_m: float | None = quantity(
         None,
-        "Depth of the flask across the plane, required in 2D and absent in 3D: the sand's force "
-        "on the table is that of the discs, times this depth over sand.disc_thickness_m.",
+        "Depth of the flask across the plane; required in 2D, absent in 3D. The sand's force on "
+        "the table is that of the discs, times this depth over sand.disc_thickness_m.",
         unit="m",
         source="user",
         gt=0,

@@ -42,8 +42,8 @@ def unbalance_problems(s: Scenario) -> Iterator[Problem]:
         depth_m = unbalance.flask_depth_m
         if s.dimension == 2 and depth_m is None:
             valid = (
-                "the flask's depth across the plane in m: in 2D the sand's force on the table is "
-                "that of discs as thick as sand.disc_thickness_m"
+                "the flask's depth across the plane in m. In 2D the discs are only as thick as "
+                "sand.disc_thickness_m, and the table carries the sand of the whole flask"
             )
             yield Problem(f"{key}.unbalance.flask_depth_m", None, valid)
         elif s.dimension == 3 and depth_m is not None:
@@ -66,7 +66,7 @@ def table_mass_problem(s: Scenario) -> Iterator[Problem]:
         least_kg = LEAST_MASS_SHARE * sand_kg
         if unbalance.moving_mass_kg < least_kg:
             valid = (
-                f"at least {least_kg:.4g} kg, a tenth of the mass of the sand in the flask: the "
+                f"at least {least_kg:.4g} kg, a tenth of the mass of the sand in the flask. The "
                 "time step does not resolve a lighter table"
             )
             yield Problem(f"{key}.unbalance.moving_mass_kg", unbalance.moving_mass_kg, valid)

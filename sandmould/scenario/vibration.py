@@ -45,8 +45,9 @@ class Shaking(Section):
     )
     hold: Literal["acceleration", "velocity", "displacement", "unbalance"] = quantity(
         "acceleration",
-        "Which amplitude stays the same when the frequency changes; with unbalance, the rotating "
-        "masses do, and the table moves as they, its mounts and the sand make it.",
+        "Which amplitude stays the same when the frequency changes. unbalance: the rotating "
+        "masses stay the same. The table's motion is then computed from them, from its mounts and "
+        "from the sand.",
         source=ARGUED,
     )
     unbalance: Unbalance | None = Field(

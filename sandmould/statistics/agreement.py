@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -25,6 +26,8 @@ from sandmould.statistics.equivalence import Agreement, agree
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import by_block, group_settings
 
+MOST_NAMED = 2
+"""Compared pairs that a sentence names; of more it counts them."""
 COLUMNS = (
     "at", "key", "first", "second", "measure", "mean_first", "mean_second", "difference",
     "ci_low", "ci_high", "margin", "n", "paired", "verdict", "note",
@@ -138,29 +141,33 @@ def agreement_sentences(compared: Sequence[Compared], confidence: float) -> tupl
     sentences = []
     if different:
         sentences.append(
-            f"They differ by more than the margin in {_named(different)}, at {percent}."
+            f"They differ by more than the margin in {_named(different, compared)}, at {percent}."
         )
     if open_:
         first = "Not resolved" if not sentences else "Also not resolved"
-        sentences.append(f"{first}, since the interval reaches over the margin: {_named(open_)}.")
+        sentences.append(
+            f"{first}, since the interval reaches over the margin: {_named(open_, compared)}."
+        )
     if untested:
-        sentences.append(f"Not tested: {_named(untested)}.")
+        sentences.append(f"Not tested: {_named(untested, compared)}.")
     agreeing = len(by_verdict["equivalent"])
     sentences.append(f"{agreeing} of {total} comparisons agree within the margins set beforehand.")
     return tuple(sentences)
 
 
-def _named(compared: Sequence[Compared]) -> str:
-    """Measures with the pairs they were compared for."""
-    measures = list(dict.fromkeys(c.measure for c in compared))
+def _named(compared: Sequence[Compared], every: Sequence[Compared]) -> str:
+    """Measures with the pairs they were compared for; more than two pairs are counted."""
+    of = Counter(c.measure for c in every)
     parts = []
-    for measure in measures:
+    for measure, count in Counter(c.measure for c in compared).items():
         pairs = [
             f"{c.first} – {c.second}{f' at {c.at}' if c.at else ''}"
             for c in compared
             if c.measure == measure
         ]
-        parts.append(f"{name_of(measure)} ({listed(pairs, most=3)})")
+        few = len(compared) <= MOST_NAMED
+        said = listed(pairs) if few else f"{count} of {of[measure]} pairs"
+        parts.append(f"{name_of(measure)} ({said})")
     return listed(parts)
 
 

@@ -38,8 +38,8 @@ class Objective(Section):
     )
     at_vibration_s: float | None = quantity(
         None,
-        "Time of vibration at which the measure is taken, at full speed; unless given at the end "
-        "of the run, where the sand is at rest again.",
+        "Time of vibration at which the measure is taken, at full speed. Unless given, it is "
+        "taken at the end of the run, where the sand is at rest again.",
         unit="s",
         source=ARGUED,
         ge=0,
@@ -71,18 +71,18 @@ class Equivalence(Section):
 
     keys: tuple[str, ...] = Field(
         (),
-        description="Swept keys, such as engine.name, whose values should agree: settings that "
+        description="Swept keys whose values should agree, such as engine.name. Settings that "
         "differ in one of them alone are compared.",
     )
     over: tuple[str, ...] = Field(
         (),
-        description="Swept keys that are averaged over: values of a key are compared over all of "
-        "theirs at once, as the main effect of a factorial design.",
+        description="Swept keys that are averaged over. The values of a key are compared over all "
+        "settings of these at once, as the main effect of a factorial design.",
     )
     margins: dict[Annotated[str, Field(pattern=NAME)], Annotated[float, Field(gt=0)]] = Field(
         {},
-        description="Columns of measures.tsv and the largest difference of means, in the unit of "
-        "the column, that counts as none.",
+        description="Columns of measures.tsv, each with the largest difference of means that "
+        "counts as none, in the unit of the column.",
     )
     confidence: float = quantity(
         0.9,

@@ -69,8 +69,8 @@ def recommend(
         return _none(f"{held} {lacking}")
     if sand is None:
         return _none(
-            "the optimum follows the springs, so it is known as well as the wave speed of the real "
-            "sand is, and certificate.sand_wave_speed names no source of that"
+            "the optimum follows the springs, so it is known only as well as the wave speed of "
+            "the real sand. certificate.sand_wave_speed states no source of that speed"
         )
     speed = f"{number(model.speed_m_s)} m/s ({model.how})"
     spread = f"{number(sand.low_m_s)} to {number(sand.high_m_s)} m/s ({sand.by})"

@@ -187,11 +187,11 @@ def _together(
     if own and own.dependence == FOLLOWS and as_column:
         first = (
             f"{at} is a resonance of the bed: it moves with the springs and with "
-            f"{_names(as_column)} as c/(4 H) does, so it is that of sand as hard as the model's."
+            f"{_names(as_column)} as c/(4 H) does. So it holds for sand as hard as the model's."
         )
         return "resonance of the bed", (first, *said)
     if own and own.dependence == FOLLOWS:
-        first = f"{at} follows the springs, so it is that of sand as hard as the model's."
+        first = f"{at} follows the springs, so it holds for sand as hard as the model's."
         return "follows the springs", (first, *said)
     if held:
         first = f"{at} is an artefact of what is held constant: it moves with {_names(held)}."
@@ -203,7 +203,7 @@ def _together(
     stays = own is not None and own.dependence == STAYS
     if not missing and stays and all(m.verdict == "held" for m in wanted):
         first = (
-            f"{at} belongs to the sand: it does not follow the springs, and neither what is held "
+            f"{at} belongs to the sand: it does not follow the springs. Neither what is held "
             "constant nor time step or engine moves it by more than the margin."
         )
         return "rearrangement of grains", (first, *said)

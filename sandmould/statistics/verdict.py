@@ -31,8 +31,8 @@ MANY = 10
 MOST_NAMED = 100
 """More further runs are named nowhere: their estimate is as uncertain as the difference."""
 NOT_TESTED = (
-    "Whether the optimum belongs to the sand or to the model's springs is not tested here: its "
-    "robustness checks (springs, bed depth, grain size, time step) have not been run."
+    "The robustness checks have not been run (springs, bed depth, grain size, time step). So it "
+    "is not known whether the optimum belongs to the sand or to the model's springs."
 )
 
 
@@ -198,7 +198,7 @@ def sand_notes(
         others = [w for w in ("acceleration", "velocity", "displacement") if w != stage.hold]
         held = "moment of the" if stage.hold == "unbalance" else "amplitude of"
         notes.append(
-            f"The {held} {stage.hold} was held constant while the frequency changed; with "
+            f"The {held} {stage.hold} was held constant while the frequency changed. With "
             f"{' or '.join(others)} held instead, another frequency may be best."
         )
     return (*notes, NOT_TESTED) if seeks_best and not is_controlled else tuple(notes)
@@ -217,7 +217,7 @@ def _identical(others: list[str]) -> list[str]:
         return []
     return [
         f"The replicates of the best setting and of {listed(others)} differ by no more than "
-        "round-off, so they say nothing about chance: check that the seed reaches the sand."
+        "round-off, so they say nothing about chance. Check that the seed reaches the sand."
     ]
 
 
@@ -297,10 +297,9 @@ def _sentences(
         "different values, before their difference can be told from chance."
     )
     return (
-        f"Not resolved: no setting can be recommended for its {what}. The {most} mean, "
-        f"{mean}, is that of {best.label}, but it cannot be told apart from "
-        f"{listed(like)} at 95 % confidence.{ruled_out}"
-        f"{_more_sentence(comparisons, best)}",
+        f"Not resolved: no setting can be recommended for its {what}. The {most} mean, {mean}, is "
+        f"that of {best.label}. At 95 % confidence it cannot be told apart from "
+        f"{listed(like)}.{ruled_out}{_more_sentence(comparisons, best)}",
         again,
     )
 

@@ -223,13 +223,13 @@ _TABLE = (
 OF_STUDY: tuple[File, ...] = (
     File("study.yaml", "The study as planned, with all that it is based on."),
     File("study_file.txt", "The study's file that the results belong to."),
-    File("runs.tsv", "The plan: a row a run.", (*_OF_RUN, _SEED, _PART, _COST[-1])),
-    File("summary.tsv", "A row a run of the sweep.", _SUMMARY),
-    File("summary_checks.tsv", "A row a run that checks the sweep: another engine, controls.",
+    File("runs.tsv", "The plan: one row per run.", (*_OF_RUN, _SEED, _PART, _COST[-1])),
+    File("summary.tsv", "One row per run of the sweep.", _SUMMARY),
+    File("summary_checks.tsv", "One row per run that checks the sweep: another engine, controls.",
          _SUMMARY),
-    File("curves.tsv", "A row a snapshot of a run of the sweep.", _CURVES),
-    File("curves_checks.tsv", "A row a snapshot of a run that checks the sweep.", _CURVES),
-    File("agreement.tsv", "A row a pair of settings and a measure that the study compares.", (
+    File("curves.tsv", "One row per snapshot of a run of the sweep.", _CURVES),
+    File("curves_checks.tsv", "One row per snapshot of a run that checks the sweep.", _CURVES),
+    File("agreement.tsv", "One row per compared pair of settings and measure.", (
         _words("at", "Setting of the other keys."),
         _words("key", "Key that the pair differs in."),
         _words("first", "Its first value."),
@@ -284,7 +284,7 @@ OF_RUN: tuple[File, ...] = (
     File("<name>.stl", "Walls and meshes as LIGGGHTS reads them."),
     File("outcome.json", "How it ended; written last.", _JSON_OUTCOME),
     File("products.json", "Where it comes from, what it cost, its files.", _JSON_PRODUCTS),
-    File("series.tsv", "A row a record.", (
+    File("series.tsv", "One row per record.", (
         *_CLOCK,
         Described("grains", "Grains in the box."),
         Described("kinetic_energy_j", "Kinetic energy of all grains."),
@@ -300,21 +300,21 @@ OF_RUN: tuple[File, ...] = (
         _words("surface", "Wall or obstacle."),
         Described("force_<axis>_n", "Force along x, y or z."),
     )),
-    File("measures.tsv", "A row a record: all measures.", (*_CLOCK, _MEASURES)),
+    File("measures.tsv", "One row per record: all measures.", (*_CLOCK, _MEASURES)),
     File("profile.tsv", "Solid fraction against height at moments of the vibration.", (
         _words("moment", "At its start, after 1/8, after 1/2, at its end."),
         _CLOCK[1],
         Described("height_m", "Middle of the slab."),
         Described("solid_fraction", "Share of grains in it."),
     )),
-    File("loose_zones.tsv", "A row a zone of loose sand in 3D.", (
+    File("loose_zones.tsv", "One row per zone of loose sand in 3D.", (
         Described("<axis>_m", "Its middle."),
         Described("volume_m3", "Its volume."),
         Described("solid_fraction", "Mean of the local one."),
         _words("side", "Where it lies: under, over or beside an obstacle, or away from all."),
     )),
-    File("table.tsv", "A row a period of a table on mounts.", _TABLE),
-    File("pattern.tsv", "A row a window of the loop between sand and pattern.", _PATTERN),
+    File("table.tsv", "One row per period of a table on mounts.", _TABLE),
+    File("pattern.tsv", "One row per window of the loop between sand and pattern.", _PATTERN),
     File("pattern_shapes.f8", "Time and displacements of the pattern's surface, 64-bit numbers."),
     File("snapshots.npz", "All grains: `numpy.load(...)[\"000005/position_m\"]` is the sixth "
          "snapshot's.", _SNAPSHOT),

@@ -15,14 +15,20 @@ from sandmould.study.kinds.registry import DEFAULT_KIND
 from sandmould.study.plan.load_study import MATERIALS, materials
 
 WHY_HELD = (
-    "What is held decides most: at 1.5 g held the shipped tube fills best at 76 Hz; with the "
-    "amplitude held it is full from 120 Hz on; with the velocity held 60 to 240 Hz fill alike."
+    "What is held decides most. With 1.5 g held the shipped tube fills best at 76 Hz. With the "
+    "amplitude held it is full from 120 Hz on. With the velocity held, 60 to 240 Hz fill alike."
 )
 HELD = {
     "acceleration": "the acceleration in g stays: a shaker whose controller holds it",
     "velocity": "the velocity in mm/s stays: a shaker whose controller holds it",
     "displacement": "the amplitude in mm stays: that of a crank or cam",
     "unbalance": "rotating masses on a table that stands on mounts",
+}
+HOLES = {
+    "tube": "a blind horizontal hole, closed at the right wall of the box",
+    "hole_up": "a blind hole that opens upwards",
+    "hole_down": "a blind hole that opens downwards",
+    "none": "no hole: the study asks how densely the sand packs",
 }
 WALL_MM = 3.0
 """Thickness of the walls round a hole."""
@@ -93,9 +99,7 @@ class NewStudy(Section):
     )
     cavity: Literal["tube", "hole_up", "hole_down", "none"] = quantity(
         "tube",
-        "Hole to fill. tube: a blind horizontal hole (a tube, closed at the right wall of the "
-        "box); hole_up, hole_down: a blind hole that opens upwards or downwards; none: no hole, "
-        "how densely does the sand pack",
+        "Hole to fill",
         source=_TUBE,
     )
     opening_mm: float = quantity(
@@ -367,12 +371,13 @@ def remarks(a: NewStudy) -> list[str]:
         lines.append(f"Left out: {f:g} Hz, {peak_g:.3g} g; the table bears {a.most_g:g} g.")
     if a.cavity != "none":
         lines.append(
-            f"The hole's middle lies {a.middle_mm:.4g} mm over the floor, its walls are "
+            f"The middle of the hole lies {a.middle_mm:.4g} mm over the floor. Its walls are "
             f"{WALL_MM:g} mm thick and reach from {low_mm:.4g} to {high_mm:.4g} mm."
         )
     lines.append(
         f"The sand comes in 3 layers and stands {a.level_mm:.4g} mm over the floor. Without the "
-        f"hole it would be {a.poured_mm:.4g} mm: so high are the layers in the file together."
+        f"hole it would stand at {a.poured_mm:.4g} mm: to this height the layers in the file add "
+        "up."
     )
     if a.cavity != "none" and a.level_mm < high_mm:
         lines.append("The sand does not cover the hole.")

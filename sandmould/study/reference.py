@@ -54,20 +54,22 @@ def measures_page() -> str:
     """The page of all measures of all kinds of study."""
     lines = [
         "# Measures", "", _WRITTEN, "",
-        "A measure is a column of `measures.tsv` (a row a record) and `summary.tsv` (a row a run). "
-        "`objective.measure`, `equivalence.margins` and the targets of a calibration name "
-        "measures; a name that the scene will not have is refused before anything starts. "
-        "`sandmould measures STUDY` lists those of a study. A unit of 1 is a pure number; those "
-        "without a unit are words and cannot be compared.", "",
+        "A measure is a column of `measures.tsv` (one row per record) and of `summary.tsv` (one "
+        "row per run). `sandmould measures STUDY` lists those of a study.", "",
+        "- `objective.measure`, `equivalence.margins` and the targets of a calibration name "
+        "measures. A name that the scene will not have is refused before anything starts.",
+        "- A unit of 1 is a pure number. Measures without a unit are words and cannot be "
+        "compared.", "",
         "A study can state measures of its own, in any kind of study:", "",
         "```yaml", "own_measures:", "  empty_fraction: 1 - tube_fill_fraction",
         "  missing_sand_m2: 0.0012 - tube_sand_m2", "```", "",
-        "A formula has numbers, names of measures (own ones too), `+ - * / **`, brackets, `min`, "
-        "`max`, `abs` and `sqrt`; nothing else is taken, and no formula is run as a program. The "
-        "name ends in the unit, as all names do; nobody checks that it is right. A value is absent "
-        "where it cannot be computed: after a division by zero, the root of a negative number, or "
-        "where a part of it is absent. An own measure is a column of `summary.tsv` and "
-        "`curves.tsv`, and what holds for other measures holds for it.",
+        "- A formula has numbers, names of measures (own ones too), `+ - * / **`, brackets, `min`, "
+        "`max`, `abs` and `sqrt`. Nothing else is taken, and no formula is run as a program.",
+        "- The name ends in the unit, as all names do. Nobody checks that the unit is right.",
+        "- A value is absent where it cannot be computed: after a division by zero, after the root "
+        "of a negative number, or where a part of it is absent.",
+        "- An own measure is a column of `summary.tsv` and `curves.tsv`. What holds for other "
+        "measures holds for it.",
     ]  # fmt: skip
     for kind in KINDS.values():
         lines += ["", f"## Studies of kind {kind.name}"]
@@ -82,9 +84,9 @@ def limits_page() -> str:
     rows = [(limit.what, f"{limit.most:,}", limit.why, limit.change) for limit in LIMITS]
     lines = [
         "# Limits", "", _WRITTEN, "",
-        "More than this is refused before anything starts, in a sentence with the count, the limit "
-        "and what to change. The limits are a guard against a slip of the pen, not a promise that "
-        "so much is fast: the plan tells the price.", "",
+        "More than this is refused before anything starts. The refusal names the count, the limit "
+        "and what to change. The limits guard against a slip, such as a zero too many. They do "
+        "not promise that so much is fast: the plan tells the price.", "",
         *_table(("of what", "at most", "because", "what to change"), rows), "",
         "All stand in `sandmould/scenario/limits.py`.",
     ]  # fmt: skip

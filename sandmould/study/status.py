@@ -165,8 +165,8 @@ def _orphans(plan: Plan, results: Path) -> list[str]:
     if not found:
         return []
     size = size_text(freed_bytes(found))
-    lines = [f"no longer of the study: {len(found)} run folders of {size}, which "
-             f"sandmould tidy {plan.study.name} removes"]  # fmt: skip
+    lines = [f"{len(found)} run folders of {size} no longer belong to the study; sandmould tidy "
+        f"{plan.study.name} removes them"]  # fmt: skip
     lines += [f"  {folder.name}" for folder in found[:LISTED_RUNS]]
     return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
 
@@ -183,6 +183,6 @@ def _left(plan: Plan, results: Path, statuses: Mapping[str, RunStatus], cores: i
         return "nothing left"
     left = [run for run in (*plan.fills, *plan.runs) if run.run in {*begun, *waiting}]
     return (
-        f"time left with its report: about {duration_text(left_s)} on {cores} cores, "
+        f"time left, report included: about {duration_text(left_s)} on {cores} cores, "
         f"{time_left.prices.basis(left)}"
     )

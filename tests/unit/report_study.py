@@ -81,7 +81,7 @@ def snapshots(run: Run, fill: float, grains: int, count: int) -> list[Snapshot]:
         found.append(
             Snapshot(
                 time_s=FILLING_S + shaken_s,
-                vibration_time_s=shaken_s if shaken_s >= 0 else -1.0,
+                vibration_time_s=shaken_s if shaken_s >= 0 else np.nan,
                 stage="settle" if shaken_s < 0 else "vibrate",
                 id=np.arange(1, grains + 1)[here],
                 layer=layer[here],
@@ -217,7 +217,7 @@ def write_run(
         snapshot.save(path / "snapshots" / f"{number:06d}.npz")
     rows = []
     for snapshot in made:
-        share = 1 - np.exp(-2 * max(snapshot.vibration_time_s, 0.0))
+        share = 1 - np.exp(-2 * np.nan_to_num(snapshot.vibration_time_s))
         tube = {"tube_fill_fraction": value * share / (1 - np.exp(-2 * DURATION_S))}
         tube["tube_sand_m2"] = tube["tube_fill_fraction"] * 0.0012
         rows.append(

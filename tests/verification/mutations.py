@@ -229,11 +229,12 @@ def section(found: list[list[str]]) -> str:
     quiet = {case.family: 0 for case in CASES if "reference" in case.engines}
     idle = ", ".join(name for name in quiet if name not in noticed) or "none"
     return (
-        f"`python -m tests.verification.mutations`, reference solver {source_hash()}: each law is "
-        "broken by 5 % (or in its structure, where that is said), the exact values are not. "
+        f"`python -m tests.verification.mutations`, reference solver {source_hash()}. Each law is "
+        "made wrong by 5 %, or in its structure where that is said. The exact values stay right. "
+        "A good set of cases notices every wrong law. "
         f"{sum(map(bool, found))} of {len(found)} mutations are noticed.\n\n"
         f"{table(['broken', 'equation', 'noticed by'], rows)}\n"
-        f"Cases that notice no wrong law, since they hold under any law: {idle}."
+        f"These cases hold under any law, so they notice no wrong one: {idle}."
     )
 
 

@@ -93,7 +93,7 @@ def test_a_study_is_computed_and_read(
     assert "little: 2 of 2 runs done" in said
     # This folder is new, so the machine's speed is measured; the plan is told once all the same.
     assert said.count("Measuring the speed of this machine") == 1
-    assert said.count("wall time on 2 cores with report") == 1
+    assert said.count("Wall time on 2 cores with report") == 1
     assert result.verdict.startswith("Not resolved")
     assert undescribed(result.folder) == []
     assert sorted(result.summary[FREQUENCY]) == [50, 75]

@@ -152,8 +152,7 @@ def test_restored_session_goes_on_bit_for_bit(
     for both in (session, restored):
         both.advance()
     one, two = session.snapshot(), restored.snapshot()
-    assert (one.time_s, one.vibration_time_s) == (two.time_s, two.vibration_time_s)
-    for name in ("position_m", "velocity_m_s", "spin_rad_s"):
+    for name in ("time_s", "vibration_time_s", "position_m", "velocity_m_s", "spin_rad_s"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     assert session.surface_loads() is not None
     for name, force in (session.surface_loads() or {}).items():

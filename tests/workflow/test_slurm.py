@@ -124,7 +124,7 @@ def test_a_run_of_two_ranks_gets_two_cores_and_the_time_that_its_partition_allow
     assert slurm.told("%C") == {job: "2"}  # a rank has one core, not as many as the run has
     assert slurm.told("%l %P") == {job: "5:00 short"}
     # What is said is shown at the next look, which may come after the first job.
-    asks = "A job asks at most 5.0 min, the limit of partition short; "
+    asks = "A job asks at most 5.0 min, the limit of partition short. "
     wait_for(lambda: asks in log.read_text(), process, log)
     # Ctrl-C takes the job away without a traceback.
     process.send_signal(signal.SIGINT)

@@ -71,7 +71,7 @@ def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
     ran = dry_run("--cores", "2", "--configfile", str(study), folder=checkout)
     assert ran.returncode == 0, ran.stderr
     assert kind_named(opened.kind).planning.work_unit in ran.stderr
-    assert "wall time on 2 cores" in ran.stderr
+    assert "Wall time on 2 cores" in ran.stderr
     assert (checkout / "results" / study.stem / "runs.tsv").exists()
 
 

@@ -152,7 +152,7 @@ def test_the_plan_counts_the_planned_step_and_says_so(
     assert len(plan.fills) == 1
     said = plan_table([*plan.fills, *plan.runs], Prices(), 1)
     assert "  1.68e-05 s planned  " in said
-    assert "Note: The price counts the planned time step. What follows the fill takes 0.7" in said
+    assert "Note: The price counts the planned time step. After the fill the step is 0.7" in said
     without = {**tree, "scenario": {**tree["scenario"], "time_step": {"fraction": 0.5}}}
     Path("plain.yaml").write_text(yaml.safe_dump(without))
     plain = open_plan(Path("plain.yaml"))

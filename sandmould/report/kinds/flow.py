@@ -14,7 +14,7 @@ def _flow_notes(
 ) -> tuple[str, ...]:
     """What the paper leaves open."""
     gradient = (
-        "The gradient as printed, eq. (3), points the wrong way and makes every run fail; the "
+        "The gradient as printed, eq. (3), points the wrong way and makes every run fail. The "
         f"gradient used here, {scenario.gradient}, is a choice."
     )
     if isinstance(scenario.case, StillTank):

@@ -49,7 +49,7 @@ def _steps_above_limit(summary: pd.DataFrame) -> tuple[str, ...]:
     share = number(float((above[LEAST_LIMIT_S] / above[TIME_STEP_S]).min()))
     return (
         f"In {len(above)} of {len(summary)} runs the exact limit of the shaken bed fell below the "
-        f"time step, to {share} of it at the least: take a smaller time_step.bed_fraction.",
+        f"time step, to {share} of it at the least. Take a smaller time_step.bed_fraction.",
     )
 
 

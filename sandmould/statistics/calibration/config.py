@@ -28,8 +28,9 @@ class TargetSand(Section):
     )
     assumed: dict[str, Target] = Field(
         {},
-        description="Swept keys and what is taken for granted of each, such as a rolling angle of "
-        "10 degrees: where one measured value leaves a ridge, it picks a place on it.",
+        description="Swept keys, each with what is taken for granted of it, such as a rolling "
+        "angle of 10 degrees. One measured value leaves a ridge of points that fit; this picks a "
+        "place on it.",
     )
 
 
@@ -41,6 +42,6 @@ class Calibration(Section):
     )
     also: tuple[Annotated[str, Field(pattern=NAME)], ...] = Field(
         (),
-        description="Finished studies that sweep the same two keys over another scene; their "
-        "columns get the study's name and two underscores before their own.",
+        description="Finished studies that sweep the same two keys over another scene. Their "
+        "columns get the study's name and two underscores in front.",
     )

@@ -64,9 +64,9 @@ class Submission:
         if planned > self._longest_min:
             number = math.ceil(planned / self._longest_min)
             self.said.append(
-                f"A job asks at most {duration_text(60 * self._longest_min)}, {why}; the longest "
-                f"is planned with {duration_text(60 * planned)}: it may take {number} jobs, each "
-                "of which goes on from the last checkpoint."
+                f"A job asks at most {duration_text(60 * self._longest_min)}, {why}. The longest "
+                f"job is planned with {duration_text(60 * planned)}. It may take {number} jobs; "
+                "each goes on from the last checkpoint."
             )
         jobs_there = jobs_of(names, Path())
         cancel([job for job in jobs_there if job.waits_for_ever])

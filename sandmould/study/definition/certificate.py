@@ -28,16 +28,17 @@ class RobustnessChecks(Section):
 
     controls: tuple[Control, ...] = quantity(
         (),
-        "hold: the other amplitudes held constant; springs: those of bed and walls x 0.25 and 4, "
-        "with each amplitude held, at seven frequencies; bed_depth: x 0.5 and 2; grain_scale: x "
-        "0.75 and 1.5; tube_length: x 0.6 and 1.5; time_step: x 0.5; engine: another one; "
-        "spectrum: the bed's own, from a small shake.",
+        "hold: the other amplitudes held constant. springs: springs of bed and walls x 0.25 and "
+        "4, with each amplitude held, at seven frequencies. bed_depth: x 0.5 and 2. grain_scale: "
+        "x 0.75 and 1.5. tube_length: x 0.6 and 1.5. time_step: x 0.5. engine: another one. "
+        "spectrum: the bed's own frequencies, from a small shake.",
         source=ARGUED,
     )
     ratio: float = quantity(
         1.41,
-        "The frequencies are the optimum's, and that over and times this; of the control springs "
-        "also over and times its second and third power.",
+        "Each control is computed at three frequencies: the optimum, the optimum over this "
+        "number, and the optimum times it. The control springs also takes its second and third "
+        "power: seven frequencies.",
         source=ARGUED,
         gt=1,
         le=4,
@@ -46,8 +47,8 @@ class RobustnessChecks(Section):
     engine: EngineName = quantity("lammps", "Engine of the control engine.", source=ARGUED)
     sand_wave_speed: SandWaveSpeed | None = Field(
         None,
-        description="Speed of compression waves in the real sand, from a source: an optimum that "
-        "follows the springs is recommended in Hz with its spread alone.",
+        description="Speed of compression waves in the real sand, with its source. An optimum that "
+        "follows the springs is recommended in Hz only with the spread of this speed.",
     )
 
 

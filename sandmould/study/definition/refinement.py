@@ -34,21 +34,22 @@ class Refinement(Section):
     )
     adds: Literal["points", "replicates"] = quantity(
         "points",
-        "What rounds add: points where the optimum may lie, with replicates where the spread hides "
-        "it; or replicates alone, for the settings that are not ruled out yet.",
+        "What rounds add. points: points where the optimum may lie, and replicates where the "
+        "spread hides it. replicates: replicates alone, for the settings that are not ruled out "
+        "yet.",
         source=ARGUED,
     )
     half_width: float | None = quantity(
         None,
-        "Half width of the 95 % interval of the difference between the two best settings, in the "
-        "unit of the objective, that is small enough: rounds of replicates end there.",
+        "For rounds of replicates: half width of the 95 % interval of the difference between the "
+        "two best settings, in the unit of the objective. Rounds end once it is this small.",
         source=ARGUED,
         gt=0,
     )
     interval: dict[str, Annotated[float, Field(gt=0)]] = Field(
         {},
-        description="Swept keys and the width, in the unit of the key, of the optimum's 95 % "
-        "interval that is narrow enough: rounds end once all are.",
+        description="Swept keys, each with a width of the optimum's 95 % interval in the unit of "
+        "the key. Rounds end once all intervals are as narrow.",
     )
     budget_core_h: float | None = quantity(
         None,

@@ -28,14 +28,15 @@ class CrossCheck(Section):
     )
     replicates: int | None = quantity(
         None,
-        "The first so many replicates, which share their seeds with the sweep's; all unless given.",
+        "Number of replicates, counted from the first; they share their seeds with the sweep's. "
+        "All unless given.",
         source=ARGUED,
         ge=1,
     )
     vibration_s: float | None = quantity(
         None,
-        "Duration of the last vibration in the runs of the check, for a shorter one; both engines "
-        "then compute runs of their own. That of the scenario unless given.",
+        "Duration of the last vibration in the runs of the check, if it is to be shorter. Both "
+        "engines then compute runs of their own. That of the scenario unless given.",
         unit="s",
         source="user",
         gt=0,
@@ -67,8 +68,8 @@ class Study(Section):
     scenario: Any
     sweep: Sweep = Field(
         Sweep(),
-        description="What is varied; replaces the sweep of based_on, its equivalence, its rounds, "
-        "its certificate and its cross_check.",
+        description="What is varied. It replaces the sweep of based_on together with its "
+        "equivalence, rounds, certificate and cross_check.",
     )
     replicates: int = quantity(
         1,
@@ -79,8 +80,8 @@ class Study(Section):
     )
     own_measures: dict[Annotated[str, Field(pattern=NAME)], str] = Field(
         {},
-        description="Measures of your own by name, its unit as its ending: each a formula of "
-        "other measures with numbers, + - * / **, brackets, min, max, abs and sqrt.",
+        description="Measures of your own by name; the name ends in the unit. Each is a formula "
+        "of other measures with numbers, + - * / **, brackets, min, max, abs and sqrt.",
     )
     objective: Objective = Field(Objective(), description="What makes a setting the best.")
     equivalence: Equivalence = Field(

@@ -234,7 +234,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         lines.append(_fills_line(runs, fills))
     whole = duration_text(study_s([prices.piece(run) for run in runs], cores))
     lines.append(
-        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}, wall time on {cores} "
+        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}. Wall time on {cores} "
         f"cores with report: {whole}, {prices.basis(runs)}"
     )
     settings = [alike[0].scenario for alike in points.values() if alike[0].part != FILL]
@@ -263,7 +263,7 @@ def later_line(later: Sequence[Run], prices: Prices, cores: int) -> str:
     whole = duration_text(study_s([prices.piece(run) for run in later], cores))
     return (
         f"Then, once the optimum is known, its controls: about {len(runs)} runs{springs}, "
-        f"{work:.3g} {unit}, wall time on {cores} cores: {whole}\n"
+        f"{work:.3g} {unit}. Wall time on {cores} cores: {whole}\n"
     )
 
 
@@ -274,7 +274,7 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     number = "1 fill" if len(fills) == 1 else f"{len(fills)} fills"
     return (
         f"The {sharing} runs start from {number} of the box. A fill is computed once and serves "
-        f"several runs; together they take about {size_text(state_bytes)} of the disk."
+        f"several runs. Together the fills take about {size_text(state_bytes)} of the disk."
     )
 
 

@@ -60,9 +60,9 @@ def check_trust(study: OpenStudy, runs: Sequence[Run]) -> None:
     if not may_run(study, runs):
         foreign = _foreign(study, runs)
         valid = (
-            "true, once you have read the deck: one that is not shipped is a program that can read "
-            f"and change your files ({listed(foreign)}); to run it write trust_deck: true in "
-            f"{study.file} (sandmould plan names lines to look at)"
+            f"true, once you have read the deck. This one is not shipped ({listed(foreign)}): it "
+            "is a program that can read and change your files. sandmould plan names lines to look "
+            f"at. To run it, write trust_deck: true in {study.file}"
         )
         raise BadInputError([Problem("trust_deck", False, valid, study.file)])
 

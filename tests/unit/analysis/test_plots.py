@@ -29,7 +29,7 @@ def box(size, blocks=(), bores=()):
 def snapshot(position, radius, layer):
     n, d = position.shape
     return Snapshot(
-        1.0, -1.0, "settle", np.arange(1, n + 1), np.array(layer), position,
+        1.0, np.nan, "settle", np.arange(1, n + 1), np.array(layer), position,
         np.zeros((n, d)), np.zeros((n, 3)), radius,
     )  # fmt: skip
 

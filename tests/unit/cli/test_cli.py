@@ -60,7 +60,7 @@ def test_plan_of_a_shipped_study_goes_to_the_results_of_this_folder(
     said = sandmould("plan", study, "--cores", "3")
     assert said.exit_code == 0, said.output
     assert question in said.output
-    assert "wall time on 3 cores" in said.output
+    assert "Wall time on 3 cores" in said.output
     assert [p.name for p in elsewhere.iterdir()] == ["results"]
     assert len(list((elsewhere / "results" / study / "runs").iterdir())) == runs
 

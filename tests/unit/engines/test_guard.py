@@ -26,7 +26,7 @@ def two_grains(overlap_m: float = 0.0, speed_m_s: float = 0.0) -> Snapshot:
     velocity = np.array([[speed_m_s, 0.0], [0.0, 0.0]])
     one = np.ones(2, dtype=np.int64)
     return Snapshot(
-        0.5, -1.0, "settle_1", np.array([1, 2]), one, position, velocity, np.zeros((2, 3)),
+        0.5, np.nan, "settle_1", np.array([1, 2]), one, position, velocity, np.zeros((2, 3)),
         np.full(2, R),
     )  # fmt: skip
 

@@ -73,7 +73,7 @@ def test_a_scene_bends_with_its_snapshot() -> None:
     none = np.zeros((0, 2))
     lower = outline.vertices_m - [0.0, 0.003]
     snapshot = Snapshot(
-        0.0, -1.0, "settle_1", np.zeros(0, int), np.zeros(0, int), none, none, np.zeros((0, 3)),
+        0.0, np.nan, "settle_1", np.zeros(0, int), np.zeros(0, int), none, none, np.zeros((0, 3)),
         np.zeros(0), pattern_m=lower,
     )  # fmt: skip
     top = np.array([[0.09, 0.06]])  # the highest edge as drawn

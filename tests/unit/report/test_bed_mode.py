@@ -33,7 +33,7 @@ def test_a_frequency_over_the_estimate_is_named_as_one() -> None:
     assert mode.estimate_hz == pytest.approx(400.0)
     assert mode.beside(100.0) == (
         "100 Hz is 0.25 times c/(4 H) = 400 Hz at the measured depth H of 80 mm. This is only an "
-        "estimate of the lowest frequency at which the bed swings by itself: no small shake has "
+        "estimate of the lowest frequency at which the bed swings by itself. No small shake has "
         "measured it."
     )
     assert mode.wave_speed.speed_m_s == 128.0

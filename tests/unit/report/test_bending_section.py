@@ -88,7 +88,7 @@ def test_the_page_tells_what_became_of_the_pattern(study: Path, text: str) -> No
     assert page.open == []
     assert "The loop holds in all 3 runs." in page.text
     assert "of vibration gave back a part of it: " in page.text
-    assert "mean of 3 fillings with its 95 % interval: the tip comes back" in page.text
+    assert "(mean of 3 fillings, 95 % interval): the tip comes back" in page.text
     assert "with factor 1" in page.text
     names = {path.name for path in (study / "figures").iterdir()}
     assert {"pattern.png", "deflection.svg"} <= names

@@ -56,7 +56,7 @@ def heap(angle_deg: float, time_s: float) -> Snapshot:
     position = grid[grid[:, 1] < under]
     n = len(position)
     return Snapshot(
-        time_s, -1.0, "discharge", np.arange(1, n + 1), np.ones(n, dtype=np.int64), position,
+        time_s, np.nan, "discharge", np.arange(1, n + 1), np.ones(n, dtype=np.int64), position,
         np.zeros((n, 2)), np.zeros((n, 3)), np.full(n, R_M),
     )  # fmt: skip
 

@@ -97,6 +97,7 @@ def test_reading_is_that_of_the_frame(tmp_path: Path) -> None:
     assert film is not None
     assert film.reading[0] is None
     assert film.reading[-1] == 1.0
+    assert film.vibration_time_s[0] is None
     middle = film.vibration_time_s.index(1.0)
     assert film.reading[middle] == 0.5
 

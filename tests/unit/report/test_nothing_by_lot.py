@@ -24,4 +24,4 @@ def test_it_asks_for_no_replicates(
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "usable replicates" not in page
-    assert "nothing is drawn by lot, so a setting is one run" in page
+    assert "Nothing is drawn by lot, so a setting is one run" in page

@@ -155,7 +155,7 @@ def test_without_a_source_of_the_wave_speed_no_frequency_is_named_first(tmp_path
     assert optimum is not None
     assert not optimum.sound
     first, second, third, fourth, *_ = optimum.sentences
-    assert first.startswith("The optimum at 50 Hz follows the springs, so it is that of sand")
+    assert first.startswith("The optimum at 50 Hz follows the springs, so it holds for sand")
     assert second.startswith("No frequency in Hz is recommended: the optimum follows the springs")
     assert third.startswith("The fill of the tube is highest at frequency")
     assert "times the bed's own first mode, measured by a small shake" in fourth

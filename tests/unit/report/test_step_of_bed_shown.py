@@ -25,9 +25,9 @@ def time_step_row(summary: pd.DataFrame) -> str:
 
 def test_the_method_names_the_limits_beside_the_step() -> None:
     assert time_step_row(SUMMARY).endswith(
-        "; after the fill 2 runs take 0.700 to 0.706 of the exact limit of the filled bed, "
-        "30 to 34 µs; the least one of the shaken bed, over 20 moments of a run, is "
-        "18 to 31.5 µs, 0.750 to 1.50 times the step"
+        ". After the fill, 2 runs take 0.700 to 0.706 of the exact limit of the filled bed, "
+        "30 to 34 µs. The least limit of the shaken bed, over 20 moments of a run, is "
+        "18 to 31.5 µs: 0.750 to 1.50 times the step"
     )
 
 

@@ -257,8 +257,8 @@ CASES: dict[str, tuple[str, str]] = {
     "table without a flask in 2D": (
         TABLE % "moment_kg_m: 0.05, moving_mass_kg: 60, mount_frequency_hz: 8",
         "trial.yaml: scenario.vibration.0.unbalance.flask_depth_m = None cannot be used: valid is"
-        " the flask's depth across the plane in m: in 2D the sand's force on the table is that of"
-        " discs as thick as sand.disc_thickness_m.",
+        " the flask's depth across the plane in m. In 2D the discs are only as thick as"
+        " sand.disc_thickness_m, and the table carries the sand of the whole flask.",
     ),
     "unbalance without a moment": (
         TABLE % "moment_kg_m: 0, moving_mass_kg: 60, mount_frequency_hz: 8, flask_depth_m: 0.3",
@@ -280,7 +280,7 @@ CASES: dict[str, tuple[str, str]] = {
         TABLE
         % "moment_kg_m: 0.05, moving_mass_kg: 0.01, mount_frequency_hz: 8, flask_depth_m: 0.3",
         "trial.yaml: scenario.vibration.0.unbalance.moving_mass_kg = 0.01 cannot be used: valid "
-        "is at least 0.56 kg, a tenth of the mass of the sand in the flask: the time step does "
+        "is at least 0.56 kg, a tenth of the mass of the sand in the flask. The time step does "
         "not resolve a lighter table.",
     ),
     "unbalance without a table": (

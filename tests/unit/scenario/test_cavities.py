@@ -277,7 +277,7 @@ def test_facets_of_a_round_hole_may_lie_in_a_cavity_which_is_smaller_then() -> N
     assert free_share(twelve, 0) == pytest.approx(3.0 / np.pi, abs=0.005)
     (problem,) = cavity_problems(round_hole(8))
     assert problem.valid.startswith(
-        "a cavity whose facets fit those of the part: about 10 % of this one lies in the part"
+        "a cavity whose facets fit those of the part. About 10 % of this one lies in the part"
     )
     assert problem.valid.endswith("with finer facets, or make the cavity a little smaller")
     (problem,) = cavity_problems(round_hole(12, centre_x_m=0.064))

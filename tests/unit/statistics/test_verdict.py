@@ -88,7 +88,7 @@ def test_tie_is_not_resolved() -> None:
     verdict = compare_settings(summary, [KEY], FILL)
     assert not verdict.resolved
     assert verdict.sentences[0].startswith("Not resolved:")
-    assert "cannot be told apart from 25 Hz at 95 %" in verdict.sentences[0]
+    assert "At 95 % confidence it cannot be told apart from 25 Hz" in verdict.sentences[0]
     assert verdict.sentences[0].endswith(
         "Ruled out: 100 Hz. These few runs cannot show a difference."
     )
@@ -134,7 +134,7 @@ def test_single_replicates_are_not_resolved() -> None:
 def test_identical_replicates_are_no_replicates() -> None:
     verdict = compare_settings(table({25: [0.1, 0.1, 0.1], 50: [0.9, 0.9, 0.9]}), [KEY], FILL)
     assert not verdict.resolved
-    assert any("check that the seed reaches the sand" in c for c in verdict.caveats)
+    assert any("Check that the seed reaches the sand" in c for c in verdict.caveats)
 
 
 def test_setting_too_thin_to_test_does_not_block_but_is_told() -> None:

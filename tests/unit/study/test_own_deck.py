@@ -187,7 +187,7 @@ def test_the_plan_is_read_back_and_priced(tmp_path: Path) -> None:
     assert lines[1].endswith(" 10 s")
     # what is used: 30 at three a second, not the 30 that the user expects
     assert lines[1].split()[-3:] == ["10", "10", "s"]
-    assert lines[-1].startswith("4 runs, 40 core-seconds, wall time on 2 cores with report: ")
+    assert lines[-1].startswith("4 runs, 40 core-seconds. Wall time on 2 cores with report: ")
 
 
 def test_a_log_is_read_past_warnings(tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def test_a_fin_thinner_than_an_element_is_told(tmp_path: Path) -> None:
         [0.0592, 0.12], [0.0592, 0.08], [0.04, 0.08]]}  # fmt: skip
     room = {"low_m": [0.0, 0.0], "high_m": [0.12, 0.16]}
     walls, *_ = notes_of(tmp_path, shapes=[fin], box=room, probes=[], element_m=0.004)
-    assert walls.startswith("The casting has walls thinner than 2 elements of 4 mm: the thinnest "
+    assert walls.startswith("The casting has walls thinner than 2 elements of 4 mm. The thinnest "
                             "measures 1.60 mm, at (0.0")  # fmt: skip
     assert "33% of the surface" in walls
     assert "missing from the run" in walls
@@ -103,7 +103,7 @@ def test_walls_of_a_picture(tmp_path: Path) -> None:
     rows[28:31, 30:58] = 0
     Image.fromarray(rows).save(tmp_path / "disc.png")
     walls, *_ = notes_of(tmp_path, shapes=[picture], box=room, probes=[], element_m=0.002)
-    assert "the thinnest measures 3" in walls
+    assert "The thinnest measures 3" in walls
 
 
 def test_large_elements_in_a_metal_that_melts_at_one_temperature_are_told(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_too_little_sand_is_told(tmp_path: Path) -> None:
     (little,) = notes_of(tmp_path, **around(0.04, 0.01), element_m=0.002)
     # 40 mm squared gives 0.79 of what 60 mm squared less it can take
     assert little.startswith("There is too little sand: 13.")
-    assert "gives 79% of what this sand can take" in little
+    assert "gives 79% of the heat that this sand can take" in little
     assert notes_of(tmp_path, **around(0.04, 0.02), element_m=0.002) == []
 
 
@@ -285,7 +285,7 @@ def test_obstacles_thinner_than_a_grain_are_told(
     told = [line for line in table(0.0005).splitlines() if line.startswith("Note: ")]
     assert len(told) == 1
     assert told[0].startswith("Note: shelf has walls thinner than the smallest grain of ")
-    assert "the thinnest measures 0.500 mm" in told[0]
+    assert "The thinnest measures 0.500 mm" in told[0]
     assert "Note: " not in table(0.01)
 
 

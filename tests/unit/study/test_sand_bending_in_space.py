@@ -42,7 +42,7 @@ def bar_run(folder: Path) -> tuple[Scenario, Snapshot]:
     one, none = np.array([1]), np.zeros((1, 3))
     place_m = np.array([[0.05, 0.02, 0.044]])
     snapshot = Snapshot(
-        0.1, -1.0, "settle_1", one, one, place_m, none, none, np.array([0.002]),
+        0.1, np.nan, "settle_1", one, one, place_m, none, none, np.array([0.002]),
         pattern_m=body.vertices_m + body.solve(load).displacement_m, pattern_load_n=load,
     )  # fmt: skip
     (folder / "snapshots").mkdir()

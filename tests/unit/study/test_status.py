@@ -75,7 +75,7 @@ def claimed(folder: Path) -> None:
 def test_time_left_of_nothing_begun_is_an_estimate(plan: Plan) -> None:
     said = status_text(plan, Path("results"), 2)
     assert said.startswith(
-        "trial: 6 waiting of 6 runs\nprocessor time so far: 0 s; time left with its report: about "
+        "trial: 6 waiting of 6 runs\nprocessor time so far: 0 s; time left, report included: about "
     )
     assert said.endswith(" on 2 cores, an estimate")
 
@@ -96,7 +96,7 @@ def test_every_state_is_told(plan: Plan) -> None:
     # 15 min of those that ended, three times 20 s of those that did not.
     # 360 s are left of three, 600 s of the one that waits: on two cores 360 s, then 600 s, then
     # the report.
-    left = "time left with its report: about 16.1 min on 2 cores, by finished runs"
+    left = "time left, report included: about 16.1 min on 2 cores, by finished runs"
     assert second == f"processor time so far: 16.0 min; {left}"
     assert lines == [
         f"  running: {running.name}  40 %, settle_1, 0.5 s simulated",

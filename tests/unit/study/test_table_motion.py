@@ -32,7 +32,7 @@ def test_the_plan_lists_what_the_table_must_do(tmp_path: Path) -> None:
     assert "* half of peak to peak" in lines[first + 4]
     assert "Below 1 g the box never throws the sand: expect little." in lines[first + 5]
     (rule,) = [line for line in lines if line.startswith("Frequency: ")]
-    assert "From about 85 Hz on (0.25 c/(4 H)) expect good filling at this wave speed." in rule
+    assert "Expect good filling from about 85 Hz on: 0.25 c/(4 H) at this wave speed." in rule
     assert rule.endswith("docs/frequency_law.md.")
 
 
@@ -55,6 +55,6 @@ def test_a_space_narrower_than_five_grains_is_told_with_its_numbers(tmp_path: Pa
         line for line in plan_of(tmp_path, [1.5], sand={"size_scale": 24}).splitlines()
         if "can jam" in line
     ]  # fmt: skip
-    assert note.startswith("Note: tube is 24 mm wide at its narrowest, as wide as 1.0 of ")
-    assert note.endswith("grains of 23.2 mm. Below 5 the grains can jam. Smaller grains "
+    assert note.startswith("Note: tube is 24 mm wide at its narrowest: 1.0 times ")
+    assert note.endswith("grain, 23.2 mm. Below 5 times the grains can jam. Smaller grains "
                          "(sand.size_scale) tell more.")  # fmt: skip

@@ -109,8 +109,8 @@ def momenta_of_rough_collisions(engine: str, dimension: int) -> Iterator[Measure
     """Damped rough grains with rolling resistance keep momentum, and angular momentum with spin.
 
     Central differences keep both to round-off if the two moments of a friction force add up to the
-    force times the distance of the centres: the arms must add up to r1 + r2 - u. They do on every
-    engine, though LAMMPS takes the whole radii for the slip (23).
+    force times the distance of the centres. So the arms must add up to r1 + r2 - u. They do on
+    every engine, though LAMMPS takes the whole radii for the slip (23).
     """
     pair = law(dimension, 0.3, 0.5, 0.1)
     found, (linear, angular) = _collision(engine, dimension, pair)

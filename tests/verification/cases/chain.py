@@ -54,10 +54,10 @@ def clamped(engine: str, dimension: int, wall_stiffness: float) -> tuple[Bench, 
 def modes_of_a_bar(engine: str, dimension: int, wall_stiffness: float) -> Iterator[Measured]:
     """Eight equal grains in a row, all contacts closed by a prestress, undamped and smooth.
 
-    m u_i'' = k (u_(i+1) - 2 u_i + u_(i-1)), the ends held by the walls' springs k_w. With k_w = k
-    the modes are sin(j pi i/(n + 1)) with omega_j = 2 sqrt(k/m) sin(j pi/(2 (n + 1))); otherwise
-    they are the eigenvectors of that matrix. Three modes are started at once by velocities of
-    their shapes; the part of each in the motion vanishes again after whole periods.
+    m u_i'' = k (u_(i+1) - 2 u_i + u_(i-1)), and the walls' springs k_w hold the ends. With k_w = k
+    the modes are sin(j pi i/(n + 1)) with omega_j = 2 sqrt(k/m) sin(j pi/(2 (n + 1))). With other
+    walls they are the eigenvectors of that matrix. Three modes are started at once by velocities of
+    their shapes. The part of each in the motion vanishes again after whole periods.
     """
     matrix = 2.0 * np.eye(GRAINS) - np.eye(GRAINS, k=1) - np.eye(GRAINS, k=-1)
     matrix[0, 0] = matrix[-1, -1] = 1.0 + wall_stiffness

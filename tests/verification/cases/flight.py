@@ -95,10 +95,13 @@ def nonviscous_damping_of_a_jump(engine: str, dimension: int, form: str) -> Iter
 def nonviscous_damping_of_a_throw(engine: str, dimension: int, form: str) -> Iterator[Measured]:
     """Thrown obliquely, isotropic damping bends the path, that by components leaves v_x alone.
 
-    Isotropic: along the path s' = -g (sin(phi) + alpha), across it s phi' = -g cos(phi), so
-    ds/s = (tan(phi) + alpha/cos(phi)) dphi and v_x = s cos(phi) = C (1/cos(phi) + tan(phi))^alpha
-    with phi the angle above the horizon. By components: the force has no horizontal part, so
-    v_x = v_x0.
+    The speed is s, and phi the angle above the horizon.
+
+    Isotropic: s' = -g (sin(phi) + alpha) along the path, s phi' = -g cos(phi) across it. So
+    ds/s = (tan(phi) + alpha/cos(phi)) dphi. From this follows
+    v_x = s cos(phi) = C (1/cos(phi) + tan(phi))^alpha.
+
+    By components: the force has no horizontal part, so v_x = v_x0.
     """
     share, speed, climb = 0.2, 0.4, 0.4
     damping = {"form": form, "nonviscous_translation": share, "nonviscous_rotation": 0.0}

@@ -79,11 +79,14 @@ def follow(bench: Bench, until_s: float, samples: int) -> list[Track]:
 def from_sliding_to_rolling(engine: str, dimension: int) -> Iterator[Measured]:
     """A grain is launched without spin, another with spin alone; friction makes both roll.
 
-    m v' = -mu m g and kappa m r^2 w' = -mu m g r, so the slip v + r w falls by mu g (1 + 1/kappa)
-    a second from v_0 and v - kappa r w stays as it is: rolling begins at the speed v_0/(1 + kappa)
-    of the launched grain (2/3 of a disc, 5/7 of a sphere), kappa v_0/(1 + kappa) of the spun one.
-    Before, the spring is stretched to its limit in a time T: sin(omega_t T) = mu g omega_t/(v_0
-    omega^2); its end finds the slip v_0 cos(omega_t T).
+    Friction gives m v' = -mu m g and kappa m r^2 w' = -mu m g r. So the slip v + r w falls from v_0
+    by mu g (1 + 1/kappa) a second, and v - kappa r w stays.
+
+    Rolling begins at the speed v_0/(1 + kappa) of the launched grain: 2/3 of v_0 for a disc, 5/7
+    for a sphere. For the spun grain it is kappa v_0/(1 + kappa).
+
+    Before that, the spring is stretched to its limit in a time T, with
+    sin(omega_t T) = mu g omega_t/(v_0 omega^2). The slip is then v_0 cos(omega_t T).
     """
     mu, speed = 0.35, 5e-3
     given = scene(
@@ -119,9 +122,9 @@ def from_sliding_to_rolling(engine: str, dimension: int) -> Iterator[Measured]:
 def rolling_to_a_stop(engine: str, dimension: int) -> Iterator[Measured]:
     """A rolling grain is stopped by the moment of its arm: (I + m r^2) w' = -r tan(alpha) m g.
 
-    The energy m (1 + kappa) v_0^2/2 is spent on the moment, half of it while the rolling spring is
-    stretched over x_0 = tan(alpha) m g/k_roll: the way is v_0^2 (1 + kappa)/(2 tan(alpha) g) +
-    x_0/2.
+    The energy m (1 + kappa) v_0^2/2 is spent on the moment. While the rolling spring is stretched
+    over x_0 = tan(alpha) m g/k_roll, the moment is half of its limit on average. So the way is
+    v_0^2 (1 + kappa)/(2 tan(alpha) g) + x_0/2.
     """
     arm, speed = 0.1, 3e-3
     given = scene(
@@ -191,8 +194,8 @@ def spinning_like_a_top(engine: str, dimension: int, rolling_axes: str) -> Itera
 def spin_with_nonviscous_damping(engine: str, dimension: int, form: str) -> Iterator[Measured]:
     """The rolling moment on a smooth floor slows a spin, and the damping (39) adds its share of it.
 
-    w' = -(1 + alpha_nvr) tan(alpha) g/(kappa r); in 3D the moment lies along the spin, so both
-    forms give the same only if the components are those of one direction.
+    w' = -(1 + alpha_nvr) tan(alpha) g/(kappa r). In 3D the moment lies along the spin. So both
+    forms of damping must give the same.
     """
     arm, share = 0.1, 0.3
     damping = {"form": form, "nonviscous_translation": 0.0, "nonviscous_rotation": share}

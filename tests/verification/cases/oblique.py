@@ -123,10 +123,14 @@ def gripping_impact(engine: str, dimension: int, regime: str) -> Iterator[Measur
     """A slow oblique impact grips, against the linear spring model.
 
     While it sticks, the tangential spring swings with omega_t^2 = (1 + 1/kappa) k_t/m beside the
-    normal one with omega^2 = k_n/m. Sticking: with omega_t = omega it has swung back when the
-    contact ends and never slips, for the ratio of the two forces stays what it was: the slip is
-    reversed, J_t = 2 m v_s/(1 + 1/kappa). Mixed: k_t = k_n and mu = 0.5, stick and slip follow each
-    other; integrated piece by piece with their events (solve_ivp, 1e-11).
+    normal one with omega^2 = k_n/m.
+
+    Sticking: omega_t = omega. The ratio of the two forces stays the same, so the contact never
+    slips, and the spring has swung back when the contact ends. The slip is reversed,
+    J_t = 2 m v_s/(1 + 1/kappa).
+
+    Mixed: k_t = k_n and mu = 0.5. Stick and slip follow each other. The exact value is integrated
+    piece by piece with their events (solve_ivp, 1e-11).
     """
     kappa = inertia_factor(engine, dimension)
     tangential = 1 / (1 + 1 / kappa) if regime == "sticking" else 1.0
@@ -151,8 +155,8 @@ def contact_point(engine: str, dimension: int) -> Iterator[Measured]:
 
     The overlap u = u_m sin(omega t) has the mean u_m pi/4, weighted by the force. The paper does
     not say where on it the contact point is. Friction on the wall's surface, at the arm r - u, has
-    the moment r J_t (1 - pi/4 u_m/r), which is the exact value here. Seen on LIGGGHTS is the arm
-    r - u/2, as between grains, 1 - pi/8 u_m/r = 0.99215, and on LAMMPS r, a moment of 1.
+    the moment r J_t (1 - pi/4 u_m/r), which is the exact value here. LIGGGHTS has the arm r - u/2,
+    as between grains: a moment of 1 - pi/8 u_m/r = 0.99215. LAMMPS has the arm r: a moment of 1.
     """
     mu = 0.1
     depth = 0.02 * LARGE_M

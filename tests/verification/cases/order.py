@@ -34,10 +34,9 @@ def order_in_the_step(engine: str, dimension: int) -> Iterator[Measured]:
     """Errors of two impacts over the step, which is a whole part of either contact's duration.
 
     A damped impact on the floor is of first order: the plain dashpot (19) takes the velocity half a
-    step late. An undamped oblique impact of two grains is of second order: central differences,
-    and the friction (25) adds up displacements of whole steps. Its grip (omega_t = 1.5 omega)
-    lasts until
-    the friction's limit vanishes with the normal force.
+    step late. An undamped oblique impact of two grains is of second order. Differences are central,
+    and the friction (25) adds up displacements of whole steps. Its grip (omega_t = 1.5 omega) lasts
+    until the friction's limit vanishes with the normal force.
     """
     z, speed, mu = 0.5, 1e-5, 10.0
     small, large = mass_kg(dimension, SMALL_M), mass_kg(dimension, LARGE_M)

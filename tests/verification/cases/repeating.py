@@ -64,8 +64,8 @@ def _apart(one: Session, other: Session) -> float:
 def restored_equals_straight(engine: str, dimension: int) -> Iterator[Measured]:
     """Sixty rough grains fall into a box; a checkpoint amid the collisions, then 1 000 steps more.
 
-    The session that wrote it against one that started from it, the largest difference of any
-    position, velocity or spin.
+    The session that wrote it is compared with one that started from it: the largest difference of
+    any position, velocity or spin.
     """
     given, place, velocity = _crowd(engine, dimension)
     with Bench(given) as bench, tempfile.TemporaryDirectory() as folder:
@@ -128,8 +128,8 @@ def _lone_grain(dimension: int, step_s: float) -> Solver:
 def orientation(engine: str, dimension: int) -> Iterator[Measured]:
     """Ten constant spins one after the other turn a grain by ten exact rotations.
 
-    In 2D the angle is the sum of w t; in 3D the matrix is the product of the rotations by |w| t
-    about w, the later on the left (12), starting from a turned grain, and it stays orthogonal.
+    In 2D the angle is the sum of w t. In 3D the grain is turned at the start. Its matrix is the
+    product of the rotations by |w| t about w, the later on the left (12). It stays orthogonal.
     """
     step, steps = 1e-4, 100
     solver = _lone_grain(dimension, step)

@@ -34,11 +34,15 @@ def restitution(
 ) -> Iterator[Measured]:
     """A large grain falls on the floor, a small one hits another large one, without gravity.
 
-    The overlap follows u'' + 2 zeta omega u' + omega^2 u = 0 with omega^2 = k_n/m and the mass of
-    (21), m1 m2/(m1 + m2), or that of the grain at a wall. The rebound is the speed at which the
-    contact ends: where the overlap does (elastic part clipped), e = exp(-pi zeta/sqrt(1 - zeta^2)),
-    or where the total force first vanishes (total clipped),
-    e = exp(-zeta/sqrt(1 - zeta^2) atan2(2 zeta sqrt(1 - zeta^2), 2 zeta^2 - 1)), exp(-2) at zeta 1.
+    The overlap follows u'' + 2 zeta omega u' + omega^2 u = 0 with omega^2 = k_n/m. The mass is that
+    of (21), m1 m2/(m1 + m2), or at a wall that of the grain. The rebound is the speed at which the
+    contact ends.
+
+    Elastic part clipped: the contact ends with the overlap, e = exp(-pi zeta/sqrt(1 - zeta^2)).
+
+    Total clipped: the contact ends where the total force first vanishes,
+    e = exp(-zeta/sqrt(1 - zeta^2) atan2(2 zeta sqrt(1 - zeta^2), 2 zeta^2 - 1)). At zeta 1 this is
+    exp(-2).
     """
     spring = law(dimension, damping_ratio)
     given = scene(

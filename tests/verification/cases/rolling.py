@@ -29,8 +29,8 @@ from tests.verification.cases.case import Measured, case
 def moment_of_the_smaller_radius(engine: str, dimension: int) -> Iterator[Measured]:
     """A small grain spins on a large one at rest, and a large one on a small one, without friction.
 
-    The upper grain presses with its weight; the moment on both is M = r_min tan(alpha) m g with the
-    smaller radius either way. It is read from the upper grain's spin, I w' = -M, and from the
+    The upper grain presses with its weight. The moment on both is M = r_min tan(alpha) m g, with
+    the smaller radius either way. It is read from the upper grain's spin, I w' = -M, and from the
     lower's, I w' = M.
     """
     arm, turn = 0.1, 2.0
@@ -84,10 +84,10 @@ def moment_of_the_smaller_radius(engine: str, dimension: int) -> Iterator[Measur
 def swing_of_the_rolling_spring(engine: str, dimension: int, where: str) -> Iterator[Measured]:
     """Below its limit the rolling moment is a spring, k_roll r_eff^2 times the angle rolled.
 
-    On the floor r_eff = r: omega^2 = k_roll/(kappa m). A small grain lying on a large one has
-    r_eff = r1 r2/(r1 + r2) and omega^2 = k_roll r_eff^2 (1/I1 + 1/I2) of the spin that differs,
-    while spins that are alike roll without a moment. The spin that differs first vanishes for the
-    second time after 3/4 of a period.
+    On the floor r_eff = r: omega^2 = k_roll/(kappa m). A small grain that lies on a large one has
+    r_eff = r1 r2/(r1 + r2). The difference of the two spins swings with
+    omega^2 = k_roll r_eff^2 (1/I1 + 1/I2). Equal spins roll without a moment. The difference
+    vanishes for the second time after 3/4 of a period.
     """
     turn, soft, unit = 1e-3, 0.5, stiffness(dimension)
     kappa = inertia_factor(engine, dimension)

@@ -43,8 +43,8 @@ def _shaken(
 def both_frames(engine: str, dimension: int) -> Iterator[Measured]:
     """A rough damped grain thrown obliquely by the floor: relative to the box alike in both frames.
 
-    The body force of (58) is the second difference of the walls' own motion, and contacts feel the
-    walls' velocity of the half step: one grain then moves alike to round-off.
+    The body force of (58) is the second difference of the walls' own motion. Contacts feel the
+    walls' velocity of the half step. So one grain moves alike to round-off.
     """
     direction = [0.6, 0.8] if dimension == 2 else [0.48, 0.36, 0.8]
     yield _frames_apart(engine, dimension, direction, 0.0)

@@ -56,7 +56,7 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
     )  # fmt: skip
     row: dict[str, Any] = {
         "time_s": snapshot.time_s,
-        "vibration_time_s": snapshot.clock_s,
+        "vibration_time_s": snapshot.vibration_time_s,
         "stage": snapshot.stage,
         "grains": len(radius),
     }
@@ -201,7 +201,7 @@ def write_profile(scenario: Scenario, folder: Path, out: Path) -> None:
             snapshot.position_m, snapshot.radius_m, scene_at(scenario, snapshot), edges_m
         )
         for height_m, fraction in zip(profile.height_m, profile.solid_fraction, strict=True):
-            rows.append((heading, snapshot.clock_s, height_m, fraction))
+            rows.append((heading, snapshot.vibration_time_s, height_m, fraction))
     columns = ["moment", "vibration_time_s", "height_m", "solid_fraction"]
     pd.DataFrame(rows, columns=columns).to_csv(out, sep="\t", index=False, float_format="%.6g")
 

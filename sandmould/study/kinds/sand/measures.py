@@ -112,13 +112,13 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
             Measure("<cavity>_grains", "Grains in the cavity <cavity>."),
             Measure(
                 "<cavity>_filled_depth_m",
-                "Length of the cavity <cavity>, from its mouth inwards, that is filled: of slabs "
-                "one mass-median grain thick, those that are at least half as dense as the bed.",
+                "Filled length of the cavity <cavity>, from its mouth inwards: of slabs one "
+                "mass-median grain thick, those at least half as dense as the bed.",
             ),
             Measure(
                 "<cavity>_voids",
-                "Voids in the cavity <cavity> that one more mass-median grain would lie in; two "
-                "are one where such grains would overlap.",
+                "Number of voids in the cavity <cavity> in which one more mass-median grain would "
+                "fit. Places where such grains would overlap count once.",
             ),
             Measure(
                 "<cavity>_void_fraction",
@@ -165,8 +165,8 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
         (
             Measure(
                 DISPLACEMENT,
-                "Amplitude of the box's motion at the frequency of its drive: as laid down, or "
-                "measured between its ramps, in the second half so far, with hold unbalance.",
+                "Amplitude of the box's motion at the frequency of its drive, as laid down. With "
+                "hold unbalance it is measured between the ramps, in the second half so far.",
             ),
             Measure(VELOCITY, "The same of its velocity."),
             Measure(ACCELERATION, "The same of its acceleration."),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ class Moment:
     stored: StoredSnapshot
     time_s: float
     vibration_time_s: float
+    """NaN before the first vibration."""
 
     def load(self) -> Snapshot:
         """Read its grains; a ValueError where they are damaged."""
@@ -40,5 +42,11 @@ def list_moments(run_folder: Path) -> tuple[Moment, ...]:
 
 
 def nearest(moments: Sequence[Moment], vibration_time_s: float) -> Moment:
-    """The snapshot nearest a time of vibration; the last of several, where the sand has rested."""
-    return min(moments, key=lambda m: (abs(m.vibration_time_s - vibration_time_s), -m.time_s))
+    """The snapshot nearest a time of vibration; the last of several, where the sand has rested.
+
+    The last of all where nothing vibrates.
+    """
+    shaken = [m for m in moments if not math.isnan(m.vibration_time_s)]
+    if not shaken:
+        return moments[-1]
+    return min(shaken, key=lambda m: (abs(m.vibration_time_s - vibration_time_s), -m.time_s))

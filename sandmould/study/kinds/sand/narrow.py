@@ -31,9 +31,9 @@ def narrow_spaces(scenario: Scenario) -> dict[str, str]:
     way_out = " Smaller grains (sand.size_scale) tell more." if scenario.sand.size_scale > 1 else ""
     return {
         name: (
-            f"{name.replace('_', ' ')} is {number(1e3 * width_m)} mm wide at its narrowest, as "
-            f"wide as {number(width_m / largest_m, 2)} of the largest grains of "
-            f"{number(1e3 * largest_m)} mm. Below {LEAST_GRAINS:g} the grains can jam.{way_out}"
+            f"{name.replace('_', ' ')} is {number(1e3 * width_m)} mm wide at its narrowest: "
+            f"{number(width_m / largest_m, 2)} times the largest grain, {number(1e3 * largest_m)} "
+            f"mm. Below {LEAST_GRAINS:g} times the grains can jam.{way_out}"
         )
         for name, width_m in widths_m.items()
         if width_m < limit_m

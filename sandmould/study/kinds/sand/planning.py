@@ -247,9 +247,9 @@ def notes(scenario: Scenario) -> list[Note]:
     told += _drive_notes(scenario)
     if scenario.time_step.bed_fraction is not None:
         text = (
-            "The price counts the planned time step. What follows the fill takes "
-            f"{scenario.time_step.bed_fraction:g} of the exact limit of the filled bed, "
-            "which nobody knows before; it is mostly longer."
+            "The price counts the planned time step. After the fill the step is "
+            f"{scenario.time_step.bed_fraction:g} of the exact limit of the filled bed. Nobody "
+            "knows that limit before; mostly it allows a longer step."
         )
         told.append(Note("time step of the bed", text))
     solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
@@ -259,9 +259,9 @@ def notes(scenario: Scenario) -> list[Note]:
             place = ", ".join(number(float(x)) for x in wall.place_m)
             text = (
                 f"{solid.name} has walls thinner than the smallest grain of "
-                f"{number(1e3 * smallest_m)} mm: the thinnest measures "
-                f"{number(1e3 * wall.thickness_m)} mm, at ({place}) m. A grain pressed in by half "
-                "of that leaves on the other side."
+                f"{number(1e3 * smallest_m)} mm. The thinnest measures "
+                f"{number(1e3 * wall.thickness_m)} mm, at ({place}) m. A grain that is pressed in "
+                "by half of that comes out on the other side."
             )
             told.append(Note(f"walls of {solid.name}", text))
     for i, obstacle in enumerate(scenario.obstacles):

@@ -76,6 +76,6 @@ def frequency_rule(scenario: Scenario, hardness: Hardness | None) -> str:
         return ""
     from_hz = LEAST_SHARE * hardness.column_hz
     return (
-        f"From about {number(from_hz, 2)} Hz on (0.25 c/(4 H)) expect good filling at this wave "
+        f"Expect good filling from about {number(from_hz, 2)} Hz on: 0.25 c/(4 H) at this wave "
         "speed. The rule comes from one tube in 2D: docs/frequency_law.md."
     )

@@ -42,9 +42,9 @@ def _sand(scenario: Solidification, it: Cooled) -> Iterator[Note]:
         least = heat_to_lose_j_m3(scenario) * it.volume_m3 / sand_takes_j_m3(scenario)
         yield Note(
             "never",
-            f"The casting never freezes in this box, whatever until_s is: down to its solidus it "
+            "The casting never freezes in this box, whatever until_s is. Down to its solidus it "
             f"gives {number(share)} times the heat that warms all of the sand to that temperature. "
-            f"The box needs more than {number(least)} {unit} of sand and has {number(it.sand_m3)}.",
+            f"The box needs more than {number(least)} {unit} of sand; it has {number(it.sand_m3)}.",
         )
         return
     wide_s, here_s = freezes_s(scenario, it), freezes_s(scenario, it, it.sand_depth_m)
@@ -52,9 +52,9 @@ def _sand(scenario: Solidification, it: Cooled) -> Iterator[Note]:
         depth_mm = number(1e3 * it.sand_depth_m)
         yield Note(
             "sand",
-            f"There is too little sand: {depth_mm} mm on the average, and no heat leaves the box. "
-            f"The casting gives {share:.0%} of what this sand can take and freezes after about "
-            f"{number(here_s)} s instead of {number(wide_s)} s; the run may show more.",
+            f"There is too little sand: {depth_mm} mm on average, and no heat leaves the box. The "
+            f"casting gives {share:.0%} of the heat that this sand can take. It freezes after "
+            f"about {number(here_s)} s instead of {number(wide_s)} s; the run may show more.",
         )
 
 
@@ -92,9 +92,9 @@ def _walls(scenario: Solidification) -> Iterator[Note]:
     yield Note(
         "walls",
         f"The casting has walls thinner than {FEWEST_ELEMENTS} elements of "
-        f"{number(1e3 * scenario.element_m)} mm: the thinnest measures "
-        f"{number(1e3 * wall.thickness_m)} mm, at ({place}) m, and {wall.surface_share:.0%} of the "
-        f"surface belongs to such walls."
+        f"{number(1e3 * scenario.element_m)} mm. The thinnest measures "
+        f"{number(1e3 * wall.thickness_m)} mm, at ({place}) m. Such walls have "
+        f"{wall.surface_share:.0%} of the surface."
         + (" What is thinner than an element may be missing from the run." if lost else ""),
     )
 
@@ -128,7 +128,7 @@ def _front(scenario: Solidification) -> Iterator[Note]:
     if largest_m > 1.5 * scenario.element_m:
         yield Note(
             "front",
-            f"The metal melts at one temperature, and layers put elements of "
-            f"{number(1e3 * largest_m)} mm into the casting: they freeze as a whole, in a strong "
-            f"chill some per cent of the casting's time too early; layers = [] leaves none.",
+            "The metal melts at one temperature, and layers put elements of "
+            f"{number(1e3 * largest_m)} mm into the casting. These freeze as a whole: in a strong "
+            "chill some per cent of the casting's time too early. layers = [] leaves none.",
         )
