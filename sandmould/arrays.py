@@ -1,5 +1,7 @@
 """Arrays by what they hold: one name each, for all rooms."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,4 +9,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Places = NDArray[np.uint32]
 """Places in long arrays, in half the memory."""
+WholeNumbers = NDArray[np.integer[Any]]
+"""Of any width."""
 Flags = NDArray[np.bool_]

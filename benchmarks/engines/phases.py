@@ -41,6 +41,7 @@ def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Mo
                     grains.radius_of, grains.mass_of,
                     grains.force, grains.moment, walls.arrays, no_vector(dim), no_vector(dim),
                     scene.wall_law, scene.dt, True, walls.history, walls.loads[c],
+                    walls.travel[0], walls.due,
                 )  # fmt: skip
             if parts > 2:
                 gather_incoming(dim, c, moving.near, grains)

@@ -105,7 +105,7 @@ def _wall_ends(solver: Solver) -> _Ends:
     used, first_slot = walls.history.used, walls.history.first_slot
     slots = np.diff(first_slot)
     in_use = np.arange(first_slot[-1]) < np.repeat(first_slot[:-1] + used, slots)
-    i = np.repeat(walls.candidates.rows, slots)[in_use]
+    i = np.repeat(walls.candidates.rows, slots)[in_use].astype(np.int64)
     radius = grains.radius[i]
     arms = np.column_stack([radius, np.zeros(len(i))])
     second = np.full(len(i), -1)

@@ -10,8 +10,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from sandmould.dem.barrier import new_barrier
-from sandmould.dem.broad_phase import Candidates, find_candidates
+from sandmould.dem.broad_phase import Candidates, candidates_in
 from sandmould.dem.chunks import chunk_bounds
+from sandmould.dem.facet_grid import FacetGrids
 from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.kinds import pair_up
 from sandmould.dem.motion import kick
@@ -85,6 +86,7 @@ class Solver:
         self._threads = min(threads, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(max(1, self._threads - 1))
         self._orientations = orientations
+        self._facets = FacetGrids()
         self._nothing = self._empty()
         self.moving = self._nothing
         """All that the step loop moves; replaced whenever pairs are listed."""
@@ -92,8 +94,8 @@ class Solver:
     def _empty(self) -> Moving:
         d = self.dimension
         grains, pairs = Grains.none(d), Pairs.none()
-        none = np.zeros(0, dtype=np.int64)
-        candidates = Candidates(none, np.zeros(1, dtype=np.int64), none.copy())
+        none = np.zeros(0, dtype=np.uint32)
+        candidates = Candidates(none, np.zeros(1, dtype=np.uint32), none.copy())
         bound = chunk_bounds(0)
         history = new_history(self._dim, 0)
         near = new_near_pairs(self._dim, bound, grains, pairs, Contacts.none(d), 0.0)
@@ -217,13 +219,16 @@ class Solver:
         speed2 = float(np.einsum("ij,ij->i", grains.velocity, grains.velocity).max())
         gap_m = near_gap(self._skin, self.scene.dt * math.sqrt(speed2))
         near = new_near_pairs(self._dim, bound, grains, pairs, contacts, gap_m)
-        candidates = find_candidates(
+        arrays = self.surfaces.arrays
+        reach_m = self._skin + float(grains.radius_of.max())
+        candidates = candidates_in(
             self._dim,
             grains.position,
             grains.radius,
             self._skin,
-            self.surfaces.arrays,
+            arrays,
             tuple(shift.tolist()),
+            *self._facets.of(self._dim, arrays, reach_m),
         )
         history = carry_wall_history(
             self._dim,
@@ -232,7 +237,7 @@ class Solver:
             grains.id[candidates.rows],
             candidates.start,
         )
-        walls = new_walls(self.surfaces.arrays, bound, candidates, history)
+        walls = new_walls(arrays, bound, candidates, history)
         walls.loads[0] = old.walls.loads.sum(axis=0)
         self.moving = Moving(
             grains,

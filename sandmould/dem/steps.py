@@ -53,6 +53,10 @@ class Walls(NamedTuple):
     """(c, nv, d) float64, N: sum over steps of what each chunk puts on the vertices, eq. (56)."""
     listed: Floats
     """(nv, d) float64, m: vertices when candidates were listed."""
+    travel: Floats
+    """(1,) float64, m: how far grains and parts may have moved towards each other since then."""
+    due: Floats
+    """(p,) float64, m: travel up to which no grain reaches the candidate; none without facets."""
 
 
 def new_walls(
@@ -61,7 +65,11 @@ def new_walls(
     """Surfaces with newly listed candidates and no loads; ``bound`` are those of the chunks."""
     loads = np.zeros((len(bound) - 1, *arrays.vertices.shape))
     first_row = np.searchsorted(candidates.rows, bound)
-    return Walls(arrays, candidates, history, first_row, loads, arrays.vertices.copy())
+    # Planes and surfaces of revolution are few, and looked at in no time.
+    due = np.zeros(len(candidates.part) if len(arrays.corner) > len(arrays.shape) else 0)
+    return Walls(
+        arrays, candidates, history, first_row, loads, arrays.vertices.copy(), np.zeros(1), due
+    )
 
 
 class Moving(NamedTuple):
@@ -133,6 +141,8 @@ def _add_forces(
         True,
         walls.history,
         walls.loads[c],
+        walls.travel[0],
+        walls.due,
     )
 
 
@@ -189,24 +199,32 @@ def _finish(
 
 @njit(**OPTIONS)
 def _state(
-    dim: Any, scene: DemScene, moving: Moving, fastest2: float, box: Any, half_skin: float
+    dim: Any,
+    scene: DemScene,
+    moving: Moving,
+    surfaces_move: bool,
+    fastest2: float,
+    box: Any,
+    half_skin: float,
 ) -> int:
     """Move deforming surfaces and say whether the lists hold after all grains have moved."""
     if not fastest2 < math.inf:
         return NOT_A_NUMBER
-    arrays, state = moving.walls.arrays, DONE
+    walls, state = moving.walls, DONE
     shift, speed = box
     way = math.sqrt(fastest2) * scene.dt
     watch(moving.near, way, 2.0 * half_skin)
     # A bound on the way relative to the box; the true way is only looked at beyond it.
-    moving.reach[0] -= (math.sqrt(fastest2) + math.sqrt(dot(speed, speed))) * scene.dt
+    bound = (math.sqrt(fastest2) + math.sqrt(dot(speed, speed))) * scene.dt
+    moving.reach[0] -= bound
+    walls.travel[0] += bound
     if moving.reach[0] < 0.0:
         moving.reach[0] = half_skin - _farthest(dim, moving.grains, moving.listed, shift)
         if moving.reach[0] < 0.1 * half_skin:
             state = LIST_IS_OLD
-    if len(arrays.steps_left) and arrays.steps_left.max() >= 0:
-        move_vertices(arrays, scene.dt)
-        if farthest_moved(arrays, moving.walls.listed) > 0.9 * half_skin:
+    if surfaces_move:
+        walls.travel[0] += move_vertices(walls.arrays, scene.dt)
+        if farthest_moved(walls.arrays, walls.listed) > 0.9 * half_skin:
             state = LIST_IS_OLD
     return state
 
@@ -253,6 +271,9 @@ def advance(
     near, bound = moving.near, moving.bound
     mine = range(thread, len(bound) - 1, threads)
     barrier, speeds2, state = team.barrier, team.speeds2, team.state
+    # Where no vertex moves, none begins to within a call.
+    steps_left = moving.walls.arrays.steps_left
+    move = len(steps_left) > 0
     for k in range(1 if drifted else 0, steps + 1):
         if k == 0:
             for c in mine:
@@ -274,7 +295,8 @@ def advance(
         wait_for_all(barrier, threads)
         if thread == 0:
             box = _box(dim, scene, displacement, k + 1)
-            state[0] = _state(dim, scene, moving, speeds2.max(), box, half_skin)
+            move = move and steps_left.max() >= 0
+            state[0] = _state(dim, scene, moving, move, speeds2.max(), box, half_skin)
         wait_for_all(barrier, threads)
         if state[0] != DONE:
             return k, state[0]

@@ -24,6 +24,7 @@ from sandmould.dem.vectors import (
     OPTIONS,
     add_to,
     dot,
+    index,
     load,
     load_spin,
     no_spin,
@@ -39,6 +40,8 @@ ONE_FACE = math.cos(math.radians(10.0))
 EDGE_SHOWS = 1e-3
 """Radii by which an edge must stand out of a face to be touched beside it: meshes are rounded."""
 _MOST = 32
+_ROUNDED = 1e-6
+"""Of a gap: it is known but for round-off."""
 _WAITS, _COVERED, _SEEN = 0, 1, 2
 
 
@@ -97,6 +100,8 @@ def surface_forces(
     keep: bool,
     history: WallHistory,
     loads: Floats,
+    travel: float,
+    due: Floats,
 ) -> None:
     """Add the forces of the surfaces to grains, and their reactions to the loads on vertices.
 
@@ -126,6 +131,10 @@ def surface_forces(
         Row by row that of the candidates.
     loads : (nv, d) float64, N
         Force of the grains on the vertices, added to, eq. (56).
+    travel : float, m
+        How far grains and parts may have moved towards each other since the candidates were found.
+    due : (p,) float64, m
+        Travel up to which no grain reaches the candidate; no entry where all are always looked at.
     """
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     rows, start, part = candidates.rows, candidates.start, candidates.part
@@ -139,16 +148,21 @@ def surface_forces(
     f_normal, f_weights = np.empty((_MOST, d)), np.empty((_MOST, d))
     f_inside, f_state = np.empty(_MOST, dtype=np.bool_), np.empty(_MOST, dtype=np.int8)
     lapse = dt if keep else 0.0
+    rests = len(due) > 0
     for row in range(first_row, last_row):
         i = rows[row]
         r = radius[kind[i]]
         x = plus(load(dim, position, i), -1.0, shift)
         touched = 0
-        for k in range(start[row], start[row + 1]):
-            distance, n, weights, inside = nearest(
-                dim, vertices, planes, shape, corner, part[k], x, r
-            )
+        far = 2.0 * r if rests else r
+        for k in range(index(start[row]), index(start[row + 1])):
+            if rests and travel < due[k]:
+                continue
+            p = int(part[k])
+            distance, n, weights, inside = nearest(dim, vertices, planes, shape, corner, p, x, far)
             if distance >= r:
+                if rests:
+                    due[k] = travel + (1.0 - _ROUNDED) * (min(distance, far) - r)
                 continue
             c = touched
             if touched < _MOST:
@@ -158,12 +172,12 @@ def surface_forces(
                 c = int(np.argmax(f_distance))
                 if distance >= f_distance[c]:
                     continue
-            f_distance[c], f_part[c], f_inside[c] = distance, part[k], inside
+            f_distance[c], f_part[c], f_inside[c] = distance, p, inside
             f_state[c] = _WAITS
             store(n, f_normal, c)
             store(weights, f_weights, c)
-        old, base = slots_used[row], first_slot[row]
-        n_slots = first_slot[row + 1] - base
+        old, base = int(slots_used[row]), int(first_slot[row])
+        n_slots = int(first_slot[row + 1]) - base
         if touched == 0:
             if keep and old:
                 slots_used[row] = 0

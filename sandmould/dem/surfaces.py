@@ -269,21 +269,26 @@ class Surfaces:
 
 
 @njit(**OPTIONS)
-def move_vertices(arrays: SurfaceArrays, dt: float) -> None:
-    """Drift all moving vertices by one step, as the grains drift.
+def move_vertices(arrays: SurfaceArrays, dt: float) -> float:
+    """Drift all moving vertices by one step, as the grains drift; gives the longest way, m.
 
     The velocity stays after the last step until the next call: the contacts of that step feel it.
     """
     vertices, velocity, left = arrays.vertices, arrays.vertex_velocity, arrays.steps_left
+    fastest2 = 0.0
     for i in range(len(left)):
         if left[i] > 0:
+            speed2 = 0.0
             for k in range(vertices.shape[1]):
                 vertices[i, k] += velocity[i, k] * dt
+                speed2 += velocity[i, k] * velocity[i, k]
             left[i] -= 1
+            fastest2 = max(fastest2, speed2)
         elif left[i] == 0:
             for k in range(vertices.shape[1]):
                 velocity[i, k] = 0.0
             left[i] = STAYS
+    return math.sqrt(fastest2) * dt
 
 
 @njit(**OPTIONS)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from sandmould.arrays import Floats, Ints, Places
+from sandmould.arrays import Floats, Ints, Places, WholeNumbers
 from sandmould.compiled import njit
 from sandmould.dem.vectors import OPTIONS, dot, load, load_spin, no_spin, store
 
@@ -23,10 +23,10 @@ SAME_CONTACT = math.cos(math.radians(30.0))
 class WallHistory(NamedTuple):
     """Memory of m grains; slot k of row i lies in row first_slot[i] + k of the last three."""
 
-    first_slot: Ints
-    """(m + 1,) int64: where the slots of each row begin."""
-    used: Ints
-    """(m,) int64: slots in use."""
+    first_slot: WholeNumbers
+    """(m + 1,) uint32: where the slots of each row begin."""
+    used: WholeNumbers
+    """(m,) uint8: slots in use."""
     normal: Floats
     """(s, d) float64: normal from the grain to the surface."""
     friction: Floats
@@ -72,11 +72,11 @@ def swap(
 
 
 @njit(**OPTIONS)
-def _empty(dim: Any, first_slot: Ints) -> WallHistory:
-    n = first_slot[-1]
+def _empty(dim: Any, first_slot: Places) -> WallHistory:
+    n = int(first_slot[-1])
     return WallHistory(
         first_slot,
-        np.zeros(len(first_slot) - 1, dtype=np.int64),
+        np.zeros(len(first_slot) - 1, dtype=np.uint8),
         np.zeros((n, len(dim))),
         np.zeros((n, len(no_spin(dim)))),
         np.zeros((n, len(no_spin(dim)))),
@@ -86,7 +86,7 @@ def _empty(dim: Any, first_slot: Ints) -> WallHistory:
 @njit(**OPTIONS)
 def new_history(dim: Any, m: int) -> WallHistory:
     """Empty memory of m grains, each with all slots."""
-    return _empty(dim, np.arange(m + 1) * slots(dim))
+    return _empty(dim, (np.arange(m + 1) * slots(dim)).astype(np.uint32))
 
 
 @njit(**OPTIONS)
@@ -103,7 +103,7 @@ def _room(dim: Any, parts: int, used: int) -> int:
 
 @njit(**OPTIONS)
 def carry_history(
-    dim: Any, old_ids: Ids, old: WallHistory, new_ids: Ids, start: Ints
+    dim: Any, old_ids: Ids, old: WallHistory, new_ids: Ids, start: WholeNumbers
 ) -> WallHistory:
     """Memory in the order of new rows.
 
@@ -114,7 +114,7 @@ def carry_history(
         Which grain, by an identity that outlives sorting, each row stands for; not negative.
     old : WallHistory
         In the order of the old rows.
-    start : (m + 1,) int64
+    start : (m + 1,) uint32
         Of the ``Candidates`` of the new rows.
     """
     largest = -1
@@ -123,11 +123,11 @@ def carry_history(
     row_of = np.full(largest + 1, -1, dtype=np.int64)
     for row in range(len(old_ids)):
         row_of[old_ids[row]] = row
-    first_slot = np.zeros(len(new_ids) + 1, dtype=np.int64)
+    first_slot = np.zeros(len(new_ids) + 1, dtype=np.uint32)
     for row in range(len(new_ids)):
         old_row = row_of[new_ids[row]] if new_ids[row] < len(row_of) else -1
-        used = old.used[old_row] if old_row >= 0 else 0
-        room = _room(dim, start[row + 1] - start[row], used)
+        used = int(old.used[old_row]) if old_row >= 0 else 0
+        room = _room(dim, int(start[row + 1]) - int(start[row]), used)
         first_slot[row + 1] = first_slot[row] + room
     new = _empty(dim, first_slot)
     for row in range(len(new_ids)):

@@ -53,7 +53,7 @@ class Probe:
         surface_forces(
             self.dim, 0, len(found.rows), found, x, v, w, np.zeros(1, np.uint8), radius,
             mass, force, moment, arrays, still, shift_v, self.law, STEP_S, True, self.history,
-            loads,
+            loads, 0.0, np.empty(0),
         )  # fmt: skip
         contacts = int(self.history.used[0]) if len(found.rows) else 0
         return Touch(force[0], moment[0], loads, contacts)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import carray, types
 
-from sandmould.arrays import Floats, Ints
+from sandmould.arrays import Floats, Ints, WholeNumbers
 from sandmould.compiled import cfunc, njit
 from sandmould.dem.addresses import call_with_two, to_floats, to_ints
 from sandmould.dem.broad_phase import Candidates, find_candidates
@@ -106,7 +106,7 @@ def _must_list(
 
 
 @njit(**OPTIONS)
-def _copy(source: Ints, target: Ints) -> None:
+def _copy(source: WholeNumbers, target: Ints) -> None:
     """Copy an array to the front of a longer one."""
     for i in range(len(source)):
         target[i] = source[i]
@@ -168,7 +168,7 @@ def _list(
         store(plus(load(dim, position, i), -1.0, shift), bridge.listed, i)
     for i in range(len(arrays.vertices)):
         store(load(dim, arrays.vertices, i), bridge.listed_vertices, i)
-    return near.part
+    return near.part.astype(np.int64)
 
 
 @njit(**OPTIONS)
@@ -240,6 +240,8 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
         moves_on,
         _history_of(bridge),
         bridge.step_loads,
+        0.0,
+        np.empty(0),
     )
     if moves_on and step % counts[LOAD_EVERY] == 0:
         if (step - counts[LOAD_EVERY]) % counts[WINDOW] == 0:

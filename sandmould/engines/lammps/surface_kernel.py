@@ -66,6 +66,8 @@ class SurfaceKernel:
         self._dimension = d
         arrays = self._surfaces.arrays
         memory = new_history(dim_of(d), n)
+        # LAMMPS' side knows arrays of numbers and of whole numbers alone.
+        slots = {k: getattr(memory, k).astype(np.int64) for k in ("first_slot", "used")}
         # The names must live as long as LAMMPS is asked by their addresses.
         self._names = [ctypes.create_string_buffer(name) for name in GRAIN_ARRAYS]
         contact, damping = scenario.laws, scenario.background_damping
@@ -90,7 +92,7 @@ class SurfaceKernel:
             start=np.zeros(n + 1, dtype=np.int64),
             part=np.zeros(4 * n + 64, dtype=np.int64),
             row_ids=np.zeros(n, dtype=np.int64),
-            **memory._asdict(),
+            **(memory._asdict() | slots),
             kind=np.arange(n),
             loads=np.zeros_like(arrays.vertices),
             step_loads=np.zeros_like(arrays.vertices),

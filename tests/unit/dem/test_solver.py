@@ -97,6 +97,48 @@ def test_every_near_pair_is_listed_once(dimension: int, seed: int) -> None:
     assert found == expected
 
 
+class AlwaysLooking(Solver):
+    """Looks at every part of the surfaces near a grain in every step."""
+
+    def _list(self, shift: np.ndarray) -> None:
+        super()._list(shift)
+        walls = self.moving.walls
+        assert len(walls.due)
+        self.moving = self.moving._replace(walls=walls._replace(due=np.zeros(0)))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("box_frame", [True, False])
+def test_parts_that_are_seldom_looked_at_are_felt_as_others(
+    dimension: int, box_frame: bool
+) -> None:
+    """A fine mesh rises into falling grains while the box shakes."""
+    grains, width_m = cloud(dimension, 60)
+    cuts = np.linspace(0.0, width_m, 15)
+    if dimension == 2:
+        vertices = np.stack([cuts, 0.001 * np.sin(900.0 * cuts)], axis=1)
+        facets = np.stack([np.arange(14), np.arange(1, 15)], axis=1)
+    else:
+        x, y = (a.ravel() for a in np.meshgrid(cuts, cuts, indexing="ij"))
+        vertices = np.stack([x, y, 0.001 * np.sin(900.0 * x)], axis=1)
+        first = (np.arange(14)[:, None] * 15 + np.arange(14)).ravel()
+        facets = np.concatenate(
+            [np.stack([first, first + a, first + b], axis=1) for a, b in ((15, 16), (16, 1))]
+        )
+    ends = []
+    for kind in (Solver, AlwaysLooking):
+        surfaces = box(dimension, width_m)
+        surfaces.add_facets("mesh", vertices, facets)
+        made = kind(scene(dimension, box_frame=box_frame), surfaces, 6e-4)
+        made.add(grains._replace(velocity=grains.velocity.copy()))
+        surfaces.set_motion("mesh", vertices + 0.002 * np.eye(dimension)[-1], 0.01, STEP_S)
+        made.advance(2e-4 * np.sin(300.0 * STEP_S * np.arange(4002)))
+        ends.append((made.grains.position, made.grains.spin, made.moving.walls.loads))
+        assert made.moving.walls.loads[:, surfaces.vertices_of("mesh")].any()
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_listing_again_changes_nothing(dimension: int) -> None:
     often, seldom = (solver(dimension, 200) for _ in range(2))

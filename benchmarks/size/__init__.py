@@ -1,0 +1,1 @@
+"""Memory, listings, threads and cost over size of the solver, beside an earlier commit."""

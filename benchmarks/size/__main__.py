@@ -1,0 +1,237 @@
+"""Memory, listings, threads and cost over size of the solver, beside an earlier commit.
+
+``python -m benchmarks.size`` unpacks that commit from the repository, settles the beds and writes
+docs/size.md. Beds of all sizes are copies of one, side by side in both directions.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.core_loop.__main__ import tree_of
+from benchmarks.engines.beds import Bed, settled, tiled
+from benchmarks.engines.timing import ratio, spread
+from benchmarks.frame import Benchmark, BenchmarkRun, render
+from benchmarks.size import worker
+from sandmould import ROOT
+
+BEFORE = "3d986c9"
+"""The commit that is compared with."""
+
+
+@dataclass(frozen=True)
+class SizeExtent:
+    """How much is measured."""
+
+    turns: int = 7
+    turn_s: float = 0.5
+    discs: int = 1_000
+    spheres: int = 2_000
+    """Of the beds that are copied."""
+    listed_discs: int = 20_000
+    copies: int = 8
+    """Copies of the spheres in each direction where memory and listings are measured."""
+    shaken_steps: int = 2_000
+    thread_copies: tuple[int, ...] = (4, 8)
+    scale_copies: tuple[int, ...] = (2, 4, 8, 16, 32)
+    largest_steps: int = 1_000
+
+
+QUICK = SizeExtent(2, 0.05, 300, 300, 600, 2, 50, (2,), (1, 2), 20)
+
+
+def copied(bed: Bed, copies: int) -> Bed:
+    """Copies of a bed of spheres side by side, as many in both directions."""
+    steps = bed.width_m * np.arange(copies)
+    shift = np.stack([*np.meshgrid(steps, steps), np.zeros((copies, copies))], axis=-1)
+    position = (bed.position_m + shift.reshape(-1, 1, 3)).reshape(-1, 3)
+    many = copies * copies
+    return Bed(
+        3,
+        copies * bed.width_m,
+        copies * bed.depth_m,
+        position,
+        np.tile(bed.velocity_m_s, (many, 1)),
+        np.tile(bed.spin_rad_s, (many, 1)),
+        np.tile(bed.radius_m, many),
+    )
+
+
+@contextmanager
+def started(trees: dict[str, Path], bed: Bed, threads: int = 1) -> Iterator[dict[str, Any]]:
+    """One process for each tree with the bed in it."""
+    environment = os.environ | {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    with tempfile.TemporaryDirectory() as name:
+        bed_file = Path(name) / "bed.npz"
+        np.savez(bed_file, **vars(bed))
+        processes = {
+            key: subprocess.Popen(
+                [sys.executable, worker.__file__, str(tree), str(bed_file), str(threads)],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=tree, env=environment,
+            )
+            for key, tree in trees.items()
+        }  # fmt: skip
+        try:
+            for process in processes.values():
+                process.stdout.readline()  # type: ignore[union-attr]
+            yield processes
+        finally:
+            for process in processes.values():
+                process.stdin.close()  # type: ignore[union-attr]
+                process.wait()
+
+
+def ask(process: Any, what: str, number: int = 0) -> dict[str, Any]:
+    """An answer of a worker."""
+    process.stdin.write(f"{what} {number}\n")
+    process.stdin.flush()
+    answer: dict[str, Any] = json.loads(process.stdout.readline())
+    return answer
+
+
+def _both() -> dict[str, Path]:
+    return {"before": tree_of(BEFORE), "now": ROOT}
+
+
+def measure_memory(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """Bytes per grain before and now, at rest and shaken; one process at a time."""
+    extent: SizeExtent = run.extent
+    beds = {
+        "side by side": copied(settled(3, extent.spheres), extent.copies),
+        "in a row": tiled(settled(3, extent.spheres), extent.copies**2 * extent.spheres),
+        "discs in a row": tiled(settled(2, extent.discs), extent.listed_discs),
+    }
+    rows = []
+    for name, bed in beds.items():
+        for motion in ("advance", "shake"):
+            row: dict[str, Any] = {"bed": bed.name, "laid": name, "motion": motion}
+            for key, tree in _both().items():
+                with started({key: tree}, bed) as processes:
+                    checksum = ask(processes[key], motion, extent.shaken_steps)["checksum"]
+                    found = ask(processes[key], "memory")
+                row[key] = {
+                    "checksum": checksum,
+                    "arrays": {k: v / bed.grains for k, v in found.pop("arrays").items()},
+                    **{k: v / bed.grains for k, v in found.items()},
+                }
+            row["same_digits"] = row["before"]["checksum"] == row["now"]["checksum"]
+            rows.append(row)
+            print(bed.name, name, motion, row["now"]["resident"], flush=True)
+    return rows
+
+
+def measure_listing(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """Processor time of a listing in turns."""
+    extent: SizeExtent = run.extent
+    beds = (
+        tiled(settled(2, extent.discs), extent.listed_discs),
+        copied(settled(3, extent.spheres), extent.copies // 2),
+        copied(settled(3, extent.spheres), extent.copies),
+    )
+    rows = []
+    for bed in beds:
+        costs: dict[str, list[float]] = {"before": [], "now": []}
+        with started(_both(), bed) as both:
+            for process in both.values():
+                ask(process, "list", 2)
+            times = max(2, round(extent.turn_s / (800e-9 * bed.grains)))
+            for _ in range(extent.turns):
+                for name, process in both.items():
+                    cpu_s = ask(process, "list", times)["cpu_s"]
+                    costs[name].append(1e9 * cpu_s / bed.grains)
+        rows.append({
+            "bed": bed.name,
+            "ns_per_grain": {name: spread(values) for name, values in costs.items()},
+            "ratio": ratio(costs["now"], costs["before"]),
+        })  # fmt: skip
+        print(rows[-1], flush=True)
+    return rows
+
+
+def measure_threads(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """Wall time of one and of two threads, before and now, in turns."""
+    extent: SizeExtent = run.extent
+    rows = []
+    for copies in extent.thread_copies:
+        bed = copied(settled(3, extent.spheres), copies)
+        with started(_both(), bed) as one, started(_both(), bed, 2) as two:
+            processes = {f"{k} {n}": p for n, s in ((1, one), (2, two)) for k, p in s.items()}
+            steps = max(10, round(extent.turn_s / (80e-9 * bed.grains)))
+            costs: dict[str, list[float]] = {name: [] for name in processes}
+            for turn in range(extent.turns + 1):
+                for name, process in processes.items():
+                    wall_s = ask(process, "advance", steps)["wall_s"]
+                    if turn:
+                        costs[name].append(1e9 * wall_s / (steps * bed.grains))
+        rows.append({
+            "bed": bed.name,
+            "ns_per_grain_step": {name: spread(values) for name, values in costs.items()},
+            "speedup": {k: ratio(costs[f"{k} 1"], costs[f"{k} 2"]) for k in ("before", "now")},
+            "load": os.getloadavg()[0],
+        })  # fmt: skip
+        print(rows[-1], flush=True)
+    return rows
+
+
+def measure_scale(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """Processor time per grain-step of beds of several sizes, before and now in turns."""
+    extent: SizeExtent = run.extent
+    rows = []
+    for copies in extent.scale_copies:
+        bed = copied(settled(3, extent.spheres), copies)
+        largest = copies == extent.scale_copies[-1]
+        steps = max(10, round(extent.turn_s / (80e-9 * bed.grains)))
+        costs: dict[str, list[float]] = {"before": [], "now": []}
+        if largest:
+            steps = extent.largest_steps // extent.turns
+        with started(_both(), bed) as both:
+            for turn in range(extent.turns + 1):
+                for name, process in both.items():
+                    cpu_s = ask(process, "advance", steps)["cpu_s"]
+                    if turn:
+                        costs[name].append(1e9 * cpu_s / (steps * bed.grains))
+        rows.append({
+            "bed": bed.name,
+            "steps": steps * extent.turns,
+            "ns_per_grain_step": {name: spread(values) for name, values in costs.items()},
+            "ratio": ratio(costs["now"], costs["before"]),
+        })  # fmt: skip
+        print(rows[-1], flush=True)
+    return rows
+
+
+def page(results: dict[str, Any]) -> str:
+    """The page of the results."""
+    return render(Path(__file__).with_name("page.md.j2"), {**results, "before": BEFORE})
+
+
+BENCHMARK = Benchmark(
+    __file__,
+    __doc__,
+    parts={
+        "memory": measure_memory,
+        "listing": measure_listing,
+        "threads": measure_threads,
+        "scale": measure_scale,
+    },
+    pages={"size.md": page},
+    extent=SizeExtent(),
+    quick=QUICK,
+    arrange=lambda measured, run: {
+        **measured, "origin": run.origin, "turns": run.extent.turns, "load": run.load_before,
+    },
+)  # fmt: skip
+
+if __name__ == "__main__":
+    BENCHMARK.command()
