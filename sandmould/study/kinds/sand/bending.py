@@ -116,6 +116,7 @@ def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
         pattern_tip_recovered_m=filled_m - table["pattern_tip_deflection_m"],
         pattern_outside_fraction=_outside_fraction(log, folder),
         pattern_loop="untouched" if verdict is None else verdict.state,
+        pattern_loop_error_fraction=0.0 if verdict is None else verdict.error_fraction,
     )
 
 

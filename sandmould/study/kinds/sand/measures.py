@@ -208,6 +208,11 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
             Measure("pattern_energy_j", "Energy in the pattern, mean since the snapshot before."),
             Measure("pattern_stored_fraction", "That energy over that work."),
             Measure("pattern_outside_fraction", "Share of the wall time that the pattern took."),
+            Measure(
+                "pattern_loop_error_fraction",
+                "How far the shape may be off by the loop, over its displacement: the residual, or "
+                "as far as energy that the loop made would bend the pattern.",
+            ),
             Measure("pattern_loop", "Whether the loop holds, lags or cycles.", is_number=False),
         ),
     ),
