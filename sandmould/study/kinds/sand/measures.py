@@ -204,6 +204,11 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
             ),
             Measure("pattern_tip_filled_m", "Deflection of the tip after filling."),
             Measure("pattern_tip_recovered_m", "What vibration gave back of the tip's deflection."),
+            Measure(
+                "pattern_pressure_above_pa",
+                "Vertical load of the sand on what faces up, over its area: mean of the record.",
+            ),
+            Measure("pattern_pressure_below_pa", "The same on what faces down."),
             Measure("pattern_work_j", "Work of the sand on the pattern."),
             Measure("pattern_energy_j", "Energy in the pattern, mean since the snapshot before."),
             Measure("pattern_stored_fraction", "That energy over that work."),
