@@ -92,4 +92,4 @@ def test_a_study_of_soft_sand_says_so_in_its_title(path: Path) -> None:
     if not isinstance(study.scenario, Scenario):
         return
     found = bed_hardness(study.scenario)
-    assert found is None or not found.soft or "(soft sand" in study.title
+    assert found is None or not found.soft or "soft sand)" in study.title
