@@ -58,6 +58,19 @@ class LoopVerdict:
     """Whether the pattern was stepped with the grains: its residual is a swing, no delay."""
 
     @property
+    def error_fraction(self) -> float:
+        """How far the shape may be off, over its displacement; infinite where nothing tells.
+
+        The residual, or as far as the energy that the loop itself made would bend the pattern:
+        energy goes with the square of the displacement.
+        """
+        if self.state == "diverged":
+            return np.inf
+        share = self.made_j / self.stored_j if self.stored_j > 0.0 else 0.0
+        bent = float(np.sqrt(share)) if share > MADE_SHARE else 0.0
+        return bent if np.isnan(self.residual_fraction) else max(self.residual_fraction, bent)
+
+    @property
     def meaning(self) -> str:
         """What the state means of such a scheme."""
         return _STEPPED.get(self.state, _MEANS[self.state]) if self.stepped else _MEANS[self.state]

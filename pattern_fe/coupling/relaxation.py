@@ -22,6 +22,12 @@ Change = tuple[Array, Array]
 """Of the displacement at the interface, and of the residual."""
 _COLUMNS = 10
 """Changes that the quasi-Newton scheme remembers."""
+STRUCK = 2.0
+"""Ratio of residuals from which on an iteration is gone back on. Below it secants may lead on: they
+are fast just because their residuals need not fall at every step. A surface that creeps to its
+place in sand at rest has larger residuals than one that stands still, too: dashpots resist it."""
+_PARTS = (0.1, 0.5)
+"""Least and greatest part of a way that led farther off, as line searches have them."""
 _FILTER = 1e-2
 """Part of a change that must be new: below it is noise of the sand."""
 
@@ -31,6 +37,12 @@ class Relaxation(Protocol):
 
     factor: float
     """Relaxation factor of the last call: part of the residual that was gone, along it."""
+    keeps_nearest: bool
+    """Whether a window that ends far off is the iteration of it with the least residual. Shares
+    that are laid down keep the last one, so that a share too large is seen to diverge."""
+
+    def begin_window(self, is_iterated: bool) -> None:
+        """Hear that a new window begins, and whether it may be computed more than once."""
 
     def next(self, displacement: Array, solution: Array) -> Array:
         """Next displacement, from that of an iteration, x, and the one its loads give, G(x)."""
@@ -45,8 +57,13 @@ class Relaxation(Protocol):
 class FixedRelaxation:
     """The same factor for every residual."""
 
+    keeps_nearest = False
+
     def __init__(self, factor: float) -> None:
         self.factor = factor
+
+    def begin_window(self, is_iterated: bool) -> None:
+        """Nothing changes."""
 
     def next(self, displacement: Array, solution: Array) -> Array:
         """Go the factor times the residual."""
@@ -84,39 +101,86 @@ class AitkenRelaxation:
     """One factor for all, from how the last two residuals differ (Küttler and Wall 2008, (44)).
 
     Its sign and size are kept within bounds: noise of the sand in the residuals would throw it.
+    Where sand lets go of a surface and strikes it, secants lead to and fro between the two. So an
+    iteration that is much farther off than the one before it in its window is gone back on: the
+    next starts from that one again and goes a part of the way.
     """
+
+    keeps_nearest = True
 
     def __init__(self, first: float, least: float, most: float) -> None:
         self.factor = self._first = first
         self._least, self._most = least, most
         self._last: Array | None = None
+        self._is_iterated = False
+        self._iterations = 0
+        """Of this window up to now."""
+        self._from: Change | None = None
+        """Displacement and residual that the last step of this window went from, if iterated."""
+        self._too_far: Array | None = None
+        """Displacement of the last iteration that was gone back on in this window."""
+        self._led = first
+        """Factor of the last step that was not gone back on."""
         self.is_calm = False
         """Whether the factor is the first one: where sand rests, and no window is computed again,
         residuals differ by noise alone, which tells no factor."""
 
+    def begin_window(self, is_iterated: bool) -> None:
+        """After a window that was iterated, go on with the factor that led to its end alone.
+
+        Loads of two windows differ for other reasons than the displacement. Where windows are
+        computed once, there is nothing else to learn from.
+        """
+        self._is_iterated = is_iterated
+        self._from = self._too_far = None
+        if self._iterations > 1:
+            self._last = None
+            self.factor = float(np.clip(self._led, self._least, self._most))
+        self._iterations = 0
+
     def next(self, displacement: Array, solution: Array) -> Array:
         """Go with the factor that would have made the last residual vanish."""
         residual = solution - displacement
+        self._iterations += self._is_iterated
+        if self._from is not None:
+            start, before = self._from
+            if residual @ residual > STRUCK**2 * float(before @ before):
+                self.factor *= float(np.clip(self._secant(before, residual), *_PARTS))
+                self._too_far = displacement.copy()
+                return np.asarray(start + self.factor * before)
+        self._led = self.factor
         if self.is_calm:
             self.factor = self._first
-        elif self._last is not None:
-            change = residual - self._last
-            square = float(change @ change)
-            if square > 0.0:
-                factor = -self.factor * float(self._last @ change) / square
-                self.factor = float(np.clip(factor, self._least, self._most))
+        elif self._last is not None and (residual != self._last).any():
+            factor = self.factor * self._secant(self._last, residual)
+            self.factor = float(np.clip(factor, self._least, self._most))
+        if self._too_far is not None and residual.any():
+            way = np.linalg.norm(self._too_far - displacement) / np.linalg.norm(residual)
+            self.factor = min(self.factor, _PARTS[1] * float(way))
         self._last = residual
+        if self._is_iterated:
+            self._from = displacement.copy(), residual
         return np.asarray(displacement + self.factor * residual)
 
+    @staticmethod
+    def _secant(before: Array, after: Array) -> float:
+        """Part of the way from one residual to another at which it would vanish."""
+        change = after - before
+        return -float(before @ change) / float(change @ change)
+
     def state(self) -> dict[str, Array]:
-        """The last residual and factor."""
+        """The last residual and factors."""
         last = np.zeros(0) if self._last is None else self._last
-        return {"last": last, "factor": np.array([self.factor])}
+        more = {"led": np.array([self._led]), "iterations": np.array([self._iterations])}
+        return {"last": last, "factor": np.array([self.factor])} | more
 
     def restore(self, arrays: dict[str, Array]) -> None:
-        """Take up the last residual and factor."""
+        """Take up the last residual and factors."""
         self._last = arrays["last"] if len(arrays["last"]) else None
         self.factor = float(arrays["factor"][0])
+        # a run that an earlier version paused has one factor
+        self._led = float(arrays["led"][0]) if "led" in arrays else self.factor
+        self._iterations = int(arrays["iterations"][0]) if "iterations" in arrays else 0
 
 
 class QuasiNewtonRelaxation:
@@ -126,6 +190,8 @@ class QuasiNewtonRelaxation:
     changes cannot span is relaxed with a fixed factor, as in the first window.
     """
 
+    keeps_nearest = True
+
     def __init__(self, first: float, columns: int, filter_fraction: float) -> None:
         self.factor = first
         self._first = first
@@ -133,6 +199,9 @@ class QuasiNewtonRelaxation:
         # newest first: the filter drops the oldest of columns that say the same
         self._changes: deque[Change] = deque(maxlen=columns)
         self._last: Change | None = None
+
+    def begin_window(self, is_iterated: bool) -> None:
+        """Nothing changes: windows are alike."""
 
     def next(self, displacement: Array, solution: Array) -> Array:
         """Go where the residual would vanish if it changed as it did before."""

@@ -24,6 +24,7 @@ from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.gain import measure_gain
 from pattern_fe.coupling.pattern_rest import PatternRest
 from pattern_fe.coupling.relaxation import (
+    STRUCK,
     AitkenRelaxation,
     MeasuredRelaxation,
     relaxation_of,
@@ -47,11 +48,18 @@ GAIN_EVERY_S = 0.02
 class _Iteration:
     """What an iteration of a window found."""
 
+    displacement_m: Array
+    """(nv, d) float64, m: at the interface, at the end of the window."""
     load_n: Array
     """(nv, d) float64, N: mean of the sand on the vertices."""
     solution: StaticSolution
     next_m: Array
     """(nv, d) float64, m: displacement of the next iteration, or towards the next window."""
+
+    @property
+    def residual_m(self) -> float:
+        """What the solution is off the displacement, root of the mean square."""
+        return rms_m(self.solution.displacement_m - self.displacement_m)
 
 
 class CoupledSession(DelegatingSession):
@@ -62,8 +70,9 @@ class CoupledSession(DelegatingSession):
     taken (conservative: force and moment are kept), the pattern is solved at rest under it, and the
     next window moves part of the way to that displacement (consistent: vertex for vertex). A window
     may be iterated, computed again from its checkpoint, until the solution is the displacement at
-    the interface. Loads of one way move no surface; by layers it stands still until the sand rests,
-    and then goes to where the loads bend the pattern.
+    the interface. One whose last iteration is far off is the one that came nearest: a surface that
+    strikes the sand would throw it. Loads of one way move no surface; by layers it stands still
+    until the sand rests, and then goes to where the loads bend the pattern.
     """
 
     def __init__(
@@ -189,19 +198,36 @@ class CoupledSession(DelegatingSession):
         tolerance = min(loop.tolerance, self._rest.share if self.sand.sand_rests else np.inf)
         start, displacement, iterations = self._interface, self._next, 0
         self._solve_s = 0.0
+        self._relaxation.begin_window(loop.most_passes > 1)
+        nearest: tuple[_Iteration, Any] | None = None
         while True:
             iteration = self._iterate(displacement, steps * self.sand.step_s)
             iterations += 1
             if iteration is None:  # too short a window for a sample: its load counts in the next
                 self._interface = displacement
                 return
-            residual_m = rms_m(iteration.solution.displacement_m - displacement)
-            converged = residual_m <= tolerance * rms_m(displacement)
-            if iterations == loop.most_passes or converged:
+            ahead = iteration.next_m
+            if iteration.residual_m <= tolerance * rms_m(displacement):
                 break
+            least_m = np.inf if nearest is None else nearest[0].residual_m
+            if iterations == loop.most_passes:
+                if nearest is not None and iteration.residual_m > STRUCK * least_m:
+                    iteration, end = nearest
+                    self.sand.restore_checkpoint(end)
+                    self._solved = iteration.solution.displacement_m
+                break
+            if self._relaxation.keeps_nearest and iteration.residual_m < least_m:
+                nearest = iteration, self.sand.save_checkpoint()
             self.sand.restore_checkpoint(checkpoint)
-            displacement = iteration.next_m
-        load = iteration.load_n
+            displacement = ahead
+        self._take(start, steps, iteration)
+        self._next = self._predicted(start, self._interface, ahead)
+        self._write(steps, iterations, iteration)
+        self._check()
+
+    def _take(self, start: Array, steps: int, iteration: _Iteration) -> None:
+        """Count the iteration that ends a window: its loads, its work, its displacement."""
+        displacement, load = iteration.displacement_m, iteration.load_n
         self._load_sum, self._load_steps = self._load_sum + steps * load, self._load_steps + steps
         self._load = self._load_sum / self._load_steps
         self._work_j += work_of(load, displacement - start)
@@ -209,9 +235,6 @@ class CoupledSession(DelegatingSession):
             self._contact_j -= work_of(iteration.solution.contact_n, displacement - start)
         self._interface = displacement
         self._rest.see(displacement, iteration.solution.displacement_m)
-        self._next = self._predicted(start, displacement, iteration.next_m)
-        self._write(steps, iterations, iteration)
-        self._check()
 
     def _iterate(self, displacement: Array, window_s: float) -> _Iteration | None:
         """Move the interface through a window, and solve the pattern; None without a load."""
@@ -229,7 +252,8 @@ class CoupledSession(DelegatingSession):
             self._relaxation.is_calm = sand.sand_rests and self._loop.most_passes == 1
         relaxed = self._relaxation.next(displacement.ravel(), self._solved.ravel())
         self._solve_s += time.perf_counter() - begun
-        return _Iteration(load, solution, self._outside(relaxed.reshape(displacement.shape)))
+        next_m = self._outside(relaxed.reshape(displacement.shape))
+        return _Iteration(displacement, load, solution, next_m)
 
     def _outside(self, displacement: Array) -> Array:
         """A displacement that enters nothing: steps beyond the solution may lead into a wall."""
@@ -251,7 +275,7 @@ class CoupledSession(DelegatingSession):
                 passes=iterations,
                 factor=self._relaxation.factor,
                 gain=self._gain,
-                residual_m=rms_m(solution.displacement_m - displacement),
+                residual_m=iteration.residual_m,
                 displacement_m=rms_m(displacement),
                 largest_m=float(np.linalg.norm(displacement, axis=1).max()),
                 load_n=float(np.linalg.norm(load.sum(axis=0))),

@@ -83,7 +83,7 @@ class Mark:
     x: float
     y: float
     kind: str
-    """``run``, ``mean`` or ``failed``; a failed run stands at the foot of the chart."""
+    """``run``, ``doubtful``, ``mean`` or ``failed``, which stands at the foot of the chart."""
     tint: Tint = PLAIN
     half_width: float = math.nan
     title: str = ""

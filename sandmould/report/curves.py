@@ -22,7 +22,15 @@ from sandmould.runs.formatting import (
     value_text,
     with_margin,
 )
-from sandmould.statistics.evidence import barred, left_out, reason_text, usable_values
+from sandmould.statistics.evidence import (
+    barred,
+    error_text,
+    left_out,
+    loop_errors,
+    reason_text,
+    shown_values,
+    usable_values,
+)
 from sandmould.statistics.settings import Setting, group_settings
 from sandmould.statistics.verdict import FEW, Verdict
 from sandmould.study.collect import Collected
@@ -200,7 +208,7 @@ def objective_charts(
     tuple of Chart
         Empty where no run has a value or nothing is swept.
     """
-    if not keys or verdict.best is None:
+    if not keys or not shown_values(summary, verdict.measure).notna().any():
         return ()
     if len(keys) == 1 and _on_a_scale(verdict, keys[0]):
         return (_scale_chart(summary, verdict, keys[0]),)
@@ -246,11 +254,12 @@ def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
         if setting.n:
             marks.append(_mean_mark(setting, x, factor * setting.mean, tint, factor))
     joined = [(x, factor * s.mean) for s, x in zip(verdict.settings, places, strict=True) if s.n]
+    line = (Line(np.array(joined), PLAIN, "joined", title="means"),) if joined else ()
     return Chart(
         titled(key),
         what,
         _settings_alt(verdict),
-        (Line(np.array(joined), PLAIN, "joined", title="means"),),
+        line,
         tuple(marks),
         x_ticks=tuple(places) if len(places) <= 12 else (),
     )
@@ -267,7 +276,7 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
         marks += [
             replace(m, x=m.y, y=row)
             for m in _run_marks(rows_of[setting.label], verdict, tint)
-            if m.kind == "run"
+            if m.kind != "failed"
         ]
         if setting.n:
             marks.append(_mean_mark(setting, factor * setting.mean, row, tint, factor))
@@ -282,14 +291,19 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
 
 def _run_marks(rows: pd.DataFrame, verdict: Verdict, tint: Tint) -> list[Mark]:
     """Marks of a setting's runs, given their rows; x is left to the caller."""
-    values = usable_values(rows, verdict.measure)
+    values = shown_values(rows, verdict.measure)
     factor = display_scale(verdict.measure)[0]
     marks = []
     reasons = left_out(rows, verdict.measure)
-    for run, why, outcome, value in zip(rows[RUN], reasons, rows[OUTCOME], values, strict=True):
+    errors = loop_errors(rows, verdict.measure)
+    for run, why, outcome, value, error in zip(
+        rows[RUN], reasons, rows[OUTCOME], values, errors, strict=True
+    ):
         if math.isfinite(value):
-            title = f"{run}: {number(value)}"
-            marks.append(Mark(math.nan, factor * value, "run", tint, title=title))
+            off = "" if error == 0.0 else f", {error_text(error)}"
+            title = f"{run}: {number(value)}{off}{f', {reason_text(why, outcome)}' if why else ''}"
+            kind = "run" if not off else "doubtful"
+            marks.append(Mark(math.nan, factor * value, kind, tint, title=title))
         else:
             title = f"{run}: {reason_text(why, outcome)}"
             marks.append(Mark(math.nan, math.nan, "failed", tint, title=title))

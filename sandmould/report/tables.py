@@ -39,7 +39,13 @@ from sandmould.runs.formatting import number, seconds, size, titled, with_margin
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.agreement import sweep_part
-from sandmould.statistics.evidence import NOT_FINISHED, left_out, reason_text
+from sandmould.statistics.evidence import (
+    NOT_FINISHED,
+    error_text,
+    left_out,
+    loop_errors,
+    reason_text,
+)
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.plan.plan_files import CHECKS, CURVES, FIGURES, STUDY_FILE, SUMMARY
 
@@ -274,14 +280,15 @@ def runs_table(
     rows, marked = [], []
     listed = listed_runs(summary, verdict)
     reasons = left_out(listed, verdict.measure)
-    for row, why in zip(listed.to_dict("records"), reasons, strict=True):
+    errors = loop_errors(listed, verdict.measure)
+    for row, why, error in zip(listed.to_dict("records"), reasons, errors, strict=True):
         rows.append(
             (
                 Cell(str(row[RUN]), str(row[RUN]), f"{runs_href}/{quote(str(row[RUN]))}/"),
                 *(_parameter_cell(row[k]) for k in keys),
                 *(_parameter_cell(row[b]) for b in blocks),
                 Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, why)),
-                *([_number_cells((_float(row[verdict.measure]), 4))[0]] if has_value else []),
+                *([_value_cell(_float(row[verdict.measure]), error)] if has_value else []),
                 *(_cost_cell(row[name], show) for name, _, show in cost),
             )
         )
@@ -289,6 +296,12 @@ def runs_table(
     failed_and_best = "those without a value and then the best; summary.tsv has all"
     note = listed_note(len(rows), len(summary), "runs", failed_and_best)
     return Table(columns, tuple(rows), tuple(marked), note)
+
+
+def _value_cell(value: float, loop_error: float) -> Cell:
+    """Value of the objective, with what its loop leaves open of it."""
+    off = "" if loop_error == 0.0 or not math.isfinite(value) else error_text(loop_error)
+    return Cell(number(value, 4), str(value), note=off.capitalize())
 
 
 def _parameter_cell(value: Any) -> Cell:

@@ -2,7 +2,11 @@
 
 A run is evidence of a measure where it finished, has a value of it, and bent its pattern, if it
 has one, by a loop that can be trusted. Every mean, interval and recommendation rests on such runs
-alone.
+alone, with one exception. Where a loop lags or goes in cycles, how far the shape may be off is
+known: the error of the loop. A length of the pattern then counts in a comparison of settings, as
+long as its error is less than the pattern's displacement. The error does not shrink with the number
+of runs, so it is added to every interval that the run enters: a difference is told from chance only
+where it is larger than what fillings scatter and loops leave open together.
 """
 
 from __future__ import annotations
@@ -12,8 +16,8 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 
-from sandmould.runs.columns import LOOP, finished
-from sandmould.runs.formatting import listed
+from sandmould.runs.columns import LOOP, LOOP_ERROR, finished
+from sandmould.runs.formatting import listed, number
 
 UNTRUSTED = {"lags": "lags", "cycles": "goes in cycles", "diverged": "diverged"}
 """States of a loop whose shape is no answer, and how a sentence says them."""
@@ -23,11 +27,50 @@ OF_THE_LOOP = frozenset(
         "pattern_residual_fraction", "pattern_force_left_fraction", "pattern_moment_left_fraction",
         "pattern_factor", "pattern_gain", "pattern_windows", "pattern_passes", "pattern_work_j",
         "pattern_energy_j", "pattern_stored_fraction", "pattern_predicted_gain",
-        "pattern_predicted_limit", "pattern_outside_fraction",
+        "pattern_predicted_limit", "pattern_outside_fraction", LOOP_ERROR,
     }
 )  # fmt: skip
 """Measures of the loop itself: to learn how it fails, runs whose loop fails are the evidence."""
+OF_THE_SHAPE = frozenset(
+    {
+        "pattern_tip_deflection_m", "pattern_largest_displacement_m", "pattern_distance_largest_m",
+        "pattern_distance_rms_m", "pattern_tip_answered_m", "pattern_tip_filled_m",
+        "pattern_tip_recovered_m",
+    }
+)  # fmt: skip
+"""Lengths of the pattern: its displacement times the error of the loop is how far they may be off.
+"""
+MOST_ERROR = 1.0
+"""Error of a loop, over the displacement of its pattern, at which its shape tells nothing."""
+_DISPLACEMENTS = ("pattern_largest_displacement_m", "pattern_tip_filled_m")
+"""The larger one is what the error of a loop is a share of."""
 NOT_FINISHED, NO_VALUE = "did not finish", "no value"
+
+
+def loop_errors(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
+    """How far the loop of each run leaves its value open, in the unit of the measure.
+
+    Parameters
+    ----------
+    summary : DataFrame
+        One row a run.
+    measure : str
+
+    Returns
+    -------
+    Series of float
+        0 where the loop holds, or where the measure is one of the loop itself; NaN where a loop
+        that does not hold tells no error of the measure.
+    """
+    errors = pd.Series(0.0, index=summary.index)
+    if LOOP not in summary or measure in OF_THE_LOOP:
+        return errors
+    untrusted = summary[LOOP].isin(list(UNTRUSTED))
+    if measure not in OF_THE_SHAPE:
+        return errors.mask(untrusted)
+    lengths = [_numbers(summary, c).abs() for c in _DISPLACEMENTS]
+    length = pd.concat(lengths, axis=1).max(axis=1)
+    return errors.mask(untrusted, _numbers(summary, LOOP_ERROR) * length)
 
 
 def barred(summary: pd.DataFrame, measure: str) -> pd.Series[str]:
@@ -46,11 +89,18 @@ def barred(summary: pd.DataFrame, measure: str) -> pd.Series[str]:
         ``NOT_FINISHED``, a state in ``UNTRUSTED`` or an empty text, by row.
     """
     why = pd.Series("", index=summary.index, dtype=object)
-    if LOOP in summary and measure not in OF_THE_LOOP:
-        untrusted = summary[LOOP].isin(list(UNTRUSTED))
-        why[untrusted] = summary.loc[untrusted, LOOP]
+    errors = loop_errors(summary, measure)
+    if (errors != 0.0).any():
+        too_large = errors.isna() | (_numbers(summary, LOOP_ERROR) >= MOST_ERROR)
+        unknown = (errors != 0.0) & too_large
+        why[unknown] = summary.loc[unknown, LOOP]
     why[~finished(summary)] = NOT_FINISHED
     return why
+
+
+def loop_barred(summary: pd.DataFrame, measure: str) -> pd.Series[bool]:
+    """Whether a run finished and its loop alone keeps it from counting."""
+    return barred(summary, measure).isin(list(UNTRUSTED))
 
 
 def left_out(summary: pd.DataFrame, measure: str) -> pd.Series[str]:
@@ -60,8 +110,18 @@ def left_out(summary: pd.DataFrame, measure: str) -> pd.Series[str]:
 
 
 def usable_values(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
-    """Measure of each run, NaN where the run is no evidence of it."""
+    """Measure of each run, NaN where the run is no evidence of it or its loop leaves it open."""
+    return bounded_values(summary, measure).where(loop_errors(summary, measure) == 0.0)
+
+
+def bounded_values(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
+    """Measure of each run that counts in a comparison, with ``loop_errors`` as its error."""
     return _numbers(summary, measure).where(barred(summary, measure) == "")
+
+
+def shown_values(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
+    """Measure of each run that finished, whether or not its loop holds."""
+    return _numbers(summary, measure).where(finished(summary))
 
 
 def _numbers(summary: pd.DataFrame, measure: str) -> pd.Series[float]:
@@ -77,6 +137,11 @@ def reason_text(why: str, outcome: str) -> str:
     if why in UNTRUSTED:
         return f"not used: its loop {UNTRUSTED[why]}"
     return "not used: no value of the objective" if why else ""
+
+
+def error_text(error: float) -> str:
+    """How far a value may be off by its loop."""
+    return f"may be off by {number(error, 2)}" if np.isfinite(error) else "may be off by any amount"
 
 
 def reasons_sentence(summary: pd.DataFrame, measure: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,10 @@ class Setting:
     sd: float
     """Standard deviation over replicates; NaN for fewer than two."""
     ci_half_width: float
-    """Half width of the 95 % interval of this mean alone; NaN for fewer than two."""
+    """Half width of the 95 % interval of this mean alone, with the error of the loops; NaN for
+    fewer than two."""
+    loop_error: float = 0.0
+    """Mean over the runs of what their loops leave open of the value."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,8 @@ class Comparison:
     """Two-sided, Bonferroni over all others."""
     paired: bool
     """Whether differences were taken replicate by replicate, which share their seeds."""
+    loop_error: float = 0.0
+    """What loops leave open of the difference; a part of the interval that no more runs narrow."""
 
     @property
     def separated(self) -> bool:
@@ -81,13 +86,17 @@ def group_settings(
     return [(values, summary.iloc[rows]) for values, rows in setting_rows(summary, keys)]
 
 
-def setting_of(values: dict[str, Any], planned: int, measured: pd.Series[float]) -> Setting:
+def setting_of(
+    values: dict[str, Any], planned: int, measured: pd.Series[float], loop_error: float = 0.0
+) -> Setting:
     """Mean, spread and interval of one setting's finished values."""
     n = len(measured)
     sd = float(measured.std(ddof=1)) if n > 1 else math.nan
     half = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) * sd / math.sqrt(n) if n > 1 else sd
     mean = float(measured.mean()) if n else math.nan
-    return Setting(values, setting_text(values), planned, n, mean, sd, half)
+    return Setting(
+        values, setting_text(values), planned, n, mean, sd, half + loop_error, loop_error
+    )
 
 
 def number_blocks(summary: pd.DataFrame) -> NDArray[np.intp]:
@@ -158,13 +167,17 @@ def compare(
     comparisons = []
     for other in others:
         ci, p, is_paired = (math.nan, math.nan), math.nan, False
+        loop_error = best.loop_error + other.loop_error
         if (test := tests[other.label]) is not None:
             result, is_paired = test
+            result = replace(result, loop_error=loop_error)
             ci = result.confidence_interval(1.0 - (1.0 - CONFIDENCE) / factor)
             p = min(1.0, factor * float(result.pvalue))
         difference = best.mean - other.mean
         comparisons.append(
-            Comparison(other.label, difference, (float(ci[0]), float(ci[1])), p, is_paired)
+            Comparison(
+                other.label, difference, (float(ci[0]), float(ci[1])), p, is_paired, loop_error
+            )
         )
     return tuple(comparisons)
 
@@ -181,15 +194,18 @@ class MeanTest:
     """Standard error of it."""
     df: float
     """Degrees of freedom."""
+    loop_error: float = 0.0
+    """By which the difference may be off besides."""
 
     @property
     def pvalue(self) -> float:
         """Of both sides."""
-        return 2.0 * float(stdtr(self.df, -abs(self.difference) / self.error))
+        beyond = max(0.0, abs(self.difference) - self.loop_error)
+        return 2.0 * float(stdtr(self.df, -beyond / self.error))
 
     def confidence_interval(self, level: float) -> tuple[float, float]:
         """Interval of the difference."""
-        half = float(stdtrit(self.df, 0.5 + level / 2)) * self.error
+        half = float(stdtrit(self.df, 0.5 + level / 2)) * self.error + self.loop_error
         return self.difference - half, self.difference + half
 
 

@@ -10,9 +10,23 @@ from typing import Literal
 import pandas as pd
 
 from sandmould.runs.columns import RUN, finished
-from sandmould.runs.formatting import listed, name_of, number, value_text, with_margin
+from sandmould.runs.formatting import (
+    listed,
+    name_of,
+    number,
+    setting_text,
+    value_text,
+    with_margin,
+)
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.statistics.evidence import one_way_caveat, reasons_sentence, usable_values
+from sandmould.statistics.evidence import (
+    bounded_values,
+    loop_barred,
+    loop_errors,
+    one_way_caveat,
+    reasons_sentence,
+    shown_values,
+)
 from sandmould.statistics.settings import (
     Comparison,
     Setting,
@@ -105,9 +119,10 @@ def compare_settings(
     -------
     Verdict
     """
-    values = usable_values(summary, measure)
+    values = bounded_values(summary, measure)
+    errors = loop_errors(summary, measure)[values.notna()].reindex(values.index)
     in_blocks = values.set_axis(number_blocks(summary))
-    groups = [(at, len(rows), in_blocks.iloc[rows].dropna())
+    groups = [(at, len(rows), in_blocks.iloc[rows].dropna(), _mean_error(errors.iloc[rows]))
               for at, rows in setting_rows(summary, keys)]  # fmt: skip
     settings = tuple(setting_of(*group) for group in groups)
     of_setting = {s.label: group[2] for s, group in zip(settings, groups, strict=True)}
@@ -120,7 +135,7 @@ def compare_settings(
     resolved = first is not None and first.separated
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
     caveats = [
-        *_run_caveats(settings, summary, measure, seeks_best, draws_by_lot),
+        *_run_caveats(settings, summary, keys, measure, seeks_best, draws_by_lot),
         *(_edge_caveats(best, settings, keys, resolved) if seeks_best else ()),
         *_identical([c.other for c in comparisons if _is_identical(c, of_setting, best)]),
         *(_spread_caveat(spread, settings) if spread else ()),
@@ -161,7 +176,7 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
         runs the better of the two middle ones is the median.
     """
     first, last = ("highest", "lowest") if better == "neither" else ("best", "worst")
-    values = usable_values(summary, measure).dropna()
+    values = bounded_values(summary, measure).dropna()
     values = values.sort_values(ascending=better == "smaller", kind="stable")
     runs = [str(r) for r in summary.loc[values.index, RUN]]
     ranks: dict[str, str] = {}
@@ -222,8 +237,8 @@ def _identical(others: list[str]) -> list[str]:
 
 
 def _run_caveats(
-    settings: Sequence[Setting], summary: pd.DataFrame, measure: str, seeks_best: bool,
-    draws_by_lot: bool,
+    settings: Sequence[Setting], summary: pd.DataFrame, keys: Sequence[str], measure: str,
+    seeks_best: bool, draws_by_lot: bool,
 ) -> list[str]:  # fmt: skip
     caveats = []
     planned, used = len(summary), sum(s.n for s in settings)
@@ -238,7 +253,8 @@ def _run_caveats(
     few = [s.label for s in settings if 0 < s.n < FEW]
     if few and draws_by_lot:
         caveats.append(f"Fewer than {FEW} usable replicates at {listed(few)}.")
-    return [*caveats, *filter(None, [one_way_caveat(summary)])]
+    loops = _loop_caveats(settings, summary, keys, measure)
+    return [*caveats, *loops, *filter(None, [one_way_caveat(summary)])]
 
 
 def _edge_caveats(
@@ -322,9 +338,11 @@ def further_replicates(comparisons: Sequence[Comparison], best: Setting) -> int 
         nothing is open, or where too few replicates tell.
     """
     open_ones = [c for c in comparisons if c.tested and not c.separated]
-    if not open_ones or any(c.difference == 0.0 for c in open_ones):
+    beyond = [abs(c.difference) - c.loop_error for c in open_ones]
+    if not open_ones or min(beyond) <= 0.0:
         return None
-    needed = max(best.n * ((c.ci[1] - c.ci[0]) / 2 / c.difference) ** 2 for c in open_ones)
+    half = [(c.ci[1] - c.ci[0]) / 2 - c.loop_error for c in open_ones]
+    needed = max(best.n * (h / left) ** 2 for h, left in zip(half, beyond, strict=True))
     return math.ceil(needed) - best.n
 
 
@@ -349,6 +367,43 @@ def _spread_caveat(spread: Spread, settings: Sequence[Setting]) -> list[str]:
         f"together). Alone, those of {FEW} runs or more scatter by {number(min(sds), 2)} to "
         f"{number(max(sds), 2)}."
     ]
+
+
+def _mean_error(errors: pd.Series[float]) -> float:
+    """Mean of what the loops of a setting's runs leave open."""
+    known = errors.dropna()
+    return float(known.mean()) if len(known) else 0.0
+
+
+def _loop_caveats(
+    settings: Sequence[Setting], summary: pd.DataFrame, keys: Sequence[str], measure: str
+) -> list[str]:
+    """Say what loops that do not hold leave open, and what the runs gave that do not count."""
+    caveats = []
+    open_ones = [s for s in settings if s.loop_error > 0.0]
+    if open_ones:
+        most = number(max(s.loop_error for s in open_ones), 2)
+        where = listed([s.label for s in open_ones]) if keys else "this setting"
+        caveats.append(
+            f"Not every loop between sand and pattern holds at {where}. How far the values may be "
+            f"off, up to {most} in the mean, is added to every interval."
+        )
+    failed = shown_values(summary, measure).where(loop_barred(summary, measure))
+    errors = loop_errors(summary, measure)
+    gave = []
+    for at, rows in setting_rows(summary, keys):
+        values = failed.iloc[rows].dropna()
+        if len(values):
+            off = errors.loc[values.index].max()
+            said = f", may be off by {number(off, 2)}" if math.isfinite(off) else ""
+            where = f"{setting_text(at)}: " if keys else ""
+            gave.append(f"{where}{number(float(values.mean()), 3)} (runs: {len(values)}{said})")
+    if gave:
+        caveats.append(
+            "What runs gave whose loops do not hold, not counted and not to be trusted: "
+            f"{'; '.join(gave)}."
+        )
+    return caveats
 
 
 def _without_value(summary: pd.DataFrame, measure: str) -> str:

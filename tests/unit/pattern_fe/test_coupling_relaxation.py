@@ -65,6 +65,45 @@ def test_aitken_stays_in_its_bounds() -> None:
         assert 0.02 <= relaxation.factor <= 0.3
 
 
+def test_aitken_finds_where_sand_that_let_go_bears_again() -> None:
+    """Sand a little below the surface, 300 times as stiff: no load at all, or far too much."""
+
+    def solution(x: Array) -> Array:
+        return np.array([1.0, 0.3]) * 300.0 * max(0.0, 1.0 - x[0])
+
+    relaxation = AitkenRelaxation(0.02, 0.0005, 0.5)
+    relaxation.begin_window(True)
+    x, left = np.array([2.0, 0.6]), []
+    for _ in range(13):
+        left.append(float(np.linalg.norm(solution(x) - x)))
+        x = relaxation.next(x, solution(x))
+    assert max(left) > 2.0 * left[0]  # it struck
+    assert min(left) < 0.03
+
+
+def test_an_iteration_farther_off_is_gone_back_on() -> None:
+    relaxation = AitkenRelaxation(0.1, 0.01, 0.5)
+    relaxation.begin_window(True)
+    ahead = relaxation.next(np.zeros(1), np.ones(1))
+    assert ahead == pytest.approx([0.1])
+    # Loads that lead back three times as far: where a line through both vanishes.
+    again = relaxation.next(ahead, ahead - 3.0)
+    assert again == pytest.approx([0.1 / 4.0])
+    # Nearer, but the secant would lead half-way to what struck, and no farther.
+    assert relaxation.next(again, again + 0.9) == pytest.approx([0.5 * (0.1 / 4.0 + 0.1)])
+
+
+def test_a_new_window_goes_on_with_the_factor_that_led_on() -> None:
+    relaxation = AitkenRelaxation(0.1, 0.01, 0.5)
+    relaxation.begin_window(True)
+    x = relaxation.next(np.zeros(1), np.ones(1))
+    for _ in range(3):  # it strikes, and strikes again
+        x = relaxation.next(x, x - 4.0)
+    assert relaxation.factor < 0.05
+    relaxation.begin_window(True)
+    assert relaxation.next(np.zeros(1), np.ones(1)) == pytest.approx([0.1])
+
+
 @pytest.mark.parametrize("n", [2, 5])
 def test_quasi_newton_ends_once_it_has_seen_every_direction(n: int) -> None:
     ratio = np.linspace(1.0, 50.0, n)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pattern_fe.export import write_stl, write_surface
-from pattern_fe.loads import vertex_pressure_pa
+from pattern_fe.loads import pressure_above_and_below_pa, vertex_pressure_pa
 from pattern_fe.pattern import Pattern
 from pattern_fe.perimeter import Perimeter
 from pattern_fe.shapes import bar, frame, mesh_of
@@ -172,3 +172,18 @@ def test_loads_of_a_wrong_shape_or_value_are_refused() -> None:
     load[0, 0] = np.nan
     with pytest.raises(ValueError, match="component that is not finite"):
         pattern.solve_nonlinear(load)
+
+
+def test_even_pressures_above_and_below_a_flange_are_found_again() -> None:
+    pattern = l_pattern()
+    outer = pattern.surface.outer
+    area = outer.vertex_area_vector_m2
+    free = ~pattern.fixed.any(axis=1)[outer.nodes]
+    up = area[:, 1] > 0.0
+    # 1 000 Pa on all that faces up, 200 Pa on all that faces down, and sand beside it.
+    load_n = -np.where(up, 1000.0, 200.0)[:, None] * area
+    above_pa, below_pa = pressure_above_and_below_pa(outer, load_n, free)
+    assert above_pa == pytest.approx(1000.0)
+    assert below_pa == pytest.approx(200.0)
+    nothing = pressure_above_and_below_pa(outer, load_n, np.zeros_like(free))
+    assert np.isnan(nothing).all()

@@ -311,3 +311,61 @@ def test_no_large_number_of_further_runs_is_named() -> None:
     alike = table({25: [0.50, 0.62, 0.560], 50: [0.51, 0.61, 0.5595]})
     said = compare_settings(alike, [KEY], FILL).sentences[0]
     assert said.endswith("These few runs cannot show a difference.")
+
+
+TIP = "pattern_tip_recovered_m"
+
+
+def of_loops(state: str, error_fraction: float, values: dict[float, list[float]]) -> pd.DataFrame:
+    """A study of a pattern that has moved by 20 mm, whose loops all do the same."""
+    rows = table({at: [1e-3 * v for v in own] for at, own in values.items()})
+    return rows.rename(columns={FILL: TIP}).assign(
+        pattern_loop=state,
+        pattern_loop_error_fraction=error_fraction,
+        pattern_largest_displacement_m=0.02,
+        pattern_tip_filled_m=0.01,
+    )
+
+
+FAR_APART = {25.0: [6.0, 6.4, 6.2, 6.1], 50.0: [2.0, 2.2, 1.9, 2.1]}
+
+
+def test_a_loop_that_lags_little_may_carry_a_verdict_and_widens_its_interval() -> None:
+    lags, holds = (
+        compare_settings(of_loops(state, 0.08, FAR_APART), [KEY], TIP)
+        for state in ("lags", "holds")
+    )
+    assert lags.best is not None
+    assert holds.best is not None
+    assert lags.resolved
+    assert lags.best.label == "25 Hz"
+    error_m = 0.08 * 0.02
+    assert lags.best.loop_error == pytest.approx(error_m)
+    assert lags.best.ci_half_width == pytest.approx(holds.best.ci_half_width + error_m)
+    assert lags.ci[0] == pytest.approx(holds.ci[0] - 2.0 * error_m)
+    assert lags.p > holds.p
+    assert any("may be off, up to 0.0016 in the mean, is added" in c for c in lags.caveats)
+
+
+def test_a_loop_that_leaves_more_open_than_is_compared_carries_none() -> None:
+    verdict = compare_settings(of_loops("cycles", 0.12, FAR_APART), [KEY], TIP)
+    assert [s.n for s in verdict.settings] == [4, 4]
+    assert not verdict.resolved  # 4 mm apart, either side off by 2.4 mm
+    # No number of runs would tell.
+    assert "more replicates" not in " ".join(verdict.sentences)
+
+
+def test_what_loops_gave_that_tell_nothing_is_shown_and_not_counted() -> None:
+    summary = of_loops("cycles", 9.0, FAR_APART)
+    verdict = compare_settings(summary, [KEY], TIP)
+    assert verdict.best is None
+    assert "none gives" in verdict.sentences[0]
+    assert verdict.caveats[-1] == (
+        "What runs gave whose loops do not hold, not counted and not to be trusted: 25 Hz: 0.00617 "
+        "(runs: 4, may be off by 0.18); 50 Hz: 0.00205 (runs: 4, may be off by 0.18)."
+    )
+
+
+def test_a_density_beside_a_loop_that_lags_has_no_error_that_is_known() -> None:
+    summary = of_loops("lags", 0.08, FAR_APART).rename(columns={TIP: "solid_fraction"})
+    assert compare_settings(summary, [KEY], "solid_fraction").best is None

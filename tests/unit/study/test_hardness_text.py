@@ -11,6 +11,7 @@ import yaml
 from sandmould import ROOT
 from sandmould.scenario.contact import Contact, ContactLaw
 from sandmould.scenario.hardness import bed_hardness
+from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand.hardness_text import hardness_text, softness_warning
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -82,3 +83,13 @@ def test_studies_of_record_are_hard(name: str) -> None:
     assert found is not None
     assert found.soft == ()
     assert 100.0 < found.wave_speed_m_s < 160.0
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "config" / "studies").glob("*.yaml")),
+                         ids=lambda p: p.stem)  # fmt: skip
+def test_a_study_of_soft_sand_says_so_in_its_title(path: Path) -> None:
+    study = open_study(path).study
+    if not isinstance(study.scenario, Scenario):
+        return
+    found = bed_hardness(study.scenario)
+    assert found is None or not found.soft or "soft sand)" in study.title

@@ -69,6 +69,17 @@ def test_demo_is_a_practitioners_study_of_at_most_twelve_lines() -> None:
     assert len(text.splitlines()) <= 12
 
 
+def test_demo_is_thirty_runs_and_two_of_lammps() -> None:
+    opened = open_study(ROOT / "config" / "studies" / "tube_demo.yaml")
+    runs = expand(opened)
+    engines = [run.scenario.engine.name for run in runs]
+    assert engines.count("lammps") == 2
+    assert len(runs) - 2 <= 30
+    shaken_s = {run.scenario.vibration[0].duration_s for run in runs
+                if run.scenario.engine.name == "lammps"}  # fmt: skip
+    assert shaken_s == {0.5}
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "config").glob("s*/*.yaml")), ids=lambda p: p.stem)
 def test_shipped_file_gives_an_editor_its_schema(path: Path) -> None:
     first = path.read_text(encoding="utf-8").splitlines()[0]

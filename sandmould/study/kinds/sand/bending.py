@@ -16,6 +16,7 @@ from pattern_fe.coupling.gain_prediction import predicted_gain
 from pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop, stored_energy_j
 from pattern_fe.distance import distance_from_drawing
 from pattern_fe.large_displacement import LoadNotReachedError
+from pattern_fe.loads import pressure_above_and_below_pa
 from pattern_fe.pattern import Pattern
 from pattern_fe.perimeter import Perimeter
 from pattern_fe.scene import pattern_of, surroundings_of
@@ -25,6 +26,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.study.run_tables import read_costs
 
 Row = dict[str, Any]
+ABOVE, BELOW = "pattern_pressure_above_pa", "pattern_pressure_below_pa"
 
 
 class BentPattern:
@@ -41,6 +43,7 @@ class BentPattern:
         held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
         if not len(held):
             held = self.pattern.space.node_m.mean(axis=0, keepdims=True)
+        self._free = ~self.pattern.fixed.any(axis=1)[self.drawn.nodes]
         self.tip = farthest_corner(self.drawn.vertices_m, held)
         """Its vertex farthest from the supports, or from its middle where it has none."""
         around = surroundings_of(scenario, self.pattern)
@@ -65,7 +68,9 @@ class BentPattern:
             "pattern_distance_rms_m": away.rms_m,
         }
         if snapshot.pattern_load_n is not None:
-            row["pattern_tip_answered_m"] = self._answered_m(snapshot.pattern_load_n)
+            load_n = snapshot.pattern_load_n
+            row["pattern_tip_answered_m"] = self._answered_m(load_n)
+            row[ABOVE], row[BELOW] = pressure_above_and_below_pa(drawn, load_n, self._free)
         return row | self._predicted
 
     @cached_property
@@ -116,6 +121,7 @@ def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
         pattern_tip_recovered_m=filled_m - table["pattern_tip_deflection_m"],
         pattern_outside_fraction=_outside_fraction(log, folder),
         pattern_loop="untouched" if verdict is None else verdict.state,
+        pattern_loop_error_fraction=0.0 if verdict is None else verdict.error_fraction,
     )
 
 

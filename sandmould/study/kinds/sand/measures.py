@@ -226,10 +226,20 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
             ),
             Measure("pattern_tip_filled_m", "Deflection of the tip after filling."),
             Measure("pattern_tip_recovered_m", "What vibration gave back of the tip's deflection."),
+            Measure(
+                "pattern_pressure_above_pa",
+                "Vertical load of the sand on what faces up, over its area: mean of the record.",
+            ),
+            Measure("pattern_pressure_below_pa", "The same on what faces down."),
             Measure("pattern_work_j", "Work of the sand on the pattern."),
             Measure("pattern_energy_j", "Energy in the pattern, mean since the snapshot before."),
             Measure("pattern_stored_fraction", "That energy over that work."),
             Measure("pattern_outside_fraction", "Share of the wall time that the pattern took."),
+            Measure(
+                "pattern_loop_error_fraction",
+                "How far the shape may be off by the loop, over its displacement: the residual, or "
+                "as far as energy that the loop made would bend the pattern.",
+            ),
             Measure("pattern_loop", "Whether the loop holds, lags or cycles.", is_number=False),
         ),
     ),
