@@ -44,7 +44,7 @@ def _study(scenario: Mapping[str, Any], hz: list[float], **top: Any) -> dict[str
     }  # fmt: skip
 
 
-def _stand_in(runs: int) -> dict[str, Any]:
+def _stand_in(runs: int, replicates: int = 5) -> dict[str, Any]:
     """Short runs: those of docs/workflow_cost.md."""
     scenario = {
         "sand": {"size_scale": 12, "size_classes": 3, "disc_thickness_m": 0.1},
@@ -52,7 +52,8 @@ def _stand_in(runs: int) -> dict[str, Any]:
         "vibration": [{**_SHAKE, "duration_s": 0.06}],
         "record": {"snapshot_every_s": 0.2},
     }
-    return _study(scenario, [20.0 + 0.04 * n for n in range(runs // 5)], replicates=5)
+    hz = [20.0 + 0.04 * n for n in range(runs // replicates)]
+    return _study(scenario, hz, replicates=replicates)
 
 
 def _sweep(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
@@ -100,6 +101,8 @@ WHOLE: dict[str, Any] = {
     "thousand_runs": _stand_in(1000),
     "one_run": _stand_in(30),
     "one_run_turns": 3,
+    "report": _stand_in(42, 3),
+    "report_turns": 3,
 }
 LITTLE: dict[str, Any] = {
     "turns": 1,
@@ -110,6 +113,8 @@ LITTLE: dict[str, Any] = {
     "thousand_runs": _stand_in(20),
     "one_run": _stand_in(5),
     "one_run_turns": 1,
+    "report": _stand_in(4, 2),
+    "report_turns": 1,
 }
 
 
@@ -274,6 +279,33 @@ def _alone(name: str, run: BenchmarkRun) -> dict[str, Any]:
     return {"row": row, "load": load, "commit": _commits({"new": ROOT})["new"]}
 
 
+def _report(run: BenchmarkRun) -> dict[str, Any]:
+    """Core time of ``sandmould report``: tables, page and figures of finished runs, in turns."""
+    versions = {"new": ROOT} if run.options.old == ROOT else _versions(run)
+    study = run.extent["report"]
+    rows: dict[str, list[float]] = {version: [] for version in versions}
+    files = {}
+    for version, root in versions.items():
+        files[version] = SCRATCH / "sweeps" / f"report_{version}" / "report.yaml"
+        files[version].parent.mkdir(parents=True, exist_ok=True)
+        files[version].write_text(yaml.safe_dump(study), encoding="utf-8")
+        _measured(_python(root), root, files[version])
+    for _ in range(run.extent["report_turns"]):
+        for version, root in versions.items():
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            subprocess.run(
+                [_python(root), "-m", "sandmould.cli", "report", "report.yaml"],
+                cwd=files[version].parent, capture_output=True, check=True,
+                env=os.environ | {"PYTHONPATH": str(root)},
+            )  # fmt: skip
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            spent_s = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+            rows[version].append(round(spent_s, 2))
+    runs = len(study["sweep"]["keys"][FREQUENCY]) * study["replicates"]
+    load = round(os.getloadavg()[0], 1)
+    return {"runs": runs, "core_s": rows, "load": load, "commits": _commits(versions)}
+
+
 def _python(root: Path) -> Path:
     own = root / ".venv" / "bin" / "python"
     return own if own.exists() else Path(sys.executable)
@@ -307,6 +339,8 @@ def page(results: dict[str, Any]) -> str:
     medians = {version: median(rows) for version, rows in one_run["core_s"].items()}
     values["one_run"] = {**one_run, "median": medians}
     values["thousand"] = results["thousand_runs"]
+    if "report" in results:
+        values["report"] = results["report"]
     if "thousand_in_turns" in results:
         values["in_turns"] = _compared(results["thousand_in_turns"])
     values["remark"] = results.get("remark", "")
@@ -330,6 +364,7 @@ BENCHMARK = Benchmark(
         "first_step": _first_step,
         "one_run": _one_run,
         "thousand_runs": partial(_alone, "thousand_runs"),
+        "report": _report,
         "thousand_in_turns": partial(_in_turns, "thousand_runs", turns=1),
         "origin": lambda run: run.origin,
     },
