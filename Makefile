@@ -110,7 +110,7 @@ size-ratio: $(INSTALLED)
 at-rest: $(INSTALLED)
 	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.at_rest $(QUICK)
 
-## studies killed, disks that fail: docs/reliability.md, half an hour
+## studies killed, disks that fail: docs/reliability.md, 50 minutes
 reliability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.reliability $(QUICK)
 

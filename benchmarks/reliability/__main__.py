@@ -31,7 +31,7 @@ class Faults:
 
 WHOLE = Faults(tuple(faults.KINDS), kills=6, torn=2)
 A_LITTLE = Faults(("casting",), kills=1, torn=0)
-_CHECKPOINTS = ("sand", "pattern")
+_CHECKPOINTS = ("sand", "sand_fill", "pattern")
 """Studies that leave checkpoints within seconds."""
 
 

@@ -25,6 +25,7 @@ from benchmarks.reliability.attempts import (
 
 KINDS = {
     "sand": "sand, reference engine",
+    "sand_fill": "sand, runs that share a fill",
     "sand_lammps": "sand, LAMMPS",
     "sand_liggghts": "sand, LIGGGHTS",
     "pattern": "sand and pattern, coupled",
@@ -160,7 +161,7 @@ def _sentence(attempt: Attempt) -> str:
 
 def _checkpoints(study: str, folder: Path) -> list[Path]:
     """Files of sealed checkpoints of all runs."""
-    marks = results_of(study, folder).glob("runs/*/work/checkpoint_*/mark.json")
+    marks = results_of(study, folder).glob("*/*/work/checkpoint_*/mark.json")
     return sorted(path for mark in marks for path in mark.parent.iterdir())
 
 

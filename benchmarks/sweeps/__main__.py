@@ -2,7 +2,8 @@
 
 ``python -m benchmarks.sweeps --old FOLDER`` writes docs/scaling.md. FOLDER is a checkout of the
 older version with its own ``.venv``, such as one that ``git worktree add`` makes and
-``make quick`` sets up.
+``make quick`` sets up. ``--part thousand_in_turns`` runs a thousand short runs with both, once:
+some 2 000 s of a core with a version that starts a process for each run, 250 s with a worker.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def _study(scenario: Mapping[str, Any], hz: list[float], **top: Any) -> dict[str
     }  # fmt: skip
 
 
-def _stand_in(runs: int) -> dict[str, Any]:
+def _stand_in(runs: int, replicates: int = 5) -> dict[str, Any]:
     """Short runs: those of docs/workflow_cost.md."""
     scenario = {
         "sand": {"size_scale": 12, "size_classes": 3, "disc_thickness_m": 0.1},
@@ -51,7 +52,8 @@ def _stand_in(runs: int) -> dict[str, Any]:
         "vibration": [{**_SHAKE, "duration_s": 0.06}],
         "record": {"snapshot_every_s": 0.2},
     }
-    return _study(scenario, [20.0 + 0.04 * n for n in range(runs // 5)], replicates=5)
+    hz = [20.0 + 0.04 * n for n in range(runs // replicates)]
+    return _study(scenario, hz, replicates=replicates)
 
 
 def _sweep(scale: float, duration_s: float, replicates: int) -> dict[str, Any]:
@@ -99,6 +101,8 @@ WHOLE: dict[str, Any] = {
     "thousand_runs": _stand_in(1000),
     "one_run": _stand_in(30),
     "one_run_turns": 3,
+    "report": _stand_in(42, 3),
+    "report_turns": 3,
 }
 LITTLE: dict[str, Any] = {
     "turns": 1,
@@ -109,6 +113,8 @@ LITTLE: dict[str, Any] = {
     "thousand_runs": _stand_in(20),
     "one_run": _stand_in(5),
     "one_run_turns": 1,
+    "report": _stand_in(4, 2),
+    "report_turns": 1,
 }
 
 
@@ -136,13 +142,22 @@ def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
         "runs": sum(1 for _ in folder.glob("runs/*")),
         "grain_steps": float(costs["grain_steps"].sum()),
         "loop_wall_s": float(costs["engine_wall_s"].sum()),
+        "loop_core_s": float((costs["cpu_s"] * costs["engine_wall_s"] / costs["wall_s"]).sum()),
         "files": sum(path.is_file() for path in folder.rglob("*")),
         "bytes": sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()),
     }
 
 
-def _in_turns(name: str, run: BenchmarkRun) -> dict[str, Any]:
-    """Rows of the old and the new version, turn by turn; kernels are compiled before."""
+def _in_turns(name: str, run: BenchmarkRun, turns: int = 0) -> dict[str, Any]:
+    """Rows of the old and the new version, turn by turn; kernels are compiled before.
+
+    Parameters
+    ----------
+    name : str
+    run : BenchmarkRun
+    turns : int
+        As the call's extent has it unless given.
+    """
     versions = _versions(run)
     rows: dict[str, list[dict[str, float]]] = {version: [] for version in versions}
     folder = SCRATCH / "sweeps"
@@ -153,7 +168,7 @@ def _in_turns(name: str, run: BenchmarkRun) -> dict[str, Any]:
             (place / f"{name}.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
         warm_up = folder / f"{name}_{version}_warm_up" / f"{name}.yaml"
         _measured(_python(root), root, warm_up)
-    for number in range(run.extent["turns"]):
+    for number in range(turns or run.extent["turns"]):
         for version, root in versions.items():
             study = folder / f"{name}_{version}_study" / f"{name}.yaml"
             rows[version].append(_measured(_python(root), root, study))
@@ -264,6 +279,33 @@ def _alone(name: str, run: BenchmarkRun) -> dict[str, Any]:
     return {"row": row, "load": load, "commit": _commits({"new": ROOT})["new"]}
 
 
+def _report(run: BenchmarkRun) -> dict[str, Any]:
+    """Core time of ``sandmould report``: tables, page and figures of finished runs, in turns."""
+    versions = {"new": ROOT} if run.options.old == ROOT else _versions(run)
+    study = run.extent["report"]
+    rows: dict[str, list[float]] = {version: [] for version in versions}
+    files = {}
+    for version, root in versions.items():
+        files[version] = SCRATCH / "sweeps" / f"report_{version}" / "report.yaml"
+        files[version].parent.mkdir(parents=True, exist_ok=True)
+        files[version].write_text(yaml.safe_dump(study), encoding="utf-8")
+        _measured(_python(root), root, files[version])
+    for _ in range(run.extent["report_turns"]):
+        for version, root in versions.items():
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            subprocess.run(
+                [_python(root), "-m", "sandmould.cli", "report", "report.yaml"],
+                cwd=files[version].parent, capture_output=True, check=True,
+                env=os.environ | {"PYTHONPATH": str(root)},
+            )  # fmt: skip
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            spent_s = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+            rows[version].append(round(spent_s, 2))
+    runs = len(study["sweep"]["keys"][FREQUENCY]) * study["replicates"]
+    load = round(os.getloadavg()[0], 1)
+    return {"runs": runs, "core_s": rows, "load": load, "commits": _commits(versions)}
+
+
 def _python(root: Path) -> Path:
     own = root / ".venv" / "bin" / "python"
     return own if own.exists() else Path(sys.executable)
@@ -277,17 +319,19 @@ def _commits(versions: Mapping[str, Path]) -> dict[str, str]:
     }
 
 
+def _compared(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Medians of a study that ran in turns, beside all of its rows."""
+    rows = found["rows"]
+    medians = {
+        version: {key: median(row[key] for row in rows[version]) for key in rows[version][0]}
+        for version in rows
+    }
+    return {**found, **medians, "turns": len(rows["new"])}
+
+
 def page(results: dict[str, Any]) -> str:
     """The page of the results."""
-    studies = {}
-    for name in STUDIES:
-        rows = results[name]["rows"]
-        medians = {
-            version: {key: median(row[key] for row in rows[version]) for key in rows[version][0]}
-            for version in rows
-        }
-        studies[name] = {**medians, "turns": len(rows["new"]), "rows": rows,
-                         "study": results[name]["study"]}  # fmt: skip
+    studies = {name: _compared(results[name]) for name in STUDIES}
     values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
     values["same"] = results["same_answer"]
     values["first"] = results["first_step"]
@@ -295,6 +339,10 @@ def page(results: dict[str, Any]) -> str:
     medians = {version: median(rows) for version, rows in one_run["core_s"].items()}
     values["one_run"] = {**one_run, "median": medians}
     values["thousand"] = results["thousand_runs"]
+    if "report" in results:
+        values["report"] = results["report"]
+    if "thousand_in_turns" in results:
+        values["in_turns"] = _compared(results["thousand_in_turns"])
     values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)
 
@@ -307,12 +355,17 @@ def _add_options(parser: ArgumentParser) -> None:
 BENCHMARK = Benchmark(
     __file__,
     __doc__,
+    by_default=(
+        *STUDIES, "same_answer", "first_step", "one_run", "thousand_runs", "origin",
+    ),
     parts={
         **{name: partial(_in_turns, name) for name in STUDIES},
         "same_answer": _same_answer,
         "first_step": _first_step,
         "one_run": _one_run,
         "thousand_runs": partial(_alone, "thousand_runs"),
+        "report": _report,
+        "thousand_in_turns": partial(_in_turns, "thousand_runs", turns=1),
         "origin": lambda run: run.origin,
     },
     pages={"scaling.md": page},

@@ -14,7 +14,7 @@ from sandmould import ROOT
 
 PAGED = (
     "agreement", "arpm", "at_rest", "calibration", "engines", "frequency_law", "mps", "prices",
-    "scaling", "stability",
+    "reliability", "scaling", "stability", "sweeps",
 )  # fmt: skip
 ORIGIN = {"commit": "abc", "machine": {"processor": "a core"}, "versions": {}}
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
 import multiprocessing
 import os
@@ -13,6 +15,7 @@ import pytest
 
 from sandmould.runs import claim
 from sandmould.runs.claim import CLAIM_FILE, Claim, owner_of
+from sandmould.study.process import _folder_lock, is_locked
 
 
 @pytest.fixture(autouse=True)
@@ -83,6 +86,29 @@ def test_an_owner_renews_its_claim_and_hears_of_its_loss(tmp_path: Path) -> None
     assert not lost.is_set()
     as_of(tmp_path, "node7")
     assert lost.wait(5.0)
+
+
+def test_where_the_file_system_has_no_locks_the_claim_keeps_two_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none_here(file: object, how: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", none_here)
+    entered = threading.Event()
+
+    def second() -> None:
+        with _folder_lock(tmp_path):
+            entered.set()
+
+    with _folder_lock(tmp_path):
+        assert is_locked(tmp_path)
+        beside = threading.Thread(target=second)
+        beside.start()
+        assert not entered.wait(0.2)
+    assert entered.wait(5.0)
+    beside.join()
+    assert not is_locked(tmp_path)
 
 
 def test_of_many_machines_one_at_a_time_owns_a_folder(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould.report.tables import key_numbers
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, total_s
 from sandmould.runs.formatting import size_text
 from sandmould.study.definition.run import FILL
@@ -154,6 +155,11 @@ def test_each_run_bears_its_part_of_a_fill(tmp_path: Path) -> None:
     assert table[FILL_CPU_S].fillna(-1).tolist() == [4.0, 4.0, 3.0, -1.0, -1.0]
     assert table[FILL_WALL_S].fillna(-1).tolist() == [8.0, 8.0, 6.0, -1.0, -1.0]
     assert total_s(table, CPU_S) == 5.0 + 8.0 + 3.0
+    # The report tells it.
+    whole = table.assign(outcome_code=0, fill=fills, wall_s=2.0).drop(index=3)
+    (cost,) = (each for each in key_numbers(whole) if each.label.startswith("computing"))
+    assert (cost.value, cost.label) == ("30 s", "computing, all runs and 2 shared fills added up")
+    assert cost.note == "15 s of processor time"
 
 
 def test_rounds_and_controls_of_the_vibration_go_on_from_the_fills_of_the_sweep() -> None:
