@@ -56,6 +56,8 @@ def test_next_layer_enters_only_when_speed_and_loads_say_that_the_last_one_rests
         rows = series[series.stage == f"settle_{layer}"]
         assert set(rows.grains) == {grains}
         assert rows.rms_speed_m_s.iloc[-1] < scene.rest.rms_speed_m_s
+        # It ends there, and not when it must.
+        assert rows.time_s.iloc[-1] - rows.time_s.iloc[0] < 0.5 * scene.fill.settling.longest_s
         support_n = -loads[loads.time_s == rows.time_s.iloc[-1]].force_y_n.sum()
         weight_n = program.mass_kg(layer) * scene.gravity_m_s2
         # rest.load_tolerance

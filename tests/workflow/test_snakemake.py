@@ -17,6 +17,7 @@ from sandmould.runs.outcome import Outcome
 from sandmould.study.kinds.registry import kind_named, kind_of
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from sandmould.study.run_tables import read_costs
 from tests.workflow.dry_runs import dry_run
 from tests.workflow.runs import kill_at_a_checkpoint
 
@@ -124,17 +125,23 @@ def test_tiny_study_end_to_end(checkout: Path) -> None:
     assert summary.tube_fill_fraction.between(0.01, 0.9).all()
     assert summary.solid_fraction.between(0.4, 0.9).all()
     assert (results / "report.html").stat().st_size < 15e6
+    # A job of its own made the one fill from which both runs go on; each bears half of it.
+    (fill,) = results.glob("fills/*/outcome.json")
+    assert "Compute fill_r1_" in ran.stderr
+    assert list(summary.fill) == [fill.parent.name] * 2
+    assert summary.fill_wall_s.sum() == pytest.approx(read_costs([fill.parent]).rows.wall_s[0])
 
     again = snakemake("--configfile", str(study), folder=checkout)
     assert "Nothing to be done" in again.stdout + again.stderr
 
     # One more point: only its run is computed, those that finished keep their files.
-    before = {p: p.stat().st_mtime_ns for p in results.glob("runs/*/outcome.json")}
+    before = {p: p.stat().st_mtime_ns for p in (*results.glob("runs/*/outcome.json"), fill)}
     study.write_text(TINY + sweep.replace("100]", "100, 75]"))
     more = snakemake("--configfile", str(study), folder=checkout)
     assert more.returncode == 0, more.stderr
     assert all(p.stat().st_mtime_ns == t for p, t in before.items())
     assert len(list(results.glob("runs/*/outcome.json"))) == 3
+    assert set(pd.read_csv(results / "summary.tsv", sep="\t").fill) == {fill.parent.name}
 
     report = snakemake(
         "--configfile", str(study), "--report", str(checkout / "report.zip"), folder=checkout
@@ -160,6 +167,11 @@ def test_one_command_computes_a_sweep_and_its_rounds(checkout: Path) -> None:
     runs = pd.read_csv(results / "summary.tsv", sep="\t")
     assert len(runs) == 6
     written = [(results / "runs" / r / "outcome.json").stat().st_mtime_ns for r in runs.run]
+    # A run of the round goes on from the fill of the sweep, too; one of another filling does not.
+    (fill,) = results.glob("fills/*/outcome.json")
+    assert set(runs.fill[runs.replicate == 1]) == {fill.parent.name}
+    assert (runs.replicate[4:] == 1).any(), runs
+    assert fill.stat().st_mtime_ns < min(written)
     # The sweep's runs were all there before the first of the round.
     assert max(written[:4]) < min(written[4:])
 
