@@ -260,7 +260,11 @@ def optimum_choice(
         # the bed is about as dense at the optimum as at the settings round it
         share /= float(used.mean())
         of_keys.append(_share_figure(share, verdict.measure, "of what fits in, about"))
-    value = KeyNumber(with_margin(factor * mean, TWO_SIDED * factor * se), what, "fitted, ± 95 %")
+    value = KeyNumber(
+        with_margin(factor * mean, TWO_SIDED * factor * se),
+        what,
+        "fitted curve, ± its 95 % interval",
+    )
     return (*of_keys, value)
 
 
@@ -287,7 +291,7 @@ def _figures(
     ]
     share = share_of_what_fits(summary, verdict.measure, setting.values)
     factor, what = display_scale(verdict.measure)
-    runs = f"{setting.n} runs, ± 95 %" if setting.n > 1 else "one run"
+    runs = f"mean of {setting.n} runs, ± its 95 % interval" if setting.n > 1 else "one run"
     mean = with_margin(factor * setting.mean, factor * setting.ci_half_width)
     if math.isfinite(share):
         figures.append(_share_figure(share, verdict.measure, "of what fits in"))

@@ -93,8 +93,8 @@ def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
     ]
     # what holds for both is said once
     assert shown.note == (
-        "0.300 mm end to end; 100 %: the tube packed as densely as the sand round it; 3 runs, "
-        "± 95 %."
+        "0.300 mm end to end; 100 %: the tube packed as densely as the sand round it; mean of 3 "
+        "runs, ± its 95 % interval."
     )
     assert {cell.note for row in shown.rows for cell in row} == {"", "47.1 mm/s", "23.6 mm/s"}
 
