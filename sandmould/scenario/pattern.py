@@ -91,7 +91,7 @@ class Hung(Section):
     """A box in which a pattern is held, as its gating holds it."""
 
     low_m: tuple[float, ...] = quantity(
-        ..., "Corner with the least coordinates, in the moulding box, one number a dimension.",
+        ..., "Corner with the least coordinates, in the moulding box, one number per dimension.",
         unit="m", source="user", min_length=2, max_length=3,
     )  # fmt: skip
     high_m: tuple[float, ...] = quantity(
@@ -223,9 +223,11 @@ class PatternConfig(Section):
     """A foam pattern that bends under the sand."""
 
     name: str = quantity("pattern", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
-    shape: Shape = Field(..., description="Its shape.")
+    shape: Shape = Field(
+        ..., description="Shape of the foam: one of the kinds below, or a drawing."
+    )
     position_m: tuple[float, ...] = quantity(
-        (0.0, 0.0), "Place of the shape's origin in the box, one number a dimension.", unit="m",
+        (0.0, 0.0), "Place of the shape's origin in the box, one number per dimension.", unit="m",
         source="user", min_length=2, max_length=3,
     )  # fmt: skip
     depth_m: float | None = quantity(
@@ -244,8 +246,10 @@ class PatternConfig(Section):
     )
     poisson_ratio: float = quantity(0.35, "Poisson's ratio.", source=ROJEK, gt=-1, lt=0.5)
     density_kg_m3: float = quantity(12.0, "Density.", unit="kg/m3", source=ROJEK, gt=0, le=3e4)
-    supports: SupportsConfig = Field(SupportsConfig(), description="How it is held.")
+    supports: SupportsConfig = Field(
+        SupportsConfig(), description="What holds the pattern in the box."
+    )
     statics: Literal["linear", "large"] = quantity(
         "linear", "Small displacements, or large ones (total Lagrangian).", source=ARGUED
     )
-    loop: Loop = Field(Loop(), description="The coupling.")
+    loop: Loop = Field(Loop(), description="How sand and pattern are coupled while it bends.")
