@@ -155,13 +155,14 @@ class Loop(Section):
     scheme: Scheme = quantity(
         "aitken",
         "How the pattern follows the loads of the sand. one_way: it bends, but the sand does not "
-        "feel it. per_layer: one solve after each layer or stage, with a fixed share. The next "
-        "four solve once a window. fixed: a fixed share. measured: a share of the limit that a "
-        "measured gain sets; not on LIGGGHTS. aitken: Aitken's share. quasi_newton: a "
-        "quasi-Newton step over the last windows (IQN-ILS); it needs repeats above 0, so not on "
-        "LIGGGHTS. The last two have no windows. in_step: the pattern, condensed on its surface, "
-        "is stepped inside every step of the engine. monolithic: all of it is stepped after every "
-        "step of the grains. That is slow, on engine reference only, and serves for comparison.",
+        "feel it. per_layer: one solve after each layer or stage, with a fixed share. fixed: one "
+        "solve a window, with a fixed share. measured: the same with a share of the limit that a "
+        "measured gain sets; not on LIGGGHTS. aitken: the same with Aitken's share. quasi_newton: "
+        "a quasi-Newton step over the last windows (IQN-ILS); it needs repeats above 0, so not on "
+        "LIGGGHTS. in_step: without windows; the pattern, condensed on its surface, is stepped "
+        "inside every step of the engine. monolithic: without windows; all of it is stepped after "
+        "every step of the grains. That is slow, on engine reference only, and serves for "
+        "comparison.",
         source=ARGUED,
     )
     factor: float = quantity(
