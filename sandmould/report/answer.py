@@ -13,7 +13,7 @@ from sandmould.report.next_steps import NextSteps
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
 from sandmould.report.robustness import RobustnessPages, follows_springs
 from sandmould.report.sureness import Ground
-from sandmould.report.tables import Cell, Column, KeyNumber, Table, share_of_what_fits
+from sandmould.report.tables import Cell, Column, KeyNumber, Table, filled_space, share_of_what_fits
 from sandmould.runs.formatting import (
     display_scale,
     listed,
@@ -32,7 +32,6 @@ from sandmould.study.definition.certificate import frequency_among
 MOST_CHOICES = 4
 """Settings that are shown in words of the machine where several may be the best."""
 _MOST_LABELS = 8
-_FILL = "_fill_fraction"
 _OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
 """Ends of swept keys that the motion of the box states."""
 
@@ -166,8 +165,9 @@ def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
 
 def _best_text(verdict: Verdict) -> str:
     """What is best there, as a clause."""
-    if verdict.measure.endswith(_FILL) and verdict.better == "larger":
-        return f"the {verdict.measure.removesuffix(_FILL).replace('_', ' ')} fills best"
+    space = filled_space(verdict.measure)
+    if space != verdict.measure and verdict.better == "larger":
+        return f"the {space.replace('_', ' ')} fills best"
     most = "highest" if verdict.better == "larger" else "lowest"
     return f"the {name_of(verdict.measure)} is {most}"
 
@@ -269,7 +269,7 @@ def optimum_choice(
 
 
 def _share_figure(share: float, measure: str, label: str) -> KeyNumber:
-    space = measure.removesuffix(_FILL).replace("_", " ")
+    space = filled_space(measure).replace("_", " ")
     note = f"100 %: the {space} packed as densely as the sand round it"
     return KeyNumber(f"{100 * share:.0f} %", label, note)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from sandmould.report.answer import choices_of, choices_table, headline_of
 from sandmould.report.next_steps import NextSteps, next_steps, setting_steps
 from sandmould.report.sureness import certificate_ground, sand_grounds, weak_ground
+from sandmould.report.tables import share_of_what_fits
 from sandmould.runs.columns import CROSS_CHECK, OUTCOME_CODE, PART, RUN, SWEEP
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.verdict import Verdict, compare_settings
@@ -81,6 +83,13 @@ def test_the_best_setting_stands_in_words_of_the_machine() -> None:
         ("77 %", "of what fits in"),
         ("0.613 ± 0.038", "fill of the tube"),
     ]
+
+
+def test_a_fill_over_that_of_the_bed_is_its_own_share() -> None:
+    table = summary(CLEAR)
+    for measure in (FILL, "tube_fill_of_bed_fraction"):
+        assert share_of_what_fits(table, measure, {KEY: 25.0}) == pytest.approx(1.25 * 0.31)
+    assert math.isnan(share_of_what_fits(table, "solid_fraction"))
 
 
 def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
