@@ -9,11 +9,20 @@ from dataclasses import dataclass
 import pandas as pd
 
 from sandmould.report.drive import drive_at
+from sandmould.report.filling import FULL_SHARE
 from sandmould.report.next_steps import NextSteps
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
 from sandmould.report.robustness import RobustnessPages, follows_springs
 from sandmould.report.sureness import Ground
-from sandmould.report.tables import Cell, Column, KeyNumber, Table, filled_space, share_of_what_fits
+from sandmould.report.tables import (
+    OF_BED,
+    Cell,
+    Column,
+    KeyNumber,
+    Table,
+    filled_space,
+    share_of_what_fits,
+)
 from sandmould.runs.formatting import (
     display_scale,
     listed,
@@ -78,6 +87,9 @@ def headline_of(
         return f"{verb} {best.label}{motion}: there {_best_text(verdict)}.", True
     alike = _or([best.label, *(c.other for c in others if not c.separated)])
     worse = [c.other for c in others if c.separated]
+    if not worse and _is_full_everywhere(verdict):
+        space = filled_space(verdict.measure).replace("_", " ")
+        return f"{verb} {alike}: the {space} is full at each, in the mean of the runs.", False
     if not worse:
         return f"Not resolved: these runs cannot tell which is best, {alike}.", False
     are = "are" if len(worse) > 1 else "is"
@@ -86,6 +98,12 @@ def headline_of(
         f"{listed(worse, most=_MOST_LABELS)} {are} worse.",
         False,
     )
+
+
+def _is_full_everywhere(verdict: Verdict) -> bool:
+    """Whether sand fills what fits at every setting, where the measure is that share."""
+    is_share = verdict.measure.endswith(OF_BED) and verdict.better == "larger"
+    return is_share and all(setting.mean >= FULL_SHARE for setting in verdict.settings)
 
 
 def optimum_headline(

@@ -82,12 +82,12 @@ class Table:
     """What it leaves out."""
 
 
-_OF_BED = "_fill_of_bed_fraction"
+OF_BED = "_fill_of_bed_fraction"
 
 
 def filled_space(measure: str) -> str:
     """Name of the tube or cavity whose fill a measure is; the measure itself for others."""
-    return measure.removesuffix(_OF_BED).removesuffix("_fill_fraction")
+    return measure.removesuffix(OF_BED).removesuffix("_fill_fraction")
 
 
 def share_of_what_fits(
@@ -108,7 +108,7 @@ def share_of_what_fits(
     float
         1 where it is packed as densely as the bed; NaN where runs do not tell.
     """
-    column = filled_space(measure) + _OF_BED
+    column = filled_space(measure) + OF_BED
     if column not in summary:
         return math.nan
     at = sweep_part(summary[finished(summary)])

@@ -85,6 +85,19 @@ def test_the_best_setting_stands_in_words_of_the_machine() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("fill", "said"),
+    [
+        (0.80, "Shake at 50 Hz or 25 Hz: the tube is full at each, in the mean of the runs."),
+        (0.60, "Not resolved: these runs cannot tell which is best, 50 Hz or 25 Hz."),
+    ],
+)
+def test_a_space_that_every_setting_fills_is_said_to_be_full(fill: float, said: str) -> None:
+    table = summary({25.0: (fill, fill - 0.02), 50.0: (fill - 0.02, fill + 0.03)})
+    verdict = compare_settings(table, [KEY], "tube_fill_of_bed_fraction")
+    assert headline_of(verdict, [KEY], {}) == (said, False)
+
+
 def test_a_fill_over_that_of_the_bed_is_its_own_share() -> None:
     table = summary(CLEAR)
     for measure in (FILL, "tube_fill_of_bed_fraction"):
