@@ -36,8 +36,9 @@ def study_file(text: str) -> Path:
         sentence += f" (did you mean the shipped study {' or '.join(near)}?)" if near else ""
         raise BadInputError([Problem("STUDY", text, "a study's file", path.name, sentence)])
     names = ", ".join(near or ["tube_demo"])
+    own = f", such as {text}.yaml" if Path(f"{text}.yaml").is_file() else ""
     valid = (
-        f"the path of a study's file, or the name of a shipped study, such as {names}; "
+        f"the path of a study's file{own}, or the name of a shipped study, such as {names}; "
         f"all of them lie in {STUDIES}"
     )
     raise BadInputError([Problem("STUDY", text, valid)])

@@ -9,11 +9,20 @@ from dataclasses import dataclass
 import pandas as pd
 
 from sandmould.report.drive import drive_at
+from sandmould.report.filling import FULL_SHARE
 from sandmould.report.next_steps import NextSteps
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
 from sandmould.report.robustness import RobustnessPages, follows_springs
 from sandmould.report.sureness import Ground
-from sandmould.report.tables import Cell, Column, KeyNumber, Table, share_of_what_fits
+from sandmould.report.tables import (
+    OF_BED,
+    Cell,
+    Column,
+    KeyNumber,
+    Table,
+    filled_space,
+    share_of_what_fits,
+)
 from sandmould.runs.formatting import (
     display_scale,
     listed,
@@ -32,7 +41,6 @@ from sandmould.study.definition.certificate import frequency_among
 MOST_CHOICES = 4
 """Settings that are shown in words of the machine where several may be the best."""
 _MOST_LABELS = 8
-_FILL = "_fill_fraction"
 _OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
 """Ends of swept keys that the motion of the box states."""
 
@@ -79,6 +87,9 @@ def headline_of(
         return f"{verb} {best.label}{motion}: there {_best_text(verdict)}.", True
     alike = _or([best.label, *(c.other for c in others if not c.separated)])
     worse = [c.other for c in others if c.separated]
+    if not worse and _is_full_everywhere(verdict):
+        space = filled_space(verdict.measure).replace("_", " ")
+        return f"{verb} {alike}: the {space} is full at each, in the mean of the runs.", False
     if not worse:
         return f"Not resolved: these runs cannot tell which is best, {alike}.", False
     are = "are" if len(worse) > 1 else "is"
@@ -87,6 +98,12 @@ def headline_of(
         f"{listed(worse, most=_MOST_LABELS)} {are} worse.",
         False,
     )
+
+
+def _is_full_everywhere(verdict: Verdict) -> bool:
+    """Whether sand fills what fits at every setting, where the measure is that share."""
+    is_share = verdict.measure.endswith(OF_BED) and verdict.better == "larger"
+    return is_share and all(setting.mean >= FULL_SHARE for setting in verdict.settings)
 
 
 def optimum_headline(
@@ -166,8 +183,9 @@ def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
 
 def _best_text(verdict: Verdict) -> str:
     """What is best there, as a clause."""
-    if verdict.measure.endswith(_FILL) and verdict.better == "larger":
-        return f"the {verdict.measure.removesuffix(_FILL).replace('_', ' ')} fills best"
+    space = filled_space(verdict.measure)
+    if space != verdict.measure and verdict.better == "larger":
+        return f"the {space.replace('_', ' ')} fills best"
     most = "highest" if verdict.better == "larger" else "lowest"
     return f"the {name_of(verdict.measure)} is {most}"
 
@@ -260,12 +278,16 @@ def optimum_choice(
         # the bed is about as dense at the optimum as at the settings round it
         share /= float(used.mean())
         of_keys.append(_share_figure(share, verdict.measure, "of what fits in, about"))
-    value = KeyNumber(with_margin(factor * mean, TWO_SIDED * factor * se), what, "fitted, ± 95 %")
+    value = KeyNumber(
+        with_margin(factor * mean, TWO_SIDED * factor * se),
+        what,
+        "fitted curve, ± its 95 % interval",
+    )
     return (*of_keys, value)
 
 
 def _share_figure(share: float, measure: str, label: str) -> KeyNumber:
-    space = measure.removesuffix(_FILL).replace("_", " ")
+    space = filled_space(measure).replace("_", " ")
     note = f"100 %: the {space} packed as densely as the sand round it"
     return KeyNumber(f"{100 * share:.0f} %", label, note)
 
@@ -287,7 +309,7 @@ def _figures(
     ]
     share = share_of_what_fits(summary, verdict.measure, setting.values)
     factor, what = display_scale(verdict.measure)
-    runs = f"{setting.n} runs, ± 95 %" if setting.n > 1 else "one run"
+    runs = f"mean of {setting.n} runs, ± its 95 % interval" if setting.n > 1 else "one run"
     mean = with_margin(factor * setting.mean, factor * setting.ci_half_width)
     if math.isfinite(share):
         figures.append(_share_figure(share, verdict.measure, "of what fits in"))

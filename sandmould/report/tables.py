@@ -88,6 +88,14 @@ class Table:
     """What it leaves out."""
 
 
+OF_BED = "_fill_of_bed_fraction"
+
+
+def filled_space(measure: str) -> str:
+    """Name of the tube or cavity whose fill a measure is; the measure itself for others."""
+    return measure.removesuffix(OF_BED).removesuffix("_fill_fraction")
+
+
 def share_of_what_fits(
     summary: pd.DataFrame, measure: str, values: Mapping[str, Any] | None = None
 ) -> float:
@@ -106,7 +114,7 @@ def share_of_what_fits(
     float
         1 where it is packed as densely as the bed; NaN where runs do not tell.
     """
-    column = measure.removesuffix("_fill_fraction") + "_fill_of_bed_fraction"
+    column = filled_space(measure) + OF_BED
     if column not in summary:
         return math.nan
     at = sweep_part(summary[finished(summary)])

@@ -87,7 +87,8 @@ def name_of(key: str) -> str:
     if last.endswith("_fill_fraction"):
         return f"fill of the {last.removesuffix('_fill_fraction').replace('_', ' ')}"
     if last.endswith(_OF_BED):
-        return f"fill of the {last.removesuffix(_OF_BED).replace('_', ' ')} over the bed's density"
+        space = last.removesuffix(_OF_BED).replace("_", " ")
+        return f"fill of the {space} as a share of what fits"
     for ending, what in _OF_PROBE.items():
         if last.endswith(ending):
             return f"{what} at {last.removesuffix(ending).replace('_', ' ')}"

@@ -81,7 +81,12 @@ class Plate(Section):
     kind: Literal["plate"]
     name: str = quantity("plate", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
     centre_m: tuple[float, ...] = quantity(
-        ..., "Centre, one number a dimension.", unit="m", source="user", min_length=2, max_length=3
+        ...,
+        "Centre, one number per dimension.",
+        unit="m",
+        source="user",
+        min_length=2,
+        max_length=3,
     )
     size_m: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
         ..., "Edge lengths, one a dimension.", unit="m", source="user", min_length=2, max_length=3

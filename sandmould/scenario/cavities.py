@@ -31,7 +31,12 @@ class BoxCavity(Section):
     kind: Literal["box"]
     name: str = quantity(..., _NAME_MEANING, source="user", pattern=NAME)
     centre_m: tuple[float, ...] = quantity(
-        ..., "Centre, one number a dimension.", unit="m", source="user", min_length=2, max_length=3
+        ...,
+        "Centre, one number per dimension.",
+        unit="m",
+        source="user",
+        min_length=2,
+        max_length=3,
     )
     size_m: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
         ..., "Edge lengths, one a dimension.", unit="m", source="user", min_length=2, max_length=3

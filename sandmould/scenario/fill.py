@@ -54,7 +54,7 @@ class PlacedGrain(Section):
     """One grain placed by hand."""
 
     position_m: tuple[float, ...] = quantity(
-        ..., "Place of its centre in the box, one number a dimension.", unit="m", source="user"
+        ..., "Place of its centre in the box, one number per dimension.", unit="m", source="user"
     )
     diameter_m: float = quantity(
         ..., "Diameter, that of a size class of the sand.", unit="m", source="user", gt=0, le=1

@@ -83,9 +83,11 @@ class MetalFlow(Section):
     """One flow of metal, complete."""
 
     case: Annotated[StillTank | ShoulderedCylinder, Field(discriminator="kind")] = Field(
-        ..., description="Where it flows."
+        ..., description="Space that the metal flows in: a tank or a cylinder with a shoulder."
     )
-    metal: PouredMetal = Field(PouredMetal(), description="What flows.")
+    metal: PouredMetal = Field(
+        PouredMetal(), description="Metal that flows: density, viscosity, gravity."
+    )
     dt_max_s: float = quantity(
         1e-3, "Largest time step.", unit="s", source=f"{PAPER}, table 2", gt=0
     )

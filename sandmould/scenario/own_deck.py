@@ -29,7 +29,9 @@ class DeckEngine(Section):
 class OwnDeck(Section):
     """One run of a template of the user's, complete."""
 
-    engine: DeckEngine = Field(DeckEngine(), description="The engine.")
+    engine: DeckEngine = Field(
+        DeckEngine(), description="Engine that runs the deck, and its cores."
+    )
     template: str = quantity(
         ...,
         "Jinja template of the deck. Its path is relative to the file that names it, in a "

@@ -91,7 +91,7 @@ class Hung(Section):
     """A box in which a pattern is held, as its gating holds it."""
 
     low_m: tuple[float, ...] = quantity(
-        ..., "Corner with the least coordinates, in the moulding box, one number a dimension.",
+        ..., "Corner with the least coordinates, in the moulding box, one number per dimension.",
         unit="m", source="user", min_length=2, max_length=3,
     )  # fmt: skip
     high_m: tuple[float, ...] = quantity(
@@ -155,13 +155,14 @@ class Loop(Section):
     scheme: Scheme = quantity(
         "aitken",
         "How the pattern follows the loads of the sand. one_way: it bends, but the sand does not "
-        "feel it. per_layer: one solve after each layer or stage, with a fixed share. The next "
-        "four solve once a window. fixed: a fixed share. measured: a share of the limit that a "
-        "measured gain sets; not on LIGGGHTS. aitken: Aitken's share. quasi_newton: a "
-        "quasi-Newton step over the last windows (IQN-ILS); it needs repeats above 0, so not on "
-        "LIGGGHTS. The last two have no windows. in_step: the pattern, condensed on its surface, "
-        "is stepped inside every step of the engine. monolithic: all of it is stepped after every "
-        "step of the grains. That is slow, on engine reference only, and serves for comparison.",
+        "feel it. per_layer: one solve after each layer or stage, with a fixed share. fixed: one "
+        "solve a window, with a fixed share. measured: the same with a share of the limit that a "
+        "measured gain sets; not on LIGGGHTS. aitken: the same with Aitken's share. quasi_newton: "
+        "a quasi-Newton step over the last windows (IQN-ILS); it needs repeats above 0, so not on "
+        "LIGGGHTS. in_step: without windows; the pattern, condensed on its surface, is stepped "
+        "inside every step of the engine. monolithic: without windows; all of it is stepped after "
+        "every step of the grains. That is slow, on engine reference only, and serves for "
+        "comparison.",
         source=ARGUED,
     )
     factor: float = quantity(
@@ -223,9 +224,11 @@ class PatternConfig(Section):
     """A foam pattern that bends under the sand."""
 
     name: str = quantity("pattern", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
-    shape: Shape = Field(..., description="Its shape.")
+    shape: Shape = Field(
+        ..., description="Shape of the foam: one of the kinds below, or a drawing."
+    )
     position_m: tuple[float, ...] = quantity(
-        (0.0, 0.0), "Place of the shape's origin in the box, one number a dimension.", unit="m",
+        (0.0, 0.0), "Place of the shape's origin in the box, one number per dimension.", unit="m",
         source="user", min_length=2, max_length=3,
     )  # fmt: skip
     depth_m: float | None = quantity(
@@ -244,8 +247,10 @@ class PatternConfig(Section):
     )
     poisson_ratio: float = quantity(0.35, "Poisson's ratio.", source=ROJEK, gt=-1, lt=0.5)
     density_kg_m3: float = quantity(12.0, "Density.", unit="kg/m3", source=ROJEK, gt=0, le=3e4)
-    supports: SupportsConfig = Field(SupportsConfig(), description="How it is held.")
+    supports: SupportsConfig = Field(
+        SupportsConfig(), description="What holds the pattern in the box."
+    )
     statics: Literal["linear", "large"] = quantity(
         "linear", "Small displacements, or large ones (total Lagrangian).", source=ARGUED
     )
-    loop: Loop = Field(Loop(), description="The coupling.")
+    loop: Loop = Field(Loop(), description="How sand and pattern are coupled while it bends.")

@@ -95,7 +95,7 @@ class Scenario(Section):
     gravity_m_s2: float = quantity(
         9.80665, "Gravity, downwards.", unit="m/s2", source="CGPM 1901", ge=0, le=1000
     )
-    box: Box = Field(Box(), description="The moulding box.")
+    box: Box = Field(Box(), description="Inner size of the moulding box.")
     obstacles: tuple[Obstacle, ...] = Field(
         (), description="Plates, tubes, polygons, cylinders and meshes in the box."
     )
@@ -105,8 +105,8 @@ class Scenario(Section):
     pattern: PatternConfig | None = Field(
         None, description="A foam pattern that bends under the sand, coupled with it."
     )
-    sand: Sand = Field(Sand(), description="The sand.")
-    contact: Contact = Field(Contact(), description="Contact laws.")
+    sand: Sand = Field(Sand(), description="Grains: sieve curve, density, size in the model.")
+    contact: Contact = Field(Contact(), description="Contact laws: springs, friction, damping.")
     background_damping: BackgroundDamping = Field(
         BackgroundDamping(), description="Damping of free grains."
     )
@@ -131,10 +131,10 @@ class Scenario(Section):
         "Frame of the computation: grains under a body force, eq. (58), or moving walls, eq. (57).",
         source="Rojek 2004, section 3.9",
     )
-    engine: Engine = Field(Engine(), description="The engine.")
-    time_step: TimeStep = Field(TimeStep(), description="The time step.")
+    engine: Engine = Field(Engine(), description="Engine that computes, and its cores.")
+    time_step: TimeStep = Field(TimeStep(), description="Length of the time step.")
     rest: Rest = Field(Rest(), description="When sand is at rest.")
-    record: Recording = Field(Recording(), description="What is recorded.")
+    record: Recording = Field(Recording(), description="What is recorded, and how often.")
     guard: GuardLimits = Field(GuardLimits(), description="When a run is stopped.")
     seed: int = quantity(1, "Seed of all that is drawn.", source="user", ge=0, le=2**31 - 1)
 

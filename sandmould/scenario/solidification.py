@@ -48,8 +48,12 @@ class PouredAt(Section):
 class MetalAndMould(Section):
     """A named pair of materials: the part of a scenario that a material file may state."""
 
-    casting: Metal = Field(..., description="The metal.")
-    mould: MouldMaterial = Field(..., description="The mould.")
+    casting: Metal = Field(
+        ..., description="Metal of the casting, with the temperatures at which it freezes."
+    )
+    mould: MouldMaterial = Field(
+        ..., description="Sand or die round the casting, which takes its heat."
+    )
     initial_k: PouredAt = Field(..., description="Temperatures at the start.")
     heat_transfer_w_m2_k: float | None = quantity(
         None,

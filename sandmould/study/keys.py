@@ -102,7 +102,7 @@ def _section_lines(model: type[BaseModel], path: str, shown: set[type[BaseModel]
         extra: Any = field.json_schema_extra or {}
         cells = (
             f"`{name}`", _unit_cell(field), _default_cell(field), _valid_cell(field),
-            field.description or "", extra.get("source", ""),
+            _meaning_cell(field), extra.get("source", ""),
         )  # fmt: skip
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
         below += [(f"{path}.{name}".lstrip("."), inner) for inner in models_in(field.annotation)]
@@ -130,6 +130,16 @@ def _default_cell(field: FieldInfo) -> str:
         return "" if field.default is not None else "absent"
     text = _default_text(field)
     return f"`{text.removeprefix('default ')}`" if text.startswith("default ") else text
+
+
+def _meaning_cell(field: FieldInfo) -> str:
+    """What a key means; each choice that is explained begins a line."""
+    text = field.description or ""
+    for choice in (*_choices_in(field.annotation), "true", "false", "null"):
+        text = text.replace(f" {choice}: ", f"<br>`{choice}`: ")
+        if text.startswith(f"{choice}: "):
+            text = f"`{choice}`{text.removeprefix(choice)}"
+    return text
 
 
 _BOUNDS = {"gt": "> ", "ge": "≥ ", "lt": "< ", "le": "≤ "}

@@ -150,23 +150,32 @@ class NewStudy(Section):
 
     @property
     def middle_mm(self) -> float:
-        """Height of the hole's middle over the floor, that of a shipped study unless given."""
+        """Height of the hole's middle over the floor.
+
+        Unless given it is that of a shipped study, or the nearest at which a larger hole and its
+        walls lie in the box.
+        """
         if self.hole_height_mm is not None:
             return self.hole_height_mm
+        half_mm, below_mm, above_mm = self._extent_mm
+        shipped_mm = 0.32 * self.height_mm
+        if self.cavity != "tube":
+            shipped_mm = 0.4 * self.height_mm + (half_mm if self.opens_down else -half_mm)
+        highest_mm = self.height_mm - half_mm - above_mm
+        return max(min(shipped_mm, highest_mm), half_mm + below_mm)
+
+    @property
+    def _extent_mm(self) -> tuple[float, float, float]:
+        """Half the height of the hole, and the walls below and above it."""
         if self.cavity == "tube":
-            return 0.32 * self.height_mm
-        half_mm = self.cavity_depth_mm / 2
-        return 0.4 * self.height_mm + (half_mm if self.opens_down else -half_mm)
+            return self.opening_mm / 2, WALL_MM, WALL_MM
+        return self.cavity_depth_mm / 2, *((0.0, WALL_MM) if self.opens_down else (WALL_MM, 0.0))
 
     @property
     def solid_ends_mm(self) -> tuple[float, float]:
         """Lowest and highest point of the hole's walls."""
-        if self.cavity == "tube":
-            half_mm = self.opening_mm / 2 + WALL_MM
-            return self.middle_mm - half_mm, self.middle_mm + half_mm
-        half_mm = self.cavity_depth_mm / 2
-        low, high = (0.0, WALL_MM) if self.opens_down else (WALL_MM, 0.0)
-        return self.middle_mm - half_mm - low, self.middle_mm + half_mm + high
+        half_mm, below_mm, above_mm = self._extent_mm
+        return self.middle_mm - half_mm - below_mm, self.middle_mm + half_mm + above_mm
 
     @property
     def level_mm(self) -> float:

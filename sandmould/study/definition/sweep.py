@@ -58,8 +58,9 @@ class Sweep(Section):
 
     design: Design = quantity(
         "grid",
-        "grid: all combinations; zipped: first values together, then second ones; list: the "
-        "given points; latin_hypercube, sobol: samples spread between the bounds.",
+        "grid: all combinations. zipped: first values together, then second ones. list: the given "
+        "points. latin_hypercube: samples spread between the bounds. sobol: the same by a Sobol "
+        "sequence, whose number is a power of two.",
         source=ARGUED,
     )
     keys: dict[str, Annotated[tuple[Any, ...], Field(min_length=1)] | Range] = Field(

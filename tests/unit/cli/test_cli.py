@@ -112,6 +112,8 @@ def test_a_study_is_a_file_or_the_name_of_a_shipped_one(elsewhere: Path) -> None
     for missing in ("mine", "", "../tube_demo", "no/tube_demo.yaml"):
         with pytest.raises(BadInputError, match="tube_demo"):
             study_file(missing)
+    with pytest.raises(BadInputError, match=r"study's file, such as mine\.yaml, or the name"):
+        study_file("mine")
 
 
 def test_no_report_without_results(elsewhere: Path) -> None:

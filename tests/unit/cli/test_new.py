@@ -46,6 +46,23 @@ def test_each_drive_with_each_cavity_plans(cavity: str) -> None:
             assert [c.name for c in scenario.cavities] == ["hole"] * cavity.startswith("hole")
 
 
+@pytest.mark.parametrize(
+    ("cavity", "size", "middle_mm"),
+    [
+        ("tube", {"opening_mm": 80.0}, 43.0),
+        ("hole_up", {"cavity_depth_mm": 45.0}, 25.5),
+        ("hole_down", {"cavity_depth_mm": 80.0}, 67.0),
+    ],
+)
+def test_a_large_hole_is_put_where_it_fits(
+    cavity: str, size: dict[str, float], middle_mm: float
+) -> None:
+    found = NewStudy.model_validate({"cavity": cavity} | size)
+    assert found.middle_mm == middle_mm
+    low_mm, high_mm = found.solid_ends_mm
+    assert (low_mm >= 0.0, high_mm <= found.height_mm) == (True, True)
+
+
 def test_options_answer_without_a_terminal() -> None:
     options = ["--hold", "displacement", "--amplitude-mm", "0.0002 m", "--settings", "3"]
     options += ["--lowest-hz", "20", "--highest-hz", "80", "--wave-speed-m-s", "130"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from sandmould.report.answer import choices_of, choices_table, headline_of
 from sandmould.report.next_steps import NextSteps, next_steps, setting_steps
 from sandmould.report.sureness import certificate_ground, sand_grounds, weak_ground
+from sandmould.report.tables import share_of_what_fits
 from sandmould.runs.columns import CROSS_CHECK, OUTCOME_CODE, PART, RUN, SWEEP
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.verdict import Verdict, compare_settings
@@ -83,6 +85,26 @@ def test_the_best_setting_stands_in_words_of_the_machine() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("fill", "said"),
+    [
+        (0.80, "Shake at 50 Hz or 25 Hz: the tube is full at each, in the mean of the runs."),
+        (0.60, "Not resolved: these runs cannot tell which is best, 50 Hz or 25 Hz."),
+    ],
+)
+def test_a_space_that_every_setting_fills_is_said_to_be_full(fill: float, said: str) -> None:
+    table = summary({25.0: (fill, fill - 0.02), 50.0: (fill - 0.02, fill + 0.03)})
+    verdict = compare_settings(table, [KEY], "tube_fill_of_bed_fraction")
+    assert headline_of(verdict, [KEY], {}) == (said, False)
+
+
+def test_a_fill_over_that_of_the_bed_is_its_own_share() -> None:
+    table = summary(CLEAR)
+    for measure in (FILL, "tube_fill_of_bed_fraction"):
+        assert share_of_what_fits(table, measure, {KEY: 25.0}) == pytest.approx(1.25 * 0.31)
+    assert math.isnan(share_of_what_fits(table, "solid_fraction"))
+
+
 def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
     table = summary(ALIKE)
     verdict, drives = judged(table)
@@ -93,8 +115,8 @@ def test_settings_that_may_be_the_best_stand_below_each_other() -> None:
     ]
     # what holds for both is said once
     assert shown.note == (
-        "0.300 mm end to end; 100 %: the tube packed as densely as the sand round it; 3 runs, "
-        "± 95 %."
+        "0.300 mm end to end; 100 %: the tube packed as densely as the sand round it; mean of 3 "
+        "runs, ± its 95 % interval."
     )
     assert {cell.note for row in shown.rows for cell in row} == {"", "47.1 mm/s", "23.6 mm/s"}
 

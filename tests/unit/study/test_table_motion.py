@@ -55,6 +55,6 @@ def test_a_space_narrower_than_five_grains_is_told_with_its_numbers(tmp_path: Pa
         line for line in plan_of(tmp_path, [1.5], sand={"size_scale": 24}).splitlines()
         if "can jam" in line
     ]  # fmt: skip
-    assert note.startswith("Note: tube is 24 mm wide at its narrowest: 1.0 times ")
-    assert note.endswith("grain, 23.2 mm. Below 5 times the grains can jam. Smaller grains "
+    assert note.startswith("Note: tube is as narrow as 24 mm: 1.0 times the largest ")
+    assert note.endswith("grain (23.2 mm). Below 5 times the grains can jam. Smaller grains "
                          "(sand.size_scale) tell more.")  # fmt: skip

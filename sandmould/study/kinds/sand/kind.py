@@ -18,14 +18,16 @@ class SandStudy(Study):
     """A study of sand."""
 
     kind: Literal["sand"] = kind_key("sand")
-    scenario: Scenario = Field(Scenario(), description="The scene of sand.")
+    scenario: Scenario = Field(
+        Scenario(), description="Scene of sand: box, obstacles, fill, vibration."
+    )
 
 
 class Material(Section):
     """A named sand: the part of a scenario that a material file may state."""
 
-    sand: Sand = Field(Sand(), description="The sand.")
-    contact: Contact = Field(Contact(), description="Contact laws.")
+    sand: Sand = Field(Sand(), description="Grains: sieve curve, density, size in the model.")
+    contact: Contact = Field(Contact(), description="Contact laws: springs, friction, damping.")
     background_damping: BackgroundDamping = Field(
         BackgroundDamping(), description="Damping of free grains."
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sandmould.runs.formatting import number
+from sandmould.runs.formatting import listed, number
 from sandmould.scenario.box import Tube
 from sandmould.scenario.geometry import Revolved
 from sandmould.scenario.scenario import Scenario
@@ -13,7 +13,7 @@ LEAST_GRAINS = 5.0
 
 
 def narrow_spaces(scenario: Scenario) -> dict[str, str]:
-    """What to know of each tube and cavity that is narrow for the grains, by its name.
+    """What to know of tubes and cavities that are narrow for the grains, by their names.
 
     Parameters
     ----------
@@ -29,12 +29,16 @@ def narrow_spaces(scenario: Scenario) -> dict[str, str]:
         if wall is not None:
             widths_m[cavity.name] = wall.thickness_m
     way_out = " Smaller grains (sand.size_scale) tell more." if scenario.sand.size_scale > 1 else ""
+    alike: dict[str, list[str]] = {}
+    for name, width_m in widths_m.items():
+        if width_m < limit_m:
+            size = f"{number(1e3 * width_m)} mm: {number(width_m / largest_m, 2)} times"
+            alike.setdefault(size, []).append(name.replace("_", " "))
     return {
-        name: (
-            f"{name.replace('_', ' ')} is {number(1e3 * width_m)} mm wide at its narrowest: "
-            f"{number(width_m / largest_m, 2)} times the largest grain, {number(1e3 * largest_m)} "
-            f"mm. Below {LEAST_GRAINS:g} times the grains can jam.{way_out}"
+        listed(names): (
+            f"{listed(names)} {'is' if len(names) == 1 else 'are'} as narrow as {size} the largest "
+            f"grain ({number(1e3 * largest_m)} mm). Below {LEAST_GRAINS:g} times the grains can "
+            f"jam.{way_out}"
         )
-        for name, width_m in widths_m.items()
-        if width_m < limit_m
+        for size, names in alike.items()
     }
