@@ -1,4 +1,4 @@
-"""Memory, listings, threads and cost over size of the solver, beside an earlier commit.
+"""Memory, listings, threads, meshes and cost over size of the solver, beside an earlier commit.
 
 ``python -m benchmarks.size`` unpacks that commit from the repository, settles the beds and writes
 docs/size.md. Beds of all sizes are copies of one, side by side in both directions.
@@ -24,6 +24,7 @@ from benchmarks.engines.beds import Bed, settled, tiled
 from benchmarks.engines.timing import ratio, spread
 from benchmarks.frame import Benchmark, BenchmarkRun, render
 from benchmarks.size import worker
+from benchmarks.size.mesh import Mesh, round_pattern
 from sandmould import ROOT
 
 BEFORE = "3d986c9"
@@ -34,21 +35,29 @@ BEFORE = "3d986c9"
 class SizeExtent:
     """How much is measured."""
 
-    turns: int = 7
-    turn_s: float = 0.5
+    turns: int = 5
+    turn_s: float = 0.3
     discs: int = 1_000
     spheres: int = 2_000
     """Of the beds that are copied."""
+    row_spheres: int = 300
+    """Of the bed that is copied in one row: many of its grains touch a wall."""
     listed_discs: int = 20_000
     copies: int = 8
     """Copies of the spheres in each direction where memory and listings are measured."""
-    shaken_steps: int = 2_000
+    shaken_steps: int = 500
     thread_copies: tuple[int, ...] = (4, 8)
     scale_copies: tuple[int, ...] = (2, 4, 8, 16, 32)
-    largest_steps: int = 1_000
+    largest_steps: int = 50
+    """In all turns on the largest bed."""
+    mesh_copies: int = 4
+    mesh_cuts: int = 92
+    """Of each face of the cube that becomes the pattern; 12 times the square are the triangles."""
+    resting_steps: int = 3_000
+    """Until grains round the pattern rest again."""
 
 
-QUICK = SizeExtent(2, 0.05, 300, 300, 600, 2, 50, (2,), (1, 2), 20)
+QUICK = SizeExtent(2, 0.05, 300, 300, 300, 600, 2, 50, (2,), (1, 2), 20, 2, 10, 50)
 
 
 def copied(bed: Bed, copies: int) -> Bed:
@@ -69,15 +78,21 @@ def copied(bed: Bed, copies: int) -> Bed:
 
 
 @contextmanager
-def started(trees: dict[str, Path], bed: Bed, threads: int = 1) -> Iterator[dict[str, Any]]:
-    """One process for each tree with the bed in it."""
+def started(
+    trees: dict[str, Path], bed: Bed, threads: int = 1, mesh: Mesh | None = None
+) -> Iterator[dict[str, Any]]:
+    """One process for each tree with the bed in it, round a pattern or not."""
     environment = os.environ | {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     with tempfile.TemporaryDirectory() as name:
         bed_file = Path(name) / "bed.npz"
         np.savez(bed_file, **vars(bed))
+        bed_and_mesh = [str(bed_file), str(threads)]
+        if mesh:
+            np.savez(Path(name) / "mesh.npz", **mesh._asdict())
+            bed_and_mesh.append(str(Path(name) / "mesh.npz"))
         processes = {
             key: subprocess.Popen(
-                [sys.executable, worker.__file__, str(tree), str(bed_file), str(threads)],
+                [sys.executable, worker.__file__, str(tree), *bed_and_mesh],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=tree, env=environment,
             )
             for key, tree in trees.items()
@@ -104,12 +119,19 @@ def _both() -> dict[str, Path]:
     return {"before": tree_of(BEFORE), "now": ROOT}
 
 
+def _steps(extent: SizeExtent, bed: Bed) -> int:
+    """Steps of about a turn."""
+    return max(10, round(extent.turn_s / (80e-9 * bed.grains)))
+
+
 def measure_memory(run: BenchmarkRun) -> list[dict[str, Any]]:
     """Bytes per grain before and now, at rest and shaken; one process at a time."""
     extent: SizeExtent = run.extent
     beds = {
         "side by side": copied(settled(3, extent.spheres), extent.copies),
-        "in a row": tiled(settled(3, extent.spheres), extent.copies**2 * extent.spheres),
+        "in a row": tiled(
+            settled(3, extent.row_spheres), extent.copies**2 * extent.spheres * 3 // 4
+        ),
         "discs in a row": tiled(settled(2, extent.discs), extent.listed_discs),
     }
     rows = []
@@ -167,7 +189,7 @@ def measure_threads(run: BenchmarkRun) -> list[dict[str, Any]]:
         bed = copied(settled(3, extent.spheres), copies)
         with started(_both(), bed) as one, started(_both(), bed, 2) as two:
             processes = {f"{k} {n}": p for n, s in ((1, one), (2, two)) for k, p in s.items()}
-            steps = max(10, round(extent.turn_s / (80e-9 * bed.grains)))
+            steps = _steps(extent, bed)
             costs: dict[str, list[float]] = {name: [] for name in processes}
             for turn in range(extent.turns + 1):
                 for name, process in processes.items():
@@ -191,7 +213,7 @@ def measure_scale(run: BenchmarkRun) -> list[dict[str, Any]]:
     for copies in extent.scale_copies:
         bed = copied(settled(3, extent.spheres), copies)
         largest = copies == extent.scale_copies[-1]
-        steps = max(10, round(extent.turn_s / (80e-9 * bed.grains)))
+        steps = _steps(extent, bed)
         costs: dict[str, list[float]] = {"before": [], "now": []}
         if largest:
             steps = extent.largest_steps // extent.turns
@@ -211,6 +233,42 @@ def measure_scale(run: BenchmarkRun) -> list[dict[str, Any]]:
     return rows
 
 
+def measure_mesh(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """Processor time of a step and of a listing, of the box alone and round a fine mesh."""
+    extent: SizeExtent = run.extent
+    plain = copied(settled(3, extent.spheres), extent.mesh_copies)
+    cut, mesh = round_pattern(plain, extent.mesh_cuts)
+    rows = []
+    with started(_both(), plain) as boxes, started(_both(), cut, 1, mesh) as meshes:
+        processes = {
+            f"{k} {n}": p for n, s in (("box", boxes), ("mesh", meshes)) for k, p in s.items()
+        }
+        grains = {name: (cut if "mesh" in name else plain).grains for name in processes}
+        same = len({
+            ask(meshes[name], "advance", extent.resting_steps)["checksum"] for name in meshes
+        }) == 1  # fmt: skip
+        for process in processes.values():
+            ask(process, "list", 2)
+        for what in ("step", "listing"):
+            costs: dict[str, list[float]] = {name: [] for name in processes}
+            for _ in range(extent.turns):
+                for name, process in processes.items():
+                    times = _steps(extent, plain) if what == "step" else 3
+                    answer = ask(process, "advance" if what == "step" else "list", times)
+                    scale = times if what == "step" else 1
+                    costs[name].append(1e9 * answer["cpu_s"] / (scale * grains[name]))
+            rows.append({
+                "what": what,
+                "grains": cut.grains,
+                "triangles": len(mesh.facets),
+                "ns_per_grain": {name: spread(values) for name, values in costs.items()},
+                "ratio": {k: ratio(costs[f"{k} mesh"], costs[f"{k} box"]) for k in meshes},
+                "same_digits": same,
+            })  # fmt: skip
+            print(rows[-1], flush=True)
+    return rows
+
+
 def page(results: dict[str, Any]) -> str:
     """The page of the results."""
     return render(Path(__file__).with_name("page.md.j2"), {**results, "before": BEFORE})
@@ -222,14 +280,19 @@ BENCHMARK = Benchmark(
     parts={
         "memory": measure_memory,
         "listing": measure_listing,
-        "threads": measure_threads,
+        "mesh": measure_mesh,
         "scale": measure_scale,
+        "threads": measure_threads,
     },
     pages={"size.md": page},
     extent=SizeExtent(),
     quick=QUICK,
     arrange=lambda measured, run: {
-        **measured, "origin": run.origin, "turns": run.extent.turns, "load": run.load_before,
+        **measured,
+        "measured": run.results.get("measured", {})
+        | {name: {"commit": run.origin["commit"], "load": run.load_before} for name in measured},
+        "origin": run.origin,
+        "turns": run.extent.turns,
     },
 )  # fmt: skip
 
