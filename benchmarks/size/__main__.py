@@ -1,4 +1,4 @@
-"""Memory, listings, threads and cost over size of the solver, beside an earlier commit.
+"""Memory, listings, threads, meshes and cost over size of the solver, beside an earlier commit.
 
 ``python -m benchmarks.size`` unpacks that commit from the repository, settles the beds and writes
 docs/size.md. Beds of all sizes are copies of one, side by side in both directions.
@@ -24,6 +24,7 @@ from benchmarks.engines.beds import Bed, settled, tiled
 from benchmarks.engines.timing import ratio, spread
 from benchmarks.frame import Benchmark, BenchmarkRun, render
 from benchmarks.size import worker
+from benchmarks.size.mesh import Mesh, round_pattern
 from sandmould import ROOT
 
 BEFORE = "3d986c9"
@@ -34,21 +35,27 @@ BEFORE = "3d986c9"
 class SizeExtent:
     """How much is measured."""
 
-    turns: int = 7
-    turn_s: float = 0.5
-    discs: int = 1_000
+    turns: int = 5
+    turn_s: float = 0.2
     spheres: int = 2_000
-    """Of the beds that are copied."""
-    listed_discs: int = 20_000
+    """Of the bed that is copied."""
+    row_spheres: int = 300
+    """Of the bed that is copied in one row: many of its grains touch a wall."""
     copies: int = 8
     """Copies of the spheres in each direction where memory and listings are measured."""
-    shaken_steps: int = 2_000
+    shaken_steps: int = 300
     thread_copies: tuple[int, ...] = (4, 8)
     scale_copies: tuple[int, ...] = (2, 4, 8, 16, 32)
-    largest_steps: int = 1_000
+    largest_steps: int = 50
+    """In all turns on the largest bed."""
+    mesh_copies: int = 4
+    mesh_cuts: int = 92
+    """Of each face of the cube that becomes the pattern; 12 times the square are the triangles."""
+    resting_steps: int = 3_000
+    """Until grains round the pattern rest again."""
 
 
-QUICK = SizeExtent(2, 0.05, 300, 300, 600, 2, 50, (2,), (1, 2), 20)
+QUICK = SizeExtent(2, 0.05, 300, 300, 2, 50, (2,), (1, 2), 20, 2, 10, 50)
 
 
 def copied(bed: Bed, copies: int) -> Bed:
@@ -69,15 +76,21 @@ def copied(bed: Bed, copies: int) -> Bed:
 
 
 @contextmanager
-def started(trees: dict[str, Path], bed: Bed, threads: int = 1) -> Iterator[dict[str, Any]]:
-    """One process for each tree with the bed in it."""
+def started(
+    trees: dict[str, Path], bed: Bed, threads: int = 1, mesh: Mesh | None = None
+) -> Iterator[dict[str, Any]]:
+    """One process for each tree with the bed in it, round a pattern or not."""
     environment = os.environ | {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     with tempfile.TemporaryDirectory() as name:
         bed_file = Path(name) / "bed.npz"
         np.savez(bed_file, **vars(bed))
+        bed_and_mesh = [str(bed_file), str(threads)]
+        if mesh:
+            np.savez(Path(name) / "mesh.npz", **mesh._asdict())
+            bed_and_mesh.append(str(Path(name) / "mesh.npz"))
         processes = {
             key: subprocess.Popen(
-                [sys.executable, worker.__file__, str(tree), str(bed_file), str(threads)],
+                [sys.executable, worker.__file__, str(tree), *bed_and_mesh],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=tree, env=environment,
             )
             for key, tree in trees.items()
@@ -104,30 +117,37 @@ def _both() -> dict[str, Path]:
     return {"before": tree_of(BEFORE), "now": ROOT}
 
 
+def _steps(extent: SizeExtent, bed: Bed) -> int:
+    """Steps of about a turn."""
+    return max(10, round(extent.turn_s / (80e-9 * bed.grains)))
+
+
 def measure_memory(run: BenchmarkRun) -> list[dict[str, Any]]:
-    """Bytes per grain before and now, at rest and shaken; one process at a time."""
+    """Bytes per grain before and now, at rest and then shaken; one process at a time."""
     extent: SizeExtent = run.extent
+    many = extent.copies**2 * extent.spheres
     beds = {
         "side by side": copied(settled(3, extent.spheres), extent.copies),
-        "in a row": tiled(settled(3, extent.spheres), extent.copies**2 * extent.spheres),
-        "discs in a row": tiled(settled(2, extent.discs), extent.listed_discs),
+        "in one row": tiled(settled(3, extent.row_spheres), many * 3 // 4),
     }
     rows = []
-    for name, bed in beds.items():
-        for motion in ("advance", "shake"):
-            row: dict[str, Any] = {"bed": bed.name, "laid": name, "motion": motion}
-            for key, tree in _both().items():
-                with started({key: tree}, bed) as processes:
-                    checksum = ask(processes[key], motion, extent.shaken_steps)["checksum"]
-                    found = ask(processes[key], "memory")
-                row[key] = {
-                    "checksum": checksum,
-                    "arrays": {k: v / bed.grains for k, v in found.pop("arrays").items()},
-                    **{k: v / bed.grains for k, v in found.items()},
-                }
-            row["same_digits"] = row["before"]["checksum"] == row["now"]["checksum"]
-            rows.append(row)
-            print(bed.name, name, motion, row["now"]["resident"], flush=True)
+    for laid, bed in beds.items():
+        found: dict[str, dict[str, Any]] = {"at rest": {}, "shaken": {}}
+        for tree, folder in _both().items():
+            with started({tree: folder}, bed) as processes:
+                process = processes[tree]
+                for state, motion in (("at rest", "advance"), ("shaken", "shake")):
+                    checksum = ask(process, motion, extent.shaken_steps)["checksum"]
+                    answer = ask(process, "memory")
+                    found[state][tree] = {
+                        "checksum": checksum,
+                        "arrays": {k: v / bed.grains for k, v in answer.pop("arrays").items()},
+                        **{k: v / bed.grains for k, v in answer.items()},
+                    }
+        for state, both in found.items():
+            same = both["before"]["checksum"] == both["now"]["checksum"]
+            rows.append({"bed": bed.name, "laid": laid, "state": state, "same": same, **both})
+            print(bed.name, laid, state, sum(both["now"]["arrays"].values()), flush=True)
     return rows
 
 
@@ -135,7 +155,6 @@ def measure_listing(run: BenchmarkRun) -> list[dict[str, Any]]:
     """Processor time of a listing in turns."""
     extent: SizeExtent = run.extent
     beds = (
-        tiled(settled(2, extent.discs), extent.listed_discs),
         copied(settled(3, extent.spheres), extent.copies // 2),
         copied(settled(3, extent.spheres), extent.copies),
     )
@@ -167,7 +186,7 @@ def measure_threads(run: BenchmarkRun) -> list[dict[str, Any]]:
         bed = copied(settled(3, extent.spheres), copies)
         with started(_both(), bed) as one, started(_both(), bed, 2) as two:
             processes = {f"{k} {n}": p for n, s in ((1, one), (2, two)) for k, p in s.items()}
-            steps = max(10, round(extent.turn_s / (80e-9 * bed.grains)))
+            steps = _steps(extent, bed)
             costs: dict[str, list[float]] = {name: [] for name in processes}
             for turn in range(extent.turns + 1):
                 for name, process in processes.items():
@@ -191,7 +210,7 @@ def measure_scale(run: BenchmarkRun) -> list[dict[str, Any]]:
     for copies in extent.scale_copies:
         bed = copied(settled(3, extent.spheres), copies)
         largest = copies == extent.scale_copies[-1]
-        steps = max(10, round(extent.turn_s / (80e-9 * bed.grains)))
+        steps = _steps(extent, bed)
         costs: dict[str, list[float]] = {"before": [], "now": []}
         if largest:
             steps = extent.largest_steps // extent.turns
@@ -211,6 +230,42 @@ def measure_scale(run: BenchmarkRun) -> list[dict[str, Any]]:
     return rows
 
 
+def measure_mesh(run: BenchmarkRun) -> list[dict[str, Any]]:
+    """Processor time of a step and of a listing, of the box alone and round a fine mesh."""
+    extent: SizeExtent = run.extent
+    plain = copied(settled(3, extent.spheres), extent.mesh_copies)
+    cut, mesh = round_pattern(plain, extent.mesh_cuts)
+    rows = []
+    with started(_both(), plain) as boxes, started(_both(), cut, 1, mesh) as meshes:
+        processes = {
+            f"{k} {n}": p for n, s in (("box", boxes), ("mesh", meshes)) for k, p in s.items()
+        }
+        grains = {name: (cut if "mesh" in name else plain).grains for name in processes}
+        same = len({
+            ask(meshes[name], "advance", extent.resting_steps)["checksum"] for name in meshes
+        }) == 1  # fmt: skip
+        for process in processes.values():
+            ask(process, "list", 2)
+        for what in ("step", "listing"):
+            costs: dict[str, list[float]] = {name: [] for name in processes}
+            for _ in range(extent.turns):
+                for name, process in processes.items():
+                    times = _steps(extent, plain) if what == "step" else 3
+                    answer = ask(process, "advance" if what == "step" else "list", times)
+                    scale = times if what == "step" else 1
+                    costs[name].append(1e9 * answer["cpu_s"] / (scale * grains[name]))
+            rows.append({
+                "what": what,
+                "grains": cut.grains,
+                "triangles": len(mesh.facets),
+                "ns_per_grain": {name: spread(values) for name, values in costs.items()},
+                "ratio": {k: ratio(costs[f"{k} mesh"], costs[f"{k} box"]) for k in meshes},
+                "same_digits": same,
+            })  # fmt: skip
+            print(rows[-1], flush=True)
+    return rows
+
+
 def page(results: dict[str, Any]) -> str:
     """The page of the results."""
     return render(Path(__file__).with_name("page.md.j2"), {**results, "before": BEFORE})
@@ -222,14 +277,20 @@ BENCHMARK = Benchmark(
     parts={
         "memory": measure_memory,
         "listing": measure_listing,
-        "threads": measure_threads,
+        "mesh": measure_mesh,
         "scale": measure_scale,
+        "threads": measure_threads,
     },
     pages={"size.md": page},
+    by_default=("memory", "listing", "mesh", "scale"),
     extent=SizeExtent(),
     quick=QUICK,
     arrange=lambda measured, run: {
-        **measured, "origin": run.origin, "turns": run.extent.turns, "load": run.load_before,
+        **measured,
+        "measured": run.results.get("measured", {})
+        | {name: {"commit": run.origin["commit"], "load": run.load_before} for name in measured},
+        "origin": run.origin,
+        "turns": run.extent.turns,
     },
 )  # fmt: skip
 

@@ -83,19 +83,19 @@ def candidates_in(
     cell_start, cell_part = grid.start, grid.part
     # A facet lies in several cells: the grain that has last met it.
     met = np.full(len(corner), -1, dtype=np.int64)
-    height = np.empty(planes)
+    # Plane by plane for all grains: most are near none.
+    near_planes = np.zeros(grains, dtype=np.bool_)
     for p in range(planes):
-        height[p] = dot(load(dim, vertices, corner[p, 0]), load(dim, shape, p))
+        normal = load(dim, shape, p)
+        height = dot(load(dim, vertices, corner[p, 0]), normal)
+        for i in range(grains):
+            x = plus(load(dim, position, i), -1.0, shift)
+            near_planes[i] |= dot(x, normal) - height <= radius[i] + skin
     for i in range(grains):
         x = plus(load(dim, position, i), -1.0, shift)
         near = radius[i] + skin
         before = listed
-        # most grains are near no plane
-        first_part = planes
-        for p in range(planes):
-            if dot(x, load(dim, shape, p)) - height[p] <= near:
-                first_part = 0
-        for p in range(first_part, first_facet):
+        for p in range(0 if near_planes[i] else planes, first_facet):
             if nearest(dim, vertices, planes, shape, corner, p, x, near)[0] <= near:
                 if listed == len(parts):
                     parts = _longer(parts, listed)

@@ -40,6 +40,17 @@ def _tell_apart(radius: Floats, mass: Floats, inertia: Floats) -> tuple[NDArray[
     return of_grain, example[:kinds]
 
 
+@njit(**OPTIONS)
+def _rows_in_order(rows: Floats, order: Ints) -> Floats:
+    """Rows of an array in another order: several times as fast as numpy's for so short ones."""
+    taken = np.empty_like(rows)
+    for i in range(len(order)):
+        row = order[i]
+        for k in range(rows.shape[1]):
+            taken[i, k] = rows[row, k]
+    return taken
+
+
 class Grains(NamedTuple):
     """State and properties of n grains; d components, s = 1 spin component in 2D, 3 in 3D.
 
@@ -135,5 +146,6 @@ class Grains(NamedTuple):
 
     def ordered(self, order: Ints) -> Grains:
         """The same grains in another order of storage."""
-        fields = self._asdict().items()
-        return self._replace(**{k: a.take(order, axis=0) for k, a in fields if k not in _OF_KINDS})
+        fields = ("position", "velocity", "spin", "force", "moment")
+        rows = {k: _rows_in_order(getattr(self, k), order) for k in fields}
+        return self._replace(id=self.id[order], kind=self.kind[order], **rows)

@@ -157,25 +157,83 @@ def _carry(dim: Any, contacts: Contacts, bound: Ints, near: NearPairs) -> None:
 
 
 @njit(**OPTIONS)
-def _count(dim: Any, bound: Ints, grains: Grains, pairs: Pairs, gap: float) -> tuple[Ints, Ints]:
-    """Near pairs of each chunk, and those of them that cross to a later one."""
+def _choose(
+    dim: Any, bound: Ints, grains: Grains, pairs: Pairs, gap: float
+) -> tuple[Ints, Ints, Places, Places]:
+    """Near pairs among the listed ones.
+
+    Returns
+    -------
+    counts, crossing : (c,) int64
+        Near pairs of each chunk, and those of them that cross to a later one.
+    stop : (n,) uint32
+        Where those of each grain end, counted from the first of its chunk.
+    other : (p,) uint32
+        Their second grains.
+    """
     position, kind, radius = grains.position, grains.kind, grains.radius_of
-    start, other = pairs.start, pairs.other
+    start, listed = pairs.start, pairs.other
     counts = np.zeros(len(bound) - 1, dtype=np.int64)
     crossing = np.zeros(len(bound) - 1, dtype=np.int64)
+    stop = np.empty(len(position), dtype=np.uint32)
+    other = np.empty(len(listed), dtype=np.uint32)
+    k = 0
     for c in range(len(counts)):
-        near, cross, end = 0, 0, bound[c + 1]
+        first, cross, end = k, 0, bound[c + 1]
         for i in range(bound[c], end):
             x, reach = load(dim, position, i), radius[kind[i]] + gap
             for p in range(index(start[i]), index(start[i + 1])):
-                j = other[p]
+                j = listed[p]
                 apart = plus(load(dim, position, j), -1.0, x)
                 far = reach + radius[kind[j]]
+                # Written at all events: a branch here is guessed wrong too often.
+                other[index(k)] = j
                 is_near = dot(apart, apart) < far * far
-                near += is_near
+                k += is_near
                 cross += is_near & (j >= end)
-        counts[c], crossing[c] = near, cross
-    return counts, crossing
+            stop[i] = k - first
+        counts[c], crossing[c] = k - first, cross
+    return counts, crossing, stop, other
+
+
+@njit(**OPTIONS)
+def _give_slots(dim: Any, c: int, bound: Ints, near: NearPairs) -> None:
+    """Give near pairs that cross to later chunks their slots, in the order of those chunks."""
+    other, ends, end = near.other, near.slot_bound[c], bound[c + 1]
+    first, last = near.first[c], near.stop[end - 1]
+    ends[:] = 0
+    for k in range(first, last):
+        if other[k] >= end:
+            ends[chunk_of(bound, other[k]) - c] += 1
+    ends[0] = near.first_slot[c]
+    for t in range(1, len(ends)):
+        ends[t] += ends[t - 1]
+    free, crossing = ends.copy(), near.first_slot[c]
+    for k in range(first, last):
+        if other[k] >= end:
+            later = chunk_of(bound, other[k]) - c - 1
+            slot = free[later]
+            free[later] += 1
+            near.slot[crossing], near.slot_grain[slot] = slot, other[k]
+            store(no_vector(dim), near.slot_force, slot)
+            store(no_spin(dim), near.slot_moment, slot)
+            crossing += 1
+
+
+@njit(**OPTIONS)
+def _lay_out(dim: Any, bound: Ints, chosen: Places, near: NearPairs) -> None:
+    """Put chosen pairs into the room of each chunk, and give those that cross their slots."""
+    k = 0
+    for c in range(len(bound) - 1):
+        first, last = bound[c], bound[c + 1]
+        if last > first:
+            room = near.first[c]
+            for q in range(near.stop[last - 1]):
+                near.other[room + q] = chosen[k + q]
+            k += near.stop[last - 1]
+            for i in range(first, last):
+                near.stop[i] += room
+            _give_slots(dim, c, bound, near)
 
 
 def _room(counts: Ints, most: Ints) -> Ints:
@@ -201,17 +259,17 @@ def new_near_pairs(
     gap_m : float
         Not negative.
     """
-    counts, crossing = _count(dim, bound, grains, pairs, gap_m)
+    counts, crossing, stop, chosen = _choose(dim, bound, grains, pairs, gap_m)
     first = _room(counts, np.diff(pairs.start[bound]))
     first_slot = _room(crossing, np.diff(first))
     room, slots, spins = first[-1], first_slot[-1], grains.spin.shape[1]
     near = NearPairs(
         first,
-        np.repeat(first[:-1], np.diff(bound)).astype(np.uint32),
+        stop,
         np.empty(room, dtype=np.uint32),
-        np.empty(room, dtype=np.uint8),
-        np.empty((room, spins)),
-        np.empty((room, spins)),
+        np.zeros(room, dtype=np.uint8),
+        np.zeros((room, spins)),
+        np.zeros((room, spins)),
         first_slot,
         np.zeros((len(counts), farthest_chunk(bound, pairs) + 1), dtype=np.int64),
         np.empty(slots, dtype=np.uint32),
@@ -219,12 +277,10 @@ def new_near_pairs(
         np.empty((slots, len(dim))),
         np.empty((slots, spins)),
         np.full(1, 0.5 * gap_m),
-        np.full(1, gap_m),
+        np.full(1, -1.0),
         np.zeros(1, dtype=np.int64),
     )
-    for c in range(len(counts)):
-        look(dim, c, bound, grains, pairs, near)
-    near.gap[0] = -1.0
+    _lay_out(dim, bound, chosen, near)
     _carry(dim, contacts, bound, near)
     return near
 
@@ -252,30 +308,6 @@ def watch(near: NearPairs, way: float, skin: float) -> None:
     if near.left[0] < 0.0:
         near.gap[0] = near_gap(skin, way)
         near.left[0] = 0.5 * near.gap[0]
-
-
-@njit(**OPTIONS)
-def _give_slots(dim: Any, c: int, bound: Ints, near: NearPairs) -> None:
-    """Give near pairs that cross to later chunks their slots, in the order of those chunks."""
-    other, ends, end = near.other, near.slot_bound[c], bound[c + 1]
-    first, last = near.first[c], near.stop[end - 1]
-    ends[:] = 0
-    for k in range(first, last):
-        if other[k] >= end:
-            ends[chunk_of(bound, other[k]) - c] += 1
-    ends[0] = near.first_slot[c]
-    for t in range(1, len(ends)):
-        ends[t] += ends[t - 1]
-    free, crossing = ends.copy(), near.first_slot[c]
-    for k in range(first, last):
-        if other[k] >= end:
-            later = chunk_of(bound, other[k]) - c - 1
-            slot = free[later]
-            free[later] += 1
-            near.slot[crossing], near.slot_grain[slot] = slot, other[k]
-            store(no_vector(dim), near.slot_force, slot)
-            store(no_spin(dim), near.slot_moment, slot)
-            crossing += 1
 
 
 @njit(**OPTIONS)

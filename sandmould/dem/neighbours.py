@@ -66,6 +66,16 @@ def make_grid(low: Floats, high: Floats, size: float, grains: int) -> Grid:
 
 
 @njit(**OPTIONS)
+def extent_of(position: Floats) -> tuple[Floats, Floats]:
+    """Smallest and largest coordinates of some grains, (d,) float64 each, m."""
+    low, high = position[0].copy(), position[0].copy()
+    for i in range(len(position)):
+        for k in range(position.shape[1]):
+            low[k], high[k] = min(low[k], position[i, k]), max(high[k], position[i, k])
+    return low, high
+
+
+@njit(**OPTIONS)
 def sort_into_cells(position: Floats, grid: Grid) -> tuple[Ints, Ints]:
     """Sort grains by cells.
 

@@ -24,7 +24,7 @@ from sandmould.dem.near_pairs import (
     near_gap,
     new_near_pairs,
 )
-from sandmould.dem.neighbours import Pairs, list_pairs, make_grid, sort_into_cells
+from sandmould.dem.neighbours import Pairs, extent_of, list_pairs, make_grid, sort_into_cells
 from sandmould.dem.steps import (
     LIST_IS_OLD,
     NO_ROOM,
@@ -35,6 +35,7 @@ from sandmould.dem.steps import (
     advance,
     find_forces,
     new_walls,
+    shares,
 )
 from sandmould.dem.surfaces import Surfaces
 from sandmould.dem.vectors import dim_of
@@ -197,9 +198,7 @@ class Solver:
         old, nothing = self.moving, self._nothing
         n = len(old.grains.id)
         size = 2 * float(old.grains.radius_of.max()) + self._skin
-        columns = old.grains.position.T  # far faster than by rows
-        low, high = np.array([x.min() for x in columns]), np.array([x.max() for x in columns])
-        grid = make_grid(low, high, size, n)
+        grid = make_grid(*extent_of(old.grains.position), size, n)
         order, start = sort_into_cells(old.grains.position, grid)
         contacts = self.contacts
         move_contacts(self._dim, contacts, order)
@@ -316,7 +315,10 @@ class Solver:
         """
         chunks = len(self.moving.bound) - 1
         threads = min(self._threads, chunks)
-        team = Team(new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64))
+        team = Team(
+            new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64),
+            shares(self.moving.bound, self.moving.near, threads),
+        )  # fmt: skip
         others = [
             self._pool.submit(run_thread, thread, threads, team) for thread in range(1, threads)
         ]

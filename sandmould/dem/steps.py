@@ -100,6 +100,27 @@ class Team(NamedTuple):
     """(c,) float64, m2/s2: largest squared speed in each chunk."""
     state: Ints
     """(1,) int64: why the loop returns."""
+    share: Ints
+    """(t + 1,) int64: first chunk of each thread."""
+
+
+def shares(bound: Ints, near: NearPairs, threads: int) -> Ints:
+    """Split the chunks among threads, (t + 1,) int64: neighbours together, with equal work.
+
+    Results do not depend on it.
+    """
+    chunks = len(bound) - 1
+    if threads == 1:
+        return np.array([0, chunks])
+    # A near pair costs about twice what a grain costs beside its pairs.
+    work = 2 * (near.stop[bound[1:] - 1].astype(np.int64) - near.first[:-1]) + np.diff(bound)
+    ends = np.concatenate([[0], work.cumsum()])
+    equal = ends[-1] * np.arange(1, threads) / threads
+    nearest = np.abs(ends[:, None] - equal).argmin(axis=0)
+    # Every thread has one chunk at least.
+    first = np.maximum.accumulate(np.concatenate([[0], nearest]) - np.arange(threads))
+    first = np.minimum(first + np.arange(threads), chunks - threads + np.arange(threads))
+    return np.append(first, chunks)
 
 
 @njit(**OPTIONS)
@@ -269,7 +290,10 @@ def advance(
         must be listed again and ``NO_ROOM`` where the near ones need more room.
     """
     near, bound = moving.near, moving.bound
-    mine = range(thread, len(bound) - 1, threads)
+    mine = range(team.share[thread], team.share[thread + 1])
+    # Chunks of threads before add to the first ones alone.
+    later = near.slot_bound.shape[1] - 1 if thread else 0
+    shared = range(mine.start, min(mine.start + later, mine.stop))
     barrier, speeds2, state = team.barrier, team.speeds2, team.state
     # Where no vertex moves, none begins to within a call.
     steps_left = moving.walls.arrays.steps_left
@@ -282,14 +306,13 @@ def advance(
             shift, speed = _box(dim, scene, displacement, k)
             for c in mine:
                 _add_forces(dim, c, scene, moving, shift, speed, scene.dt)
-                if threads == 1:
+                if c >= shared.stop:
                     # The chunk moves on while it is still in the cache: later chunks neither
                     # read it nor add to it.
                     speeds2[c] = _finish(dim, c, scene, moving, displacement, k, k < steps)
-            if threads > 1:
-                wait_for_all(barrier, threads)
-                for c in mine:
-                    speeds2[c] = _finish(dim, c, scene, moving, displacement, k, k < steps)
+            wait_for_all(barrier, threads)
+            for c in shared:
+                speeds2[c] = _finish(dim, c, scene, moving, displacement, k, k < steps)
         if k == steps:
             break
         wait_for_all(barrier, threads)
