@@ -288,11 +288,7 @@ def runs_table(
                 *(_parameter_cell(row[k]) for k in keys),
                 *(_parameter_cell(row[b]) for b in blocks),
                 Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, why)),
-                *(
-                    [_value_cell(verdict.measure, _float(row[verdict.measure]), error)]
-                    if has_value
-                    else []
-                ),
+                *([_value_cell(row, verdict.measure, error)] if has_value else []),
                 *(_cost_cell(row[name], show) for name, _, show in cost),
             )
         )

@@ -361,7 +361,7 @@ def test_what_loops_gave_that_tell_nothing_is_shown_and_not_counted() -> None:
     assert verdict.best is None
     assert "none gives" in verdict.sentences[0]
     assert verdict.caveats[-1] == (
-        "What runs gave whose loops do not hold, not counted and not to be trusted: 25 Hz: 6.2 mm "
+        "What runs gave whose loops do not hold, not counted and not to be trusted: 25 Hz: 6.20 mm "
         "(runs: 4; may be off by 180 mm), 50 Hz: 2.05 mm (runs: 4; may be off by 180 mm)."
     )
 
