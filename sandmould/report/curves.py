@@ -300,7 +300,7 @@ def _run_marks(rows: pd.DataFrame, verdict: Verdict, tint: Tint) -> list[Mark]:
         rows[RUN], reasons, rows[OUTCOME], values, errors, strict=True
     ):
         if math.isfinite(value):
-            off = "" if error == 0.0 else f", {error_text(error)}"
+            off = "" if error == 0.0 else f", {error_text(verdict.measure, error)}"
             title = f"{run}: {number(value)}{off}{f', {reason_text(why, outcome)}' if why else ''}"
             kind = "run" if not off else "doubtful"
             marks.append(Mark(math.nan, factor * value, kind, tint, title=title))

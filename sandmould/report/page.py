@@ -283,7 +283,7 @@ def _answer(
         figures = choices[0] if len(choices) == 1 else ()
         table = choices_table(choices) if len(choices) > 1 else None
     grounds = (
-        *finished_ground(collected.summary),
+        *finished_ground(collected.summary, verdict.measure),
         *of_kind.grounds,
         *certificate_ground(study, robustness),
     )

@@ -13,6 +13,7 @@ from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed, name_of, number
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.evidence import loop_barred
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.definition.certificate import frequency_key
@@ -29,18 +30,27 @@ class Ground:
     text: str
 
 
-def finished_ground(summary: pd.DataFrame) -> tuple[Ground, ...]:
-    """Say where runs did not finish.
+def finished_ground(summary: pd.DataFrame, measure: str) -> tuple[Ground, ...]:
+    """Say where runs did not finish, or where their loops do not hold.
 
     Parameters
     ----------
     summary : DataFrame
         One row a run.
+    measure : str
+        The objective.
     """
     lost = len(summary) - int(finished(summary).sum())
-    if not lost:
-        return ()
-    return (Ground("Runs", f"{lost} of {len(summary)} did not finish and are not counted."),)
+    barred = int(loop_barred(summary, measure).sum())
+    text = f"{lost} of {len(summary)} did not finish and are not counted."
+    grounds = [Ground("Runs", text)] if lost else []
+    if barred:
+        text = (
+            f"in {barred} of {len(summary)} runs the loop between sand and pattern does not hold; "
+            "what they gave is shown and not counted."
+        )
+        grounds.append(Ground("Loop", text))
+    return tuple(grounds)
 
 
 def scatter_ground(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple[Ground, ...]:

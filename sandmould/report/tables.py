@@ -296,7 +296,7 @@ def runs_table(
                 *(_parameter_cell(row[k]) for k in keys),
                 *(_parameter_cell(row[b]) for b in blocks),
                 Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, why)),
-                *([_value_cell(_float(row[verdict.measure]), error)] if has_value else []),
+                *([_value_cell(row, verdict.measure, error)] if has_value else []),
                 *(_cost_cell(row[name], show) for name, _, show in cost),
             )
         )
@@ -306,9 +306,10 @@ def runs_table(
     return Table(columns, tuple(rows), tuple(marked), note)
 
 
-def _value_cell(value: float, loop_error: float) -> Cell:
+def _value_cell(row: Mapping[Any, Any], measure: str, loop_error: float) -> Cell:
     """Value of the objective, with what its loop leaves open of it."""
-    off = "" if loop_error == 0.0 or not math.isfinite(value) else error_text(loop_error)
+    value = _float(row[measure])
+    off = "" if loop_error == 0.0 or not math.isfinite(value) else error_text(measure, loop_error)
     return Cell(number(value, 4), str(value), note=off.capitalize())
 
 

@@ -140,6 +140,13 @@ def display_scale(key: str) -> tuple[float, str]:
     return 1.0, titled(key)
 
 
+def display_number(key: str, value: float, digits: int = 3) -> str:
+    """A value of a measure with its unit as it is shown: lengths in mm."""
+    unit = unit_of(key)
+    factor, unit = (1e3, "mm") if unit == "m" else (1.0, unit)
+    return f"{number(factor * value, digits)} {unit}".rstrip()
+
+
 def value_text(key: str, value: Any) -> str:
     """A swept value with its unit."""
     if isinstance(value, float | int) and not isinstance(value, bool):

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from sandmould.runs.columns import LOOP, LOOP_ERROR, finished
-from sandmould.runs.formatting import listed, number
+from sandmould.runs.formatting import display_number, listed
 
 UNTRUSTED = {"lags": "lags", "cycles": "goes in cycles", "diverged": "diverged"}
 """States of a loop whose shape is no answer, and how a sentence says them."""
@@ -139,9 +139,11 @@ def reason_text(why: str, outcome: str) -> str:
     return "not used: no value of the objective" if why else ""
 
 
-def error_text(error: float) -> str:
-    """How far a value may be off by its loop."""
-    return f"may be off by {number(error, 2)}" if np.isfinite(error) else "may be off by any amount"
+def error_text(measure: str, error: float) -> str:
+    """How far a value of a measure may be off by its loop."""
+    if not np.isfinite(error):
+        return "may be off by any amount"
+    return f"may be off by {display_number(measure, error, 2)}"
 
 
 def reasons_sentence(summary: pd.DataFrame, measure: str) -> str:

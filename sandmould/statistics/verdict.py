@@ -11,6 +11,7 @@ import pandas as pd
 
 from sandmould.runs.columns import RUN, finished
 from sandmould.runs.formatting import (
+    display_number,
     listed,
     name_of,
     number,
@@ -21,6 +22,7 @@ from sandmould.runs.formatting import (
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.evidence import (
     bounded_values,
+    error_text,
     loop_barred,
     loop_errors,
     one_way_caveat,
@@ -382,7 +384,7 @@ def _loop_caveats(
     caveats = []
     open_ones = [s for s in settings if s.loop_error > 0.0]
     if open_ones:
-        most = number(max(s.loop_error for s in open_ones), 2)
+        most = display_number(measure, max(s.loop_error for s in open_ones), 2)
         where = listed([s.label for s in open_ones]) if keys else "this setting"
         caveats.append(
             f"Not every loop between sand and pattern holds at {where}. How far the values may be "
@@ -394,14 +396,14 @@ def _loop_caveats(
     for at, rows in setting_rows(summary, keys):
         values = failed.iloc[rows].dropna()
         if len(values):
-            off = errors.loc[values.index].max()
-            said = f", may be off by {number(off, 2)}" if math.isfinite(off) else ""
+            off = error_text(measure, float(errors.loc[values.index].max()))
             where = f"{setting_text(at)}: " if keys else ""
-            gave.append(f"{where}{number(float(values.mean()), 3)} (runs: {len(values)}{said})")
+            mean = display_number(measure, float(values.mean()))
+            gave.append(f"{where}{mean} (runs: {len(values)}; {off})")
     if gave:
         caveats.append(
             "What runs gave whose loops do not hold, not counted and not to be trusted: "
-            f"{'; '.join(gave)}."
+            f"{', '.join(gave)}."
         )
     return caveats
 
