@@ -13,7 +13,7 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
 .PHONY: help install demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
-.PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop reliability fuzz benchmarks peers scaling solidification flow \
+.PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop size reliability fuzz benchmarks peers scaling solidification flow \
   reproduction
 
 help:
@@ -125,6 +125,10 @@ benchmarks: $(INSTALLED)
 ## the solver's step loop beside an earlier commit: docs/core_loop.md
 core-loop: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.core_loop $(QUICK)
+
+## memory, listings, meshes and large beds beside an earlier commit: docs/size.md
+size: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.size $(QUICK)
 
 # The peers need an older numpy, so they have an environment of their own.
 ## calibration beside other tools: docs/calibration_peers.md
