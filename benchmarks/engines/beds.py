@@ -115,7 +115,7 @@ def opened(scenario: Scenario) -> Iterator[Session]:
             session.close()
 
 
-def _falling(dimension: int) -> dict[str, Any]:
+def falling(dimension: int) -> dict[str, Any]:
     """Changes for the fall: springs that allow longer steps."""
     springs_n_m = SPRING_N_M / _SOFTER[dimension]
     law = {
@@ -130,7 +130,7 @@ def _falling(dimension: int) -> dict[str, Any]:
     }
 
 
-def _resting() -> dict[str, Any]:
+def resting() -> dict[str, Any]:
     """Changes for coming to rest with the springs as they are: in a thick oil."""
     return {
         "time_step": {"fraction": 0.8},
@@ -178,15 +178,15 @@ def settled(dimension: int, grains: int) -> Bed:
     def changed(changes: dict[str, Any]) -> Scenario:
         return scene(dimension, grains, width_m, width_m, **changes)
 
-    falling, resting = changed(_falling(dimension)), changed(_resting())
+    soft, stiff = changed(falling(dimension)), changed(resting())
     origin = {
-        "falling": falling.model_dump_json(), "resting": resting.model_dump_json(),
+        "falling": soft.model_dump_json(), "resting": stiff.model_dump_json(),
         "solver": source_hash(),
     }  # fmt: skip
 
     def settle() -> dict[str, list[Any]]:
         print(f"settling {grains} grains in {dimension}D", flush=True)
-        bed = _rested(resting, _rested(falling, None))
+        bed = _rested(stiff, _rested(soft, None))
         return {k: v.tolist() for k, v in vars(bed).items() if isinstance(v, np.ndarray)}
 
     arrays = Parts(SCRATCH / "beds", origin).get(f"bed {dimension}d {grains}", settle)
@@ -212,9 +212,11 @@ def tiled(bed: Bed, grains: int) -> Bed:
     )
 
 
-def solver_on(bed: Bed, threads: int = 1) -> Solver:
-    """Bare solver of the reference engine with a bed in it."""
-    scenario = scene(bed.dimension, bed.grains, bed.width_m, bed.depth_m, threads=threads)
+def solver_on(bed: Bed, threads: int = 1, **changes: Any) -> Solver:
+    """Bare solver of the reference engine with a bed in it, the scene changed as said."""
+    scenario = scene(
+        bed.dimension, bed.grains, bed.width_m, bed.depth_m, threads=threads, **changes
+    )
     solver = solver_of(scenario, build_program(scenario).stages[0], scenario.step_s)
     kinds = np.ones(bed.grains, dtype=np.int64)
     solver.add(grains_of(scenario, PlannedLayer(kinds, bed.radius_m, bed.position_m), 0.0, 1))

@@ -24,7 +24,7 @@ from benchmarks.engines.beds import Bed, settled, tiled
 from benchmarks.engines.timing import ratio, spread
 from benchmarks.frame import Benchmark, BenchmarkRun, render
 from benchmarks.size import worker
-from benchmarks.size.mesh import Mesh, round_pattern
+from benchmarks.size.mesh import Mesh, rested, round_pattern
 from sandmould import ROOT
 
 BEFORE = "3d986c9"
@@ -51,11 +51,12 @@ class SizeExtent:
     mesh_copies: int = 4
     mesh_cuts: int = 92
     """Of each face of the cube that becomes the pattern; 12 times the square are the triangles."""
-    resting_steps: int = 3_000
+    fall_s: float = 0.06
+    rest_s: float = 0.01
     """Until grains round the pattern rest again."""
 
 
-QUICK = SizeExtent(2, 0.05, 300, 300, 2, 50, (2,), (1, 2), 20, 2, 10, 50)
+QUICK = SizeExtent(2, 0.05, 300, 300, 2, 50, (2,), (1, 2), 20, 2, 10, 1e-4, 1e-4)
 
 
 def copied(bed: Bed, copies: int) -> Bed:
@@ -235,6 +236,7 @@ def measure_mesh(run: BenchmarkRun) -> list[dict[str, Any]]:
     extent: SizeExtent = run.extent
     plain = copied(settled(3, extent.spheres), extent.mesh_copies)
     cut, mesh = round_pattern(plain, extent.mesh_cuts)
+    cut = rested(cut, mesh, extent.fall_s, extent.rest_s)
     rows = []
     with started(_both(), plain) as boxes, started(_both(), cut, 1, mesh) as meshes:
         processes = {
@@ -242,10 +244,15 @@ def measure_mesh(run: BenchmarkRun) -> list[dict[str, Any]]:
         }
         grains = {name: (cut if "mesh" in name else plain).grains for name in processes}
         same = len({
-            ask(meshes[name], "advance", extent.resting_steps)["checksum"] for name in meshes
+            ask(meshes[name], "advance", 200)["checksum"] for name in meshes
         }) == 1  # fmt: skip
         for process in processes.values():
             ask(process, "list", 2)
+            ask(process, "advance", 20)
+        touching = {
+            name: ask(process, "touching")["contacts"] / grains[name]
+            for name, process in processes.items()
+        }
         for what in ("step", "listing"):
             costs: dict[str, list[float]] = {name: [] for name in processes}
             for _ in range(extent.turns):
@@ -260,6 +267,7 @@ def measure_mesh(run: BenchmarkRun) -> list[dict[str, Any]]:
                 "triangles": len(mesh.facets),
                 "ns_per_grain": {name: spread(values) for name, values in costs.items()},
                 "ratio": {k: ratio(costs[f"{k} mesh"], costs[f"{k} box"]) for k in meshes},
+                "touching": touching,
                 "same_digits": same,
             })  # fmt: skip
             print(rows[-1], flush=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from benchmarks.engines.beds import Bed
+from benchmarks.engines.beds import Bed, falling, resting, solver_on
 from sandmould.arrays import Floats, Ints
 
 _HALF_AXES = (0.33, 0.33, 0.09)
@@ -65,3 +66,21 @@ def round_pattern(bed: Bed, cuts: int) -> tuple[Bed, Mesh]:
         bed.spin_rad_s[clear], bed.radius_m[clear],
     )  # fmt: skip
     return rest, mesh
+
+
+def rested(bed: Bed, mesh: Mesh, fall_s: float, rest_s: float) -> Bed:
+    """Let a bed fall on a pattern with softer springs, and come to rest with its own."""
+    for changes, time_s in ((falling(3), fall_s), (resting(), rest_s)):
+        solver = solver_on(bed, **changes)
+        solver.surfaces.add_facets("pattern", *mesh)
+        solver.place(bed.position_m, bed.velocity_m_s, bed.spin_rad_s)
+        solver.advance(np.zeros(round(time_s / solver.scene.dt) + 2))
+        velocity, spin = solver.whole_step_velocities()
+        order = np.argsort(solver.grains.id)
+        bed = replace(
+            bed,
+            position_m=solver.grains.position[order],
+            velocity_m_s=velocity[order],
+            spin_rad_s=spin[order],
+        )
+    return bed

@@ -1,8 +1,8 @@
 """One bed in one source tree, asked for times and memory line by line on standard input.
 
 ``python worker.py TREE BED.npz THREADS [MESH.npz]``: it imports from ``TREE`` alone, so that two
-trees can be measured in turns. Lines are ``advance STEPS``, ``shake STEPS``, ``list TIMES`` and
-``memory``.
+trees can be measured in turns. Lines are ``advance STEPS``, ``shake STEPS``, ``list TIMES``,
+``touching`` and ``memory``.
 """
 
 from __future__ import annotations
@@ -94,6 +94,10 @@ class _Worker:
                 self.solver.advance(np.zeros(3))
             cpu_s.append(time.process_time() - begun)
         return {"cpu_s": (cpu_s[0] - cpu_s[1]) / times}
+
+    def touching(self, _: int) -> dict[str, Any]:
+        """Contacts of grains with surfaces."""
+        return {"contacts": int(self.solver.moving.walls.history.used.sum())}
 
     def memory(self, _: int) -> dict[str, Any]:
         """Bytes between steps by array and as the kernel counts them, and the most in a listing."""
