@@ -99,7 +99,7 @@ def test_wall_times_as_slurm_writes_them() -> None:
     ("keys", "asked_min", "said"),
     [
         ({}, None, ""),
-        ({"partition": "short"}, 60, "at most 60.0 min, the limit of partition short; "),
+        ({"partition": "short"}, 60, "at most 60.0 min, the limit of partition short. "),
         ({"partition": "long", "longest_wall_h": 2}, 120, "at most 2.0 h, longest_wall_h of clu"),
         ({"partition": "short", "longest_wall_h": 2}, 60, "the limit of partition short"),
         ({"partition": "long,short"}, 60, "the limit of partition short"),
@@ -125,9 +125,7 @@ def test_a_longer_run_is_told_to_go_on_in_the_next_job(plan: Plan) -> None:
     cluster(partition="short")
     (said,) = submission(plan).said
     jobs = -(-plan.runtime_min(plan.runs[0].run) // 60)
-    assert said.endswith(
-        f": it may take {jobs} jobs, each of which goes on from the last checkpoint."
-    )
+    assert said.endswith(f" It may take {jobs} jobs; each goes on from the last checkpoint.")
 
 
 def test_slurm_judges_what_will_be_submitted(slurm: Slurm, plan: Plan) -> None:

@@ -117,7 +117,7 @@ def test_work_of_a_fill_is_counted_once(tmp_path: Path) -> None:
     assert "4 runs, " in text
     assert "The 4 runs start from 2 fills of the box. A fill is computed once" in text
     room = size_text(sum(PLANNING.state_bytes(fill.scenario) for fill in plan.fills))
-    assert f"together they take about {room} of the disk." in text
+    assert f"Together the fills take about {room} of the disk." in text
 
 
 def test_a_plan_writes_fills_beside_the_runs(tmp_path: Path) -> None:
