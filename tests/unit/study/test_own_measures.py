@@ -231,7 +231,8 @@ def test_names_of_all_columns_of_runs_are_taken() -> None:
     }
     of_measures = {
         columns.SOLID_FRACTION, columns.BED_HEIGHT_M, columns.CLASSIFICATION, columns.LOOP,
-        columns.LOOP_ERROR, columns.HOPS, columns.SOLIDIFICATION_TIME_S, columns.OVERLAP_P99_FRACTION,
+        columns.LOOP_ERROR, columns.HOPS, columns.SOLIDIFICATION_TIME_S,
+        columns.OVERLAP_P99_FRACTION,
     }  # fmt: skip
     of_cells = {columns.SWEEP, columns.CROSS_CHECK, columns.CROSS_CHECK_OWN, columns.CONTROL}
     costs = {f.name for kind in (ElementCost, FlowCost) for f in dataclasses.fields(kind)}
