@@ -53,11 +53,8 @@ class LooseZone:
 class LooseSand:
     """Loose sand of a bed."""
 
-    bed_fraction: float
-    """Median of the local solid fraction where a ball meets no surface; NaN where there is no such
-    place."""
     loose_fraction: float
-    """Share of the bed's places at which sand lies loose."""
+    """Share of the bed's places at which sand lies loose; NaN without places."""
     side_fraction: dict[Side, float]
     """The same of the places on each side of the solids; NaN where there are none."""
     zones: tuple[LooseZone, ...]
@@ -90,16 +87,14 @@ def find_loose_sand(position_m: Array, radius_m: Array, scene: Scene, grain_m: f
     clear_m = np.minimum(from_solid_m, from_wall_m)
     is_place = is_buried & (clear_m > 0.0)
     if not is_place.any():
-        return LooseSand(np.nan, np.nan, dict.fromkeys(SIDES, np.nan), ())
+        return LooseSand(np.nan, dict.fromkeys(SIDES, np.nan), ())
     points_m, clear_m = grid[is_place], clear_m[is_place]
     at_places = _local_fraction(points_m, position_m, radius_m, scene, ball_m, clear_m)
     usual = _usual_fraction(at_places, clear_m, ball_m, cell_m)
     local, loose = np.zeros(is_place.shape), np.zeros(is_place.shape, dtype=np.bool_)
     local[is_place], loose[is_place] = at_places, at_places < LOOSE * usual
     side = _sides(from_solid_m, 2.0 * ball_m)
-    far = at_places[clear_m >= ball_m]
     return LooseSand(
-        float(np.median(far)) if len(far) else np.nan,
         float(loose[is_place].mean()),
         {
             name: float(loose[at].mean()) if (at := is_place & (side == number)).any() else np.nan

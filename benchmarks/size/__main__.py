@@ -123,6 +123,19 @@ def _steps(extent: SizeExtent, bed: Bed) -> int:
     return max(10, round(extent.turn_s / (80e-9 * bed.grains)))
 
 
+def _in_turns(
+    processes: dict[str, Any], bed: Bed, steps: int, turns: int, clock: str
+) -> dict[str, list[float]]:
+    """Cost of a grain-step in each turn, ns, by one of the clocks; a turn before is not counted."""
+    costs: dict[str, list[float]] = {name: [] for name in processes}
+    for turn in range(turns + 1):
+        for name, process in processes.items():
+            spent_s = ask(process, "advance", steps)[clock]
+            if turn:
+                costs[name].append(1e9 * spent_s / (steps * bed.grains))
+    return costs
+
+
 def measure_memory(run: BenchmarkRun) -> list[dict[str, Any]]:
     """Bytes per grain before and now, at rest and then shaken; one process at a time."""
     extent: SizeExtent = run.extent
@@ -187,13 +200,7 @@ def measure_threads(run: BenchmarkRun) -> list[dict[str, Any]]:
         bed = copied(settled(3, extent.spheres), copies)
         with started(_both(), bed) as one, started(_both(), bed, 2) as two:
             processes = {f"{k} {n}": p for n, s in ((1, one), (2, two)) for k, p in s.items()}
-            steps = _steps(extent, bed)
-            costs: dict[str, list[float]] = {name: [] for name in processes}
-            for turn in range(extent.turns + 1):
-                for name, process in processes.items():
-                    wall_s = ask(process, "advance", steps)["wall_s"]
-                    if turn:
-                        costs[name].append(1e9 * wall_s / (steps * bed.grains))
+            costs = _in_turns(processes, bed, _steps(extent, bed), extent.turns, "wall_s")
         rows.append({
             "bed": bed.name,
             "ns_per_grain_step": {name: spread(values) for name, values in costs.items()},
@@ -210,17 +217,10 @@ def measure_scale(run: BenchmarkRun) -> list[dict[str, Any]]:
     rows = []
     for copies in extent.scale_copies:
         bed = copied(settled(3, extent.spheres), copies)
-        largest = copies == extent.scale_copies[-1]
-        steps = _steps(extent, bed)
-        costs: dict[str, list[float]] = {"before": [], "now": []}
-        if largest:
-            steps = extent.largest_steps // extent.turns
+        is_largest = copies == extent.scale_copies[-1]
+        steps = extent.largest_steps // extent.turns if is_largest else _steps(extent, bed)
         with started(_both(), bed) as both:
-            for turn in range(extent.turns + 1):
-                for name, process in both.items():
-                    cpu_s = ask(process, "advance", steps)["cpu_s"]
-                    if turn:
-                        costs[name].append(1e9 * cpu_s / (steps * bed.grains))
+            costs = _in_turns(both, bed, steps, extent.turns, "cpu_s")
         rows.append({
             "bed": bed.name,
             "steps": steps * extent.turns,

@@ -14,17 +14,11 @@ from sandmould.report.next_steps import NextSteps
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
 from sandmould.report.robustness import RobustnessPages, follows_springs
 from sandmould.report.sureness import Ground
-from sandmould.report.tables import (
-    OF_BED,
-    Cell,
-    Column,
-    KeyNumber,
-    Table,
-    filled_space,
-    share_of_what_fits,
-)
+from sandmould.report.tables import Cell, Column, KeyNumber, Table, share_of_what_fits
 from sandmould.runs.formatting import (
+    OF_BED,
     display_scale,
+    filled_space,
     listed,
     name_of,
     number,

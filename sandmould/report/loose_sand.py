@@ -50,13 +50,13 @@ def loose_sand_pages(
     row = summary.loc[summary[RUN] == run].iloc[0]
     shares = {side: float(row[f"loose_{side}_fraction"]) for side in (*_SIDES, "away")}
     near = [
-        f"{_percent(shares[side])} of those {words} them"
+        f"{_percent(shares[side])} of the places {words} the obstacles"
         for side, words in _SIDES.items()
         if math.isfinite(shares[side])
     ]
-    sentence = f"Places near the obstacles at which sand lies loose: {listed(near, most=3)}."
+    sentence = f"Sand lies loose at {listed(near, most=len(_SIDES))}."
     if math.isfinite(shares["away"]):
-        sentence += f" Of those farther away it is {_percent(shares['away'])}: corners, and chance."
+        sentence += f" Farther away it is {_percent(shares['away'])}: corners, and chance."
     zones = pd.read_csv(path, sep="\t")
     more = len(zones) - _LISTED
     note = f"{more} smaller zones are in {LOOSE_ZONES} of the run." if more > 0 else ""

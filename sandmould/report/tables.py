@@ -35,7 +35,15 @@ from sandmould.runs.columns import (
     finished,
     total_s,
 )
-from sandmould.runs.formatting import number, seconds, size, titled, with_margin
+from sandmould.runs.formatting import (
+    OF_BED,
+    filled_space,
+    number,
+    seconds,
+    size,
+    titled,
+    with_margin,
+)
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.agreement import sweep_part
@@ -86,14 +94,6 @@ class Table:
     marked: tuple[bool, ...]
     note: str = ""
     """What it leaves out."""
-
-
-OF_BED = "_fill_of_bed_fraction"
-
-
-def filled_space(measure: str) -> str:
-    """Name of the tube or cavity whose fill a measure is; the measure itself for others."""
-    return measure.removesuffix(OF_BED).removesuffix("_fill_fraction")
 
 
 def share_of_what_fits(

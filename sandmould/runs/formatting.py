@@ -65,7 +65,13 @@ _ONE_NUMBER = 1e-9
 """Numbers that differ by less, as a share, are one: round-off of a unit."""
 
 
-_OF_BED = "_fill_of_bed_fraction"
+FILL, OF_BED = "_fill_fraction", "_fill_of_bed_fraction"
+"""Ends of the measures of a filled space: over its own space, and over what fits."""
+
+
+def filled_space(measure: str) -> str:
+    """Name of the tube or cavity whose fill a measure is; the measure itself for others."""
+    return measure.removesuffix(OF_BED).removesuffix(FILL)
 
 
 def unit_of(key: str) -> str:
@@ -84,11 +90,9 @@ def name_of(key: str) -> str:
     last = key.rsplit(".", 1)[-1]
     if key in _NAMES or last in _NAMES:
         return _NAMES.get(key) or _NAMES[last]
-    if last.endswith("_fill_fraction"):
-        return f"fill of the {last.removesuffix('_fill_fraction').replace('_', ' ')}"
-    if last.endswith(_OF_BED):
-        space = last.removesuffix(_OF_BED).replace("_", " ")
-        return f"fill of the {space} as a share of what fits"
+    if (space := filled_space(last)) != last:
+        share = " as a share of what fits" if last.endswith(OF_BED) else ""
+        return f"fill of the {space.replace('_', ' ')}{share}"
     for ending, what in _OF_PROBE.items():
         if last.endswith(ending):
             return f"{what} at {last.removesuffix(ending).replace('_', ' ')}"

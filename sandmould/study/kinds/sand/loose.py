@@ -31,7 +31,7 @@ def add_loose_sand(table: pd.DataFrame, loose: LooseSand | None) -> pd.DataFrame
     if loose is None or table.empty:
         return table
     largest = loose.zones[0].measure if loose.zones else 0.0
-    found = {
+    columns = {
         "loose_fraction": loose.loose_fraction,
         "loose_under_fraction": loose.side_fraction["under"],
         "loose_over_fraction": loose.side_fraction["over"],
@@ -40,7 +40,7 @@ def add_loose_sand(table: pd.DataFrame, loose: LooseSand | None) -> pd.DataFrame
         "loose_zones": len(loose.zones),
         "largest_loose_zone_m3": largest,
     }
-    for name, value in found.items():
+    for name, value in columns.items():
         table.loc[table.index[-1], name] = value
     return table
 

@@ -151,8 +151,12 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = (
                 "Share of the bed where sand lies loose: in a ball of three mass-median grains it "
                 "is below 0.9 of what the bed has as far from a surface.",
             ),
-            Measure("loose_under_fraction", "The same of the places straight under an obstacle."),
-            Measure("loose_over_fraction", "The same of those straight over one."),
+            Measure(
+                "loose_under_fraction",
+                "The same of the places straight under an obstacle, within three such grains of "
+                "it.",
+            ),
+            Measure("loose_over_fraction", "The same of those straight over one, as near."),
             Measure("loose_beside_fraction", "The same of those near one, and neither of both."),
             Measure("loose_away_fraction", "The same of those farther than three grains away."),
             Measure("loose_zones", "Zones of loose sand at least as large as a grain."),

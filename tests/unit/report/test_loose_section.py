@@ -1,0 +1,86 @@
+"""Loose sand of a 3D run: its row of measures, its table of zones, and what the report says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sandmould.engines.snapshot import Snapshot
+from sandmould.report.loose_sand import loose_sand_pages
+from sandmould.runs.columns import RUN
+from sandmould.scenario.sand import Sand
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.kinds.sand.loose import (
+    LOOSE_ZONES,
+    add_loose_sand,
+    last_loose_sand,
+    write_loose_zones,
+)
+
+GRAIN_M = 0.001
+PLATE = {"kind": "plate", "name": "part", "centre_m": [0.007, 0.007, 0.009],
+         "size_m": [0.006, 0.006, 0.002]}  # fmt: skip
+
+
+def scene(**keys: object) -> Scenario:
+    """A plate in a small box, for grains whose median is 1 mm."""
+    scale = GRAIN_M / Sand(size_scale=1.0).mass_median_diameter_m
+    box = {"width_m": 0.014, "depth_m": 0.014, "height_m": 0.02}
+    of_scene = {"dimension": 3, "box": box, "obstacles": [PLATE], "sand": {"size_scale": scale}}
+    return Scenario.model_validate(of_scene | keys)
+
+
+def hollow() -> np.ndarray:
+    """Spheres in rows round the plate; 108 are missing under it."""
+    axes = [GRAIN_M * (np.arange(n) + 0.5) for n in (14, 14, 16)]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    for middle, half in (([7.0, 7.0, 9.0], [3.0, 3.0, 1.0]), ([7.0, 7.0, 6.5], [3.0, 3.0, 1.5])):
+        outside = np.abs(places / GRAIN_M - middle) > np.array(half) + 0.01
+        places = places[outside.any(axis=1)]
+    return places
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Results of a study with one run that has one snapshot."""
+    places = hollow()
+    ids, none = np.arange(1, len(places) + 1), np.zeros((len(places), 3))
+    radius = np.full(len(places), GRAIN_M / 2)
+    still = Snapshot(0.1, np.nan, "settle_1", ids, np.ones_like(ids), places, none, none, radius)
+    (tmp_path / "runs" / "one" / "snapshots").mkdir(parents=True)
+    still.save(tmp_path / "runs" / "one" / "snapshots" / "000000.npz")
+    return tmp_path
+
+
+def test_a_hollow_under_a_plate_is_measured_and_told(folder: Path) -> None:
+    run = folder / "runs" / "one"
+    loose = last_loose_sand(scene(), run)
+    assert loose is not None
+    table = add_loose_sand(pd.DataFrame({"time_s": [0.0, 0.1]}), loose)
+    first, last = table.to_dict("records")
+    assert np.isnan(first["loose_fraction"])
+    assert last["loose_over_fraction"] == 0.0
+    assert last["loose_zones"] == 1
+    write_loose_zones(loose, run / LOOSE_ZONES)
+    pages = loose_sand_pages(folder, "one", pd.DataFrame([{RUN: "one", **last}]), scene())
+    assert pages is not None
+    assert last["loose_under_fraction"] == 1.0
+    sentence = (
+        "Sand lies loose at 100 % of the places straight under the obstacles, 0 % of the places"
+    )
+    assert pages.sentence.startswith(sentence)
+    (row,) = pages.table.rows
+    assert [cell.text for cell in row[:2]] == ["under", "7, 7, 6"]
+    assert float(row[3].sort) == pytest.approx(
+        last["largest_loose_zone_m3"] / (np.pi / 6 * GRAIN_M**3), rel=1e-4
+    )
+    assert pages.note == ""
+
+
+def test_none_is_sought_in_2d_without_obstacles_or_through_a_gate(folder: Path) -> None:
+    assert last_loose_sand(Scenario(dimension=3), folder / "runs" / "one") is None
+    assert last_loose_sand(Scenario(), folder / "runs" / "one") is None
+    assert loose_sand_pages(folder, "one", pd.DataFrame([{RUN: "one"}]), scene()) is None
