@@ -5,6 +5,8 @@ Without a folder of one's own nothing is kept.
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -40,7 +42,7 @@ def njit(**options: Any) -> Callable[[_Function], _Function]:
     """Compile a function for compiled code and for Python; options are those of ``numba.njit``."""
 
     def compiled(function: _Function) -> _Function:
-        dispatcher: Any = numba.njit(cache=KEEPS, **options)(function)
+        dispatcher: Any = _saved_alone(numba.njit(cache=KEEPS, **options)(function))
         if not options.get("parallel"):  # loading one of these may start threads
             DISPATCHERS[f"{function.__module__}.{function.__qualname__}"] = dispatcher
         return dispatcher
@@ -51,4 +53,24 @@ def njit(**options: Any) -> Callable[[_Function], _Function]:
 def cfunc(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function that C code calls by its ``address``; options as ``numba.cfunc``."""
     compiled: Callable[[Callable[..., Any]], Any] = numba.cfunc(signature, cache=KEEPS, **options)
+    return lambda function: _saved_alone(compiled(function))
+
+
+def _saved_alone(compiled: Any) -> Any:
+    """Let one process at a time keep machine code of a function.
+
+    Two that keep it for other types at once give both the same file: later processes would load
+    the code of the other types, and some of them crash (numba's issue 10128).
+    """
+    if KEEPS:
+        file = compiled._cache._cache_file
+        save = file.save
+
+        def alone(*given: Any) -> None:
+            with (FOLDER / "saving").open("w") as lock:
+                with contextlib.suppress(OSError):  # a file system without locks
+                    fcntl.flock(lock, fcntl.LOCK_EX)
+                save(*given)
+
+        file.save = alone
     return compiled

@@ -45,7 +45,7 @@ def load(scenario: Any, ahead: bool = True) -> None:
 
 def load_kept(scenario: Any) -> None:
     """Load compiled code that runs like this one have needed: it takes longer than a short run."""
-    with contextlib.suppress(ValueError, LookupError, TypeError, AttributeError):  # a damaged file
+    with contextlib.suppress(Exception):  # a damaged file; what is not loaded is compiled later
         load_kernels(kept_kernels(_class_of(scenario)) - loaded_kernels())
 
 

@@ -76,6 +76,8 @@ class Screen:
         self._ended: list[Ended] = []
         self._so_far: SoFar | None = None
         self._time_left: TimeLeft | None = None
+        self._begun = False
+        """Whether a run has begun."""
         self._whole = whole
         self._begun_s = time.monotonic()
         self._next_line_s = self._begun_s + LINE_EVERY_S
@@ -147,7 +149,7 @@ class Screen:
             self._print("A failed run is computed once more by: sandmould again RUN")
 
     def _learn(self, run: str) -> None:
-        self._time_left_known().learn(run, computed_wall_s(self._folders[run]))
+        self._time_left_known(begun=True).learn(run, computed_wall_s(self._folders[run]))
 
     def _end(self, run: Ended) -> None:
         self._so_far_known().add([run.run])
@@ -157,13 +159,14 @@ class Screen:
             self._done += 1
             self._ended.append(run)
 
-    def _time_left_known(self) -> TimeLeft:
-        """What foretells the time: made late, since a start measures the machine's speed first."""
-        if self._time_left is None:
+    def _time_left_known(self, begun: bool = False) -> TimeLeft:
+        """What foretells the time: made anew until a run begins, once the speed is measured."""
+        if self._time_left is None or not self._begun:
             every = (*self._plan.fills, *self._plan.runs)
             self._time_left = TimeLeft(every, stored_speeds(self._plan, self._results))
             for run in self._whole:
-                self._learn(run)
+                self._time_left.learn(run, computed_wall_s(self._folders[run]))
+            self._begun = begun or bool(self._watch.running)
         return self._time_left
 
     def _so_far_known(self) -> SoFar:

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -33,16 +34,19 @@ def house(tmp_path: Path) -> Path:
     return tmp_path / "house"
 
 
-def printed(house: Path, script: str) -> str:
-    """What a script prints that imports the rooms of a copy."""
-    environment = os.environ | {
+def alone_in(house: Path) -> dict[str, str]:
+    """Environment in which a copy of the rooms is imported."""
+    return os.environ | {
         "PYTHONPATH": str(house),
         "XDG_CACHE_HOME": str(house / "cache"),
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    ran = subprocess.run(
-        [sys.executable, "-c", script], env=environment, cwd=house, capture_output=True, text=True
-    )
+
+
+def printed(house: Path, script: str, *given: str) -> str:
+    """What a script prints that imports the rooms of a copy."""
+    command = [sys.executable, "-c", script, *given]
+    ran = subprocess.run(command, env=alone_in(house), cwd=house, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
     return ran.stdout.strip()
 
@@ -110,6 +114,44 @@ def test_an_edited_callee_is_compiled_again(
     assert text.count(old) == 1
     (house / callee).write_text(text.replace(old, new), encoding="utf-8")
     assert (before, printed(house, script)) == numbers
+
+
+SLOW = """
+import sys, time
+from numba.core.caching import IndexDataCacheFile
+from pathlib import Path
+save_index = IndexDataCacheFile._save_index
+def slowly(self, overloads):
+    if "grow" in self._index_name:
+        Path(f"saving_{sys.argv[1]}").touch()
+        time.sleep(1.0)
+    save_index(self, overloads)
+IndexDataCacheFile._save_index = slowly
+"""
+GROW = """
+import sys
+sys.path.insert(0, ".")
+from grow import grow
+from numba import types
+grow.compile((getattr(types, sys.argv[1]),))
+print(*(str(s[0]) for s in grow.signatures), sum(grow.stats.cache_hits.values()))
+"""
+
+
+def test_two_processes_that_keep_a_function_at_once_do_not_mix_it_up(house: Path) -> None:
+    kernel = "from sandmould.compiled import njit\n@njit()\ndef grow(x):\n    return x + 1\n"
+    (house / "grow.py").write_text(kernel, encoding="utf-8")
+    command = [sys.executable, "-c", SLOW + GROW]
+    first = subprocess.Popen([*command, "float64"], env=alone_in(house), cwd=house)
+    while not (house / "saving_float64").exists():
+        assert first.poll() is None
+        time.sleep(0.01)
+    subprocess.run([*command, "int64"], env=alone_in(house), cwd=house, check=True)
+    assert first.wait() == 0
+    assert [printed(house, GROW, kind) for kind in ("float64", "int64")] == [
+        "float64 1",
+        "int64 1",
+    ]
 
 
 def test_what_is_compiled_is_kept_for_the_next_process(house: Path) -> None:

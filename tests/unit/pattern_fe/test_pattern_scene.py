@@ -193,8 +193,13 @@ def test_a_mesh_file_of_tetrahedra_meets_the_sand(tmp_path: Path) -> None:
         ({}, {"loop": {"scheme": "monolithic"}}, r"scheme = 'monolithic' .* another scheme in 3D"),
         (
             {},
-            {"loop": {"scheme": "in_step"}, "element_m": 0.002},
-            r"element_m = 0.002 .* at most 5,000 components of a surface",
+            {"loop": {"scheme": "in_step"}, "element_m": 0.005},
+            r"element_m = 0.005 .* at most 5,000 components of a surface",
+        ),
+        (
+            {},
+            {"element_m": 0.002},
+            r"element_m = 0.002 .* at most 20,000 tetrahedra .* not 180,000",
         ),
         (
             {

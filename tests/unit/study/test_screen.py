@@ -15,6 +15,7 @@ from rich.console import Console
 from sandmould.runs import words
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.definition.run import LAST_MEASURED
+from sandmould.study.kinds.sand import speed
 from sandmould.study.plan.build_plan import Plan, announce, open_plan
 from sandmould.study.run_study import stated_cores
 from sandmould.study.screen.ending import last_line, trouble
@@ -159,6 +160,25 @@ def test_plain_lines_tell_the_whole_study_now_and_then(
     assert line.endswith(
         " left; so far: fill of the tube 0.500 (1 run); nothing to compare with yet"
     )
+
+
+def test_the_time_left_knows_a_speed_that_is_measured_after_the_first_line(
+    plan: Plan, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sandmould.study.screen.screen.LINE_EVERY_S", 0.0)
+    screen = Screen(plan, RESULTS, 2, live=False)
+    screen.look()
+    monkeypatch.setattr(speed, "_measure_rate", lambda scenario: 1.0)  # a very slow machine
+    speed.measured_rate(plan.runs[0].scenario, RESULTS)
+    screen.look()
+    guessed, measured = capsys.readouterr().err.splitlines()
+    assert guessed.endswith((" s left", " min left"))
+    assert measured.endswith(" days left")
+    (STUDY / "runs" / plan.runs[0].run / "lock").write_text("")
+    screen.look()
+    (RESULTS / speed.STORED).unlink()  # nothing is looked up again once a run has begun
+    screen.look()
+    assert all(line.endswith(" days left") for line in capsys.readouterr().err.splitlines())
 
 
 def test_failures_of_an_earlier_start_are_told_at_the_end(

@@ -47,8 +47,8 @@ def measured_rate(scenario: Scenario, results: Path) -> float | None:
         rate = _measure_rate(scenario)
         if rate is None:
             return None
-        rates[machine] = rate
         results.mkdir(parents=True, exist_ok=True)
+        rates = {**_rates(results), machine: rate}  # another start may have measured meanwhile
         (results / STORED).write_text(json.dumps(rates, indent=1), encoding="utf-8")
     return rates[machine]
 
