@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould.runs.parent import call_process, end_with_parent
+from sandmould.runs.words import say
 from sandmould.study.forked import END_SIGNALS, fork, print_to
 
 PLACE = "SANDMOULD_STANDBY"
@@ -60,7 +61,7 @@ def _do(work: str, given: Iterable[Any]) -> None:
 
 
 def _done_elsewhere(work: str, given: Collection[Any]) -> int | None:
-    """Have the process that stands by do some work; its exit status, None where there is none."""
+    """Have the process that stands by do some work; its exit status, None where it ended first."""
     place = os.environ.get(PLACE)
     if not place:
         return None
@@ -75,9 +76,12 @@ def _done_elsewhere(work: str, given: Collection[Any]) -> int | None:
             socket.send_fds(line, [b"\n"], [1, 2])
             line.sendall(json.dumps(job).encode() + b"\n")
             status = line.makefile().readline()
-    if not status:
-        raise SystemExit("the process that loads what runs need was killed")
-    return int(status)
+    if status:
+        return int(status)
+    if os.path.exists(place):
+        say("the process that loads what runs need was killed: this job goes on by itself")
+        return None
+    raise SystemExit("the command that started this job has ended")
 
 
 @contextlib.contextmanager
@@ -105,6 +109,7 @@ def standing_by(scenarios: Collection[Any]) -> Iterator[None]:
         yield
     finally:
         del os.environ[PLACE]
+        os.unlink(place)  # jobs see by this that they are to end, too
         with contextlib.suppress(ProcessLookupError):
             os.killpg(pid, signal.SIGKILL)
         os.waitpid(pid, 0)
