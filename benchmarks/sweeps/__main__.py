@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.sweeps --old FOLDER`` writes docs/scaling.md. FOLDER is a checkout of the
 older version with its own ``.venv``, such as one that ``git worktree add`` makes and
-``make quick`` sets up. ``--part thousand_in_turns`` runs a thousand short runs with both, once:
-some 2 000 s of a core with a version that starts a process for each run, 250 s with a worker.
+``make quick`` sets up. ``--part thousand_runs`` runs a thousand short runs with both, once:
+some 1 700 s of a core with a version that starts a process for each run, 200 s with a worker.
 """
 
 from __future__ import annotations
@@ -265,20 +265,6 @@ def _one_run(run: BenchmarkRun) -> dict[str, Any]:
     return {"core_s": rows, "load": round(os.getloadavg()[0], 1), "commits": _commits(versions)}
 
 
-def _alone(name: str, run: BenchmarkRun) -> dict[str, Any]:
-    """A study too long for turns, with this version alone; kernels are compiled before."""
-    folder = SCRATCH / "sweeps"
-    for turn, study in (("warm_up", LITTLE["short_runs"]), ("study", run.extent[name])):
-        place = folder / f"{name}_{turn}"
-        place.mkdir(parents=True, exist_ok=True)
-        (place / f"{name}.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
-    _measured(_python(ROOT), ROOT, folder / f"{name}_warm_up" / f"{name}.yaml")
-    load_before = os.getloadavg()[0]
-    row = _measured(_python(ROOT), ROOT, folder / f"{name}_study" / f"{name}.yaml")
-    load = [round(load_before, 1), round(os.getloadavg()[0], 1)]
-    return {"row": row, "load": load, "commit": _commits({"new": ROOT})["new"]}
-
-
 def _report(run: BenchmarkRun) -> dict[str, Any]:
     """Core time of ``sandmould report``: tables, page and figures of finished runs, in turns."""
     versions = {"new": ROOT} if run.options.old == ROOT else _versions(run)
@@ -338,11 +324,9 @@ def page(results: dict[str, Any]) -> str:
     one_run = results["one_run"]
     medians = {version: median(rows) for version, rows in one_run["core_s"].items()}
     values["one_run"] = {**one_run, "median": medians}
-    values["thousand"] = results["thousand_runs"]
+    values["thousand"] = _compared(results["thousand_runs"])
     if "report" in results:
         values["report"] = results["report"]
-    if "thousand_in_turns" in results:
-        values["in_turns"] = _compared(results["thousand_in_turns"])
     values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)
 
@@ -355,17 +339,14 @@ def _add_options(parser: ArgumentParser) -> None:
 BENCHMARK = Benchmark(
     __file__,
     __doc__,
-    by_default=(
-        *STUDIES, "same_answer", "first_step", "one_run", "thousand_runs", "origin",
-    ),
+    by_default=(*STUDIES, "same_answer", "first_step", "one_run", "origin"),
     parts={
         **{name: partial(_in_turns, name) for name in STUDIES},
         "same_answer": _same_answer,
         "first_step": _first_step,
         "one_run": _one_run,
-        "thousand_runs": partial(_alone, "thousand_runs"),
+        "thousand_runs": partial(_in_turns, "thousand_runs", turns=1),
         "report": _report,
-        "thousand_in_turns": partial(_in_turns, "thousand_runs", turns=1),
         "origin": lambda run: run.origin,
     },
     pages={"scaling.md": page},

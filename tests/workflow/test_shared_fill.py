@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -132,13 +133,27 @@ def test_a_branch_with_a_pattern_too(scheme: str, tmp_path: Path) -> None:
     assert_same(shorter, computed(scene, tmp_path / "straight"))
 
 
+def plank_on(make: Callable[..., Scenario], **loop: Any) -> Scenario:
+    """A foam plank under ten discs, on the engine of a maker of scenes."""
+    plank = {key: value for key, value in PLANK.items() if key != "engine"}
+    changes = {
+        "pattern": {**PLANK["pattern"], "loop": loop},
+        "fill": {"layers": [{"count": 10}]},
+        "vibration": [{"acceleration_g": 0.5, "frequency_hz": 15.0, "duration_s": 0.02}],
+        "rest": SOON,
+    }
+    return with_surface(make(**{**plank, **changes}))
+
+
 @pytest.mark.parametrize(
     "scene",
     [
         tube_scene(rest=SOON),
+        plank_on(tube_scene, scheme="measured"),
         pytest.param(liggghts_scene(rest={**SOON, "load_tolerance": 0.3}), marks=needs_liggghts),
+        pytest.param(plank_on(liggghts_scene, scheme="aitken", repeats=0), marks=needs_liggghts),
     ],
-    ids=["lammps", "liggghts"],
+    ids=["lammps", "lammps with a pattern", "liggghts", "liggghts with a pattern"],
 )
 def test_decks_go_on_from_the_end_of_a_fill(scene: Scenario, tmp_path: Path) -> None:
     """The shaken sand stands where the straight run's does, to what a restart loses."""

@@ -88,10 +88,12 @@ COMMAND = [
 ]  # fmt: skip
 
 
-def start(slurm: SlurmNode, folder: Path, log: Path) -> subprocess.Popen[bytes]:
+def start(
+    slurm: SlurmNode, folder: Path, log: Path, command: list[str] = COMMAND
+) -> subprocess.Popen[bytes]:
     with log.open("wb") as file:
         return subprocess.Popen(
-            COMMAND, cwd=folder, env=slurm.environment, stdout=file, stderr=file,
+            command, cwd=folder, env=slurm.environment, stdout=file, stderr=file,
             start_new_session=True,
         )  # fmt: skip
 
@@ -100,6 +102,32 @@ def call(slurm: SlurmNode, folder: Path, *command: str) -> subprocess.CompletedP
     return subprocess.run(
         command, cwd=folder, env=slurm.environment, capture_output=True, text=True, timeout=LIMIT_S
     )
+
+
+@pytest.mark.slow
+def test_without_shared_jobs_each_asks_what_the_partition_gives(
+    slurm: SlurmNode, tmp_path: Path
+) -> None:
+    folder, log = study_folder(tmp_path / "study", STUDY), tmp_path / "log"
+    alone = [each.replace("batch_wall_s=8", "batch_wall_s=0") for each in COMMAND]
+    process = start(slurm, folder, log, alone)
+    small = folder / "results" / "small"
+    told: dict[str, str] = {}
+    wait_for(
+        lambda: bool(told.update(slurm.told("%P %l %k")) or [*small.glob("runs/*/outcome.json")]),
+        process,
+        log,
+    )
+    names = {
+        f"{rule}_wildcards_{path.name}"
+        for rule, place in (("render", "runs"), ("fill", "fills"), ("simulate", "runs"))
+        for path in (small / place).iterdir()
+    }
+    assert set(told.values()) <= {f"short 5:00 rule_{name}" for name in names}
+    assert len(told) >= 6 + 2 + 1
+    process.send_signal(signal.SIGINT)
+    assert process.wait(LIMIT_S) == 130
+    assert slurm.jobs() == {}
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ rule render:
     resources:
         **SUBMITTED,
         mem_mb=1000,
-        runtime=10,
+        runtime=SUBMISSION.runtime_min(10),
     message:
         "Render the deck of {wildcards.run}"
     script:
@@ -109,7 +109,7 @@ rule measure:
     resources:
         **SUBMITTED,
         mem_mb=2000,
-        runtime=30,
+        runtime=SUBMISSION.runtime_min(30),
     message:
         "Measure {wildcards.run}"
     script:
