@@ -72,9 +72,14 @@ class SlurmNode:
                 memory_mb=os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2**21,
             )
         )
+        # Snakemake's jobs hide SLURM_CONF from srun, which then looks at the cluster's usual place.
+        srun = folder / "bin" / "srun"
+        srun.parent.mkdir()
+        srun.write_text(f'#!/bin/sh\nSLURM_CONF={conf} exec {shutil.which("srun")} "$@"\n')
+        srun.chmod(0o755)
         self.environment = os.environ | {
             "SLURM_CONF": str(conf),
-            "PATH": f"{os.environ['PATH']}:/usr/sbin",
+            "PATH": f"{srun.parent}:{os.environ['PATH']}:/usr/sbin",
         }
 
     def start(self) -> None:
