@@ -4,6 +4,7 @@
 older version with its own ``.venv``, such as one that ``git worktree add`` makes and
 ``make quick`` sets up. ``--part thousand_runs`` runs a thousand short runs with both, once:
 some 1 700 s of a core with a version that starts a process for each run, 200 s with a worker.
+``--part same_answer_on_slurm`` wants Debian's slurmd and a machine without other work.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import resource
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from argparse import ArgumentParser
 from collections.abc import Mapping
@@ -29,8 +31,15 @@ from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import read_summary
 from sandmould.study.run_tables import read_costs
+from tests.workflow.slurm_node import SlurmNode
 
 CORES = 2
+ON_CORES = ["--cores", str(CORES)]
+ON_SLURM = [
+    "--", "--workflow-profile", "slurm", "--config", "batch_wall_s=300", f"batch_cores={CORES}",
+    "--default-resources", "mem_mb=500", "runtime=30",
+]  # fmt: skip
+"""The profile as shipped, told the cores of its node."""
 STUDIES = ("sweep", "certified", "short_runs")
 FREQUENCY = "vibration.0.frequency_hz"
 _TUBE: dict[str, Any] = {"engine": {"name": "reference"}, "time_step": {"fraction": 0.8}}
@@ -118,26 +127,30 @@ LITTLE: dict[str, Any] = {
 }
 
 
-def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
-    """Run a study from nothing to its report with one version; what that took and left."""
+def _measured(
+    python: Path, root: Path, study: Path, slurm: SlurmNode | None = None
+) -> dict[str, float]:
+    """Run a study from nothing to its report with one version; what that took and left.
+
+    On Slurm jobs are no children of this process: the time of all cores is taken, that of other
+    work too.
+    """
     shutil.rmtree(study.parent / "results", ignore_errors=True)
     shutil.rmtree(study.parent / ".snakemake", ignore_errors=True)
-    before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    taken_s = _children_s if slurm is None else _machine_s
+    before_s, begun = taken_s(), time.perf_counter()
     ran = subprocess.run(
-        [python, "-m", "sandmould.cli", "run", study.name, "--cores", str(CORES)],
+        [python, "-m", "sandmould.cli", "run", study.name, *(ON_SLURM if slurm else ON_CORES)],
         cwd=study.parent, capture_output=True, text=True,
-        env=os.environ | {"PYTHONPATH": str(root)},
+        env=(slurm.environment if slurm else os.environ) | {"PYTHONPATH": str(root)},
     )  # fmt: skip
-    wall_s = time.perf_counter() - begun
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    wall_s, core_s = time.perf_counter() - begun, taken_s() - before_s
     folder = study.parent / "results" / study.stem
     if ran.returncode and not (folder / "report.html").exists():
         raise SystemExit(f"{study} failed with {root}:\n{ran.stdout[-2000:]}{ran.stderr[-2000:]}")
     costs = read_costs([*folder.glob("runs/*"), *folder.glob("fills/*")]).rows
     return {
-        "core_s": sum(
-            getattr(after, name) - getattr(before, name) for name in ("ru_utime", "ru_stime")
-        ),
+        "core_s": core_s,
         "wall_s": wall_s,
         "runs": sum(1 for _ in folder.glob("runs/*")),
         "grain_steps": float(costs["grain_steps"].sum()),
@@ -146,6 +159,18 @@ def _measured(python: Path, root: Path, study: Path) -> dict[str, float]:
         "files": sum(path.is_file() for path in folder.rglob("*")),
         "bytes": sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()),
     }
+
+
+def _children_s() -> float:
+    """Time of a core that ended children of this process have taken."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def _machine_s() -> float:
+    """Time that the cores of this machine have worked."""
+    user, nice, system, *_ = Path("/proc/stat").read_text().split()[1:]
+    return (int(user) + int(nice) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
 def _in_turns(name: str, run: BenchmarkRun, turns: int = 0) -> dict[str, Any]:
@@ -176,12 +201,15 @@ def _in_turns(name: str, run: BenchmarkRun, turns: int = 0) -> dict[str, Any]:
     return {"study": run.extent[name], "rows": rows, "commits": _commits(versions)}
 
 
-def _same_answer(run: BenchmarkRun) -> dict[str, Any]:
+def _same_answer(run: BenchmarkRun, slurm: SlurmNode | None = None) -> dict[str, Any]:
     """What the same half width between the two best settings costs, old and new."""
     versions, extent = _versions(run), run.extent["same_answer"]
     size = extent["scale"], extent["duration_s"]
     rows: dict[str, dict[str, Any]] = {}
-    for name, time_step in (("old", {}), ("new", {}), ("new_step", {"bed_fraction": 0.7})):
+    steps: dict[str, dict[str, float]] = {"old": {}, "new": {}}
+    if slurm is None:
+        steps["new_step"] = {"bed_fraction": 0.7}
+    for name, time_step in steps.items():
         root = versions["old" if name == "old" else "new"]
         study = _sweep(*size, extent["replicates"])
         if name != "old":
@@ -189,10 +217,21 @@ def _same_answer(run: BenchmarkRun) -> dict[str, Any]:
         file = SCRATCH / "sweeps" / f"same_{name}" / "same.yaml"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(yaml.safe_dump(study), encoding="utf-8")
-        rows[name] = _measured(_python(root), root, file)
+        rows[name] = _measured(_python(root), root, file, slurm)
         rows[name] |= _answer(file.parent / "results" / file.stem, pools_spread=name != "old")
         print(name, rows[name], flush=True)
     return {"rows": rows, **extent, "commits": _commits(versions)}
+
+
+def _same_answer_on_slurm(run: BenchmarkRun) -> dict[str, Any]:
+    """The same on a Slurm of one node, this machine, while nothing else works on it."""
+    with tempfile.TemporaryDirectory() as folder:
+        slurm = SlurmNode(Path(folder))
+        slurm.start()
+        try:
+            return _same_answer(run, slurm)
+        finally:
+            slurm.stop()
 
 
 def _answer(folder: Path, pools_spread: bool) -> dict[str, Any]:
@@ -234,7 +273,7 @@ def _begun_s(python: Path, root: Path, study: Path) -> float:
     shutil.rmtree(folder, ignore_errors=True)
     begun = time.perf_counter()
     started = subprocess.Popen(
-        [python, "-m", "sandmould.cli", "run", study.name, "--cores", str(CORES)],
+        [python, "-m", "sandmould.cli", "run", study.name, *ON_CORES],
         cwd=study.parent, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         env=os.environ | {"PYTHONPATH": str(root)},
     )  # fmt: skip
@@ -278,15 +317,13 @@ def _report(run: BenchmarkRun) -> dict[str, Any]:
         _measured(_python(root), root, files[version])
     for _ in range(run.extent["report_turns"]):
         for version, root in versions.items():
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            before_s = _children_s()
             subprocess.run(
                 [_python(root), "-m", "sandmould.cli", "report", "report.yaml"],
                 cwd=files[version].parent, capture_output=True, check=True,
                 env=os.environ | {"PYTHONPATH": str(root)},
             )  # fmt: skip
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            spent_s = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-            rows[version].append(round(spent_s, 2))
+            rows[version].append(round(_children_s() - before_s, 2))
     runs = len(study["sweep"]["keys"][FREQUENCY]) * study["replicates"]
     load = round(os.getloadavg()[0], 1)
     return {"runs": runs, "core_s": rows, "load": load, "commits": _commits(versions)}
@@ -320,6 +357,7 @@ def page(results: dict[str, Any]) -> str:
     studies = {name: _compared(results[name]) for name in STUDIES}
     values = {"studies": studies, "commits": results["sweep"]["commits"], **results["origin"]}
     values["same"] = results["same_answer"]
+    values["on_slurm"] = results.get("same_answer_on_slurm")
     values["first"] = results["first_step"]
     one_run = results["one_run"]
     medians = {version: median(rows) for version, rows in one_run["core_s"].items()}
@@ -343,6 +381,7 @@ BENCHMARK = Benchmark(
     parts={
         **{name: partial(_in_turns, name) for name in STUDIES},
         "same_answer": _same_answer,
+        "same_answer_on_slurm": _same_answer_on_slurm,
         "first_step": _first_step,
         "one_run": _one_run,
         "thousand_runs": partial(_in_turns, "thousand_runs", turns=1),

@@ -42,10 +42,10 @@ IN_3D = 0.4
 STATE_BYTES, SNAPSHOT_BYTES = {2: 230, 3: 560}, {2: 75, 3: 97}
 """Disk that a grain at rest takes in a checkpoint of the reference engine, with its contacts, and
 in a snapshot: measured at 282 discs and 2 000 spheres."""
-PASSES = 5.5
-"""Times that a window of sand and pattern is computed, where it may be repeated: 3.2 to 4.3 in the
-mean on the L in soft sand while it is filled, in windows of 2 to 20 ms (study l_judged), 5.7 to 7.2
-in hard sand that is shaken, too (record of l_depth)."""
+PASSES = 4.1
+"""Times that a window of sand and pattern is computed, where it may be repeated. Between 3.1 on a
+bracket of foam (study bracket_foam_small), 3.6 to 3.8 on the L that is filled at hard sand
+(l_deflection) and 5.0 to 5.8 where it is shaken deep in sand (l_depth): within 1.4 of each."""
 HIGH_ACCELERATION_G = 20.0
 """Peak acceleration above which a plan asks whether the amplitude is meant so."""
 COMPILE_S = 25.0
