@@ -53,10 +53,10 @@ quick: $(INSTALLED)
 
 ## lint, types, import contract and all tests
 test: lint
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 fast-tests: $(INSTALLED)
-	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser"
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and not browser"
 
 ## lint, types and import contract alone
 lint: $(LINT)
