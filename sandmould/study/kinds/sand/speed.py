@@ -18,7 +18,7 @@ STORED = "calibration.json"
 GRAINS = 400
 FALL_WALL_S = 5.0
 WINDOWS, WINDOW_S = 8, 0.125
-"""The fastest counts: what else the machine does for a moment is not the engine's."""
+"""The fastest counts: what else the machine does slows an engine even on a core of its own."""
 
 
 def stored_rate(scenario: Scenario, results: Path) -> float | None:
@@ -102,8 +102,19 @@ def _measure_rate(scenario: Scenario) -> float | None:
 
 
 def _window_rate(session: Session) -> float:
-    """Grain-steps per second of wall time over a moment."""
-    steps, begun = session.steps, time.perf_counter()
-    while time.perf_counter() - begun < WINDOW_S:
+    """Grain-steps per second of a core over a moment."""
+    steps, begun_s = session.steps, _spent_s()
+    while _spent_s() - begun_s < WINDOW_S:
         session.advance()
-    return session.grains * (session.steps - steps) / (time.perf_counter() - begun)
+    return session.grains * (session.steps - steps) / (_spent_s() - begun_s)
+
+
+def _spent_s() -> float:
+    """Time that cores have worked for this process and those that it has started.
+
+    It does not grow while others have the cores, as wall time does.
+    """
+    lists = Path("/proc/self/task").glob("*/children")
+    started = [pid for each in lists for pid in each.read_text(encoding="ascii").split()]
+    stats = [Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii") for pid in started]
+    return time.process_time() + sum(float(each.split()[0]) for each in stats) / 1e9

@@ -1,0 +1,36 @@
+"""The speed of an engine on this machine."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+
+from sandmould.study.kinds.sand.speed import _spent_s, _window_rate
+
+
+class OnABusyMachine:
+    """A session whose engine has a core for a small part of the time."""
+
+    steps, grains = 0, 10
+
+    def advance(self) -> None:
+        begun_s = time.process_time()
+        while time.process_time() - begun_s < 2e-3:
+            pass
+        time.sleep(0.01)
+        self.steps += 100
+
+
+def test_time_in_which_others_have_the_cores_does_not_count() -> None:
+    rate = _window_rate(OnABusyMachine())  # type: ignore[arg-type]
+    assert 0.5 < rate / (10 * 100 / 2e-3) <= 1.0  # by the clock it would be below 0.17
+
+
+def test_an_engine_in_a_process_of_its_own_counts() -> None:
+    begun_s = _spent_s()
+    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as engine:
+        while _spent_s() - begun_s < 0.2:
+            time.sleep(0.01)
+            assert engine.poll() is None
+        engine.kill()
