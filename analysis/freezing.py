@@ -58,9 +58,13 @@ def freezing(position_m: Array, frozen_s: Array, reach_m: float) -> Freezing:
     latest_first = np.argsort(-time_s, kind="stable")
     rank = np.empty(len(time_s), dtype=np.int64)
     rank[latest_first] = np.arange(len(time_s))
-    near = cKDTree(position_m).query_ball_point(position_m, reach_m)
     # of elements that freeze together, as mirror images do, the first stands for all
-    spots = [i for i in latest_first.tolist() if rank[near[i]].min() == rank[i]]
+    tree = cKDTree(position_m)
+    _, nearest = tree.query(position_m, k=2 * position_m.shape[1] + 1, distance_upper_bound=reach_m)
+    before_these = np.append(rank, len(rank))[nearest].min(axis=1) >= rank
+    latest = latest_first[before_these[latest_first]]  # few are left to be held against all near
+    near = tree.query_ball_point(position_m[latest], reach_m)
+    spots = [i for i, others in zip(latest, near, strict=True) if rank[others].min() == rank[i]]
     ends = float(time_s.max())
     liquid = math.isinf(ends)
     return Freezing(

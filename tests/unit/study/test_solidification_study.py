@@ -234,6 +234,17 @@ def test_hot_spots_are_the_latest_within_reach() -> None:
         freezing(place, np.ones(5), 0.0)
 
 
+@pytest.mark.parametrize("reach_m", [0.02, 0.1, 0.4])
+def test_hot_spots_are_those_of_all_pairs(reach_m: float) -> None:
+    random = np.random.default_rng(1)
+    place_m, frozen_s = random.random((300, 3)), random.integers(0, 40, 300).astype(float)
+    apart_m = np.linalg.norm(place_m[:, None] - place_m, axis=2)
+    turn = np.argsort(np.argsort(-frozen_s, kind="stable"))
+    first = np.where(apart_m <= reach_m, turn, 300).min(axis=1) == turn
+    expected = place_m[first][np.argsort(turn[first])]
+    np.testing.assert_array_equal(freezing(place_m, frozen_s, reach_m).hot_spots_m, expected)
+
+
 TETRAHEDRON = """\
 solid corner
 {}
