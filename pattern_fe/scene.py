@@ -21,15 +21,13 @@ from pattern_fe.supports import Supports
 from pattern_fe.surroundings import Surroundings
 from pattern_fe.volume_mesh import drawing_mesh
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.limits import PATTERN_ELEMENTS, SOLID_ELEMENTS
+from sandmould.scenario.limits import PATTERN_ELEMENTS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig, PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import drawn_surface, unit_hint
 
 Array = NDArray[np.float64]
-_TETRAHEDRA_A_BRICK = 6
-"""Of as many unknowns: at order 2 a brick of a mesh has 8 nodes, a tetrahedron 1.4."""
 
 
 def pattern_of(scenario: Scenario) -> Pattern:
@@ -68,10 +66,7 @@ def _check_elements(config: PatternConfig, box_depth_m: float | None) -> None:
     if box_depth_m is not None:
         sides_m.append(config.depth_m or box_depth_m)
     elements = math.prod(side_m / config.element_m for side_m in sides_m)
-    if box_depth_m is None:
-        PATTERN_ELEMENTS.check("pattern.element_m", elements, config.element_m)
-    else:
-        SOLID_ELEMENTS.check("pattern.element_m", _TETRAHEDRA_A_BRICK * elements, config.element_m)
+    PATTERN_ELEMENTS.check("pattern.element_m", elements, config.element_m)
 
 
 def surroundings_of(scenario: Scenario, pattern: Pattern) -> Surroundings:

@@ -33,7 +33,7 @@ _NAMES = {
     "overlap_p99_fraction": "overlap that 99 of 100 contacts do not exceed",
     "pattern_tip_deflection_m": "deflection of the pattern's tip",
     "pattern_tip_filled_m": "deflection of the pattern's tip after filling",
-    "pattern_tip_recovered_m": "what vibration gave back of the tip's deflection",
+    "pattern_tip_recovered_m": "deflection given back by vibration",
     "pattern_under_fraction": "sand in the space under the pattern",
     "apparent_density_raw_kg_m3": "apparent density by the printed formula, Rojek 2004, eq. (55)",
     "apparent_density_corrected_kg_m3": "apparent density, corrected for walls",

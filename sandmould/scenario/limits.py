@@ -99,7 +99,7 @@ PATTERN_ELEMENTS = Limit(
     "2 million unknowns of its stiffness at order 2 in 2D",
 )  # fmt: skip
 SOLID_ELEMENTS = Limit(
-    20_000, "tetrahedra of a pattern in 3D, six a brick", "a larger element_m",
+    20_000, "tetrahedra of a drawn pattern", "a larger element_m",
     "0.7 GB and 14 s at 9 270 of order 2, nearly squared for twice as many: their equations fill",
 )  # fmt: skip
 STEPPED_COMPONENTS = Limit(

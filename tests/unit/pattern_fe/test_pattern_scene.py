@@ -197,11 +197,6 @@ def test_a_mesh_file_of_tetrahedra_meets_the_sand(tmp_path: Path) -> None:
             r"element_m = 0.005 .* at most 5,000 components of a surface",
         ),
         (
-            {},
-            {"element_m": 0.002},
-            r"element_m = 0.002 .* at most 20,000 tetrahedra .* not 180,000",
-        ),
-        (
             {
                 **SPACE,
                 "obstacles": [
