@@ -59,8 +59,9 @@ function playFilms({ page, stored, framesPerS, unpack, draw, frameFor }) {
 // Sizes a canvas for a figure of so many metres: as wide as the page, at most 70 % of the window high.
 function fittedPen(canvas, wide_m, high_m, margin_px) {
   const ratio = window.devicePixelRatio || 1, margins = 2 * margin_px;
-  const scale = Math.min(
-    (canvas.parentElement.clientWidth - margins) / wide_m, (0.7 * window.innerHeight - margins) / high_m);
+  // 0 in a window that has no size yet
+  const scale = Math.max(0, Math.min(
+    (canvas.parentElement.clientWidth - margins) / wide_m, (0.7 * window.innerHeight - margins) / high_m));
   const width = scale * wide_m + margins, height = scale * high_m + margins;
   canvas.style.width = `${width}px`;
   canvas.style.height = `${height}px`;

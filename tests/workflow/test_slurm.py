@@ -71,6 +71,12 @@ def simulating(folder: Path) -> list[int]:
     return found
 
 
+def job_of(pid: int) -> str:
+    """Number of the job that a process belongs to."""
+    environment = Path(f"/proc/{pid}/environ").read_text(encoding="utf-8").split("\0")
+    return dict(each.split("=", 1) for each in environment if each)["SLURM_JOB_ID"]
+
+
 def study_folder(folder: Path, study: str) -> Path:
     """A place to run a study in, on a partition of jobs of five minutes."""
     folder.mkdir()
@@ -198,8 +204,7 @@ def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished
     wait_for(lambda: len(done()) >= 1 and bool(simulating(folder)), process, log)
     os.kill(simulating(folder)[0], signal.SIGKILL)
     wait_for(lambda: len(done()) >= 2 and bool(simulating(folder)), process, log)
-    going = [job for job, state in slurm.jobs().items() if state == "RUNNING"]
-    slurm.requeue(going[0])
+    slurm.requeue(job_of(simulating(folder)[0]))
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     left, finished = slurm.jobs(), done()
