@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -23,7 +22,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, render
+from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, children_s, render
 from sandmould import ROOT
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, RUN, WALL_S, finished, total_s
 from sandmould.scenario.bad_input import BadInputError
@@ -91,16 +90,14 @@ def _row(name: str, scratch: Path) -> dict[str, Any]:
     plan = open_plan(path, results)
     measure_speeds(plan, results)
     planned_s, load = _planned_s(plan, known_prices(plan, results)), os.getloadavg()[0]
-    before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    before_s, begun = children_s(), time.perf_counter()
     ran = subprocess.run(
         [sys.executable, "-m", "sandmould.cli", "run", str(path), "--cores", str(CORES)],
         cwd=scratch, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    wall_s = time.perf_counter() - begun
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    wall_s, core_s = time.perf_counter() - begun, children_s() - before_s
     if ran.returncode and not (results / name / "report.html").exists():
         raise SystemExit(f"{name} failed:\n{ran.stderr[-2000:]}")
-    core_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     table = read_summary(results / name)
     in_runs_s = total_s(table, CPU_S) if FILL_CPU_S in table else float(table[CPU_S].sum())
     row = {

@@ -10,7 +10,6 @@ some 1 700 s of a core with a version that starts a process for each run, 200 s 
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -25,7 +24,7 @@ from typing import Any
 
 import yaml
 
-from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, render
+from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, children_s, render
 from sandmould import ROOT
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.verdict import compare_settings
@@ -137,7 +136,7 @@ def _measured(
     """
     shutil.rmtree(study.parent / "results", ignore_errors=True)
     shutil.rmtree(study.parent / ".snakemake", ignore_errors=True)
-    taken_s = _children_s if slurm is None else _machine_s
+    taken_s = children_s if slurm is None else _machine_s
     before_s, begun = taken_s(), time.perf_counter()
     ran = subprocess.run(
         [python, "-m", "sandmould.cli", "run", study.name, *(ON_SLURM if slurm else ON_CORES)],
@@ -159,12 +158,6 @@ def _measured(
         "files": sum(path.is_file() for path in folder.rglob("*")),
         "bytes": sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()),
     }
-
-
-def _children_s() -> float:
-    """Time of a core that ended children of this process have taken."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def _machine_s() -> float:
@@ -317,13 +310,13 @@ def _report(run: BenchmarkRun) -> dict[str, Any]:
         _measured(_python(root), root, files[version])
     for _ in range(run.extent["report_turns"]):
         for version, root in versions.items():
-            before_s = _children_s()
+            before_s = children_s()
             subprocess.run(
                 [_python(root), "-m", "sandmould.cli", "report", "report.yaml"],
                 cwd=files[version].parent, capture_output=True, check=True,
                 env=os.environ | {"PYTHONPATH": str(root)},
             )  # fmt: skip
-            rows[version].append(round(_children_s() - before_s, 2))
+            rows[version].append(round(children_s() - before_s, 2))
     runs = len(study["sweep"]["keys"][FREQUENCY]) * study["replicates"]
     load = round(os.getloadavg()[0], 1)
     return {"runs": runs, "core_s": rows, "load": load, "commits": _commits(versions)}

@@ -6,7 +6,11 @@ import subprocess
 import sys
 import time
 
-from sandmould.study.kinds.sand.speed import _spent_s, _window_rate
+import pytest
+
+from sandmould.engines.session import Session
+from sandmould.study.kinds.sand.speed import _measure_rate, _spent_s, _window_rate
+from tests.scenes import tube_scene
 
 
 class OnABusyMachine:
@@ -34,3 +38,21 @@ def test_an_engine_in_a_process_of_its_own_counts() -> None:
             time.sleep(0.01)
             assert engine.poll() is None
         engine.kill()
+
+
+@pytest.mark.slow
+def test_sand_that_settles_is_timed_while_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each window has work, though a layer ends by itself after 2 s, before the last of them."""
+    windows: list[float] = []
+
+    def noted(session: Session) -> float:
+        windows.append(_window_rate(session))
+        return windows[-1]
+
+    monkeypatch.setattr("sandmould.study.kinds.sand.speed._window_rate", noted)
+    monkeypatch.setattr("sandmould.study.kinds.sand.speed.WINDOWS", 16)
+    coarse = {"sand": {"disc_thickness_m": 0.1}, "time_step": {"fraction": 0.8}}
+    scene = tube_scene(engine={"name": "reference"}, vibration=[], **coarse)
+    rate = _measure_rate(scene)
+    assert rate is not None
+    assert 0.0 < min(windows) <= rate <= max(windows)

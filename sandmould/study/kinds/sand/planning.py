@@ -55,7 +55,7 @@ _kernel_folder = functools.cache(cache_folder)
 STEPPED_ENTRY_S = 0.2e-9
 """Processor time of a step for an entry of the matrix of a pattern stepped in step, which memory
 decides: 0.06 ns measured where it fits the cache of 32 MB (1 292 components), 0.2 ns beyond (1 820
-to 4 400), 0.55 ns beside work that filled the cache."""
+to 4 400); an earlier measurement gave 0.53 and 0.63 ns."""
 PASS_S = 2e-3
 """Processor time of a pass of a window beside its grain-steps: loads, solution, new surface."""
 
