@@ -12,6 +12,7 @@ from types import FrameType
 from sandmould.engines.bed_step import limit_moments, limit_warning, with_bed_step
 from sandmould.engines.blockage import what_blocks
 from sandmould.engines.cost import cost_before
+from sandmould.engines.durations import grain_steps, run_s
 from sandmould.engines.guard import Guard
 from sandmould.engines.program import Program, Stage, build_program
 from sandmould.engines.recording import Recorder
@@ -139,7 +140,7 @@ class Driver:
             outcome, detail = Outcome.DISK_REFUSED, f"{error.strerror}{where}"
         warning = limit_warning(self.cost.time_step_s, self.cost.least_limit_s)
         detail = "; ".join(said for said in (detail, warning, *notes) if said)
-        return RunOutcome(outcome, detail, self._simulated_s, self._program.expected_s)
+        return RunOutcome(outcome, detail, self._simulated_s, run_s(self._program))
 
     def _go_on(self, newest: tuple[Path, CheckpointMark] | None) -> bool:
         """Compute in a session from a checkpoint, or from the beginning.
@@ -172,9 +173,9 @@ class Driver:
 
     def _expected_grain_steps(self) -> float:
         """Work of this run: the fill, where it does not share it, has the planned step."""
-        filled, fill = self._program.fill_stages, self._planned.expected_grain_steps
-        own_fill = fill(self._shared_stages) - fill(filled)
-        return own_fill + self._program.expected_grain_steps(max(filled, self._shared_stages))
+        filled, planned = self._program.fill_stages, self._planned
+        own_fill = grain_steps(planned, self._shared_stages) - grain_steps(planned, filled)
+        return own_fill + grain_steps(self._program, max(filled, self._shared_stages))
 
     def _ask_to_stop(self, number: int, frame: FrameType | None) -> None:
         self._stop_requested = True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,30 +10,10 @@ from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.box import Piston
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.fill import FillVibration, Settling
-from sandmould.scenario.placement import (
-    PlannedLayer,
-    fall_s,
-    filled_measure,
-    plan_counts,
-    plan_layer,
-    portion_of,
-)
+from sandmould.scenario.placement import PlannedLayer, plan_counts, plan_layer, portion_of
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 from sandmould.scenario.vibration import RestStage, VibrationStage
-
-OUTFLOW = {2: 0.78, 3: 0.43}
-"""Solid measure that flows through an outlet in the time w^(1/2 - d) / sqrt(g), w its width less
-``EDGE`` grains; only used to foretell times. In 2D measured, 0.65 without the edge at seven largest
-grains; in 3D the 0.58 of Beverloo et al., Chem. Eng. Sci. 15 (1961) 260, for bulk measure and a
-round outlet, as 0.74 of the area of a square one, times a solid fraction of 0.58."""
-EDGE = 1.4
-"""Median grains along the edge of an outlet through which nothing flows (Beverloo et al. 1961)."""
-REST_AFTER_FLOW_S = 0.7
-"""Guess of the time until the last grains of a heap have rolled out: with it six recorded studies
-of hoppers needed 0.75 to 1.22 times what is foretold for the whole run."""
-REST_AFTER_FALL_S = 0.3
-"""Guess of the time a bed needs to come to rest after the last grain has landed."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +31,8 @@ class Stage:
     """When the sand is at rest, which ends the stage; none in one of a given duration."""
     vibration: VibrationStage | None = None
     """How the box moves; in a stage of rest, the vibration that it comes from."""
-    expected_s: float = 0.0
-    """Duration: exact for vibration, a guess for settling."""
+    duration_s: float = 0.0
+    """As given; none where the sand must come to rest."""
     stops_smoothly: bool = False
     """Whether the box stops smoothly once the vibration is over, since a rest follows."""
     vibration_steps: int = 0
@@ -134,45 +113,10 @@ class Program:
         return sum(self._masses_kg[:layers])
 
     @property
-    def expected_s(self) -> float:
-        """Expected simulated time of the whole run."""
-        return sum(stage.expected_s for stage in self.stages)
-
-    @property
     def fill_stages(self) -> int:
         """Stages before the first vibration; all where the box never vibrates."""
         shaken = (n for n, stage in enumerate(self.stages) if stage.counts_as_vibration)
         return next(shaken, len(self.stages))
-
-    def expected_grain_steps(self, first_stage: int = 0) -> float:
-        """Sum over stages of grains present times steps, from a stage on."""
-        total, grains = 0.0, 0
-        for number, stage in enumerate(self.stages):
-            grains += self.counts[stage.layer - 1] if stage.layer else 0
-            if number >= first_stage:
-                total += grains * stage.expected_s / self.scenario.step_s
-        return total
-
-
-def _settling_s(scenario: Scenario, count: int) -> float:
-    """Guess of the time a layer needs: the fall of its highest grain, then coming to rest."""
-    settling = scenario.fill.settling
-    return min(
-        max(fall_s(scenario, count) + REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s
-    )
-
-
-def _outflow_s(scenario: Scenario, discharge: Discharge) -> float:
-    """Guess of the time that the sand takes to leave through a gate and come to rest."""
-    gate, g, d = scenario.gate, scenario.gravity_m_s2, scenario.dimension
-    if gate is None or g == 0.0:
-        return discharge.settling.longest_s
-    width = max(gate.size_m) - EDGE * scenario.sand.mass_median_diameter_m
-    if width <= 0.0:
-        return discharge.settling.longest_s
-    flow = OUTFLOW[d] * math.sqrt(g) * width ** (d - 0.5)
-    guess = filled_measure(scenario) / flow + REST_AFTER_FLOW_S
-    return min(max(guess, discharge.settling.shortest_s), discharge.settling.longest_s)
 
 
 def build_program(scenario: Scenario) -> Program:
@@ -189,10 +133,8 @@ def build_program(scenario: Scenario) -> Program:
 def _press(scenario: Scenario, piston: Piston) -> Iterator[Stage]:
     """A wall moves into the sand, which comes to rest once it stands."""
     steps = StepCounts.of(scenario).steps(piston.duration_s)
-    yield Stage(StageKind.PRESS, steps=steps, expected_s=piston.duration_s)
-    settling = scenario.fill.settling
-    rest_s = min(max(REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s)
-    yield Stage(StageKind.HOLD, settling=settling, expected_s=rest_s)
+    yield Stage(StageKind.PRESS, steps=steps, duration_s=piston.duration_s)
+    yield Stage(StageKind.HOLD, settling=scenario.fill.settling)
 
 
 def _flow(scenario: Scenario, discharge: Discharge) -> Iterator[Stage]:
@@ -201,14 +143,12 @@ def _flow(scenario: Scenario, discharge: Discharge) -> Iterator[Stage]:
     opening_s, duration_s = discharge.opening_time_s or 0.0, discharge.duration_s
     opening = counts.steps(opening_s)
     if opening:
-        yield Stage(StageKind.OPEN, slides=gate, steps=opening, expected_s=opening_s)
+        yield Stage(StageKind.OPEN, slides=gate, steps=opening, duration_s=opening_s)
     if duration_s is None:
-        expected_s = _outflow_s(scenario, discharge)
-        settling = discharge.settling
-        yield Stage(StageKind.DISCHARGE, opens=gate, settling=settling, expected_s=expected_s)
+        yield Stage(StageKind.DISCHARGE, opens=gate, settling=discharge.settling)
     else:
         steps, left_s = counts.steps(duration_s) - opening, duration_s - opening_s
-        yield Stage(StageKind.DISCHARGE, opens=gate, steps=steps, expected_s=left_s)
+        yield Stage(StageKind.DISCHARGE, opens=gate, steps=steps, duration_s=left_s)
 
 
 def _pours(scenario: Scenario, counts: list[int]) -> Iterator[Stage]:
@@ -219,22 +159,17 @@ def _pours(scenario: Scenario, counts: list[int]) -> Iterator[Stage]:
         return
     spout = scenario.fill.spout
     steps = 0 if spout is None else StepCounts.of(scenario).steps(spout.interval_s)
-    for number, count in enumerate(counts, start=1):
+    for number in range(1, len(counts) + 1):
         layer = portion_of(scenario, number)[0]
         if spout is not None and number < len(counts) and (
             portion_of(scenario, number + 1)[0] == layer
         ):  # fmt: skip
-            yield Stage(StageKind.POUR, number, steps=steps, expected_s=spout.interval_s)
+            yield Stage(StageKind.POUR, number, steps=steps, duration_s=spout.interval_s)
             continue
-        yield Stage(
-            StageKind.SETTLE,
-            number,
-            settling=scenario.fill.settling,
-            expected_s=_settling_s(scenario, count),
-        )
+        yield Stage(StageKind.SETTLE, number, settling=scenario.fill.settling)
         if between is not None and number < len(counts):
             yield Stage(
-                StageKind.BETWEEN, number, vibration=between, expected_s=between.whole_duration_s
+                StageKind.BETWEEN, number, vibration=between, duration_s=between.whole_duration_s
             )
 
 
@@ -250,7 +185,7 @@ def _vibrated_pours(scenario: Scenario, vibration: FillVibration, layers: int) -
             StageKind.POUR,
             number,
             vibration=whole,
-            expected_s=last_s if last else vibration.layer_s,
+            duration_s=last_s if last else vibration.layer_s,
             stops_smoothly=True,
             vibration_steps=begin,
             steps=end - begin,
@@ -278,7 +213,7 @@ def _box_stages(scenario: Scenario) -> Iterator[Stage]:
                 StageKind.VIBRATE,
                 number,
                 vibration=stage,
-                expected_s=stage.whole_duration_s,
+                duration_s=stage.whole_duration_s,
                 stops_smoothly=stops and stage.stop_s > 0,
             )
             moved = stage
@@ -300,7 +235,6 @@ def _rest_stage(
         number,
         settling=settling,
         vibration=moved,
-        expected_s=min(max(stop_s + REST_AFTER_FALL_S, settling.shortest_s), settling.longest_s),
         stops_smoothly=stop_s > 0,
         vibration_steps=0 if moved is None else StepCounts.of(scenario).vibration(moved),
     )

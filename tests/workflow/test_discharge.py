@@ -108,7 +108,7 @@ def test_engines_let_as_much_flow_out(engine: str, emptied: Emptied) -> None:
     # that. (Over 12 fillings the outflow scattered by 0.019 on LAMMPS, by 0.014 on reference.)
     assert ends[0].outflow_fraction == pytest.approx(ends[1].outflow_fraction, abs=0.1)
     for end in ends:
-        # OUTFLOW in sandmould/engines/program.py foretells 0.2 s, without the last of the sand.
+        # OUTFLOW in sandmould/engines/durations.py foretells 0.2 s, without the last of the sand.
         # Checks of rest follow the last grains longer than one record below the limit did.
         assert 0.1 < end.outflow_time_s < 1.2
         assert 0.1 < end.side_load_fraction < 1.5

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sandmould.engines.bed_step import MOMENTS, limit_moments, limit_warning, with_bed_step
+from sandmould.engines.durations import stage_s
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.scenario.time_step import damped_step
@@ -80,8 +81,8 @@ def test_soft_beds_keep_to_the_vibration_and_loose_ones_to_the_plan() -> None:
 def test_moments_see_all_phases_of_the_box() -> None:
     scene = tube_scene(**OF_BED, vibration=[{"acceleration_g": 1.5, "frequency_hz": 50.0,
                                              "duration_s": 2.0}])  # fmt: skip
-    moments = limit_moments(build_program(scene))
-    steps = build_program(scene).stages[-2].expected_s / scene.step_s
+    program = build_program(scene)
+    moments, steps = limit_moments(program), stage_s(program, program.stages[-2]) / scene.step_s
     twentieths = [int(moment / steps * MOMENTS) for moment in moments]
     assert twentieths == list(range(MOMENTS))
     phases = np.sort(np.array(moments) * scene.step_s * 50.0 % 1.0)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sandmould.engines.driver import Driver
+from sandmould.engines.durations import grain_steps, stage_s
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_of, engine_problem
@@ -32,12 +33,12 @@ def test_the_steps_of_a_timed_discharge_are_those_of_its_times() -> None:
     opening, flow = (s for s in program.stages if s.name in ("open", "discharge"))
     assert opening.longest_steps(counts) == counts.steps(OPENING_S)
     assert opening.longest_steps(counts) + flow.longest_steps(counts) == counts.steps(DURATION_S)
-    assert opening.expected_s + flow.expected_s == pytest.approx(DURATION_S)
+    assert stage_s(program, opening) + stage_s(program, flow) == pytest.approx(DURATION_S)
     assert flow.settling is None
     filled = [s for s in program.stages if s.kind.fills]
     grains = sum(program.counts)
     planned = build_program(program.scenario.model_copy(update={"discharge": None}))
-    more = program.expected_grain_steps() - planned.expected_grain_steps()
+    more = grain_steps(program) - grain_steps(planned)
     assert more == pytest.approx(grains * DURATION_S / counts.step_s)
     assert [s.name for s in program.stages][len(filled) : len(filled) + 2] == ["open", "discharge"]
 

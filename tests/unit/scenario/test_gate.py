@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sandmould.engines.durations import REST_AFTER_FLOW_S, stage_s
 from sandmould.engines.guard import Guard, measure_health
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
@@ -103,13 +104,14 @@ def test_flow_through_a_wider_outlet_is_foretold_to_be_faster() -> None:
     def foretold_s(half_outlet_m: float, **settling: float) -> float:
         plates = hopper_plates(half_outlet_m)
         scene = hopper_scene(obstacles=plates, discharge={"settling": settling})
-        return next(s for s in build_program(scene).stages if s.opens).expected_s
+        program = build_program(scene)
+        return stage_s(program, next(s for s in program.stages if s.opens))
 
-    # Flow goes with the free width to the power of 3/2, after which the last grains roll for 0.7 s.
+    # Flow goes with the free width to the power of 3/2, after which the last grains roll.
     edge_m = 1.4 * hopper_scene().sand.mass_median_diameter_m
     narrow, wide = foretold_s(0.008), foretold_s(0.016)
     freer = (0.032 - edge_m) / (0.016 - edge_m)
-    assert narrow - 0.7 == pytest.approx((wide - 0.7) * freer**1.5)
+    assert narrow - REST_AFTER_FLOW_S == pytest.approx((wide - REST_AFTER_FLOW_S) * freer**1.5)
     blocked = 0.4 * edge_m
     assert foretold_s(blocked, longest_s=9.0) == 9.0
     assert foretold_s(0.008, longest_s=0.4) == 0.4

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sandmould.engines.driver import Driver, Opening
+from sandmould.engines.durations import run_s
 from sandmould.engines.program import Program, build_program
 from sandmould.runs import checkpoint_folders as checkpoints
 from sandmould.runs.hashing import scenario_hash
@@ -44,7 +45,7 @@ def fill_apart(run: Run, folder: Path, program: Program, opening: Opening) -> Co
     driver = Driver(build_program(fill), folder, run.run, scenario_hash(fill), opening, True)
     ended = driver.run()
     if ended.outcome is not Outcome.FINISHED:
-        return Computed(replace(ended, planned_s=program.expected_s), driver.cost, driver.is_root)
+        return Computed(replace(ended, planned_s=run_s(program)), driver.cost, driver.is_root)
     end = work / checkpoints.END_CHECKPOINT
     checkpoints.seal(end, replace(checkpoints.read_mark(end), scenario_hash=run_hash))
     for name in ("checkpoint_a", "checkpoint_b"):

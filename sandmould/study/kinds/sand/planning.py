@@ -10,6 +10,7 @@ from pathlib import Path
 import pattern_fe
 from sandmould.digest import digest
 from sandmould.engines import registry
+from sandmould.engines.durations import grain_steps, run_s, stage_s
 from sandmould.engines.program import build_program
 from sandmould.kernel_cache import are_compiled, cache_folder
 from sandmould.runs.formatting import number
@@ -176,7 +177,7 @@ def allowed_s(scenario: Scenario) -> float:
 def planned_work(scenario: Scenario) -> float:
     """Steps times grains in the box at the time, and again where windows are repeated."""
     most = 1 if scenario.pattern is None else scenario.pattern.loop.most_passes
-    return min(most, PASSES) * build_program(scenario).expected_grain_steps()
+    return min(most, PASSES) * grain_steps(build_program(scenario))
 
 
 def predicted_s(scenario: Scenario) -> float:
@@ -207,13 +208,13 @@ def _stepped_components(scenario: Scenario) -> int:
 
 def planned_s(scenario: Scenario) -> float:
     """Fill, estimated, discharge, vibration and rest."""
-    return build_program(scenario).expected_s
+    return run_s(build_program(scenario))
 
 
 def planned_steps(scenario: Scenario) -> int:
     """Time steps of a run: its fill and its rests, estimated, and its vibration."""
-    stages = build_program(scenario).stages
-    return sum(math.ceil(stage.expected_s / scenario.step_s) for stage in stages)
+    program = build_program(scenario)
+    return sum(math.ceil(stage_s(program, each) / scenario.step_s) for each in program.stages)
 
 
 def speed_class(scenario: Scenario) -> SpeedClass:

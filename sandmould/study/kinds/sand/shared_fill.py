@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sandmould.engines import registry
 from sandmould.engines.cost import cost_before
+from sandmould.engines.durations import run_s
 from sandmould.engines.program import Program
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT
 from sandmould.runs.hashing import scenario_hash
@@ -58,7 +59,7 @@ def _lay(run: Run, folder: Path, program: Program) -> RunOutcome | None:
         lay_tables(fill, work, SAND_TABLES)
         if ended.outcome is not Outcome.FINISHED:
             detail = f"in the fill {run.fill}, which it shares: {ended.detail}"
-            return replace(ended, detail=detail, planned_s=program.expected_s)
+            return replace(ended, detail=detail, planned_s=run_s(program))
         lay_checkpoint(
             fill / END_CHECKPOINT,
             work,
