@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from skfem import MeshHex
 from threadpoolctl import threadpool_limits
 
 from pattern_fe.checks import check_inside
@@ -21,7 +22,7 @@ from pattern_fe.supports import Supports
 from pattern_fe.surroundings import Surroundings
 from pattern_fe.volume_mesh import drawing_mesh
 from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.limits import PATTERN_ELEMENTS
+from sandmould.scenario.limits import PATTERN_ELEMENTS, SOLID_EQUATIONS
 from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig, PatternDrawing
 from sandmould.scenario.scenario import Scenario
@@ -93,6 +94,13 @@ def _computed(
         mesh = _mesh(config, size_m).translated(np.array(config.position_m))
     with _blaming("pattern.position_m", list(config.position_m)):
         check_inside(mesh.p.T, np.zeros(len(size_m)), np.array(size_m))
+    if isinstance(mesh, MeshHex):
+        # of each element its own nodes; those of the surface come to them
+        equations = 3 * config.order**3 * mesh.nelements
+        asked: tuple[str, Any] = ("pattern.element_m", config.element_m)
+        if isinstance(config.shape, MeshFile):
+            asked = ("pattern.shape.file", config.shape.file)
+        SOLID_EQUATIONS.check(asked[0], equations, asked[1])
     # Threads of small matrices wait for one another, longest beside other runs.
     with (
         threadpool_limits(1),

@@ -102,6 +102,11 @@ SOLID_ELEMENTS = Limit(
     20_000, "tetrahedra of a drawn pattern", "a larger element_m",
     "0.7 GB and 14 s at 9 270 of order 2, nearly squared for twice as many: their equations fill",
 )  # fmt: skip
+SOLID_EQUATIONS = Limit(
+    85_000, "equations of a pattern of hexahedra", "larger elements, or order 1",
+    "1 GB and 11 s at 46 000 in an L, 1.9 GB and 55 s at 54 000 in a bar; more than squared for "
+    "twice as many",
+)  # fmt: skip
 STEPPED_COMPONENTS = Limit(
     5_000, "components of a surface stepped in 3D", "a larger element_m, or a scheme with windows",
     "a matrix of 200 MB that every step reads, and its modes",
@@ -127,6 +132,6 @@ TRIANGLES = Limit(
 
 LIMITS = (
     YAML_BYTES, YAML_DEPTH, YAML_ALIASES, YAML_VALUES, RUNS, REPLICATES, GRAINS, CELLS, PARTICLES,
-    PATTERN_ELEMENTS, SOLID_ELEMENTS, STEPPED_COMPONENTS, RECORDS, FRAMES, PIXELS, DRAWING_BYTES,
-    TRIANGLES,
+    PATTERN_ELEMENTS, SOLID_ELEMENTS, SOLID_EQUATIONS, STEPPED_COMPONENTS, RECORDS, FRAMES,
+    PIXELS, DRAWING_BYTES, TRIANGLES,
 )  # fmt: skip

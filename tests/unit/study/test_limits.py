@@ -108,6 +108,11 @@ CASES: dict[str, tuple[str, str]] = {
         "trial.yaml: scenario.pattern.element_m = 1e-07 cannot be used: valid is one with at most "
         "500,000 elements of the pattern, not 1,200,000,000,000: a larger element_m.",
     ),
+    "equations of a pattern in 3D": (
+        "based_on: plank_3d\nscenario: {pattern: {element_m: 2e-3}}",
+        "trial.yaml: scenario.pattern.element_m = 0.002 cannot be used: valid is one with at most "
+        "85,000 equations of a pattern of hexahedra, not 96,000: larger elements, or order 1.",
+    ),
 }
 
 
