@@ -46,7 +46,7 @@ class SizeExtent:
     shaken_steps: int = 300
     thread_copies: tuple[int, ...] = (4, 8)
     scale_copies: tuple[int, ...] = (2, 4, 8, 16, 32)
-    largest_steps: int = 50
+    largest_steps: int = 1_000
     """In all turns on the largest bed."""
     mesh_copies: int = 4
     mesh_cuts: int = 92

@@ -7,6 +7,7 @@ import pytest
 from sandmould import ROOT
 from sandmould.study.definition.run import Run
 from sandmould.study.kinds.kind import SpeedClass
+from sandmould.study.kinds.sand import planning
 from sandmould.study.kinds.sand.planning import PASS_S, PASSES, beside_s, planned_s, planned_work
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.expand import expand
@@ -95,6 +96,21 @@ def test_passes_of_a_pattern_take_time_whatever_the_grains() -> None:
     assert beside_s(small) == pytest.approx(PASSES * PASS_S * windows)
     sand = expand(open_study(ROOT / "config" / "studies" / "tube_demo.yaml"))[0].scenario
     assert beside_s(sand) == 0.0
+
+
+def test_a_matrix_beyond_the_cache_costs_more_an_entry(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = ROOT / "config" / "studies" / "bracket_foam_small.yaml"
+    scenario = next(
+        run.scenario
+        for run in expand(open_study(path))
+        if run.scenario.pattern.loop.scheme == "in_step"
+    )
+    costs_s = []
+    for components in (800, 1_600, 3_200):
+        monkeypatch.setattr(planning, "_stepped_components", lambda _, n=components: n)
+        costs_s.append(beside_s(scenario))
+    assert costs_s[1] == pytest.approx(4 * costs_s[0])
+    assert costs_s[2] > 12 * costs_s[1]
 
 
 def test_time_left_is_that_of_the_whole_study(demo: list[Run]) -> None:

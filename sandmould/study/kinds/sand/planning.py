@@ -53,10 +53,11 @@ COMPILE_S = 25.0
 """Processor time for what a first run compiles: 24 s measured in 2D, 26 s in 3D, 24 s with a
 pattern (fe_column)."""
 _kernel_folder = functools.cache(cache_folder)
-STEPPED_ENTRY_S = 0.2e-9
-"""Processor time of a step for an entry of the matrix of a pattern stepped in step, which memory
-decides: 0.06 ns measured where it fits the cache of 32 MB (1 292 components), 0.2 ns beyond (1 820
-to 4 400); an earlier measurement gave 0.53 and 0.63 ns."""
+STEPPED_ENTRY_S, STEPPED_CACHED_S = 0.2e-9, 0.06e-9
+"""Processor time of a step for an entry of the matrix of a pattern stepped in step, where memory
+decides (1 820 to 4 400 components) and where it fits the cache of 32 MB (1 290 components)."""
+STEPPED_CACHED = 1_600
+"""Most components of a surface whose matrix, here of 20 MB, is taken to stay in the cache."""
 PASS_S = 2e-3
 """Processor time of a pass of a window beside its grain-steps: loads, solution, new surface."""
 
@@ -193,7 +194,9 @@ def beside_s(scenario: Scenario) -> float:
         return 0.0
     loop = scenario.pattern.loop
     if loop.scheme == "in_step":
-        return planned_steps(scenario) * _stepped_components(scenario) ** 2 * STEPPED_ENTRY_S
+        components = _stepped_components(scenario)
+        entry_s = STEPPED_CACHED_S if components <= STEPPED_CACHED else STEPPED_ENTRY_S
+        return planned_steps(scenario) * components**2 * entry_s
     if not loop.has_windows:
         return 0.0
     return min(loop.most_passes, PASSES) * planned_s(scenario) / loop.window_s * PASS_S
