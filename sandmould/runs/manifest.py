@@ -17,6 +17,8 @@ MANIFEST_FILE = "products.json"
 DECK_FILE = "deck.in"
 LEFT_OUT = "left_out"
 """Step of files that a pack of the run did without: they are not missed, but cannot be measured."""
+MEASURED_BY = "measured_by"
+"""What names the code that took the measures."""
 OLDER_ORIGIN, OLDER_COST = "provenance.json", "cost.tsv"
 """What runs of older times have beside it."""
 Manifest = dict[str, dict[str, Any]]
@@ -53,6 +55,7 @@ def write_manifest(
     sizes: Mapping[str, int],
     origin: Mapping[str, Any] | None = None,
     cost: Mapping[str, Any] | None = None,
+    code: str = "",
 ) -> None:
     """Write down what a step of a run left.
 
@@ -68,6 +71,8 @@ def write_manifest(
         Provenance of what was computed.
     cost : mapping, optional
         Its cost row.
+    code : str, optional
+        State of the code that measured.
     """
     if step == "computed":
         deck = folder / DECK_FILE
@@ -75,7 +80,7 @@ def write_manifest(
         stated = {"origin": origin, "cost": cost}
         tree |= {name: dict(values) for name, values in stated.items() if values is not None}
     else:
-        tree = read_manifest(folder) or {}
+        tree = (read_manifest(folder) or {}) | {MEASURED_BY: {"code_sha256": code}}
     write_text(folder / MANIFEST_FILE, json.dumps({**tree, step: sizes}, indent=1) + "\n")
 
 

@@ -160,6 +160,9 @@ _JSON_PRODUCTS = (
     _words("cost", "The cost columns of `summary.tsv`."),
     Described("computed", "Files that computing left, with their sizes.", "bytes"),
     Described("measured", "Files that measuring left, with their sizes.", "bytes"),
+    _words(
+        "measured_by", "Hash of our code that measured: where it changes, runs are measured again."
+    ),
 )
 _SOLIDIFIED = (
     Described("solidified_fraction", "Share of the casting that is solid."),

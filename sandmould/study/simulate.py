@@ -48,7 +48,7 @@ def measure(run: Run, folder: Path) -> None:
         for path in folder.rglob("*")
         if path.is_file() and earlier.get(path) != path.stat().st_mtime_ns
     }
-    write_manifest(folder, "measured", written)
+    write_manifest(folder, "measured", written, code=kind_of(run.scenario).planning.measuring_hash)
 
 
 def provenance(scenario: Any, *arguments: str) -> dict[str, Any]:

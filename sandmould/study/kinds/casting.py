@@ -60,6 +60,7 @@ def casting_planning(
     speed_class: Callable[[ScenarioT], SpeedClass],
     plan_cells: Callable[[ScenarioT], Mapping[str, str]],
     notes: Callable[[ScenarioT], Sequence[Note]],
+    measuring: tuple[str, ...],
 ) -> Planning[ScenarioT]:
     """Plan runs whose solver is our own: no engine can be missing, nothing runs under MPI.
 
@@ -86,6 +87,7 @@ def casting_planning(
         speed_class=speed_class,
         plan_cells=plan_cells,
         notes=notes,
+        measuring=("sandmould/study/kinds/casting.py", *measuring),
     )
 
 

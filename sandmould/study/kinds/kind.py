@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from sandmould import ROOT
+from sandmould.digest import code_digest
 from sandmould.runs.measures import MeasureGroup
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
@@ -150,6 +152,18 @@ class Planning(Generic[ScenarioT]):
     """None where ``predicted_s`` is all that is known."""
     program: UserProgram[ScenarioT] | None = None
     """None where all that a run executes is shipped."""
+    measuring: tuple[str, ...] = ()
+    """Files, from the root of the house, whose code takes the measures; what draws is left out."""
+
+    @property
+    def measuring_hash(self) -> str:
+        """State of the code that takes the measures: runs measured by another one are so again."""
+        return _hash_of(self.measuring)
+
+
+@cache
+def _hash_of(files: tuple[str, ...]) -> str:
+    return code_digest([ROOT / file for file in files])
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import (
     LEFT_OUT,
     MANIFEST_FILE,
+    MEASURED_BY,
     OLDER_COST,
     Manifest,
     damage,
@@ -87,6 +88,13 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     except UNREADABLE:
         return Lack(Need.COMPUTE, f"{MANIFEST_FILE} cannot be read")
     lack = _lack_of_files(folder, manifest)
+    if (
+        lack is WHOLE
+        and manifest
+        and LEFT_OUT not in manifest
+        and _measured_otherwise(run, manifest)
+    ):
+        lack = Lack(Need.MEASURE, "our code measures otherwise since")
     return lack if run.part != FILL or lack.need is Need.COMPUTE else _lack_of_end(run, folder)
 
 
@@ -120,6 +128,12 @@ def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
     if why and manifest and LEFT_OUT in manifest:
         return Lack(Need.COMPUTE, f"{why}, and its snapshots were left out of a pack")
     return Lack(Need.MEASURE, why) if why else WHOLE
+
+
+def _measured_otherwise(run: Run, manifest: Manifest) -> bool:
+    """Whether another state of our code than today's took the measures of a run."""
+    code = manifest.get(MEASURED_BY, {}).get("code_sha256")
+    return "measured" in manifest and code != kind_of(run.scenario).planning.measuring_hash
 
 
 def _empty(folder: Path, names: Iterable[str]) -> str:

@@ -18,6 +18,7 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study import batch_job
 from sandmould.study.batch_job import compute_batch
 from sandmould.study.definition.run import LAST_MEASURED, Run
+from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.batches import START_S, alone, is_done, plan_batches, planned_wall_s
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand
@@ -145,7 +146,8 @@ class Jobs:
     def measure(self, run: Run, folder: Path, log: Path) -> None:
         self.measured.append(folder.name)
         (folder / LAST_MEASURED).touch()
-        write_manifest(folder, "measured", {LAST_MEASURED: 0})
+        code = kind_of(run.scenario).planning.measuring_hash
+        write_manifest(folder, "measured", {LAST_MEASURED: 0}, code=code)
 
 
 def planned(folder: Path, **changes: Any) -> list[Path]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sandmould.runs.manifest import MANIFEST_FILE, OLDER_COST, OLDER_ORIGIN
+from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, OLDER_COST, OLDER_ORIGIN
 from sandmould.study.batch_job import compute_batch
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of, notes_of
@@ -144,6 +144,25 @@ def test_a_killed_measurement_is_done_again(plan: Plan) -> None:
     del tree["measured"]
     path.write_text(json.dumps(tree))
     assert lack(plan) == Lack(Need.MEASURE, "computed, but its measures are not taken yet")
+
+
+def test_what_other_code_measured_is_measured_again_if_it_can_be(plan: Plan) -> None:
+    folder = folder_of(plan)
+    path = folder / MANIFEST_FILE
+    tree = json.loads(path.read_text())
+    for of_other_code in (
+        tree | {"measured_by": {"code_sha256": "0" * 12}},
+        {step: tree[step] for step in tree if step != "measured_by"},
+    ):
+        path.write_text(json.dumps(of_other_code))
+        assert lack(plan) == Lack(Need.MEASURE, "our code measures otherwise since")
+        # a pack that leaves out what is measured keeps the measures that it has
+        path.write_text(json.dumps(of_other_code | {LEFT_OUT: {"snapshots.npz": 1}}))
+        assert lack(plan) == WHOLE
+    path.write_text(json.dumps(of_other_code))
+    measure_run(folder)
+    assert lack(plan) == WHOLE
+    assert json.loads(path.read_text()) == tree
 
 
 def test_notes_ask_for_what_is_lacking_and_go_when_nothing_is(plan: Plan) -> None:

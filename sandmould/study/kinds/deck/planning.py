@@ -150,4 +150,5 @@ PLANNING = Planning[OwnDeck](
         speed.stored_rate, speed.measured_rate, f"by a pilot run (results/{speed.STORED})"
     ),
     program=UserProgram[OwnDeck](shipped=DECKS, files=files, foreign=foreign, to_read=to_read),
+    measuring=("sandmould/study/kinds/deck/execution.py",),
 )

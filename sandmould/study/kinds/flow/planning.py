@@ -95,4 +95,6 @@ PLANNING = casting_planning(
     speed_class=speed_class,
     plan_cells=plan_cells,
     notes=notes,
+    # beside them only files of the solver: with those it is computed again
+    measuring=("sandmould/study/kinds/flow/execution.py",),
 )

@@ -32,6 +32,15 @@ from sandmould.study.kinds.sand.measures import MEASURES
 from sandmould.study.kinds.sand.narrow import narrow_spaces
 from sandmould.study.kinds.sand.table_motion import frequency_rule, table_lines
 
+MEASURING = (
+    *(f"analysis/{name}.py" for name in (
+        "cavity_fill", "coordination", "deflection", "density", "free_space", "intersections",
+        "layers", "loose_zones", "mesh_parts", "repose", "sections", "solid_fraction", "tube_fill",
+    )),
+    *(f"sandmould/study/kinds/sand/{name}.py" for name in (
+        "bending", "drive", "loose", "measure", "moments", "outflow",
+    )),
+)  # fmt: skip
 BASE_MEMORY_MB = 600
 STEPPED_COPIES = 8
 """Matrices of a surface held together while the masses of the in-step scheme are found."""
@@ -331,4 +340,5 @@ PLANNING = Planning[Scenario](
     notes=notes,
     settings_lines=table_lines,
     speed=MachineSpeed(speed.stored_rate, speed.measured_rate),
+    measuring=MEASURING,
 )

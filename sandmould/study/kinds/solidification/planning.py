@@ -91,4 +91,5 @@ PLANNING = casting_planning(
     speed_class=speed_class,
     plan_cells=plan_cells,
     notes=notes,
+    measuring=("analysis/freezing.py", "sandmould/study/kinds/solidification/execution.py"),
 )
