@@ -36,7 +36,10 @@ def stage_s(program: Program, stage: Stage) -> float:
     if stage.settling is None:
         return stage.duration_s
     if stage.kind is StageKind.SETTLE and stage.vibration is None:
-        guess = fall_s(scenario, program.counts[stage.layer - 1]) + REST_AFTER_FALL_S
+        landed_s = fall_s(scenario, program.counts[stage.layer - 1])
+        # sand that may be as fast as it falls is at rest at once
+        rests_at_once = scenario.rest.rms_speed_m_s > scenario.gravity_m_s2 * landed_s
+        guess = 0.0 if rests_at_once else landed_s + REST_AFTER_FALL_S
     elif stage.kind is StageKind.DISCHARGE:
         guess = _outflow_s(scenario) + REST_AFTER_FLOW_S
     else:

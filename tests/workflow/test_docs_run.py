@@ -18,6 +18,7 @@ import pytest
 
 from sandmould.cli.study_file import study_file
 from sandmould.study.kinds.sand import speed
+from sandmould.study.kinds.sand.speed import SPEED
 from sandmould.study.plan.build_plan import open_plan
 from tests.workflow.pages import PAGES, blocks
 
@@ -151,7 +152,7 @@ def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
     """A reader whose plans know how fast the machine is: measuring it takes 10 s each."""
     monkeypatch.setattr(speed, "_measure_rate", lambda _: 2e7)
     for study in ("tube_quick", "tube_3d_small"):
-        speed.measured_rate(open_plan(study_file(study)).runs[0].scenario, tmp_path / "results")
+        SPEED.measured(open_plan(study_file(study)).runs[0].scenario, tmp_path / "results")
     return Reader(tmp_path)
 
 

@@ -13,7 +13,15 @@ from sandmould.runs.measures import MeasureGroup
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
 from sandmould.study.definition.run import LAST_MEASURED, Run
-from sandmould.study.kinds.kind import Execution, Note, Planning, ScenarioT, SpeedClass
+from sandmould.study.kinds.kind import (
+    Execution,
+    MachineSpeed,
+    Note,
+    Planning,
+    ScenarioT,
+    SpeedClass,
+    nothing_beside,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,6 +69,8 @@ def casting_planning(
     plan_cells: Callable[[ScenarioT], Mapping[str, str]],
     notes: Callable[[ScenarioT], Sequence[Note]],
     measuring: tuple[str, ...],
+    speed: MachineSpeed[ScenarioT],
+    beside_s: Callable[[ScenarioT], float] = nothing_beside,
 ) -> Planning[ScenarioT]:
     """Plan runs whose solver is our own: no engine can be missing, nothing runs under MPI.
 
@@ -88,6 +98,8 @@ def casting_planning(
         plan_cells=plan_cells,
         notes=notes,
         measuring=("sandmould/study/kinds/casting.py", *measuring),
+        speed=speed,
+        beside_s=beside_s,
     )
 
 

@@ -19,9 +19,9 @@ from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.fills import own_work, predicted_s
 
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
-BEGIN_S = 5.0
+BEGIN_S = 4.0
 """What Snakemake takes to read its rules, and the study to be planned."""
-END_S = 8.0
+END_S = 6.0
 """What tables, report and check take once all runs have ended: three jobs."""
 
 

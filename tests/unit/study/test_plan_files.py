@@ -24,6 +24,7 @@ from sandmould.scenario.vibration import STOP_PERIODS
 from sandmould.study.definition.run import RUN_NAME, Run
 from sandmould.study.kinds.sand import speed
 from sandmould.study.kinds.sand.planning import planned_steps, planned_work, predicted_s
+from sandmould.study.kinds.stored_speed import STORED
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.build_plan import announce, measure_speeds, open_plan
 from sandmould.study.plan.expand import expand
@@ -124,7 +125,7 @@ def test_plan_is_announced_without_an_engine(
     monkeypatch.setattr(speed, "_measure_rate", lambda scenario: pytest.fail("an engine started"))
     plan = open_plan(ROOT / "config" / "studies" / "tube_demo.yaml")
     assert price_line(announce(plan, tmp_path, 1)).endswith(", an estimate")
-    assert not (tmp_path / speed.STORED).exists()
+    assert not (tmp_path / STORED).exists()
     monkeypatch.setattr(speed, "_measure_rate", lambda scenario: 1e7)
     assert capsys.readouterr().err == ""
     measure_speeds(plan, tmp_path)
@@ -187,6 +188,12 @@ def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
         {"fill": {"layers": [{"count": 300}], "settling": {"longest_s": 0.2}}}
     )
     assert run_s(build_program(scene)) == 0.2
+    at_once = {**scene.model_dump(), "rest": {"rms_speed_m_s": 10.0}}
+    rule = scene.fill.settling.model_copy(update={"longest_s": 2.0})
+    trivial = Scenario.model_validate(at_once).model_copy(
+        update={"fill": scene.fill.model_copy(update={"settling": rule})}
+    )
+    assert run_s(build_program(trivial)) == rule.shortest_s
     weightless = scene.model_copy(update={"gravity_m_s2": 0.0})
     assert run_s(build_program(weightless)) == 0.2
 

@@ -16,6 +16,8 @@ from sandmould.runs import words
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.definition.run import LAST_MEASURED
 from sandmould.study.kinds.sand import speed
+from sandmould.study.kinds.sand.speed import SPEED
+from sandmould.study.kinds.stored_speed import STORED
 from sandmould.study.plan.build_plan import Plan, announce, open_plan
 from sandmould.study.run_study import stated_cores
 from sandmould.study.screen.ending import last_line, trouble
@@ -169,14 +171,14 @@ def test_the_time_left_knows_a_speed_that_is_measured_after_the_first_line(
     screen = Screen(plan, RESULTS, 2, live=False)
     screen.look()
     monkeypatch.setattr(speed, "_measure_rate", lambda scenario: 1.0)  # a very slow machine
-    speed.measured_rate(plan.runs[0].scenario, RESULTS)
+    SPEED.measured(plan.runs[0].scenario, RESULTS)
     screen.look()
     guessed, measured = capsys.readouterr().err.splitlines()
     assert guessed.endswith((" s left", " min left"))
     assert measured.endswith(" days left")
     (STUDY / "runs" / plan.runs[0].run / "lock").write_text("")
     screen.look()
-    (RESULTS / speed.STORED).unlink()  # nothing is looked up again once a run has begun
+    (RESULTS / STORED).unlink()  # nothing is looked up again once a run has begun
     screen.look()
     assert all(line.endswith(" days left") for line in capsys.readouterr().err.splitlines())
 

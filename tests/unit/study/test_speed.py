@@ -5,11 +5,17 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
+from sandmould import ROOT
 from sandmould.engines.session import Session
+from sandmould.study.kinds.registry import kind_of
 from sandmould.study.kinds.sand.speed import _measure_rate, _spent_s, _window_rate
+from sandmould.study.kinds.stored_speed import STORED, stored_speed
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 from tests.scenes import tube_scene
 
 
@@ -56,3 +62,34 @@ def test_sand_that_settles_is_timed_while_it_does(monkeypatch: pytest.MonkeyPatc
     rate = _measure_rate(scene)
     assert rate is not None
     assert 0.0 < min(windows) <= rate <= max(windows)
+
+
+@pytest.mark.parametrize("name", ["plates_small", "bracket_freezes", "tank_small", "shoulder_pour"])
+def test_castings_are_priced_by_a_trial_on_this_machine(name: str, tmp_path: Path) -> None:
+    scenario = expand(open_study(ROOT / "config" / "studies" / f"{name}.yaml"))[0].scenario
+    speed = kind_of(scenario).planning.speed
+    assert speed.stored(scenario, tmp_path) is None
+    rate = speed.measured(scenario, tmp_path)
+    # within a hundred times the speed of a core of 2026
+    assert 1e4 < rate < 5e10
+    assert speed.stored(scenario, tmp_path) == rate
+
+
+def test_a_speed_is_measured_once_and_a_damaged_file_is_written_anew(tmp_path: Path) -> None:
+    trials: list[str] = []
+
+    def trial(scenario: str) -> float | None:
+        trials.append(scenario)
+        return None if scenario == "fails" else 2.0
+
+    speed = stored_speed(lambda scenario: scenario, trial)  # type: ignore[arg-type, type-var]
+    assert speed.measured("fails", tmp_path) is None
+    assert not (tmp_path / STORED).exists()
+    for _ in range(2):
+        assert speed.measured("one", tmp_path) == 2.0
+    assert speed.measured("another", tmp_path) == 2.0
+    assert trials == ["fails", "one", "another"]
+    assert speed.stored("one", tmp_path) == 2.0
+    (tmp_path / STORED).write_text("[1]")
+    assert speed.stored("one", tmp_path) is None
+    assert speed.measured("one", tmp_path) == 2.0

@@ -166,7 +166,7 @@ def main(name: str) -> int:
     write_text(folder / "begun", "")
     computed = computation.compute(scenario, folder, "pilot", "pilot")
     if computed.outcome.outcome == 0:
-        write_text(folder / "whole.json", json.dumps(computed.cost.wall_s))
+        write_text(folder / "whole.json", json.dumps(computed.cost.cpu_s))
     else:
         write_text(folder / "why.txt", computed.outcome.detail or computed.outcome.outcome.label)
     return 0

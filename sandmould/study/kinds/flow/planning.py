@@ -10,6 +10,7 @@ from sandmould.scenario.flow import MetalFlow, ShoulderedCylinder, StillTank
 from sandmould.study.kinds.casting import casting_planning
 from sandmould.study.kinds.flow.limits import limit_problems
 from sandmould.study.kinds.flow.measures import MEASURES
+from sandmould.study.kinds.flow.speed import SPEED
 from sandmould.study.kinds.kind import Note, SpeedClass
 
 BASE_MEMORY_MB = 600
@@ -97,4 +98,5 @@ PLANNING = casting_planning(
     notes=notes,
     # beside them only files of the solver: with those it is computed again
     measuring=("sandmould/study/kinds/flow/execution.py",),
+    speed=SPEED,
 )

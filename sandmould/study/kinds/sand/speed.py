@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import platform
 import statistics
 import tempfile
 import time
@@ -15,8 +13,8 @@ from sandmould.engines.session import EngineStop, Session
 from sandmould.scenario.fill import Fill, Layer, Settling
 from sandmould.scenario.placement import fall_s
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.kinds.stored_speed import stored_speed
 
-STORED = "calibration.json"
 GRAINS = 400
 FALL_WALL_S = 5.0
 LONG_S = 60.0
@@ -25,59 +23,19 @@ WINDOWS, WINDOW_S = 8, 0.125
 """Their median counts: what else the machine does slows an engine even on a core of its own."""
 
 
-def stored_rate(scenario: Scenario, results: Path) -> float | None:
-    """Grain-steps per second of one core of this machine, as measured before; starts nothing.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    results : Path
-        Folder of all results, which holds what was measured.
-    """
-    rates = _rates(results)
-    return rates.get(_machine(scenario)) if rates else None
-
-
-def measured_rate(scenario: Scenario, results: Path) -> float | None:
-    """The same, measured now and stored where it was not; parameters as in ``stored_rate``.
-
-    Returns
-    -------
-    float or None
-        None when the engine could not run; the study's own runs will say why.
-    """
-    rates, machine = _rates(results), _machine(scenario)
-    if machine not in rates:
-        rate = _measure_rate(scenario)
-        if rate is None:
-            return None
-        results.mkdir(parents=True, exist_ok=True)
-        rates = {**_rates(results), machine: rate}  # another start may have measured meanwhile
-        (results / STORED).write_text(json.dumps(rates, indent=1), encoding="utf-8")
-    return rates[machine]
-
-
-def _machine(scenario: Scenario) -> str:
-    """Machine, engine, dimension, and the frame of sand that is shaken, as one text."""
+def _computed_by(scenario: Scenario) -> str:
+    """Engine, dimension, and the frame of sand that is shaken, as one text."""
     version = registry.engine_of(scenario).installed_version()
     how = f" shaken, {scenario.frame}" if scenario.vibrations else ""
-    return f"{platform.node()} {scenario.engine.name} {version} {scenario.dimension}D{how}"
-
-
-def _rates(results: Path) -> dict[str, float]:
-    """All that was measured; nothing where the file is damaged."""
-    try:
-        tree = json.loads((results / STORED).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return {machine: float(rate) for machine, rate in tree.items()}
+    return f"{scenario.engine.name} {version} {scenario.dimension}D{how}"
 
 
 def _measure_rate(scenario: Scenario) -> float | None:
-    """Let a few hundred grains of the scene fall, and time how they are shaken, or settle.
+    """Let a few hundred grains of the scene fall, and time how they settle or are shaken.
 
     Falling grains touch nothing and are too cheap to count, so they fall first, as far as a few
-    seconds of this machine take them.
+    seconds of this machine take them. In 3D, where runs fill for as long as they shake, and
+    shaken spheres lose more of their contacts, both are timed.
     """
     shaken = scenario.vibrations
     trial = scenario.model_copy(
@@ -100,14 +58,20 @@ def _measure_rate(scenario: Scenario) -> float | None:
             begun, rest_s = time.perf_counter(), fall_s(trial, GRAINS)
             while session.time_s < rest_s and (time.perf_counter() - begun < FALL_WALL_S):
                 session.advance()
+            rates = [_typical_rate(session)] if scenario.dimension == 3 or not shaken else []
             if shaken:
                 session.end_stage()
                 session.start_stage(program.stages[program.fill_stages])
-            measured = statistics.median(_window_rate(session) for _ in range(WINDOWS))
+                rates.append(_typical_rate(session))
             session.close()
         except EngineStop:
             return None
-    return measured
+    return statistics.harmonic_mean(rates)
+
+
+def _typical_rate(session: Session) -> float:
+    """Median of some windows."""
+    return statistics.median(_window_rate(session) for _ in range(WINDOWS))
 
 
 def _window_rate(session: Session) -> float:
@@ -127,3 +91,6 @@ def _spent_s() -> float:
     started = [pid for each in lists for pid in each.read_text(encoding="ascii").split()]
     stats = [Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii") for pid in started]
     return time.process_time() + sum(float(each.split()[0]) for each in stats) / 1e9
+
+
+SPEED = stored_speed(_computed_by, lambda scenario: _measure_rate(scenario))
