@@ -84,7 +84,8 @@ def test_a_file_that_is_no_study(verb: str, elsewhere: Path) -> None:
 
 def test_results_that_are_damaged(elsewhere: Path) -> None:
     Path("bar.yaml").write_text(CASTING)
-    assert said("plan", "bar.yaml") == (0, [])
+    status, (line,) = said("plan", "bar.yaml")
+    assert (status, line.startswith("Measuring the speed of this machine, once")) == (0, True)
     (run,) = Path("results", "bar", "runs").iterdir()
     of_study = [Path("results", "bar", name) for name in ("runs.tsv", "study.yaml", "summary.tsv")]
     of_run = [run / name for name in ("outcome.json", "cost.tsv", "scenario.yaml")]

@@ -63,8 +63,8 @@ def planned_s(scenario: Solidification) -> float:
 
 
 def speed_class(scenario: Solidification) -> SpeedClass:
-    """How heat is exchanged, and the dimension."""
-    return scenario.exchange, scenario.dimensions
+    """Elements or finite differences; runs of one class may share a job."""
+    return computation.engine_of(scenario), scenario.dimensions
 
 
 def _speed(scenario: Solidification) -> float:
