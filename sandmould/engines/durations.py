@@ -21,7 +21,7 @@ EDGE = 1.4
 """Median grains along the edge of an outlet through which nothing flows (Beverloo et al. 1961)."""
 REST_AFTER_FLOW_S = 1.3
 """Guess of the time until the last grains of a heap have rolled out: with it nine recorded studies
-of hoppers needed 0.72 to 1.39 times the grain-steps that are foretold for the whole run."""
+of hoppers needed 0.68 to 1.39 times the grain-steps that are foretold for the whole run."""
 REST_AFTER_FALL_S = 0.4
 """Guess of the time a bed needs to come to rest after the last grain has landed: 0.22 to 0.43 s on
 average in each of six studies of boxes in 2D and 3D, 0.27 to 1.14 s round a pattern."""

@@ -87,14 +87,7 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
         return Lack(Need.COMPUTE, f"{MANIFEST_FILE} is missing")
     except UNREADABLE:
         return Lack(Need.COMPUTE, f"{MANIFEST_FILE} cannot be read")
-    lack = _lack_of_files(folder, manifest)
-    if (
-        lack is WHOLE
-        and manifest
-        and LEFT_OUT not in manifest
-        and _measured_otherwise(run, manifest)
-    ):
-        lack = Lack(Need.MEASURE, "our code measures otherwise since")
+    lack = _lack_of_files(run, folder, manifest)
     return lack if run.part != FILL or lack.need is Need.COMPUTE else _lack_of_end(run, folder)
 
 
@@ -111,7 +104,7 @@ def _lack_of_end(fill: Run, folder: Path) -> Lack:
     return WHOLE
 
 
-def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
+def _lack_of_files(run: Run, folder: Path, manifest: Manifest | None) -> Lack:
     """What is lost of the files of a run that ended; a run of older times has no manifest."""
     sizes = (manifest or {}).get("computed")
     why = deck_damage(folder, manifest or {}) or (
@@ -124,16 +117,18 @@ def _lack_of_files(folder: Path, manifest: Manifest | None) -> Lack:
     elif "measured" not in manifest:
         why = "computed, but its measures are not taken yet"
     else:
-        why = damage(folder, manifest["measured"])
+        why = damage(folder, manifest["measured"]) or _measured_otherwise(run, manifest)
     if why and manifest and LEFT_OUT in manifest:
         return Lack(Need.COMPUTE, f"{why}, and its snapshots were left out of a pack")
     return Lack(Need.MEASURE, why) if why else WHOLE
 
 
-def _measured_otherwise(run: Run, manifest: Manifest) -> bool:
-    """Whether another state of our code than today's took the measures of a run."""
+def _measured_otherwise(run: Run, manifest: Manifest) -> str:
+    """Say that other code than today's measured a run that can be measured again."""
     code = manifest.get(MEASURED_BY, {}).get("code_sha256")
-    return "measured" in manifest and code != kind_of(run.scenario).planning.measuring_hash
+    if LEFT_OUT in manifest or code == kind_of(run.scenario).planning.measuring_hash:
+        return ""
+    return "our code measures otherwise since"
 
 
 def _empty(folder: Path, names: Iterable[str]) -> str:
