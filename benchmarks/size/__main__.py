@@ -46,8 +46,8 @@ class SizeExtent:
     shaken_steps: int = 300
     thread_copies: tuple[int, ...] = (4, 8)
     scale_copies: tuple[int, ...] = (2, 4, 8, 16, 32)
-    largest_steps: int = 1_000
-    """In all turns on the largest bed."""
+    scale_steps: int = 1_000
+    """At least, in all turns on a bed of any size: a turn of few steps is mostly its beginning."""
     mesh_copies: int = 4
     mesh_cuts: int = 92
     """Of each face of the cube that becomes the pattern; 12 times the square are the triangles."""
@@ -217,8 +217,7 @@ def measure_scale(run: BenchmarkRun) -> list[dict[str, Any]]:
     rows = []
     for copies in extent.scale_copies:
         bed = copied(settled(3, extent.spheres), copies)
-        is_largest = copies == extent.scale_copies[-1]
-        steps = extent.largest_steps // extent.turns if is_largest else _steps(extent, bed)
+        steps = max(extent.scale_steps // extent.turns, _steps(extent, bed))
         with started(_both(), bed) as both:
             costs = _in_turns(both, bed, steps, extent.turns, "cpu_s")
         rows.append({
