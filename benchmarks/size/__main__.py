@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -211,23 +211,40 @@ def measure_threads(run: BenchmarkRun) -> list[dict[str, Any]]:
     return rows
 
 
-def measure_scale(run: BenchmarkRun) -> list[dict[str, Any]]:
-    """Processor time per grain-step of beds of several sizes, before and now in turns."""
+def measure_scale(run: BenchmarkRun) -> dict[str, Any]:
+    """Processor time per grain-step of beds of several sizes, before and now, all in turns."""
     extent: SizeExtent = run.extent
-    rows = []
-    for copies in extent.scale_copies:
-        bed = copied(settled(3, extent.spheres), copies)
-        steps = max(extent.scale_steps // extent.turns, _steps(extent, bed))
-        with started(_both(), bed) as both:
-            costs = _in_turns(both, bed, steps, extent.turns, "cpu_s")
-        rows.append({
-            "bed": bed.name,
-            "steps": steps * extent.turns,
-            "ns_per_grain_step": {name: spread(values) for name, values in costs.items()},
-            "ratio": ratio(costs["now"], costs["before"]),
-        })  # fmt: skip
-        print(rows[-1], flush=True)
-    return rows
+    source = settled(3, extent.spheres)
+    least_steps = extent.scale_steps // extent.turns
+    costs: dict[tuple[str, str], list[float]] = {}
+    with ExitStack() as stack:
+        beds = {}
+        for copies in extent.scale_copies:
+            bed = copied(source, copies)
+            processes = stack.enter_context(started(_both(), bed))
+            beds[bed.name] = (processes, bed.grains, max(least_steps, _steps(extent, bed)))
+        for turn in range(extent.turns + 1):
+            for name, (processes, grains, steps) in beds.items():
+                for tree, process in processes.items():
+                    spent_s = ask(process, "advance", steps)["cpu_s"]
+                    if turn:
+                        cost = 1e9 * spent_s / (steps * grains)
+                        costs.setdefault((name, tree), []).append(cost)
+            print(f"turn {turn} of {extent.turns}", flush=True)
+    now = {name: costs[name, "now"] for name in beds}
+    by_cost = sorted(now.values(), key=np.median)
+    return {
+        "beds": [
+            {
+                "bed": name,
+                "steps": steps * extent.turns,
+                "ns_per_grain_step": {t: spread(costs[name, t]) for t in ("before", "now")},
+                "ratio": ratio(now[name], costs[name, "before"]),
+            }
+            for name, (_, _, steps) in beds.items()
+        ],
+        "dearest_over_cheapest": ratio(by_cost[-1], by_cost[0]),
+    }
 
 
 def measure_mesh(run: BenchmarkRun) -> list[dict[str, Any]]:
