@@ -124,13 +124,13 @@ def _steps(extent: SizeExtent, bed: Bed) -> int:
 
 
 def _in_turns(
-    processes: dict[str, Any], bed: Bed, steps: int, turns: int, clock: str
+    processes: dict[str, Any], bed: Bed, steps: int, turns: int
 ) -> dict[str, list[float]]:
-    """Cost of a grain-step in each turn, ns, by one of the clocks; a turn before is not counted."""
+    """Wall time of a grain-step in each turn, ns; a turn before is not counted."""
     costs: dict[str, list[float]] = {name: [] for name in processes}
     for turn in range(turns + 1):
         for name, process in processes.items():
-            spent_s = ask(process, "advance", steps)[clock]
+            spent_s = ask(process, "advance", steps)["wall_s"]
             if turn:
                 costs[name].append(1e9 * spent_s / (steps * bed.grains))
     return costs
@@ -200,7 +200,7 @@ def measure_threads(run: BenchmarkRun) -> list[dict[str, Any]]:
         bed = copied(settled(3, extent.spheres), copies)
         with started(_both(), bed) as one, started(_both(), bed, 2) as two:
             processes = {f"{k} {n}": p for n, s in ((1, one), (2, two)) for k, p in s.items()}
-            costs = _in_turns(processes, bed, _steps(extent, bed), extent.turns, "wall_s")
+            costs = _in_turns(processes, bed, _steps(extent, bed), extent.turns)
         rows.append({
             "bed": bed.name,
             "ns_per_grain_step": {name: spread(values) for name, values in costs.items()},
