@@ -13,8 +13,8 @@ import yaml
 import sandmould
 from sandmould import ROOT
 from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.contents import undescribed
 from sandmould.study.plan.build_plan import open_plan
+from tests.undescribed import undescribed
 from tests.workflow.pages import PAGES, blocks
 
 FREQUENCY = "vibration.0.frequency_hz"

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from sandmould.report.page import write_report
-from sandmould.study.contents import undescribed
 from tests.finished_study import FLOW, finished_study, study_text
+from tests.undescribed import undescribed
 
 SAND = """\
 based_on: tube_quick
