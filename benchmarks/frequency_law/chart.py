@@ -39,7 +39,8 @@ def draw(studies: Sequence[dict[str, Any]], path: Path) -> None:
             ax.set_ylabel("fill of the tube")
             ax.grid(alpha=0.3)
         row[0].set_title(study["title"], fontsize=9, loc="left")
-        row[0].legend(fontsize=8)
+        if len(study["series"]) > 1:
+            row[0].legend(fontsize=8)
     figure.savefig(path, dpi=110, metadata={"Software": None})
 
 

@@ -21,7 +21,13 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.records import RECORDS
 
-STUDIES = ("tube_law_springs", "tube_law_depth", "tube_law_hold", "tube_law_width")
+STUDIES = (
+    "tube_law_springs",
+    "tube_law_depth",
+    "tube_law_hold",
+    "tube_law_width",
+    "tube_3d_frequency",
+)
 COLLAPSED = ("tube_law_springs", "tube_law_depth", "tube_law_hold")
 """Studies of one tube and one sand, which differ in springs, depth and what is held."""
 HELD_OUT = {

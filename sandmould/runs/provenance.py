@@ -54,14 +54,15 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 @cache
 def commit() -> str:
-    """Commit of the checkout, marked where anything but its records differs from it.
+    """Commit of the checkout, marked where anything differs that no run or benchmark writes.
 
     Of an installed package its version.
     """
     if not IS_CHECKOUT:  # it may lie in the checkout of something else
         return f"sandmould {metadata.version('sandmould')}"
     name = _git("describe", "--always") or "not a git checkout"
-    changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/results")
+    written = (":!docs", ":!benchmarks/*/results.json")
+    changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", *written)
     return f"{name}-dirty" if changed else name
 
 
