@@ -7,8 +7,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.stats import quantile_test
 
 
 @dataclass(frozen=True)
@@ -96,3 +98,17 @@ def spread(values: Sequence[float]) -> dict[str, float]:
 def ratio(over: Sequence[float], under: Sequence[float]) -> dict[str, float]:
     """Median and range of the ratios within each round."""
     return spread([a / b for a, b in zip(over, under, strict=True)])
+
+
+def median_interval(values: Sequence[float]) -> dict[str, float]:
+    """Median, and its 95 % interval by the ranks of the values: no shape of their spread is meant.
+
+    Of fewer than six values neither end of such an interval is known: both are NaN.
+    """
+    # A pair; the type stubs of SciPy call it a float.
+    interval: Any = quantile_test(values, p=0.5).confidence_interval(0.95)
+    return {
+        "median": float(np.median(values)),
+        "low": float(interval.low),
+        "high": float(interval.high),
+    }
