@@ -211,7 +211,7 @@ def _same_answer(run: BenchmarkRun, slurm: SlurmNode | None = None) -> dict[str,
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(yaml.safe_dump(study), encoding="utf-8")
         rows[name] = _measured(_python(root), root, file, slurm)
-        rows[name] |= _answer(file.parent / "results" / file.stem, pools_spread=name != "old")
+        rows[name] |= _answer(file.parent / "results" / file.stem)
         print(name, rows[name], flush=True)
     return {"rows": rows, **extent, "commits": _commits(versions)}
 
@@ -227,12 +227,9 @@ def _same_answer_on_slurm(run: BenchmarkRun) -> dict[str, Any]:
             slurm.stop()
 
 
-def _answer(folder: Path, pools_spread: bool) -> dict[str, Any]:
+def _answer(folder: Path) -> dict[str, Any]:
     """The best setting, and how well its difference from the next is known."""
-    verdict = compare_settings(
-        sweep_part(read_summary(folder)), [FREQUENCY], "tube_fill_fraction",
-        pools_spread=pools_spread,
-    )  # fmt: skip
+    verdict = compare_settings(sweep_part(read_summary(folder)), [FREQUENCY], "tube_fill_fraction")
     assert verdict.best is not None
     assert verdict.runner_up is not None
     low, high = verdict.ci

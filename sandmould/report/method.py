@@ -124,9 +124,10 @@ def statistics_method(objective: Objective, ends: str, draws_by_lot: bool) -> Ro
         return Row("Statistics", f"{compared}. Nothing is drawn by lot, so a setting is one run.")
     return Row(
         "Statistics",
-        f"{compared}. A setting's ± is the 95 % interval of its mean (Student). Settings with the "
-        "same usable replicates are compared by paired differences, others by Welch's test. "
-        "Intervals and p values of the best against the others carry Bonferroni's factor.",
+        f"{compared}. A setting's ± is the 95 % interval of its mean (Student). Settings are "
+        "compared by the spread that all share (analysis of variance), or by their own where it is "
+        "larger. Where all have the same usable replicates, what a replicate shifts in all of them "
+        "drops out. Intervals and p values hold for all pairs of settings together (Tukey).",
     )
 
 

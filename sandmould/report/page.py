@@ -148,9 +148,14 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
     verdict = compare_settings(
-        summary, keys, objective.measure, objective.better, notes, seeks_best,
-        pools_spread=study.pools_spread, draws_by_lot=kind_named(study.kind).draws_by_lot,
-    )  # fmt: skip
+        summary,
+        keys,
+        objective.measure,
+        objective.better,
+        notes,
+        seeks_best,
+        draws_by_lot=kind_named(study.kind).draws_by_lot,
+    )
     pictured_run = next(iter(pictured_runs(study_folder, summary, verdict).values()), "")
     listed = {setting.label for setting in listed_settings(verdict)}
     by_setting = {}
@@ -161,7 +166,7 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
                 by_setting[label] = own, summary.iloc[rows]
     if seeks_best:
         verdict = with_amplitudes(verdict, drives_of(by_setting))
-    if study.pools_spread:
+    if study.adds_replicates:
         effort = effort_sentence(read_rounds(study_folder, study), study, summary)
         verdict = replace(verdict, sentences=(*verdict.sentences, effort))
     relative = os.path.relpath(study_folder.absolute(), home)

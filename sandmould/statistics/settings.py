@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -44,11 +45,10 @@ class Comparison:
     other: str
     difference: float
     ci: tuple[float, float]
-    """95 % interval, Bonferroni over all others; NaN where replicates are too few or identical."""
+    """95 % interval, for all pairs of settings together; NaN where replicates are too few or
+    identical."""
     p: float
-    """Two-sided, Bonferroni over all others."""
-    paired: bool
-    """Whether differences were taken replicate by replicate, which share their seeds."""
+    """Two-sided, for all pairs of settings together."""
     loop_error: float = 0.0
     """What loops leave open of the difference; a part of the interval that no more runs narrow."""
 
@@ -120,35 +120,55 @@ def by_block(
 
 @dataclass(frozen=True)
 class Spread:
-    """Standard deviation that all settings share."""
+    """Standard deviation of a run that all settings share, by an analysis of variance."""
 
     sd: float
+    """Round the mean of its setting; where all settings have the same blocks, apart from what a
+    block shifts in all of them. NaN without a degree of freedom."""
     df: int
-    """Degrees of freedom: runs less settings."""
+    settings: int
+    in_blocks: bool
 
     @staticmethod
     def of(values: Iterable[pd.Series[float]]) -> Spread:
-        """Pool the spread within the settings; NaN where none has two values."""
-        several = [v for v in values if len(v) > 1]
-        df = sum(len(v) - 1 for v in several)
-        squares = sum(float(v.var(ddof=1)) * (len(v) - 1) for v in several)
-        return Spread(math.sqrt(squares / df) if df else math.nan, df)
+        """Pool the spread of the settings' values by block.
 
-    def test(
-        self, first: pd.Series[float], second: pd.Series[float]
-    ) -> tuple[MeanTest, bool] | None:
-        """Test the difference of two means by this spread; as ``compare_means``, never in pairs."""
+        Replicates that share their seeds are one block. A shift that a block gives to all settings
+        drops out of their differences, so it does not count.
+        """
+        used = [v for v in values if len(v)]
+        blocks = used[0].index if used else pd.Index([])
+        in_blocks = all(v.index.is_unique and set(v.index) == set(blocks) for v in used)
+        if in_blocks:
+            table = np.array([v.reindex(blocks) for v in used], dtype=np.float64)
+            table = table.reshape(len(used), len(blocks))
+            left = table - table.mean(axis=1, keepdims=True) - table.mean(axis=0) + table.mean()
+            df = (len(used) - 1) * (len(blocks) - 1)
+        else:
+            left = np.concatenate([v - v.mean() for v in used])
+            df = len(left) - len(used)
+        sd = math.sqrt(float((left**2).sum()) / df) if df > 0 else math.nan
+        return Spread(sd, df, len(used), in_blocks)
+
+    def test(self, first: pd.Series[float], second: pd.Series[float]) -> MeanTest | None:
+        """Test the difference of two means, for all pairs of settings together (Tukey, Kramer).
+
+        Where the two scatter more than all settings do, their own spread counts: the shared one
+        would then call chance a difference. None where no spread is left to test by.
+        """
         error = self.sd * math.sqrt(1.0 / len(first) + 1.0 / len(second))
+        if (own := compare_means(first, second)) is not None and self.df > 0:
+            error = max(error, own[0].error)
         if not error > 1e-12 * max(float(np.abs(first).max()), float(np.abs(second).max())):
             return None
-        return MeanTest(float(first.mean() - second.mean()), error, self.df), False
+        return MeanTest(float(first.mean() - second.mean()), error, self.df, means=self.settings)
 
 
 def compare(
     best: Setting,
     others: Sequence[Setting],
     values: Mapping[str, pd.Series[float]],
-    spread: Spread | None = None,
+    spread: Spread,
 ) -> tuple[Comparison, ...]:
     """The best minus each other setting, nearest first.
 
@@ -158,35 +178,26 @@ def compare(
     others : sequence of Setting
     values : mapping of label to Series of float
         Of each setting, by block.
-    spread : Spread, optional
-        By which all are compared; that of the two settings, or of their pairs, unless given.
+    spread : Spread
+        By which all are compared.
     """
-    test_of = spread.test if spread else compare_means
-    tests = {o.label: test_of(values[best.label], values[o.label]) for o in others}
-    factor = max(1, sum(test is not None for test in tests.values()))
     comparisons = []
     for other in others:
-        ci, p, is_paired = (math.nan, math.nan), math.nan, False
+        ci, p = (math.nan, math.nan), math.nan
         loop_error = best.loop_error + other.loop_error
-        if (test := tests[other.label]) is not None:
-            result, is_paired = test
-            result = replace(result, loop_error=loop_error)
-            ci = result.confidence_interval(1.0 - (1.0 - CONFIDENCE) / factor)
-            p = min(1.0, factor * float(result.pvalue))
+        if (test := spread.test(values[best.label], values[other.label])) is not None:
+            result = replace(test, loop_error=loop_error)
+            ci, p = result.confidence_interval(CONFIDENCE), result.pvalue
         difference = best.mean - other.mean
-        comparisons.append(
-            Comparison(
-                other.label, difference, (float(ci[0]), float(ci[1])), p, is_paired, loop_error
-            )
-        )
+        comparisons.append(Comparison(other.label, difference, ci, p, loop_error))
     return tuple(comparisons)
 
 
 @dataclass(frozen=True)
 class MeanTest:
-    """Student's t of a difference of two means, as ``scipy.stats`` has it.
+    """Test of a difference of two means, as ``scipy.stats`` has it.
 
-    That package takes half a second to load.
+    That package takes half a second to load, so Student's t does without it.
     """
 
     difference: float
@@ -196,17 +207,40 @@ class MeanTest:
     """Degrees of freedom."""
     loop_error: float = 0.0
     """By which the difference may be off besides."""
+    means: int = 2
+    """How many means there are: the test holds for all their pairs together, by Tukey's
+    studentized range; of two this is Student's t."""
 
     @property
     def pvalue(self) -> float:
         """Of both sides."""
-        beyond = max(0.0, abs(self.difference) - self.loop_error)
-        return 2.0 * float(stdtr(self.df, -beyond / self.error))
+        beyond = max(0.0, abs(self.difference) - self.loop_error) / self.error
+        if self.means > 2:
+            return _range_beyond(math.sqrt(2.0) * beyond, self.means, self.df)
+        return 2.0 * float(stdtr(self.df, -beyond))
 
     def confidence_interval(self, level: float) -> tuple[float, float]:
         """Interval of the difference."""
-        half = float(stdtrit(self.df, 0.5 + level / 2)) * self.error + self.loop_error
+        if self.means > 2:
+            reach = _range_reached(level, self.means, self.df) / math.sqrt(2.0)
+        else:
+            reach = float(stdtrit(self.df, 0.5 + level / 2))
+        half = reach * self.error + self.loop_error
         return self.difference - half, self.difference + half
+
+
+@cache
+def _range_reached(level: float, means: int, df: float) -> float:
+    """Quantile of the studentized range: an integral that takes a tenth of a second."""
+    from scipy.stats import studentized_range
+
+    return float(studentized_range.ppf(level, means, df))
+
+
+def _range_beyond(reach: float, means: int, df: float) -> float:
+    from scipy.stats import studentized_range
+
+    return float(studentized_range.sf(reach, means, df))
 
 
 def compare_means(

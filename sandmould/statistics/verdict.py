@@ -84,16 +84,16 @@ def compare_settings(
     better: Better = "larger",
     notes: Sequence[str] = (),
     seeks_best: bool = True,
-    pools_spread: bool = False,
     draws_by_lot: bool = True,
 ) -> Verdict:
     """Compare the settings of a study by the mean of the objective.
 
-    Only runs that are evidence of the objective count, see ``evidence``. Replicates share their
-    seeds across settings, so two settings with the same usable replicates are compared by paired
-    differences, others by Welch's test. The best is picked after seeing the data among all
-    settings: intervals and p values carry Bonferroni's factor, the number of other settings that
-    can be tested.
+    Only runs that are evidence of the objective count, see ``evidence``. Settings are compared
+    by the spread that all share, that of an analysis of variance, or by their own where it is
+    larger. Replicates share their seeds across settings: where all settings have the same ones,
+    what a replicate shifts in all of them drops out. The best is picked after seeing the data:
+    intervals and p values hold for all pairs of settings together (Tukey 1953; Kramer 1956 for
+    unlike numbers of replicates).
 
     Parameters
     ----------
@@ -109,10 +109,6 @@ def compare_settings(
         Caveats that the caller knows of, put after those found here.
     seeks_best : bool
         Whether the study looks for the best setting, so that its place in the sweep matters.
-    pools_spread : bool
-        Compare by one spread that all settings share, instead of by each pair's own: settings of
-        two replicates can then be told apart. For studies that give more replicates to the
-        settings that may be the best.
     draws_by_lot : bool
         Whether runs of one setting differ by their seeds, so that few of them are a reason to
         doubt.
@@ -131,8 +127,9 @@ def compare_settings(
     sign = -1 if better == "larger" else 1
     ranked = sorted((s for s in settings if s.n), key=lambda s: sign * s.mean)
     best = ranked[0] if ranked else None
-    spread = Spread.of(of_setting.values()) if pools_spread else None
-    comparisons = compare(best, ranked[1:], of_setting, spread) if best else ()
+    comparisons = (
+        compare(best, ranked[1:], of_setting, Spread.of(of_setting.values())) if best else ()
+    )
     first = comparisons[0] if comparisons else None
     resolved = first is not None and first.separated
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
@@ -140,7 +137,6 @@ def compare_settings(
         *_run_caveats(settings, summary, keys, measure, seeks_best, draws_by_lot),
         *(_edge_caveats(best, settings, keys, resolved) if seeks_best else ()),
         *_identical([c.other for c in comparisons if _is_identical(c, of_setting, best)]),
-        *(_spread_caveat(spread, settings) if spread else ()),
         *notes,
     ]
     return Verdict(
@@ -303,13 +299,13 @@ def _sentences(
         return (
             f"{_capital(best.label)} is best: it gives the {most} {what}, {mean}, against "
             f"{with_margin(second.mean, second.ci_half_width)} at {second.label}, the runner-up.",
-            _difference_sentence(first, best, len(comparisons)),
+            _difference_sentence(first, ranked),
         )
     like = [c.other for c in comparisons if not c.separated]
     worse = [c.other for c in comparisons if c.separated]
     ruled_out = f" Ruled out: {listed(worse)}." if worse else ""
     again = (
-        _difference_sentence(first, best, len(comparisons))
+        _difference_sentence(first, ranked)
         if first.tested
         else f"{_capital(best.label)} and {second.label} need two replicates or more, with "
         "different values, before their difference can be told from chance."
@@ -358,17 +354,6 @@ def _more_sentence(comparisons: Sequence[Comparison], best: Setting) -> str:
         f" If the differences are as large as they seem, about {more} more replicates of each "
         "of these settings decide."
     )
-
-
-def _spread_caveat(spread: Spread, settings: Sequence[Setting]) -> list[str]:
-    sds = [s.sd for s in settings if s.n >= FEW]
-    if not spread.df or not sds:
-        return []
-    return [
-        f"All settings are taken to scatter alike, by {number(spread.sd, 2)} (all replicates "
-        f"together). Alone, those of {FEW} runs or more scatter by {number(min(sds), 2)} to "
-        f"{number(max(sds), 2)}."
-    ]
 
 
 def _mean_error(errors: pd.Series[float]) -> float:
@@ -423,10 +408,11 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _difference_sentence(first: Comparison, best: Setting, others: int) -> str:
-    how = f"{best.n} paired replicates" if first.paired else "independent replicates"
-    allowance = f", allowing for {others} comparisons" if others > 1 else ""
+def _difference_sentence(first: Comparison, settings: Sequence[Setting]) -> str:
+    fewest, most = min(s.n for s in settings), max(s.n for s in settings)
+    how = f"{fewest} replicates" if fewest == most else f"{fewest} to {most} replicates"
+    together = f", {len(settings)} settings compared together" if len(settings) > 2 else ""
     return (
         f"The difference from {first.other} is {number(first.difference, 2)}, with a 95 % interval "
-        f"from {number(first.ci[0], 2)} to {number(first.ci[1], 2)} ({how}{allowance})."
+        f"from {number(first.ci[0], 2)} to {number(first.ci[1], 2)} ({how}{together})."
     )

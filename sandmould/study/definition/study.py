@@ -108,8 +108,8 @@ class Study(Section):
         return not self.equivalence.keys and self.objective.better != "neither"
 
     @property
-    def pools_spread(self) -> bool:
-        """Whether settings are compared by one spread, since some have few replicates."""
+    def adds_replicates(self) -> bool:
+        """Whether rounds give more replicates to settings that may be the best."""
         return self.refine.rounds > 0 and self.refine.adds == "replicates"
 
     @property

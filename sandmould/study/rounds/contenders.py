@@ -50,8 +50,8 @@ class Contenders:
 def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Contenders | None:
     """Find the settings that are not ruled out by the runs so far.
 
-    Settings are compared as in the report, by the spread that all share and with Bonferroni's
-    factor, so that a setting that gets no more runs is one that the report calls worse.
+    Settings are compared as in the report, so that one that gets no more runs is one that the
+    report calls worse.
 
     Parameters
     ----------
@@ -67,9 +67,7 @@ def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Con
         None where no two settings can be compared.
     """
     objective = study.objective
-    verdict = compare_settings(
-        summary, keys, objective.measure, objective.better, pools_spread=study.pools_spread
-    )
+    verdict = compare_settings(summary, keys, objective.measure, objective.better)
     if verdict.best is None or not any(c.tested for c in verdict.comparisons):
         return None
     labels = [verdict.best.label, *(c.other for c in verdict.comparisons if not c.separated)]

@@ -100,7 +100,7 @@ def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
     if swept.empty:
         return ""
     keys = swept_keys(swept)
-    verdict = compare_settings(swept, keys, measure, better, pools_spread=study.pools_spread)
+    verdict = compare_settings(swept, keys, measure, better)
     used = [setting for setting in verdict.settings if setting.n]
     if not used or verdict.best is None:
         return ""
