@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -40,17 +40,24 @@ class Setting:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The best setting minus another one."""
+    """The best setting minus another one, judged for all pairs of settings together."""
 
     other: str
     difference: float
-    ci: tuple[float, float]
-    """95 % interval, for all pairs of settings together; NaN where replicates are too few or
-    identical."""
-    p: float
-    """Two-sided, for all pairs of settings together."""
+    test: MeanTest | None
+    """None where replicates are too few or identical."""
     loop_error: float = 0.0
     """What loops leave open of the difference; a part of the interval that no more runs narrow."""
+
+    @property
+    def ci(self) -> tuple[float, float]:
+        """95 % interval; NaN without a test."""
+        return self.test.confidence_interval(CONFIDENCE) if self.test else (math.nan, math.nan)
+
+    @property
+    def p(self) -> float:
+        """Two-sided; NaN without a test. It takes a hundredth of a second."""
+        return self.test.pvalue if self.test else math.nan
 
     @property
     def separated(self) -> bool:
@@ -60,7 +67,7 @@ class Comparison:
     @property
     def tested(self) -> bool:
         """Whether there were enough replicates, with different values, to test."""
-        return math.isfinite(self.p)
+        return self.test is not None
 
 
 def setting_rows(
@@ -127,7 +134,6 @@ class Spread:
     block shifts in all of them. NaN without a degree of freedom."""
     df: int
     settings: int
-    in_blocks: bool
 
     @staticmethod
     def of(values: Iterable[pd.Series[float]]) -> Spread:
@@ -148,9 +154,11 @@ class Spread:
             left = np.concatenate([v - v.mean() for v in used])
             df = len(left) - len(used)
         sd = math.sqrt(float((left**2).sum()) / df) if df > 0 else math.nan
-        return Spread(sd, df, len(used), in_blocks)
+        return Spread(sd, df, len(used))
 
-    def test(self, first: pd.Series[float], second: pd.Series[float]) -> MeanTest | None:
+    def test(
+        self, first: pd.Series[float], second: pd.Series[float], loop_error: float = 0.0
+    ) -> MeanTest | None:
         """Test the difference of two means, for all pairs of settings together (Tukey, Kramer).
 
         Where the two scatter more than all settings do, their own spread counts: the shared one
@@ -161,7 +169,8 @@ class Spread:
             error = max(error, own[0].error)
         if not error > 1e-12 * max(float(np.abs(first).max()), float(np.abs(second).max())):
             return None
-        return MeanTest(float(first.mean() - second.mean()), error, self.df, means=self.settings)
+        difference = float(first.mean() - second.mean())
+        return MeanTest(difference, error, self.df, loop_error, self.settings)
 
 
 def compare(
@@ -183,13 +192,9 @@ def compare(
     """
     comparisons = []
     for other in others:
-        ci, p = (math.nan, math.nan), math.nan
         loop_error = best.loop_error + other.loop_error
-        if (test := spread.test(values[best.label], values[other.label])) is not None:
-            result = replace(test, loop_error=loop_error)
-            ci, p = result.confidence_interval(CONFIDENCE), result.pvalue
-        difference = best.mean - other.mean
-        comparisons.append(Comparison(other.label, difference, ci, p, loop_error))
+        test = spread.test(values[best.label], values[other.label], loop_error)
+        comparisons.append(Comparison(other.label, best.mean - other.mean, test, loop_error))
     return tuple(comparisons)
 
 
