@@ -76,6 +76,7 @@ def page(records: Path = RECORDS, picture: Path | None = None) -> str:
             )
     values = {
         "studies": studies,
+        "names": list(there),
         "missing": [name for name in STUDIES if name not in there],
         "law": law,
         "number": number,

@@ -24,7 +24,8 @@ STATES = {
     "interval lies in theirs, or holds their number",
     DIFFERS: "it does not",
     UNRESOLVED: "our interval reaches over an end of their range",
-    POSSIBLE: "theirs lies among settings of ours that are not told apart from our best",
+    POSSIBLE: "theirs lies on the top of our best: between the nearest settings on either side that are "
+    "ruled out, or the ends of the sweep",
     NO_INTERVAL: "two numbers without a spread: the difference stands, no verdict",
     TAKEN: "a number that is put in, the same in our study",
     PICTURE: "theirs is in a picture and not in the text, so that nothing can be compared",
@@ -135,8 +136,8 @@ def _with_interval(ours: OurNumber, unit: str, digits: int, is_best: bool) -> st
         text = f"best at {number(ours.best, digits)} {unit}".rstrip()
         if ours.low == ours.high:
             return text + runs
-        among = f"{number(ours.low, digits)} to {number(ours.high, digits)}"
-        return f"{text}, not told apart from {among}{runs}"
+        ends = f"{number(ours.low, digits)} and {number(ours.high, digits)}"
+        return f"{text}, its top between {ends}{runs}"
     if ours.low == ours.high:
         return f"{number(ours.best, digits)} {unit}".rstrip()
     return f"{with_margin(ours.best, ours.half_width)} {unit}".rstrip() + runs

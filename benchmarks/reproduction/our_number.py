@@ -19,8 +19,8 @@ class OurNumber:
 
     low: float
     high: float
-    """Ends of the 95 % interval of a mean, or of the settings not told apart from the best; both
-    the number itself where there is no interval."""
+    """Ends of the 95 % interval of a mean; or the settings next to the best that are ruled out, else
+    the ends of the sweep; both the number itself where there is no interval."""
     best: float
     n: int
     """Runs, or rows, that it rests on."""
@@ -44,9 +44,18 @@ def taken(rows: pd.DataFrame, source: OurSource) -> OurNumber:
         best = verdict.best
         if best is None:
             return OurNumber(math.nan, math.nan, math.nan, 0)
+        at = best.values[source.of]
+        tried = [s.values[source.of] for s in verdict.settings if s.n]
         told_apart = {c.other for c in verdict.comparisons if c.separated}
-        near = [s.values[source.of] for s in verdict.settings if s.n and s.label not in told_apart]
-        return OurNumber(min(near), max(near), best.values[source.of], len(rows), cost)
+        # a setting that is ruled out lies outside
+        ruled_out = [
+            math.nextafter(s.values[source.of], at)
+            for s in verdict.settings
+            if s.label in told_apart
+        ]
+        low = max((value for value in ruled_out if value < at), default=min(tried))
+        high = min((value for value in ruled_out if value > at), default=max(tried))
+        return OurNumber(low, high, at, len(rows), cost)
     if source.take == "where_least":
         at = float(rows[source.of].iloc[int(values.abs().argmin())])
         return OurNumber(at, at, at, len(rows), cost)

@@ -28,6 +28,7 @@ from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.robustness.controls import BY_FACTOR, SHAKEN_HZ, Case, cases
 from sandmould.study.rounds.decide import choose_controls, next_round
 from sandmould.study.rounds.round_log import RoundLog, basis_of, read_rounds, write_rounds
+from tests.liggghts_scenes import needs_liggghts
 
 FREQUENCY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"
@@ -231,7 +232,14 @@ def test_a_refused_control_is_told_before_the_first_run_not_after_the_rounds(
     opened(tmp_path, scenario=STUDY["scenario"] | long, refine={"rounds": 2})
     with pytest.raises(BadInputError, match=r"certificate.controls = 'tube_length x1.5' cannot"):
         open_plan(tmp_path / "trial.yaml")
-    # An engine that refuses a control's scene is told too: liggghts has no background damping (37).
+
+
+@needs_liggghts
+def test_an_engine_that_refuses_a_control_is_told_before_the_first_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    # LIGGGHTS has no background damping (37).
     opened(tmp_path, certificate={"controls": ["engine"], "engine": "liggghts"})
     with pytest.raises(BadInputError, match=r"on engine liggghts"):
         open_plan(tmp_path / "trial.yaml")

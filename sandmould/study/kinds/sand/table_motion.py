@@ -77,5 +77,5 @@ def frequency_rule(scenario: Scenario, hardness: Hardness | None) -> str:
     from_hz = LEAST_SHARE * hardness.column_hz
     return (
         f"Expect good filling from about {number(from_hz, 2)} Hz on: 0.25 c/(4 H) at this wave "
-        "speed. The rule comes from one tube in 2D: docs/frequency_law.md."
+        "speed. The rule comes from one tube in 2D; one in 3D agrees: docs/frequency_law.md."
     )
