@@ -63,7 +63,8 @@ class OurSource(Section):
     take: Take = Field(
         "mean",
         description="What of the rows: their mean, the least, the most, the value of the swept "
-        "key with the best mean and the nearest ones that are ruled out, or where the size is least.",
+        "key with the best mean and the nearest ones that are ruled out, or where the size is "
+        "least.",
     )
     of: str = Field("", description="The swept key of best and where_least.")
     minus: OurSource | None = Field(None, description="What is taken off.")

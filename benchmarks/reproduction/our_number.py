@@ -19,8 +19,8 @@ class OurNumber:
 
     low: float
     high: float
-    """Ends of the 95 % interval of a mean; or the settings next to the best that are ruled out, else
-    the ends of the sweep; both the number itself where there is no interval."""
+    """Ends of the 95 % interval of a mean; or the settings next to the best that are ruled out,
+    else the ends of the sweep; both the number itself where there is no interval."""
     best: float
     n: int
     """Runs, or rows, that it rests on."""
