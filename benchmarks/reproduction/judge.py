@@ -24,8 +24,8 @@ STATES = {
     "interval lies in theirs, or holds their number",
     DIFFERS: "it does not",
     UNRESOLVED: "our interval reaches over an end of their range",
-    POSSIBLE: "theirs lies on the top of our best: between the nearest settings on either side that "
-    "are ruled out, or the ends of the sweep",
+    POSSIBLE: "theirs lies on the top of our best: between the nearest settings on either side "
+    "that are ruled out, or the ends of the sweep",
     NO_INTERVAL: "two numbers without a spread: the difference stands, no verdict",
     TAKEN: "a number that is put in, the same in our study",
     PICTURE: "theirs is in a picture and not in the text, so that nothing can be compared",
