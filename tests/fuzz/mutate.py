@@ -159,7 +159,7 @@ def _archive(data: bytes, chance: random.Random) -> bytes:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for part, content in parts.items():
-            archive.writestr(part, content)
+            archive.writestr(zipfile.ZipInfo(part), content)  # without the time of day
     return file.getvalue()
 
 
