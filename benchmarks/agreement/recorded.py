@@ -11,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from sandmould import ROOT
+from sandmould.runs.columns import REPLICATE
 from sandmould.statistics.agreement import Compared, EngineSpeed, agreement_sentences, speeds
 from sandmould.study.collect import compare_study, read_summary, swept_keys
 from sandmould.study.plan.load_study import open_study
@@ -23,6 +24,7 @@ class Recorded:
     name: str
     title: str
     replicates: int
+    """Those of the record; the study may ask for others by now."""
     confidence: float
     record: dict[str, Any]
     keys: tuple[str, ...]
@@ -51,7 +53,7 @@ def read_recorded(folder: Path) -> Recorded:
     return Recorded(
         folder.name,
         study.title,
-        study.replicates,
+        summary[REPLICATE].nunique(),
         study.equivalence.confidence,
         record,
         study.equivalence.keys,

@@ -201,6 +201,7 @@ def test_page_on_the_engines_has_its_tables(tmp_path: Path) -> None:
     assert "# Do three engines fill and shake the same box alike?" in text
     assert "| solid fraction | lammps − reference | 0.81" in text
     assert text.count("| equivalent |") >= 6
+    assert "Study `engine_twins`, 6 replicates," in text  # the file asks for more
     assert "| reference | 22 Jul 2025 | 6 | 21 M |" in text
     assert "2/5 m r²" in text
     assert "\n\n\n\n" not in text
