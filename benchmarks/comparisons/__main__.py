@@ -1,13 +1,13 @@
 """Errors and power of the comparison of settings: ``python -m benchmarks.comparisons``.
 
 How many studies rule out a setting that is as good as the best, and how many settings that are
-worse are ruled out. It prints the table of docs/explanation/statistics.md; nothing of it is
+worse are ruled out. It prints the tables of docs/explanation/statistics.md; nothing of it is
 simulated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -15,76 +15,98 @@ from numpy.typing import NDArray
 
 from benchmarks.frame import table
 from sandmould.scenario.module_main import run_main
-from sandmould.statistics.settings import CONFIDENCE, MeanTest, Spread, compare_means
+from sandmould.statistics.contrasts import Spread
+from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest, compare_means
 
 STUDIES = 2000
 SIZES = ((2, 3), (4, 2), (4, 3), (4, 4), (4, 8), (6, 3), (12, 3), (12, 8))
+ROUNDS = ((3, 3, 5, 5), (2, 2, 2, 2, 8, 8), (3, 3, 3, 3, 8, 8), (3, 3, 3, 3, 3, 3, 3, 3, 12, 12))
+"""Replicates of the settings of a study after rounds, the planted best among the last."""
+SHIFTS = (0.0, 0.4, 0.8)
+"""Standard deviations of what a filling shifts in all settings, over that of a run."""
 BETTER_BY = 2.5
 """What the planted best is better by, in standard deviations of a run."""
-Fills = NDArray[np.float64]
-Judge = Callable[[Sequence["pd.Series[float]"], int], list[MeanTest | None]]
+Fills = Mapping[str, "pd.Series[float]"]
+Judge = Callable[[Fills], list[MeanTest | None]]
 
 
-def as_now(fills: Sequence[pd.Series[float]], best: int) -> list[MeanTest | None]:
-    """Each other setting against the best, as the report compares them."""
+def as_now(fills: Fills) -> list[MeanTest | None]:
+    """The best setting against each other one, as the report compares them."""
     spread = Spread.of(fills)
-    return [spread.test(fills[best], other) for other in _others(fills, best)]
+    best = max(fills, key=spread.mean)
+    return [spread.compare(best, other)[1] for other in fills if other != best]
 
 
-def in_pairs(fills: Sequence[pd.Series[float]], best: int) -> list[MeanTest | None]:
-    """The same by Student's test of pairs."""
-    return [(compare_means(fills[best], other) or (None,))[0] for other in _others(fills, best)]
+def apart(fills: Fills) -> list[MeanTest | None]:
+    """The same, each run for itself: what a filling shifts is not taken out."""
+    return as_now(
+        {
+            label: pd.Series(v.to_numpy(), index=[f"{label} {i}" for i in v.index])
+            for label, v in fills.items()
+        }
+    )
 
 
-def _others(fills: Sequence[pd.Series[float]], best: int) -> list[pd.Series[float]]:
-    return [row for place, row in enumerate(fills) if place != best]
+def in_pairs(fills: Fills) -> list[MeanTest | None]:
+    """By Student's test of pairs."""
+    best = max(fills, key=lambda label: float(fills[label].mean()))
+    others = [fills[other] for other in fills if other != best]
+    return [(compare_means(fills[best], other) or (None,))[0] for other in others]
 
 
 def ruled_out(judge: Judge, fills: Fills, level: float) -> list[bool]:
     """Whether each setting but the best is ruled out."""
-    tests = judge([pd.Series(row) for row in fills], int(fills.mean(axis=1).argmax()))
-    intervals = [test.confidence_interval(level) for test in tests if test is not None]
+    intervals = [test.confidence_interval(level) for test in judge(fills) if test is not None]
     return [low > 0 or high < 0 for low, high in intervals]
 
 
-def spreads(settings: int) -> dict[str, Fills]:
-    """Standard deviations of the settings' runs, mean one."""
-    unlike = np.linspace(1.0, 3.0, settings)
-    return {"alike": np.ones(settings), "1 to 3": unlike / unlike.mean()}
+def unlike(settings: int) -> NDArray[np.float64]:
+    """Standard deviations that rise from one to three times over the settings, mean one."""
+    sds = np.linspace(1.0, 3.0, settings)
+    return sds / sds.mean()
 
 
-def shares(judge: Judge, sds: Fills, replicates: int) -> tuple[float, float]:
+def shares(
+    judge: Judge, sds: NDArray[np.float64], replicates: Sequence[int], best: int, shift: float = 0.0
+) -> tuple[float, float]:
     """Studies of equal settings with one ruled out, and worse settings that are ruled out."""
     rng = np.random.default_rng(1)
-    # Bonferroni's factor for the other settings; Tukey's test needs none.
-    level = CONFIDENCE if judge is as_now else 1.0 - (1.0 - CONFIDENCE) / (len(sds) - 1)
+    # Bonferroni's factor for the other settings of pairs; Tukey's test needs none.
+    level = 1.0 - (1.0 - CONFIDENCE) / (len(sds) - 1) if judge is in_pairs else CONFIDENCE
     wrong, rightly = 0, []
-    planted = np.zeros((len(sds), 1))
-    planted[len(sds) // 2] = BETTER_BY
     for _ in range(STUDIES):
-        noise = sds[:, None] * rng.standard_normal((len(sds), replicates))
-        wrong += any(ruled_out(judge, noise, level))
-        rightly += ruled_out(judge, planted + noise, level)
+        noise = sds[:, None] * rng.standard_normal((len(sds), max(replicates)))
+        noise += shift * rng.standard_normal(max(replicates))
+        equal = {str(i): pd.Series(noise[i, :n]) for i, n in enumerate(replicates)}
+        wrong += any(ruled_out(judge, equal, level))
+        equal[str(best)] += BETTER_BY
+        rightly += ruled_out(judge, equal, level)
     return wrong / STUDIES, float(np.mean(rightly))
+
+
+def _percent(*judged: tuple[float, float]) -> list[str]:
+    return [f"{100 * share:.0f} %" for pair in judged for share in pair]
 
 
 def main() -> None:
     """Plant, compare, print."""
     rows = []
     for settings, replicates in SIZES:
-        for name, sds in spreads(settings).items():
-            now, pairs = (shares(judge, sds, replicates) for judge in (as_now, in_pairs))
-            rows.append(
-                [
-                    str(settings),
-                    str(replicates),
-                    name,
-                    *(f"{100 * x:.0f} %" for x in (*now, *pairs)),
-                ]
-            )
-    head = ["settings", "replicates", "spreads", "wrongly ruled out", "rightly ruled out",
-            "in pairs: wrongly", "in pairs: rightly"]  # fmt: skip
-    print(table(head, rows))
+        for name, sds in (("alike", np.ones(settings)), ("1 to 3", unlike(settings))):
+            of = sds, [replicates] * settings, settings // 2
+            judged = _percent(shares(as_now, *of), shares(in_pairs, *of))
+            rows.append([str(settings), str(replicates), name, *judged])
+    told = ["wrongly ruled out", "rightly ruled out"]
+    pairs = ["in pairs: wrongly", "in pairs: rightly"]
+    print(table(["settings", "replicates", "spreads", *told, *pairs], rows))
+    rows = []
+    for numbers in ROUNDS:
+        for shift in SHIFTS:
+            all_of = np.ones(len(numbers)), numbers, len(numbers) - 1, shift
+            judged = _percent(shares(as_now, *all_of), shares(apart, *all_of))
+            rows.append([", ".join(map(str, numbers)), f"{shift:g}", *judged])
+    alone = ["not taken out: wrongly", "not taken out: rightly"]
+    print(table(["replicates", "shift of a filling", *told, *alone], rows))
 
 
 if __name__ == "__main__":

@@ -15,8 +15,9 @@ from sandmould.runs.formatting import setting_text
 from sandmould.scenario.hardness import bed_hardness, column_mode_hz
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import usable_values
+from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
-from sandmould.statistics.settings import CONFIDENCE, number_blocks
+from sandmould.statistics.settings import number_blocks
 from sandmould.statistics.spring_dependence import CurveLimbs, find_limbs
 
 Array = NDArray[np.float64]

@@ -17,7 +17,8 @@ from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred
-from sandmould.statistics.settings import CONFIDENCE, Setting, setting_of
+from sandmould.statistics.mean_tests import CONFIDENCE
+from sandmould.statistics.settings import Setting, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.study.definition.study import Study

@@ -11,7 +11,7 @@ from sandmould.runs.formatting import name_of, number, unit_of, with_margin
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.hard_limit import extrapolate
-from sandmould.statistics.settings import CONFIDENCE
+from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.verdict import Verdict
 
 HARDNESS_KEYS = ("sand.disc_thickness_m", "contact.wave_speed_m_s")

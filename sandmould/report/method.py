@@ -126,8 +126,9 @@ def statistics_method(objective: Objective, ends: str, draws_by_lot: bool) -> Ro
         "Statistics",
         f"{compared}. A setting's ± is the 95 % interval of its mean (Student). Settings are "
         "compared by the spread that all share (analysis of variance), or by their own where it is "
-        "larger. Where all have the same usable replicates, what a replicate shifts in all of them "
-        "drops out. Intervals and p values hold for all pairs of settings together (Tukey).",
+        "larger. What a replicate shifts in all of them drops out of their differences, unless "
+        "that takes more than half of the degrees of freedom. Intervals and p values hold for all "
+        "pairs of settings together (Tukey).",
     )
 
 

@@ -27,9 +27,9 @@ from sandmould.runs.formatting import (
     with_margin,
 )
 from sandmould.statistics.emulator import TooFewRunsError
+from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.recommendation import Recommendation, recommend
-from sandmould.statistics.settings import CONFIDENCE
 from sandmould.study.definition.certificate import frequency_key
 from sandmould.study.definition.study import Study
 from sandmould.study.rounds.round_log import RoundLog, read_rounds

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr, stdtrit
 
-from sandmould.statistics.settings import compare_means
+from sandmould.statistics.mean_tests import compare_means
 
 EquivalenceVerdict = Literal["equivalent", "different", "not resolved", "not tested"]
 POWER = 0.8

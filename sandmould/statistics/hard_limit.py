@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtrit
 
-from sandmould.statistics.settings import CONFIDENCE
+from sandmould.statistics.mean_tests import CONFIDENCE
 
 Array = NDArray[np.float64]
 LEAST_LEVELS = 4

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sandmould.statistics.emulator import Array, Emulator, fit_emulator
 from sandmould.statistics.evidence import usable_values
-from sandmould.statistics.settings import CONFIDENCE
+from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.verdict import Better
 
 DRAWS = 2000

@@ -15,7 +15,7 @@ from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective
 from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.statistics.evidence import usable_values
-from sandmould.statistics.settings import CONFIDENCE
+from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.spring_dependence import FOLLOWS, SHARE, STAYS, SpringCheck
 
 ShiftVerdict = Literal["up", "down", "held", "unclear", "no result"]

@@ -20,10 +20,12 @@ from scipy.special import stdtrit
 from sandmould.runs.columns import PART, SWEEP
 from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective, fewest_points
+from sandmould.statistics.contrasts import Contrasts
 from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.statistics.evidence import usable_values
+from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
-from sandmould.statistics.settings import CONFIDENCE, number_blocks
+from sandmould.statistics.settings import number_blocks
 
 Array = NDArray[np.float64]
 Shape = Literal["inner", "rising", "falling", "open", "no result"]
@@ -235,13 +237,15 @@ def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> CurveLimbs:
     """
     distinct, place = np.unique(hz, return_inverse=True)
     last = len(distinct) - 1
-    contrasts = _Contrasts(place, np.unique(block, return_inverse=True)[1], value)
-    t = contrasts.quantile(1.0 - (1.0 - CONFIDENCE) / last)
+    contrasts = Contrasts(place, np.unique(block, return_inverse=True)[1], value)
+    level = 1.0 - (1.0 - CONFIDENCE) / last
+    t = float(stdtrit(contrasts.df, level)) if contrasts.df > 0 else math.nan
     drop, error = np.full((2, last + 1), math.nan), np.full((2, last + 1), math.nan)
     for j in range(last + 1):
         for side, end in enumerate((0, last)):
             if j != end:
-                drop[side, j], error[side, j] = contrasts.difference(j, end)
+                drop[side, j], scale = contrasts.difference(j, end)
+                error[side, j] = contrasts.sd * scale
     least = drop - t * error
     inner = np.where(np.isnan(least[:, 1:last]), -np.inf, least[:, 1:last]).min(axis=0)
     top = 1 + int(inner.argmax())
@@ -260,38 +264,6 @@ def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> CurveLimbs:
         (float(least[0, top]), float(least[1, top])),
         float(t * np.nanmax(error[:, top])) if np.isfinite(error[:, top]).any() else math.nan,
     )
-
-
-class _Contrasts:
-    """Differences of the means of settings that were run in blocks, by least squares."""
-
-    def __init__(self, setting: NDArray[np.intp], block: NDArray[np.intp], value: Array) -> None:
-        self._settings = int(setting.max()) + 1
-        parts = np.zeros((len(value), self._settings + int(block.max()) + 1))
-        rows = np.arange(len(value))
-        parts[rows, setting] = 1.0
-        parts[rows, self._settings + block] = 1.0
-        inverse = np.linalg.pinv(parts)
-        self._fitted = inverse @ value
-        # Which sums of the unknowns the runs tell: settings without a block in common do not.
-        self._told = inverse @ parts
-        self._freedom = len(value) - round(float(np.trace(self._told)))
-        left = value - parts @ self._fitted
-        variance = float(left @ left) / self._freedom if self._freedom > 0 else math.nan
-        self._covariance = variance * (inverse @ inverse.T)
-
-    def quantile(self, level: float) -> float:
-        """Of Student's t, one-sided; NaN where no spread is left to test by."""
-        return float(stdtrit(self._freedom, level)) if self._freedom > 0 else math.nan
-
-    def difference(self, first: int, second: int) -> tuple[float, float]:
-        """Mean of a setting minus that of another, and its standard error."""
-        weights = np.zeros(len(self._fitted))
-        weights[first], weights[second] = 1.0, -1.0
-        if np.abs(weights @ self._told - weights).max() > 1e-8:
-            return math.nan, math.nan
-        error = math.sqrt(max(float(weights @ self._covariance @ weights), 0.0))
-        return float(weights @ self._fitted), error
 
 
 def _judge(hold: str, curves: Sequence[SpringCurve], blind: float) -> HoldVerdict:

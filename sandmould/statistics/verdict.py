@@ -20,6 +20,7 @@ from sandmould.runs.formatting import (
     with_margin,
 )
 from sandmould.scenario.vibration import VibrationStage
+from sandmould.statistics.contrasts import Spread
 from sandmould.statistics.evidence import (
     bounded_values,
     error_text,
@@ -32,7 +33,6 @@ from sandmould.statistics.evidence import (
 from sandmould.statistics.settings import (
     Comparison,
     Setting,
-    Spread,
     compare,
     number_blocks,
     setting_of,
@@ -90,8 +90,9 @@ def compare_settings(
 
     Only runs that are evidence of the objective count, see ``evidence``. Settings are compared
     by the spread that all share, that of an analysis of variance, or by their own where it is
-    larger. Replicates share their seeds across settings: where all settings have the same ones,
-    what a replicate shifts in all of them drops out. The best is picked after seeing the data:
+    larger. Replicates share their seeds across settings: what a replicate shifts in all of them
+    drops out of their differences, see ``Spread.of``. Where settings have unlike replicates, these
+    differences also rank them. The best is picked after seeing the data:
     intervals and p values hold for all pairs of settings together (Tukey 1953; Kramer 1956 for
     unlike numbers of replicates).
 
@@ -124,12 +125,8 @@ def compare_settings(
               for at, rows in setting_rows(summary, keys)]  # fmt: skip
     settings = tuple(setting_of(*group) for group in groups)
     of_setting = {s.label: group[2] for s, group in zip(settings, groups, strict=True)}
-    sign = -1 if better == "larger" else 1
-    ranked = sorted((s for s in settings if s.n), key=lambda s: sign * s.mean)
+    ranked, comparisons = _ranked(settings, of_setting, better)
     best = ranked[0] if ranked else None
-    comparisons = (
-        compare(best, ranked[1:], of_setting, Spread.of(of_setting.values())) if best else ()
-    )
     first = comparisons[0] if comparisons else None
     resolved = first is not None and first.separated
     resolved = resolved and all(c.separated for c in comparisons if c.tested)
@@ -155,6 +152,18 @@ def compare_settings(
         else (_without_value(summary, measure),),
         caveats=tuple(caveats),
     )
+
+
+def _ranked(
+    settings: Sequence[Setting], values: Mapping[str, pd.Series[float]], better: Better
+) -> tuple[list[Setting], tuple[Comparison, ...]]:
+    """Settings that have values, the best first, and the best against each of the others."""
+    used = [s for s in settings if s.n]
+    if not used:
+        return [], ()
+    spread = Spread.of(values)
+    used.sort(key=lambda s: spread.mean(s.label), reverse=better == "larger")
+    return used, compare(used[0], used[1:], spread)
 
 
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
@@ -301,6 +310,12 @@ def _sentences(
             f"{with_margin(second.mean, second.ci_half_width)} at {second.label}, the runner-up.",
             _difference_sentence(first, ranked),
         )
+    highest = max(ranked, key=lambda s: s.mean if better == "larger" else -s.mean)
+    where = (
+        f"The {most} mean, {mean}, is that of {best.label}."
+        if best.mean == highest.mean
+        else f"The {most} among like replicates is {best.label}, with a mean of {mean}."
+    )
     like = [c.other for c in comparisons if not c.separated]
     worse = [c.other for c in comparisons if c.separated]
     ruled_out = f" Ruled out: {listed(worse)}." if worse else ""
@@ -311,9 +326,9 @@ def _sentences(
         "different values, before their difference can be told from chance."
     )
     return (
-        f"Not resolved: no setting can be recommended for its {what}. The {most} mean, {mean}, is "
-        f"that of {best.label}. At 95 % confidence it cannot be told apart from "
-        f"{listed(like)}.{ruled_out}{_more_sentence(comparisons, best)}",
+        f"Not resolved: no setting can be recommended for its {what}. {where} At 95 % "
+        f"confidence it cannot be told apart from {listed(like)}.{ruled_out}"
+        f"{_more_sentence(comparisons, best)}",
         again,
     )
 
@@ -412,7 +427,12 @@ def _difference_sentence(first: Comparison, settings: Sequence[Setting]) -> str:
     fewest, most = min(s.n for s in settings), max(s.n for s in settings)
     how = f"{fewest} replicates" if fewest == most else f"{fewest} to {most} replicates"
     together = f", {len(settings)} settings compared together" if len(settings) > 2 else ""
+    apart = settings[0].mean - settings[1].mean
+    is_of_means = math.isclose(first.difference, apart, rel_tol=1e-6, abs_tol=1e-12)
+    of_what = (
+        "" if is_of_means else " Like replicates are compared, so it is not that of the means."
+    )
     return (
         f"The difference from {first.other} is {number(first.difference, 2)}, with a 95 % interval "
-        f"from {number(first.ci[0], 2)} to {number(first.ci[1], 2)} ({how}{together})."
+        f"from {number(first.ci[0], 2)} to {number(first.ci[1], 2)} ({how}{together}).{of_what}"
     )

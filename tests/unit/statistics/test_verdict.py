@@ -13,7 +13,7 @@ import pytest
 from scipy import stats
 
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.statistics.settings import compare_means
+from sandmould.statistics.mean_tests import compare_means
 from sandmould.statistics.verdict import NOT_TESTED, compare_settings, rank_runs, sand_notes
 
 KEY = "vibration.0.frequency_hz"
@@ -210,6 +210,23 @@ def test_one_setting_has_nothing_to_compare_with() -> None:
     assert verdict.settings[0].ci_half_width == pytest.approx(
         stats.t.ppf(0.975, 2) * 0.01 / math.sqrt(3)
     )
+
+
+def test_unlike_replicates_are_compared_within_them() -> None:
+    # From the third filling on all fill more. 50 Hz is the better one in each that it has.
+    fills = {
+        25: [0.302, 0.299, 0.401, 0.400],
+        50: [0.338, 0.341, 0.439, 0.442],
+        75: [0.330, 0.331, 0.429, 0.430, 0.431, 0.430],
+    }
+    verdict = compare_settings(table(fills), [KEY], FILL)
+    assert verdict.best is not None
+    assert verdict.best.label == "50 Hz"
+    assert verdict.best.mean < verdict.settings[2].mean
+    assert verdict.difference == pytest.approx(0.01, abs=0.002)
+    said = "Like replicates are compared, so it is not that of the means."
+    assert verdict.sentences[1].endswith(said)
+    assert verdict.resolved
 
 
 def test_best_at_the_edge_is_told() -> None:

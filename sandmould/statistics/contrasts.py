@@ -1,0 +1,154 @@
+"""Differences of settings, taken within blocks: replicates that share their seeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sandmould.statistics.mean_tests import MeanTest, compare_means
+
+Array = NDArray[np.float64]
+_ROUND_OFF = 1e-10
+
+
+class Contrasts:
+    """Means of settings whose runs come in blocks, by generalized least squares.
+
+    A block shifts all settings alike. The variance of these shifts is Henderson's third estimate
+    (1953): the larger it is beside that of a run, the more the differences are those within blocks.
+    With the same blocks in all settings they are those of the plain means.
+
+    Parameters
+    ----------
+    setting, block : (n,) int
+        Of each run, numbered from zero on without a gap.
+    value : (n,) float64
+    """
+
+    means: Array
+    """(settings,) float64: of each setting, over all blocks alike."""
+    sd: float
+    """Standard deviation of a run within its block; NaN without a degree of freedom."""
+    df: int
+    """Degrees of freedom of it."""
+    are_linked: bool
+    """Whether blocks in common link every setting with every other one."""
+
+    def __init__(self, setting: NDArray[np.intp], block: NDArray[np.intp], value: Array) -> None:
+        runs = np.zeros((setting.max() + 1, block.max() + 1))
+        np.add.at(runs, (setting, block), 1.0)
+        self._runs = runs.sum(axis=1)
+        # Where each setting has its runs. What is left of the normal equations is of the blocks.
+        self._shares = runs / self._runs[:, None]
+        self._equations = np.diag(runs.sum(axis=0)) - runs.T @ self._shares
+        self._inverse = np.linalg.pinv(self._equations, rcond=_ROUND_OFF, hermitian=True)
+        rank = int(np.linalg.matrix_rank(self._inverse, hermitian=True))
+        self.are_linked = rank == len(self._equations) - 1
+        raw = np.bincount(setting, value) / self._runs
+        right = np.bincount(block, value) - runs.T @ raw
+        shift = self._inverse @ right
+        left = value - (raw - self._shares @ shift)[setting] - shift[block]
+        self.df = len(value) - len(raw) - rank
+        self.sd = math.sqrt(float(left @ left) / self.df) if self.df > 0 else math.nan
+        self._solved = self._inverse
+        if self.df > 0 and rank:
+            between = (float(right @ shift) - rank * self.sd**2) / np.trace(self._equations)
+            self._solved = np.zeros_like(self._inverse)
+            if between > 0.0:
+                ridge = self.sd**2 / between * np.eye(len(shift))
+                self._solved = np.linalg.pinv(
+                    self._equations + ridge, rcond=_ROUND_OFF, hermitian=True
+                )
+        self.means = raw - self._shares @ (self._solved @ right)
+
+    def difference(self, first: int, second: int) -> tuple[float, float]:
+        """Mean of a setting minus that of another, and its standard error over ``sd``.
+
+        Both are NaN where the two have no blocks in common, nor others that link them.
+        """
+        apart = self._shares[first] - self._shares[second]
+        if np.abs(self._equations @ (self._inverse @ apart) - apart).max() > _ROUND_OFF:
+            return math.nan, math.nan
+        variance = 1.0 / self._runs[first] + 1.0 / self._runs[second] + apart @ self._solved @ apart
+        return float(self.means[first] - self.means[second]), math.sqrt(float(variance))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Standard deviation of a run that all settings share, and their differences by it."""
+
+    values: Mapping[str, pd.Series[float]]
+    """Of each setting that has some, by block."""
+    contrasts: Contrasts
+    in_blocks: bool
+    """Whether blocks count in the differences."""
+
+    @staticmethod
+    def of(values: Mapping[str, pd.Series[float]]) -> Spread:
+        """Fit settings and blocks to all values.
+
+        Replicates that share their seeds are one block. Blocks count unless they do not link all
+        settings, or take more than half of the degrees of freedom.
+
+        Parameters
+        ----------
+        values : mapping of label to Series of float
+            Of each setting, by block; one of them at least is not empty.
+        """
+        used = {label: v for label, v in values.items() if len(v)}
+        run_value = np.concatenate([v.to_numpy(dtype=np.float64) for v in used.values()])
+        setting = np.repeat(np.arange(len(used)), [len(v) for v in used.values()])
+        apart = Contrasts(setting, np.zeros_like(setting), run_value)
+        block = pd.factorize(np.concatenate([v.index.to_numpy() for v in used.values()]))[0]
+        # Blocks of one run each tell nothing, and their equations are many.
+        if block.max() + 1 < len(block) and all(v.index.is_unique for v in used.values()):
+            within = Contrasts(setting, block, run_value)
+            if within.are_linked and 0 < apart.df <= 2 * within.df:
+                return Spread(used, within, True)
+        return Spread(used, apart, False)
+
+    def mean(self, label: str) -> float:
+        """Mean of a setting, over all blocks alike where they count."""
+        return float(self.contrasts.means[self._place(label)])
+
+    def compare(
+        self, first: str, second: str, loop_error: float = 0.0
+    ) -> tuple[float, MeanTest | None]:
+        """Test the difference of two means, for all pairs of settings together (Tukey, Kramer).
+
+        Where the two scatter more than all settings do, their own spread counts: the shared one
+        would then call chance a difference.
+
+        Returns
+        -------
+        (float, MeanTest or None)
+            The first minus the second; None where no spread is left to test by.
+        """
+        contrasts = self.contrasts
+        difference, scale = contrasts.difference(self._place(first), self._place(second))
+        if contrasts.df <= 0:
+            return difference, None
+        error = max(contrasts.sd * scale, self._own_error(first, second, scale))
+        largest = max(float(self.values[label].abs().max()) for label in (first, second))
+        if not error > 1e-12 * largest:
+            return difference, None
+        return difference, MeanTest(difference, error, contrasts.df, loop_error, len(self.values))
+
+    def _place(self, label: str) -> int:
+        return list(self.values).index(label)
+
+    def _own_error(self, first: str, second: str, scale: float) -> float:
+        """Standard error by the spread of the two alone; zero where they have none."""
+        x, y = self.values[first], self.values[second]
+        if self.in_blocks:
+            shared = x.index.intersection(y.index)
+            x, y = x.loc[shared], y.loc[shared]
+        if (own := compare_means(x, y)) is None:
+            return 0.0
+        # Pairs tell the standard deviation of a difference: that of a run times the root of two.
+        return own[0].error * math.sqrt(len(x) / 2.0) * scale if self.in_blocks else own[0].error
