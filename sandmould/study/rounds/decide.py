@@ -6,15 +6,22 @@ from dataclasses import replace
 
 import pandas as pd
 
-from sandmould.runs.columns import CPU_S, total_s
-from sandmould.runs.formatting import listed, name_of, number, setting_text, unit_of
+from sandmould.runs.columns import CPU_S, REPLICATE, total_s
+from sandmould.runs.formatting import (
+    listed,
+    name_of,
+    number,
+    setting_text,
+    unit_of,
+    value_text,
+)
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
 from sandmould.study.definition.certificate import round_best_hz
 from sandmould.study.definition.refinement import Refinement
 from sandmould.study.definition.study import Study
-from sandmould.study.definition.sweep import is_whole
+from sandmould.study.definition.sweep import is_whole, points
 from sandmould.study.rounds.contenders import find_contenders, why_decided
 from sandmould.study.rounds.round_log import Round, RoundLog
 
@@ -33,7 +40,9 @@ def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str
     """
     if study.refine.rounds:
         of_kind = next_round if study.refine.adds == "points" else next_replicates
-        log = of_kind(log, study, summary, keys)
+        # Runs of the controls lie beyond the sweep: they must not open what has ended, or all
+        # controls are computed again round another optimum.
+        log = of_kind(log, study, _of_rounds(log, study, summary, keys), keys)
     else:
         log = replace(log, ended="The sweep is done.")
     if not log.ended or not study.certificate.controls or log.certified_hz:
@@ -66,6 +75,19 @@ def next_round(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[st
     )
     # Controls are of the optimum that was best then: with more runs they are chosen anew.
     return replace(log, rounds=(*log.rounds, added), ended="", certified_hz=())
+
+
+def _of_rounds(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """Rows of the sweep and its rounds, without those at frequencies of the controls alone."""
+    if not log.certified_hz:
+        return summary
+    (key,) = keys
+    every = range(1, study.replicates + 1)
+    swept = points(study.sweep, study.scenario)
+    mine = {(point[key], r) for point in swept for r in every}
+    mine |= {(point[key], r) for point, r in log.runs}
+    rows = zip(summary[key], summary[REPLICATE], strict=True)
+    return summary[[row in mine for row in rows]]
 
 
 def choose_controls(
@@ -109,6 +131,13 @@ def why_narrow(refine: Refinement, optimum: Optimum) -> str:
     wide = [key for key, width in refine.interval.items() if _width(optimum, key) > width]
     if not refine.interval or wide:
         return ""
+    for key in refine.interval:
+        if end := optimum.at_end(key):
+            where = value_text(key, optimum.setting[key])
+            return (
+                f"The optimum is {where} or beyond, the {end} {name_of(key)} swept: no round "
+                "inside the sweep narrows it."
+            )
     return f"The optimum is as narrow as asked: {_intervals(optimum, list(refine.interval))}."
 
 

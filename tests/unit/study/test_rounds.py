@@ -21,7 +21,13 @@ from sandmould.study.collect import collect
 from sandmould.study.plan.build_plan import Plan, announce
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.rounds.decide import decision_text, next_round, why_narrow, why_over
+from sandmould.study.rounds.decide import (
+    decision_text,
+    next_round,
+    next_runs,
+    why_narrow,
+    why_over,
+)
 from sandmould.study.rounds.round_log import (
     ROUNDS_FILE,
     RoundLog,
@@ -222,6 +228,34 @@ def test_a_round_log_is_read_back_and_another_studys_is_kept_aside(tmp_path: Pat
 def test_what_cannot_be_refined_is_told(tmp_path: Path, changes: dict[str, Any], told: str) -> None:
     with pytest.raises(BadInputError, match=told):
         opened(tmp_path, **changes)
+
+
+def test_an_optimum_at_the_end_of_the_sweep_is_not_called_narrow(tmp_path: Path) -> None:
+    study = opened(tmp_path, refine=STUDY["refine"] | {"interval": {FREQUENCY: 20.0}}).study
+    rising = table([10.0, 15.0, 20.0, 25.0, 30.0], 3, 0.001)
+    log = next_round(RoundLog(basis_of(study)), study, rising, [FREQUENCY])
+    assert log.ended == (
+        "The optimum is 30 Hz or beyond, the highest frequency swept: no round inside the sweep "
+        "narrows it."
+    )
+
+
+def test_controls_beyond_the_sweep_open_no_round_that_has_ended(tmp_path: Path) -> None:
+    study = opened(
+        tmp_path,
+        sweep={"keys": {FREQUENCY: [10.0, 15.0, 20.0, 25.0, 30.0]}},
+        replicates=3,
+        refine=STUDY["refine"] | {"interval": {FREQUENCY: 4.0}},
+        certificate={"controls": ["hold"]},
+    ).study
+    swept = table([10.0, 15.0, 20.0, 25.0, 30.0], 3, 0.01)
+    ended = next_runs(RoundLog(basis_of(study)), study, swept, [FREQUENCY])
+    assert ended.ended
+    assert ended.certified_hz[1] == 30.0
+    # The controls find more at 42.3 Hz, and less again at 60 Hz.
+    with_controls = pd.concat([swept, table([21.3, 42.3, 60.0], 4, 0.01)], ignore_index=True)
+    assert find_optimum(with_controls, [FREQUENCY], FILL, "larger").setting[FREQUENCY] > 35.0
+    assert next_runs(ended, study, with_controls, [FREQUENCY]) == ended
 
 
 @pytest.mark.slow
