@@ -2,7 +2,7 @@
 
 How many studies rule out a setting that is as good as the best, and how many settings that are
 worse are ruled out. It prints the tables of docs/explanation/statistics.md; nothing of it is
-simulated.
+simulated. Last it prints how much fillings shift all settings in the records of tubes.
 """
 
 from __future__ import annotations
@@ -15,8 +15,12 @@ from numpy.typing import NDArray
 
 from benchmarks.frame import table
 from sandmould.scenario.module_main import run_main
+from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.contrasts import Spread
 from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest, compare_means
+from sandmould.statistics.settings import by_block, group_settings
+from sandmould.study.collect import read_summary, swept_keys
+from sandmould.study.records import RECORDS
 
 STUDIES = 2000
 SIZES = ((2, 3), (4, 2), (4, 3), (4, 4), (4, 8), (6, 3), (12, 3), (12, 8))
@@ -24,6 +28,19 @@ ROUNDS = ((3, 3, 5, 5), (2, 2, 2, 2, 8, 8), (3, 3, 3, 3, 8, 8), (3, 3, 3, 3, 3, 
 """Replicates of the settings of a study after rounds, the planted best among the last."""
 SHIFTS = (0.0, 0.4, 0.8)
 """Standard deviations of what a filling shifts in all settings, over that of a run."""
+TUBES = (
+    "tube_frequency",
+    "tube_frequency_stroke",
+    "tube_demo",
+    "tube_certified",
+    "tube_3d_frequency",
+    "tube_law_hold",
+    "tube_law_springs",
+    "tube_law_depth",
+    "tube_law_width",
+)
+"""Records of a tube in hard sand with two settings or more."""
+MEASURE = "tube_fill_fraction"
 BETTER_BY = 2.5
 """What the planted best is better by, in standard deviations of a run."""
 Fills = Mapping[str, "pd.Series[float]"]
@@ -84,6 +101,14 @@ def shares(
     return wrong / STUDIES, float(np.mean(rightly))
 
 
+def filling_shift(name: str) -> float:
+    """Standard deviation of what a filling shifts in a record, over that of a run within it."""
+    summary = sweep_part(read_summary(RECORDS / name))
+    groups = group_settings(summary, list(swept_keys(summary)))
+    spread = Spread.of({str(i): by_block(r, r[MEASURE]) for i, (_, r) in enumerate(groups)})
+    return spread.contrasts.block_sd / spread.contrasts.sd
+
+
 def _percent(*judged: tuple[float, float]) -> list[str]:
     return [f"{100 * share:.0f} %" for pair in judged for share in pair]
 
@@ -107,6 +132,7 @@ def main() -> None:
             rows.append([", ".join(map(str, numbers)), f"{shift:g}", *judged])
     alone = ["not taken out: wrongly", "not taken out: rightly"]
     print(table(["replicates", "shift of a filling", *told, *alone], rows))
+    print(table(["record", "shift"], [[name, f"{filling_shift(name):.2f}"] for name in TUBES]))
 
 
 if __name__ == "__main__":

@@ -36,6 +36,8 @@ class Contrasts:
     """Standard deviation of a run within its block; NaN without a degree of freedom."""
     df: int
     """Degrees of freedom of it."""
+    block_sd: float
+    """Standard deviation of what a block shifts in all settings; NaN where the runs do not tell."""
     are_linked: bool
     """Whether blocks in common link every setting with every other one."""
 
@@ -55,9 +57,11 @@ class Contrasts:
         left = value - (raw - self._shares @ shift)[setting] - shift[block]
         self.df = len(value) - len(raw) - rank
         self.sd = math.sqrt(float(left @ left) / self.df) if self.df > 0 else math.nan
+        self.block_sd = math.nan
         self._solved = self._inverse
         if self.df > 0 and rank:
-            between = (float(right @ shift) - rank * self.sd**2) / np.trace(self._equations)
+            between = (float(right @ shift) - rank * self.sd**2) / float(np.trace(self._equations))
+            self.block_sd = math.sqrt(max(between, 0.0))
             self._solved = np.zeros_like(self._inverse)
             if between > 0.0:
                 ridge = self.sd**2 / between * np.eye(len(shift))

@@ -7,14 +7,7 @@ from dataclasses import replace
 import pandas as pd
 
 from sandmould.runs.columns import CPU_S, REPLICATE, total_s
-from sandmould.runs.formatting import (
-    listed,
-    name_of,
-    number,
-    setting_text,
-    unit_of,
-    value_text,
-)
+from sandmould.runs.formatting import listed, name_of, number, setting_text, unit_of
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
@@ -133,10 +126,9 @@ def why_narrow(refine: Refinement, optimum: Optimum) -> str:
         return ""
     for key in refine.interval:
         if end := optimum.at_end(key):
-            where = value_text(key, optimum.setting[key])
             return (
-                f"The optimum is {where} or beyond, the {end} {name_of(key)} swept: no round "
-                "inside the sweep narrows it."
+                f"The optimum may lie beyond the {end} {name_of(key)} swept: no round inside the "
+                "sweep narrows it."
             )
     return f"The optimum is as narrow as asked: {_intervals(optimum, list(refine.interval))}."
 

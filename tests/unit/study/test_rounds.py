@@ -235,7 +235,7 @@ def test_an_optimum_at_the_end_of_the_sweep_is_not_called_narrow(tmp_path: Path)
     rising = table([10.0, 15.0, 20.0, 25.0, 30.0], 3, 0.001)
     log = next_round(RoundLog(basis_of(study)), study, rising, [FREQUENCY])
     assert log.ended == (
-        "The optimum is 30 Hz or beyond, the highest frequency swept: no round inside the sweep "
+        "The optimum may lie beyond the highest frequency swept: no round inside the sweep "
         "narrows it."
     )
 
