@@ -17,8 +17,7 @@ import pandas as pd
 from benchmarks.reproduction.ledger import OurSource
 from benchmarks.reproduction.our_number import OurNumber, less, over, taken
 from sandmould import ROOT
-from sandmould.casting.arpm import computation as arpm
-from sandmould.casting.mps import computation as mps
+from sandmould.casting import arpm, mps
 from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed
 from sandmould.scenario.bad_input import BadInputError, Problem

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from sandmould import ROOT
-from sandmould.digest import code_digest
+from sandmould.digest import code_identity
 from sandmould.runs.measures import MeasureGroup
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.bad_input import Problem
@@ -163,7 +163,7 @@ class Planning(Generic[ScenarioT]):
 
 @cache
 def _hash_of(files: tuple[str, ...]) -> str:
-    return code_digest([ROOT / file for file in files])
+    return code_identity([[ROOT / file for file in files]])
 
 
 @dataclass(frozen=True)

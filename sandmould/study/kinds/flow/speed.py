@@ -13,7 +13,7 @@ TIMED_S = 0.5
 
 def _computed_by(scenario: MetalFlow) -> str:
     """What the speed depends on: our code, and the case, which has its dimension."""
-    from sandmould.casting.mps.computation import source_hash
+    from sandmould.casting.mps import source_hash
 
     return f"mps {source_hash()} {scenario.case.kind}"
 

@@ -14,6 +14,7 @@ from sandmould.engines.durations import grain_steps, run_s, stage_s
 from sandmould.engines.program import build_program
 from sandmould.kernel_cache import are_compiled, cache_folder
 from sandmould.runs.formatting import number
+from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario import checks
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.hardness import bed_hardness
@@ -143,7 +144,7 @@ def computed_hash(scenario: Scenario) -> str:
     of_engine = registry.computed_hash(scenario)
     if scenario.pattern is None:
         return of_engine
-    return digest(of_engine, scenario.pattern.model_dump_json(), pattern_fe.source_hash())
+    return digest(of_engine, scenario_hash(scenario.pattern), pattern_fe.source_hash())
 
 
 def vibration_s(scenario: Scenario) -> float:

@@ -14,7 +14,7 @@ STEPS = 10
 
 def _computed_by(scenario: Solidification) -> str:
     """What the speed depends on: how heat is exchanged, our code, the dimension."""
-    from sandmould.casting.arpm.computation import source_hash
+    from sandmould.casting.arpm import source_hash
 
     return f"{scenario.exchange} {source_hash()} {scenario.dimensions}D"
 
