@@ -45,10 +45,9 @@ from sandmould.study.packs.recorded import RECORDS, record_part
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
-from sandmould.study.plan.plan_files import CHECKS, FIGURES
+from sandmould.study.plan.plan_files import CHECKS, FIGURES, SUMMARY
 from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
 
-COPIED = ("runs.tsv", "summary.tsv")
 OVER_TIME = "over_time.tsv"
 TIMES = 8
 """Moments of the vibration, equally far apart, at which a record keeps what the study judges."""
@@ -123,7 +122,7 @@ def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:
         raise SystemExit(f"{folder} is not whole, {len(missing)} runs are missing: run the study.")
     summary = read_summary(folder)
     failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
-    names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
+    names = [SUMMARY, *(["agreement.tsv"] if _compares(study.study) else [])]
     names += [name for name in (ROUNDS_FILE, CHECKS[0]) if (folder / name).exists()]
     provenance = read_origin(folder / "runs" / runs[0].run)
     record: dict[str, Any] = {

@@ -31,7 +31,7 @@ def test_the_list_is_up_to_date() -> None:
 def test_a_new_record_gets_a_page_that_keeps_what_is_written(tmp_path: Path) -> None:
     folder = tmp_path / "tube_demo"
     folder.mkdir()
-    for name in ("record.json", "runs.tsv", "summary.tsv", "summary_checks.tsv"):
+    for name in ("record.json", "summary.tsv", "summary_checks.tsv"):
         shutil.copy(RECORDS / "tube_demo" / name, folder / name)
     page = folder / "README.md"
     page.write_text(RecordPage(folder).text(), encoding="utf-8")

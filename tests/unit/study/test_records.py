@@ -199,7 +199,7 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
         (folder / "runs" / run.run / "outcome.json").touch()
     pd.DataFrame(rows).to_csv(folder / "summary.tsv", sep="\t", index=False)
     (folder / "curves.tsv").write_text("run\ttime_s\n")
-    for name in ("runs.tsv", "agreement.tsv", "report.html"):
+    for name in ("agreement.tsv", "report.html"):
         (folder / name).write_text("")
     (folder / "figures").mkdir()
     for name in ("objective.svg", "curves.svg", ".snakemake_timestamp"):
