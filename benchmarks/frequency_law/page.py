@@ -89,7 +89,7 @@ def _study(folder: Path) -> dict[str, Any]:
     record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
     opened = open_study(ROOT / record["study"])
     summary = read_summary(folder)
-    keys = swept_keys(pd.read_csv(folder / "runs.tsv", sep="\t"))
+    keys = swept_keys(summary)
     other = next((key for key in keys if key != FREQUENCY), None)
     scenarios: dict[Any, Scenario] = {}
     for run in expand(opened):

@@ -82,11 +82,10 @@ class RecordPage:
     @property
     def runs(self) -> str:
         """How many there were, and which failed."""
-        number = len((self.folder / "runs.tsv").read_text("utf-8").splitlines()) - 1
         summary = read_summary(self.folder)
         bad = summary[~finished(summary)]
         failed = [f"{run} ({why})" for run, why in zip(bad[RUN], bad[OUTCOME], strict=True)]
-        return f"{number}; failed: {listed(failed)}" if failed else f"{number}, all finished"
+        return f"{len(summary)}" + (f"; failed: {listed(failed)}" if failed else ", all finished")
 
     @property
     def took(self) -> str:

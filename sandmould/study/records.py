@@ -1,9 +1,9 @@
 """Committed results and whether they still stand for what the code would compute.
 
-``python -m sandmould.study.records record STUDY.yaml`` copies a finished study's tables and
-figures with what was run; ``part STUDY.yaml`` packs the runs of an unfinished one that are at their
-end, which the next start of the study takes up. ``check`` lists the records that are stale and
-computes the smallest one of each kind again.
+``python -m sandmould.study.records record STUDY.yaml [FIGURE ...]`` copies a finished study's
+tables, and the figures that its pages show, with what was run; ``part STUDY.yaml`` packs the runs
+of an unfinished one that are at their end, which the next start of the study takes up. ``check``
+lists the records that are stale and computes the smallest one of each kind again.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import math
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,10 +45,9 @@ from sandmould.study.packs.recorded import RECORDS, record_part
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
-from sandmould.study.plan.plan_files import CHECKS, FIGURES
+from sandmould.study.plan.plan_files import CHECKS, FIGURES, SUMMARY
 from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
 
-COPIED = ("runs.tsv", "summary.tsv")
 OVER_TIME = "over_time.tsv"
 TIMES = 8
 """Moments of the vibration, equally far apart, at which a record keeps what the study judges."""
@@ -62,7 +62,7 @@ OLD_DEFAULTS = "old defaults"
 OLDER_SOLVER = "older solver"
 """Of a record: its scenarios are those of today, what computes them has changed since. It counts
 as long as the cheapest study of its kind, computed again, agrees with its own record."""
-USAGE = "python -m sandmould.study.records check | record STUDY.yaml | part STUDY.yaml"
+USAGE = "python -m sandmould.study.records check | record STUDY.yaml [FIGURE ...] | part STUDY.yaml"
 SAME = {
     "tube_fill_fraction": 0.05,
     "solid_fraction": 0.02,
@@ -94,15 +94,25 @@ def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
     return expand(study, log.runs, log.certified_hz)
 
 
-def record(path: Path, results: Path) -> Path:
+def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:
     """Keep a study: its tables and figures, what was run, on what, and the hash of the study.
 
     Runs that failed are named in the record.
+
+    Parameters
+    ----------
+    path, results : Path
+        Of the study, and where its results lie.
+    figures : sequence of str
+        Names of figures that a page shall show. Those that the record has are kept, too, as they
+        are drawn now.
 
     Raises
     ------
     SystemExit
         While runs have no outcome.
+    OSError
+        Where the study has no such figure.
     """
     study = open_study(path)
     folder = results / study.name
@@ -112,7 +122,7 @@ def record(path: Path, results: Path) -> Path:
         raise SystemExit(f"{folder} is not whole, {len(missing)} runs are missing: run the study.")
     summary = read_summary(folder)
     failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
-    names = [*COPIED, *(["agreement.tsv"] if _compares(study.study) else [])]
+    names = [SUMMARY, *(["agreement.tsv"] if _compares(study.study) else [])]
     names += [name for name in (ROUNDS_FILE, CHECKS[0]) if (folder / name).exists()]
     provenance = read_origin(folder / "runs" / runs[0].run)
     record: dict[str, Any] = {
@@ -132,20 +142,25 @@ def record(path: Path, results: Path) -> Path:
     }
     target = RECORDS / study.name
     target.mkdir(parents=True, exist_ok=True)
+    _keep_figures(folder / FIGURES, target / FIGURES, figures)
     for name in names:
         shutil.copy(folder / name, target / name)
     measure = study.study.objective.measure
     courses = over_time(read_collected(folder).curves, measure)
     if not courses.empty:
         courses.to_csv(target / OVER_TIME, sep="\t", index=False, float_format="%.5g")
-    shutil.rmtree(target / FIGURES, ignore_errors=True)
-    if (folder / FIGURES).exists():
-        # without the mark that Snakemake leaves in folders
-        shutil.copytree(
-            folder / FIGURES, target / FIGURES, ignore=shutil.ignore_patterns(".snakemake*")
-        )
     (target / "record.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     return target
+
+
+def _keep_figures(drawn: Path, kept: Path, asked: Sequence[str]) -> None:
+    """Copy figures anew: those asked for, and those kept so far that are still drawn."""
+    again = [path.name for path in kept.glob("*") if (drawn / path.name).exists()]
+    files = {name: (drawn / name).read_bytes() for name in (*again, *asked)}
+    shutil.rmtree(kept, ignore_errors=True)
+    for name, content in files.items():
+        kept.mkdir(exist_ok=True)
+        (kept / name).write_bytes(content)
 
 
 def over_time(curves: pd.DataFrame, measure: str) -> pd.DataFrame:
@@ -273,14 +288,14 @@ def _recompute(name: str, study: str, results: Path) -> list[str]:
 
 def main(arguments: list[str]) -> int:
     """Check all records, or keep one study."""
-    if arguments[:1] == ["record"] and len(arguments) == 2:
-        print(record(Path(arguments[1]), Path("results")))
+    if arguments[:1] == ["record"] and len(arguments) > 1:
+        print(record(Path(arguments[1]), Path("results"), arguments[2:]))
         return 0
     if arguments[:1] == ["part"] and len(arguments) == 2:
         print(record_part(open_plan(Path(arguments[1])), Path("results")).text())
         return 0
     if arguments != ["check"]:
-        print(f"usage: {USAGE}")
+        print(f"usage: {USAGE}", file=sys.stderr)
         return 2
     return _check()
 
@@ -315,5 +330,5 @@ if __name__ == "__main__":
     run_main(
         lambda *given: main([*given]),
         USAGE,
-        (1, 2),
+        range(1, 100),
     )

@@ -188,8 +188,7 @@ def records(folder: Path) -> Path:
         collect(made)
         kept = folder / "records" / name
         kept.mkdir(parents=True)
-        for file in ("runs.tsv", "summary.tsv"):
-            shutil.copy(made / file, kept / file)
+        shutil.copy(made / "summary.tsv", kept / "summary.tsv")
         record = {"study": f"config/studies/{engine_twins.TWINS}.yaml", "commit": "abc1234",
                   "machine": {"processor": "one", "cores": 2}}  # fmt: skip
         (kept / "record.json").write_text(json.dumps(record))

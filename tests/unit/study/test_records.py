@@ -199,17 +199,22 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
         (folder / "runs" / run.run / "outcome.json").touch()
     pd.DataFrame(rows).to_csv(folder / "summary.tsv", sep="\t", index=False)
     (folder / "curves.tsv").write_text("run\ttime_s\n")
-    for name in ("runs.tsv", "agreement.tsv", "report.html"):
+    for name in ("agreement.tsv", "report.html"):
         (folder / name).write_text("")
     (folder / "figures").mkdir()
-    (folder / "figures" / "objective.svg").write_text("<svg/>")
-    (folder / "figures" / ".snakemake_timestamp").touch()
+    for name in ("objective.svg", "curves.svg", ".snakemake_timestamp"):
+        (folder / "figures" / name).write_text("<svg/>")
     monkeypatch.setattr(records, "RECORDS", tmp_path / "records")
     # Hundreds of decks: another test hashes a study.
     monkeypatch.setattr(records, "_computed_hash", lambda run: run.scenario.engine.name)
-    kept = records.record(path, tmp_path / "results")
+    with pytest.raises(FileNotFoundError, match=r"sand\.png"):
+        records.record(path, tmp_path / "results", ["sand.png"])
+    kept = records.record(path, tmp_path / "results", ["objective.svg"])
+    (folder / "figures" / "objective.svg").write_text("<svg>drawn anew</svg>")
+    assert records.record(path, tmp_path / "results") == kept
     assert (kept / "agreement.tsv").exists()
-    assert [path.name for path in (kept / "figures").iterdir()] == ["objective.svg"]
+    (figure,) = (kept / "figures").iterdir()
+    assert (figure.name, figure.read_text()) == ("objective.svg", "<svg>drawn anew</svg>")
     record = json.loads((kept / "record.json").read_text())
     assert set(record["engines"]) == {"lammps", "liggghts", "reference"}
     assert record["failed"] == {runs[5].run: "lost grains"}
