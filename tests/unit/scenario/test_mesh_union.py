@@ -117,6 +117,64 @@ def test_gap_below_the_tolerance_is_none(tmp_path: Path) -> None:
     assert len(apart.section_m(2, 14.0)) == 2
 
 
+OBLIQUE: dict[str, tuple[list[Part], float, float]] = {
+    "part of a face": (SCENES["part of a face"][0], 10880, 3360),
+    "flush with a corner": (SCENES["flush with a corner"][0], 10880, 3360),
+    "an edge": (SCENES["an edge"][0], 16000, 4800),
+    "overlap": (SCENES["overlap"][0], 10880, 3360),
+    "hollow and bridged": (SCENES["hollow and bridged"][0], 6464, 3424),
+    "cavities that touch": (
+        [CUBE, box([8, 8, 8], [14, 14, 14], True), box([14, 10, 10], [20, 20, 20], True)],
+        7184,
+        3024,
+    ),
+    "cavity open to a side": ([CUBE, box([8, 8, 8], [14, 14, 24], True)], 7424, 2784),
+    "cavity in two that touch": (
+        [CUBE, box([24, 4, 4], [44, 24, 24]), box([20, 8, 8], [30, 20, 20], True)],
+        14560,
+        4768,
+    ),
+    "cavity that the second solid fills": (
+        [CUBE, box([14, 4, 4], [44, 24, 24]), box([16, 8, 8], [20, 20, 20], True)],
+        16000,
+        4000,
+    ),
+    "solid in a cavity, hollow itself": (
+        [
+            CUBE,
+            box([6, 6, 6], [22, 22, 22], True),
+            box([8, 8, 8], [20, 20, 20]),
+            box([10, 10, 10], [18, 18, 18], True),
+        ],
+        5120,
+        2400 + 1536 + 864 + 384,
+    ),
+}
+
+
+@pytest.mark.parametrize("seed", [None, 0, 1, 2])
+@pytest.mark.parametrize("name", OBLIQUE)
+def test_volume_and_area_of_a_union_turned_anyhow(
+    name: str, seed: int | None, tmp_path: Path
+) -> None:
+    """Rounding tears oblique faces that touch apart, and leaves slivers where they are flush."""
+    parts, volume, area = OBLIQUE[name]
+    axes = np.eye(3) if seed is None else Rotation.random(random_state=seed).as_matrix()
+    mesh = mesh_of([(vertices @ axes.T, facets) for vertices, facets in parts], tmp_path)
+    exact = 1e-12 if seed is None else 2e-7
+    assert mesh.measure == pytest.approx(volume, rel=exact)
+    assert double_areas(mesh).sum() / 2.0 == pytest.approx(area, rel=exact)
+    assert least_angles_deg(mesh).min() > 4.0
+
+
+@pytest.mark.parametrize("name", ["apart", "one in the other", "hollow"])
+def test_shells_that_meet_nowhere_stay_as_they_are_drawn(name: str, tmp_path: Path) -> None:
+    parts, _ = SCENES[name]
+    stay = parts[:1] if name == "one in the other" else parts
+    drawn = np.concatenate([vertices[facets] for vertices, facets in stay])
+    np.testing.assert_array_equal(mesh_of(parts, tmp_path).corners_m, drawn)
+
+
 def test_cavity_that_sticks_out_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MeshFileError, match="shells that face inwards only where they are cav"):
         mesh_of([CUBE, box([20, 8, 8], [44, 20, 20], True)], tmp_path)
@@ -131,13 +189,20 @@ def test_union_has_no_narrower_triangles_than_its_parts(tmp_path: Path) -> None:
     """Lines of a fan across a lid left triangles of 0.06 degrees, which LIGGGHTS refuses."""
     mesh = mesh_of([CUBE, cylinder(40, 6, [14, 14, 19], 15), cylinder(30, 3, [14, 14, 21], 25)],
                    tmp_path)  # fmt: skip
-    a, b, c = mesh.corners_m.transpose(1, 0, 2)
-    sides = np.sort([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
-    double = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    least_deg = np.degrees(np.arcsin(double / (sides[1] * sides[2])))
-    assert least_deg.min() > 0.5
+    assert least_angles_deg(mesh).min() > 0.5
     discs = 20 * math.sin(2 * math.pi / 40) * 36, 15 * math.sin(2 * math.pi / 30) * 9
     assert mesh.measure == pytest.approx(8000 + 10 * discs[0] + 12 * discs[1], rel=1e-5)
+
+
+def double_areas(mesh: TriangleMesh) -> np.ndarray:
+    a, b, c = mesh.corners_m.transpose(1, 0, 2)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def least_angles_deg(mesh: TriangleMesh) -> np.ndarray:
+    a, b, c = mesh.corners_m.transpose(1, 0, 2)
+    sides = np.sort([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
+    return np.degrees(np.arcsin(double_areas(mesh) / (sides[1] * sides[2])))
 
 
 def cylinder(sides: int, radius: float, low: Sequence[float], height: float) -> Part:
