@@ -5,12 +5,15 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
+import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 _Block = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+_PATH = re.compile(r"\bsandmould[./][\w./]*")
+"""Where a file of the house lies, by its path or its name as a module."""
 SHORT = 12
 """Digits of a hash that names a state of some sources."""
 EQUAL_CODE = Path(__file__).with_name("equal_code.toml")
@@ -53,9 +56,9 @@ def equal_code() -> dict[str, str]:
 def code_digest(paths: Iterable[Path]) -> str:
     """Short hash of the statements of Python files, equal on every Python that is supported.
 
-    Left out are comments, docstrings, layout, imports, the annotations of functions and of their
-    variables, and in which of the files a statement of a module stands. Fields of classes are
-    code: their annotations stay.
+    Left out are comments, docstrings, layout, imports, names of files and modules of the house, the
+    annotations of functions and of their variables, and in which of the files a statement of a
+    module stands. Fields of classes are code: their annotations stay.
     """
     statements = [text for path in paths for text in _statements_in(path.read_bytes())]
     return digest("\n".join(sorted(statements)))[:SHORT]
@@ -80,7 +83,7 @@ def _for_types(statement: ast.stmt) -> bool:
 def _text(node: Any) -> str:
     """A node of a tree as text of our own: that of ``ast.dump`` differs from Python to Python."""
     if isinstance(node, ast.Constant):
-        return f"Constant({node.value!r})"
+        return f"Constant({_PATH.sub('a path', repr(node.value))})"
     if isinstance(node, ast.AST):
         parts = [f"{name}={_text(value)}" for name, value in _fields(node)]
         return f"{type(node).__name__}({', '.join(parts)})"
