@@ -14,12 +14,12 @@ from benchmarks.frequency_law import chart, groups, groups_chart
 from benchmarks.frequency_law.controls import RecordedCurves
 from benchmarks.frequency_law.series import FREQUENCY, Power, Series, power_of, series_of
 from sandmould import ROOT
+from sandmould.execution.records import RECORDS
 from sandmould.runs.formatting import number, seconds
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.records import RECORDS
 
 STUDIES = (
     "tube_law_springs",

@@ -17,14 +17,14 @@ from typing import Any
 import jinja2
 
 from sandmould import ROOT
+from sandmould.execution.packs.recorded import RECORDS
+from sandmould.execution.records import DEFAULTS
+from sandmould.module_main import run_main
 from sandmould.runs.columns import OUTCOME, RUN, finished
 from sandmould.runs.formatting import listed
 from sandmould.runs.progress import duration_text
-from sandmould.scenario.module_main import run_main
 from sandmould.study.collect import read_summary
-from sandmould.study.packs.recorded import RECORDS
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.records import DEFAULTS
 
 RECORD = "## Record\n"
 ANSWER = "**Answer.** "

@@ -9,15 +9,14 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from sandmould import ROOT
+from sandmould import ROOT, geometry
+from sandmould.bad_input import Problem
 from sandmould.digest import code_identity, digest
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, Session
-from sandmould.scenario import geometry_sources
-from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.pattern import PatternDrawing
@@ -198,7 +197,7 @@ def code_groups(scenario: Scenario) -> list[list[Path]]:
         isinstance(solid, SolidMesh | PatternDrawing)
         for solid in (*scenario.obstacles, *scenario.cavities, *pattern)
     )
-    surfaces = [geometry_sources.source_files()] if drawn else []
+    surfaces = [geometry.source_files()] if drawn else []
     return [of_every_engine, *surfaces, *engine_of(scenario).session_sources(scenario)]
 
 

@@ -21,16 +21,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-import pattern_fe
-from sandmould import ROOT
+from sandmould import ROOT, geometry, pattern_fe
 from sandmould.casting import arpm, mps
+from sandmould.definition.run import Run
 from sandmould.digest import EQUAL_CODE, SHORT, code_digest, equal_code
 from sandmould.engines.registry import code_groups
+from sandmould.kinds.registry import KINDS
 from sandmould.runs.hashing import scenario_hash
-from sandmould.scenario import geometry_sources
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.registry import KINDS
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 
@@ -48,7 +46,7 @@ def parts() -> dict[str, list[Path]]:
     """Files of each part of the house that results depend on, by a name for people."""
     found = {
         "pattern": pattern_fe.source_files(),
-        "geometry": geometry_sources.source_files(),
+        "geometry": geometry.source_files(),
         "casting": arpm.source_files(),
         "flow": mps.source_files(),
     }

@@ -7,9 +7,8 @@ method", Materials Transactions 60 (2019) 33-40. Equation numbers are those of t
 from importlib.metadata import version
 from pathlib import Path
 
-from sandmould import ROOT
+from sandmould import ROOT, geometry
 from sandmould.digest import code_identity
-from sandmould.scenario import geometry_sources
 
 _SHARED = ("casting_shapes", "solidification", "solids")
 
@@ -22,4 +21,4 @@ def source_files() -> list[Path]:
 
 def source_hash() -> str:
     """State of the solver, which stands in place of a version."""
-    return code_identity([source_files(), geometry_sources.source_files()], version("numba"))
+    return code_identity([source_files(), geometry.source_files()], version("numba"))

@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.definition.study import Study
+from sandmould.definition.sweep import Point
 from sandmould.digest import digest
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import said
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.definition.study import Study
-from sandmould.study.definition.sweep import Point
 
 ROUNDS_FILE = "rounds.json"
 

@@ -8,12 +8,10 @@ from typing import Any
 
 import pytest
 
-import pattern_fe
-from sandmould import ROOT, dem
+from sandmould import ROOT, dem, geometry, pattern_fe
 from sandmould.casting import arpm, mps
 from sandmould.digest import code_digest, code_identity
 from sandmould.engines.registry import deck_sources
-from sandmould.scenario import geometry_sources
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from tests.scenes import tube_scene
@@ -180,7 +178,8 @@ def test_code_with_the_same_digits_keeps_its_identity(
 
 
 def test_a_pattern_is_hashed_by_what_its_room_computes() -> None:
-    assert pattern_fe.source_hash() == code_identity([(ROOT / "pattern_fe").rglob("*.py")])
+    sources = (ROOT / "sandmould" / "pattern_fe").rglob("*.py")
+    assert pattern_fe.source_hash() == code_identity([sources])
 
 
 @pytest.mark.parametrize(
@@ -194,12 +193,12 @@ def test_a_pattern_is_hashed_by_what_its_room_computes() -> None:
 def test_a_solver_is_hashed_by_all_that_computes_for_it(solver: Any, files: list[str]) -> None:
     sources = solver.source_files()
     assert {ROOT / "sandmould" / name for name in files} <= set(sources)
-    groups = [sources, geometry_sources.source_files()] if solver is arpm else [sources]
+    groups = [sources, geometry.source_files()] if solver is arpm else [sources]
     assert solver.source_hash() == code_identity(groups, version("numba"))
 
 
 def test_a_drawing_is_hashed_by_what_reads_it() -> None:
-    reading = set(geometry_sources.source_files())
+    reading = set(geometry.source_files())
     (bracket,) = expand(open_study(ROOT / "config" / "studies" / "bracket_small.yaml"))
     assert reading <= set(deck_sources(bracket.scenario))
     assert not reading & set(deck_sources(tube_scene()))

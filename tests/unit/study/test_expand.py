@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from sandmould import ROOT
+from sandmould.bad_input import BadInputError
+from sandmould.definition.run import Run
 from sandmould.runs.hashing import scenario_hash
-from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.definition.run import Run
 from sandmould.study.plan.expand import MOST_PROBLEMS, expand, replicate_seed
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import read_run, write_plan
