@@ -83,7 +83,6 @@ def casting_planning(
         problems=problems,
         engine_problem=lambda scenario: None,
         measures=measures,
-        vibration_s=lambda scenario: 0.0,
         sources=lambda scenario: solver.source_files(),
         template_hash=lambda scenario: solver.source_hash(),
         computed_hash=solver.computed_hash,

@@ -22,8 +22,6 @@ AnyScenario = Section
 ScenarioT = TypeVar("ScenarioT", bound=Section)
 SpeedClass = tuple[str, int]
 """Engine and dimension: what the speed of a core depends on most."""
-OF_SAND = ("cross_check", "calibration", "certificate")
-"""Sections of a study that speak of sand."""
 
 
 class Note(NamedTuple):
@@ -110,8 +108,6 @@ class Planning(Generic[ScenarioT]):
     """Why this machine cannot compute it."""
     measures: tuple[MeasureGroup[ScenarioT], ...]
     """All that its runs can be measured by: the one list of names, units and meanings."""
-    vibration_s: Callable[[ScenarioT], float]
-    """Time of vibration, over which measures are taken."""
     sources: Callable[[ScenarioT], list[Path]]
     """Files that its runs are computed again for when they change."""
     template_hash: Callable[[ScenarioT], str]
@@ -208,8 +204,6 @@ class Kind(Generic[ScenarioT]):
     open_execution: Callable[[], Execution[ScenarioT]]
     material: type[Section] | None = None
     """What a material file holds for it; None where it has none."""
-    absent: tuple[str, ...] = OF_SAND
-    """Sections that a study of this kind does not have."""
     draws_by_lot: bool = False
     """Whether runs of other seeds differ, so that replicates tell something."""
     labels_have_units: bool = True

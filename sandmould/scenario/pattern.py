@@ -39,15 +39,6 @@ class LShape(Section):
     reach_m: float = _length("From the back of the stem to the tip of the flange.")
 
 
-class TShape(Section):
-    """A stem in the middle under a flange."""
-
-    kind: Literal["t_shape"]
-    thickness_m: float = _length("Thickness of stem and flange.")
-    height_m: float = _length("From the foot to the top of the flange.")
-    width_m: float = _length("Width of the flange.")
-
-
 class MeshFile(Section):
     """A mesh that meshio reads: triangles or quadrilaterals, in 3D tetrahedra or hexahedra."""
 
@@ -84,7 +75,7 @@ class PatternDrawing(Section):
         return Path(os.path.normpath(ROOT / self.file))
 
 
-Shape = Annotated[Bar | LShape | TShape | MeshFile | PatternDrawing, Field(discriminator="kind")]
+Shape = Annotated[Bar | LShape | MeshFile | PatternDrawing, Field(discriminator="kind")]
 
 
 class Hung(Section):

@@ -17,7 +17,7 @@ from sandmould.geometry.drawing_file import MeshFileError, file_hash
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.mesher import is_step
 from sandmould.geometry.revolved import Revolved
-from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.quantity import PLANNED, Section, quantity
 
 Array = NDArray[np.float64]
 MANY_TRIANGLES = 100_000
@@ -65,7 +65,7 @@ DRAWING_FILE: Any = quantity(
 DRAWING_HASH: Any = quantity(
     None,
     "Hash of the file; the plan of a study writes it, so that another drawing is another run.",
-    source="user",
+    source=PLANNED,
     pattern=r"^[0-9a-f]{64}$",
 )
 DRAWING_UNIT: Any = quantity(
@@ -104,19 +104,19 @@ class SolidMesh(Section):
 
 
 class Triangles(Section):
-    """A solid bounded by triangles given in place, 3D only: a pattern stands in its scene so."""
+    """A solid bounded by triangles given in place, 3D only: so a plan puts a pattern in a scene."""
 
     kind: Literal["triangles"]
     name: str = quantity(
-        "triangles", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$"
+        "triangles", "Name in tables.", source=PLANNED, pattern=r"^[a-z][a-z0-9_]*$"
     )
     vertices_m: tuple[tuple[float, float, float], ...] = quantity(
-        ..., "Vertices.", unit="m", source="user", min_length=4
+        ..., "Vertices.", unit="m", source=PLANNED, min_length=4
     )
     triangles: tuple[tuple[int, int, int], ...] = quantity(
         ...,
         "Vertices of each triangle, counted from 0, counter-clockwise seen from outside.",
-        source="user",
+        source=PLANNED,
         min_length=4,
     )
 

@@ -22,11 +22,6 @@ _ALLOWED = 3.0
 """Wall time to ask for over what the user expects."""
 
 
-def vibration_s(scenario: OwnDeck) -> float:
-    """Measures are those of the last row of the log."""
-    return 0.0
-
-
 def engine_problem(scenario: OwnDeck) -> Problem | None:
     """Say how the engine is installed where it is missing."""
     valid = engine_module(scenario.engine.name).installation_problem()
@@ -132,7 +127,6 @@ PLANNING = Planning[OwnDeck](
     problems=own_deck.problems,
     engine_problem=engine_problem,
     measures=MEASURES,
-    vibration_s=vibration_s,
     sources=sources,
     template_hash=template_hash,
     computed_hash=computed_hash,

@@ -56,7 +56,6 @@ SAND = Kind(
     open_planning=_planning,
     open_execution=_execution,
     material=Material,
-    absent=(),
     draws_by_lot=True,
     labels_have_units=False,
     defaults=_default_scene,

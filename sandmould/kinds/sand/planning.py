@@ -149,11 +149,6 @@ def computed_hash(scenario: Scenario) -> str:
     return digest(of_engine, scenario_hash(scenario.pattern), pattern_fe.source_hash())
 
 
-def vibration_s(scenario: Scenario) -> float:
-    """The whole vibration."""
-    return sum(stage.whole_duration_s for stage in scenario.vibrations)
-
-
 def threads(scenario: Scenario) -> int:
     """Ranks of MPI, or threads."""
     return scenario.engine.ranks
@@ -331,7 +326,6 @@ PLANNING = Planning[Scenario](
     problems=problems,
     engine_problem=registry.engine_problem,
     measures=MEASURES,
-    vibration_s=vibration_s,
     sources=sources,
     template_hash=template_hash,
     computed_hash=computed_hash,

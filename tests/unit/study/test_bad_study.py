@@ -97,11 +97,6 @@ CASES: dict[str, tuple[str | bytes, str]] = {
         "trial.yaml: sweep.keys.sand.size_scale.nummer = 3 cannot be used: valid is one of the "
         "keys high, low, number, spacing (did you mean number?).",
     ),
-    "measure after the end": (
-        "based_on: tube\nobjective: {at_vibration_s: 60}",
-        "trial.yaml: objective.at_vibration_s = 60.0 cannot be used: "
-        "valid is at most 2 s, the end of the vibration.",
-    ),
     "key twice": (
         "based_on: tube\nreplicates: 2\nreplicates: 3",
         "trial.yaml: line 3 cannot be read as YAML: key 'replicates' stands twice, first in "
