@@ -6,7 +6,7 @@ import contextlib
 import time
 
 from sandmould.kinds.stored_speed import stored_speed
-from sandmould.scenario.flow import MetalFlow, ShoulderedCylinder
+from sandmould.scenario.flow import MetalFlow
 
 TIMED_S = 0.5
 
@@ -22,10 +22,7 @@ def _trial(scenario: MetalFlow) -> float | None:
     """Particle-solves per second of one core, in the first steps; of a mould that is full."""
     from sandmould.casting.mps import scene
 
-    if isinstance(scenario.case, ShoulderedCylinder):
-        full = scenario.case.model_copy(update={"starts": "full"})
-        scenario = scenario.model_copy(update={"case": full})
-    flow = scene.open_flow(scenario)
+    flow = scene.open_flow(scenario, full=True)
     with contextlib.suppress(ArithmeticError):
         flow.step()  # compiled before it is timed
     before, begun_s = flow.cost.particle_solves, time.process_time()
