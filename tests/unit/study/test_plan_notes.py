@@ -97,8 +97,8 @@ def test_walls_of_a_picture(tmp_path: Path) -> None:
     y, x = np.indices(rows.shape)
     rows[(x - 20) ** 2 + (y - 30) ** 2 <= 15**2] = 0
     Image.fromarray(rows).save(tmp_path / "disc.png")
-    picture = {"kind": "image", "file": "disc.png", "pixel_m": 0.001, "low_m": [0.01, 0.01]}
-    room = {"low_m": [0.0, 0.0], "high_m": [0.08, 0.08]}
+    picture = {"kind": "image", "file": "disc.png", "pixel_m": 0.001}
+    room = {"low_m": [-0.01, -0.01], "high_m": [0.07, 0.07]}
     assert notes_of(tmp_path, shapes=[picture], box=room, probes=[], element_m=0.001) == []
     rows[28:31, 30:58] = 0
     Image.fromarray(rows).save(tmp_path / "disc.png")
