@@ -94,23 +94,23 @@ verification: $(INSTALLED)
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
 
-## what LAMMPS decks cost with near grains and sorting: docs/lammps_speed.md
+## what LAMMPS decks cost with near grains and sorting: docs/developers/lammps_speed.md
 lammps-decks: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.lammps_decks $(QUICK)
 
-## impacts on all engines and beds with both dashpots: docs/rebound.md
+## impacts on all engines and beds with both dashpots: docs/developers/rebound.md
 rebound: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.rebound $(QUICK)
 
-## small grains between large ones: docs/size_ratio.md
+## small grains between large ones: docs/developers/size_ratio.md
 size-ratio: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.size_ratio $(QUICK)
 
-## packing measured at speed and at rest: docs/measured_at_rest.md
+## packing measured at speed and at rest: docs/developers/measured_at_rest.md
 at-rest: $(INSTALLED)
 	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.at_rest $(QUICK)
 
-## studies killed, disks that fail: docs/reliability.md, 50 minutes
+## studies killed, disks that fail: docs/developers/reliability.md, 50 minutes
 reliability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.reliability $(QUICK)
 
@@ -118,24 +118,24 @@ reliability: $(INSTALLED)
 fuzz: $(INSTALLED)
 	@$(BIN)/python -m tests.fuzz.campaign --minutes $(MINUTES)
 
-## how fast the engines are: docs/speed.md
+## how fast the engines are: docs/developers/speed.md
 benchmarks: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.engines $(QUICK)
 
-## the solver's step loop beside an earlier commit: docs/core_loop.md
+## the solver's step loop beside an earlier commit: docs/developers/core_loop.md
 core-loop: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.core_loop $(QUICK)
 
-## memory, listings, meshes and large beds beside an earlier commit: docs/size.md
+## memory, listings, meshes and large beds beside an earlier commit: docs/developers/size.md
 size: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.size $(QUICK)
 
 # The peers need an older numpy, so they have an environment of their own.
-## calibration beside other tools: docs/calibration_peers.md
+## calibration beside other tools: docs/developers/calibration_peers.md
 peers: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.calibration $(QUICK)
 
-## what the workflow costs up to 10 000 runs: docs/workflow_cost.md
+## what the workflow costs up to 10 000 runs: docs/developers/workflow_cost.md
 scaling: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.scaling $(QUICK)
 
@@ -162,7 +162,7 @@ solidification: $(INSTALLED)
 docs: $(INSTALLED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-## draw the rooms and write docs/architecture.md
+## draw the rooms and write docs/developers/architecture.md
 architecture: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.house.architecture
 

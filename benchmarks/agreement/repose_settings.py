@@ -1,4 +1,4 @@
-"""The page on the cheapest settings that change no angle: ``docs/repose_settings.md``."""
+"""The page on the cheapest settings that change no angle."""
 
 from __future__ import annotations
 

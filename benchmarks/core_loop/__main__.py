@@ -1,7 +1,8 @@
 """The step loop of the solver beside that of an earlier commit, on the same beds in turns.
 
 ``python -m benchmarks.core_loop`` unpacks that commit from the repository, settles the beds and
-writes docs/core_loop.md. Times are processor times of one thread, so that a busy machine does not
+writes docs/developers/core_loop.md. Times are processor times of one thread, so that a busy machine
+does not
 spoil them.
 """
 
@@ -156,7 +157,7 @@ BENCHMARK = Benchmark(
     __file__,
     __doc__,
     parts={"beds": measure_beds, "rest": measure_rest},
-    pages={"core_loop.md": page},
+    pages={"developers/core_loop.md": page},
     extent=LoopExtent(),
     quick=QUICK,
     arrange=lambda measured, run: {**measured, "origin": run.origin, "turns": run.extent.turns},

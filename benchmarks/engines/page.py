@@ -1,4 +1,4 @@
-"""The page docs/speed.md, written from what was measured."""
+"""The page docs/developers/speed.md, written from what was measured."""
 
 from __future__ import annotations
 

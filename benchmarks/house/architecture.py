@@ -1,4 +1,4 @@
-"""Write ``docs/architecture.md`` and its picture: ``python -m benchmarks.house.architecture``.
+"""Write ``docs/developers/architecture.md`` and its picture: ``make architecture``.
 
 With ``--before COMMIT``, the rooms of an earlier commit are counted and kept for the page.
 """
@@ -18,7 +18,7 @@ from benchmarks.house.picture import draw_house
 from benchmarks.house.rooms import House, Room, read_house, rooms_at
 from sandmould import ROOT
 
-PAGE = ROOT / "docs" / "architecture.md"
+PAGE = ROOT / "docs" / "developers" / "architecture.md"
 PICTURE = "architecture.svg"
 BEFORE = Path(__file__).with_name("rooms_before.json")
 """Rooms at the commit before they were built anew; a shallow clone does not have it."""
@@ -81,7 +81,7 @@ def write_before(commit: str, path: Path = BEFORE) -> None:
 
 def main(arguments: Sequence[str] | None = None, page: Path = PAGE) -> int:
     """Write the page and its picture; status 1 where an import runs up."""
-    parser = argparse.ArgumentParser(description="Write docs/architecture.md and its picture.")
+    parser = argparse.ArgumentParser(description="Write architecture.md and its picture.")
     parser.add_argument("--before", metavar="COMMIT", help="count the rooms at COMMIT for the page")
     commit = parser.parse_args(arguments).before
     if commit:

@@ -1,4 +1,4 @@
-"""The page docs/workflow_cost.md, written from what was measured."""
+"""The page docs/developers/workflow_cost.md, written from what was measured."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Memory, listings, threads, meshes and cost over size of the solver, beside an earlier commit.
 
 ``python -m benchmarks.size`` unpacks that commit from the repository, settles the beds and writes
-docs/size.md. Beds of all sizes are copies of one, side by side in both directions.
+docs/developers/size.md. Beds of all sizes are copies of one, side by side in both directions.
 """
 
 from __future__ import annotations
@@ -310,7 +310,7 @@ BENCHMARK = Benchmark(
         "scale": measure_scale,
         "threads": measure_threads,
     },
-    pages={"size.md": page},
+    pages={"developers/size.md": page},
     by_default=("memory", "listing", "mesh", "scale"),
     extent=SizeExtent(),
     quick=QUICK,

@@ -34,7 +34,8 @@ class EngineModule(Protocol):
 
     CAPABILITIES: Capabilities
     GRAIN_STEPS_PER_S: float
-    """Speed of one core in 2D that batches are filled by (docs/speed.md); fixed, so that a study
+    """Speed of one core in 2D that batches are filled by (docs/developers/speed.md); fixed, so that
+    a study
     has the same batches on every machine."""
     RANKS: Ranks
 

@@ -65,7 +65,7 @@ def test_the_interval_of_a_median_goes_by_ranks() -> None:
 
 def test_the_committed_page_is_that_of_the_results() -> None:
     results = json.loads(RESULTS.read_text(encoding="utf-8"))
-    assert (ROOT / "docs" / "size.md").read_text(encoding="utf-8") == page(results)
+    assert (ROOT / "docs" / "developers" / "size.md").read_text(encoding="utf-8") == page(results)
 
 
 def test_what_is_not_measured_is_told() -> None:

@@ -58,7 +58,8 @@ bracket of foam (study bracket_foam_small), 3.6 to 3.8 on the L that is filled a
 (l_deflection) and 5.0 to 5.8 where it is shaken deep in sand (l_depth): within 1.4 of each."""
 MEASURING_3D_S = 1.3
 """Processor time for measures and pictures in 3D beside what any job takes: 1.4 to 4.0 s a run in
-four shipped studies, nothing in a fifth (docs/prices.md); in 2D it is lost in the rest."""
+four shipped studies, nothing in a fifth (docs/developers/prices.md); in 2D it is lost in the
+rest."""
 HIGH_ACCELERATION_G = 20.0
 """Peak acceleration above which a plan asks whether the amplitude is meant so."""
 COMPILE_S = 25.0
