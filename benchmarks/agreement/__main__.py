@@ -15,6 +15,7 @@ BENCHMARK = Benchmark(
     __doc__,
     pages={
         "engine_twins.md": lambda results: engine_twins.page(),
+        "one_difference.md": lambda results: engine_twins.one_difference(),
         "developers/repose_settings.md": lambda results: repose_settings.page(),
     },
 )

@@ -1,7 +1,8 @@
-"""The page on the law of the best frequency: ``docs/frequency_law.md``."""
+"""The pages on the law of the best frequency."""
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,7 +15,7 @@ from benchmarks.frequency_law import chart, groups, groups_chart
 from benchmarks.frequency_law.controls import RecordedCurves
 from benchmarks.frequency_law.series import FREQUENCY, Power, Series, power_of, series_of
 from sandmould import ROOT
-from sandmould.runs.formatting import number, seconds
+from sandmould.runs.formatting import number
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.expand import expand
@@ -54,18 +55,9 @@ POWERS: dict[str, tuple[str, str, Callable[[Series], float]]] = {
 
 
 def page(records: Path = RECORDS, picture: Path | None = None) -> str:
-    """Write the page from the records that are there, and its picture where it is given a place."""
-    there = {
-        name: _study(records / name)
-        for name in STUDIES
-        if (records / name / "record.json").is_file()
-    }
-    others = [
-        RecordedCurves(records / name)
-        for name in HELD_OUT
-        if (records / name / "record.json").is_file()
-    ]
-    law = _law(there, others) if all(name in there for name in COLLAPSED) else None
+    """Write the law from the records that are there, and its picture where it is given a place."""
+    there = _recorded(records)
+    law = _law_of(records)
     studies = list(there.values())
     if picture is not None:
         if studies:
@@ -80,9 +72,36 @@ def page(records: Path = RECORDS, picture: Path | None = None) -> str:
         "missing": [name for name in STUDIES if name not in there],
         "law": law,
         "number": number,
-        "seconds": seconds,
     }
     return render(Path(__file__).with_name("page.md.j2"), values)
+
+
+def evidence(records: Path = RECORDS) -> str:
+    """Write why these two numbers decide, and how well they predict."""
+    values = {"law": _law_of(records), "number": number}
+    return render(Path(__file__).with_name("evidence.md.j2"), values)
+
+
+@functools.cache
+def _recorded(records: Path) -> dict[str, dict[str, Any]]:
+    """Studies of the law that are there."""
+    return {
+        name: _study(records / name)
+        for name in STUDIES
+        if (records / name / "record.json").is_file()
+    }
+
+
+@functools.cache
+def _law_of(records: Path) -> dict[str, Any] | None:
+    """The law and what it is asked for; none before all studies that it is fitted to are there."""
+    there = _recorded(records)
+    others = [
+        RecordedCurves(records / name)
+        for name in HELD_OUT
+        if (records / name / "record.json").is_file()
+    ]
+    return _law(there, others) if all(name in there for name in COLLAPSED) else None
 
 
 def _study(folder: Path) -> dict[str, Any]:

@@ -354,8 +354,6 @@ def page(results: dict[str, Any]) -> str:
     medians = {version: median(rows) for version, rows in one_run["core_s"].items()}
     values["one_run"] = {**one_run, "median": medians}
     values["thousand"] = _compared(results["thousand_runs"])
-    if "report" in results:
-        values["report"] = results["report"]
     values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)
 
