@@ -73,8 +73,8 @@ SMALLER = {
 """What is written in the place of what stands on the page, so that a study takes seconds."""
 
 ONE_STUDY = (
-    "README.md", "docs/how-to/write_a_study.md", "docs/running.md", "docs/cluster.md",
-    "docs/tutorials/cluster.md",
+    "README.md", "docs/how-to/write_a_study.md", "docs/running.md", "docs/how-to/packs.md",
+    "docs/cluster.md", "docs/tutorials/cluster.md",
 )  # fmt: skip
 """They speak of the study of the README: one person reads them in one folder."""
 
