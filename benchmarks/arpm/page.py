@@ -17,6 +17,8 @@ ADAPTIVE = ("2-3B, faces, local steps", 2.0)
 KERNELS, LOCAL = (PAPERS[0], 1.0), ("uniform, faces, local steps", 1.0)
 KERNEL_SIZES = (1.4, 2.4, 3.2, 4.2)
 """Of the contact cases in tables; the picture has all."""
+JUMP_SIZES = (1.4, 2.1, 4.2)
+"""Kernels of the jumps of sizes in the table."""
 LIMITS_PERCENT = (2.0, 1.0, 0.5, 0.2, 0.1)
 Row = Mapping[str, Any]
 
@@ -49,7 +51,7 @@ def page(results: Mapping[str, Any]) -> str:
         "papers_rows": [
             r for r in ways if r["way"] in PAPERS and r["size_mm"] in PAPERS_SIZES_MM
         ],
-        "origins": results,
+        "origins": {name: part for name, part in results.items() if "solver" in part},
     })  # fmt: skip
 
 
@@ -84,7 +86,10 @@ def failures(results: Mapping[str, Any]) -> str:
         "faces_most_percent": max(abs(r["error_percent"]) for r in faces),
         "faces_largest_k": max(r["largest_k"] for r in faces),
         "limits": limits,
-        "jumps": pivot(limits["jumps"], ("exchange", "kernel_size"), "ratio", "largest_k"),
+        "jumps": pivot(
+            [r for r in limits["jumps"] if r["kernel_size"] in (None, *JUMP_SIZES)],
+            ("exchange", "kernel_size"), "ratio", "largest_k",
+        ),
         "scatter": pivot(limits["scatter"], ("exchange",), "scatter", "largest_k"),
     })  # fmt: skip
 
