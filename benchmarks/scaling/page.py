@@ -16,12 +16,10 @@ SETTINGS = (
     ("whole nodes, half an hour", 1800.0, 32),
 )
 WHEN_FAILING = {
-    "sandmould": "the run's outcome says why; the others end; the report is written and the last "
-    "rule fails",
-    "Snakemake with Paramspace": "with `--keep-going` the others end; no table; the reason is in "
-    "what the job printed",
-    "signac with signac-flow": "the first that fails ends all; the runs' folders tell what is done",
-    "yade-batch": "the others end; a line with the exit status and a log a run; no table by itself",
+    "sandmould": "the outcome says why; the others end; the report is written",
+    "Snakemake with Paramspace": "with `--keep-going` the others end; no table",
+    "signac with signac-flow": "the first that fails ends all",
+    "yade-batch": "the others end; a log a run; no table by itself",
 }
 TO_GO_ON = {
     "sandmould": "the same command",
