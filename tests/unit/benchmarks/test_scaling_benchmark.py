@@ -87,7 +87,7 @@ def test_page_and_picture_are_made_from_numbers(found: dict[str, Any], tmp_path:
     assert "| graph, collection and report, a run | 0.510 | 0.060 | 0.011 |" in text
     assert "33 kB and 5.5 ms of a core for each job" in text  # of three a run
     # Without the start of Snakemake.
-    assert "| a run of the whole study, shared jobs | 1.92 |" in text
+    assert "one in shared jobs 1.92 s" in text
     assert "0 of 40 finished runs redone" in text
     draw(found, tmp_path / "scaling.png")
     assert (tmp_path / "scaling.png").stat().st_size > 1e4
