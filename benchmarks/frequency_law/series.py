@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sandmould.runs.formatting import setting_text
 from sandmould.scenario.hardness import bed_hardness, column_mode_hz
@@ -33,17 +32,6 @@ DRIVE = {
 
 
 @dataclass(frozen=True)
-class Rise:
-    """What the mean fill gains between two frequencies."""
-
-    from_hz: float
-    to_hz: float
-    gain: float
-    half_width: float
-    """Of its 95 % interval, in pairs. The two were picked after seeing, so it is too narrow."""
-
-
-@dataclass(frozen=True)
 class FillCurve:
     """Fill of one scene over frequency."""
 
@@ -58,23 +46,6 @@ class FillCurve:
     """A row a filling, a column a frequency in rising order; NaN where a run failed."""
     drives: pd.DataFrame
     """A row a frequency in the same order: ``DRIVE``, peaks of the box's motion."""
-
-    @property
-    def largest_rise(self) -> Rise:
-        """Where the mean fill gains most towards higher frequencies.
-
-        Beside a curve that falls from its lowest frequency it shows a second top.
-        """
-        means = self.fills.mean().to_numpy(dtype=np.float64)
-        gains = np.array([means[j] - means[:j].min() for j in range(1, len(means))])
-        top = 1 + int(gains.argmax())
-        valley = int(means[:top].argmin())
-        pairs = (self.fills.iloc[:, top] - self.fills.iloc[:, valley]).dropna().to_numpy()
-        half = float(stdtrit(len(pairs) - 1, 0.5 + CONFIDENCE / 2)) * float(pairs.std(ddof=1))
-        hz = self.fills.columns
-        return Rise(
-            float(hz[valley]), float(hz[top]), float(pairs.mean()), half / len(pairs) ** 0.5
-        )
 
     @property
     def wave_speed_m_s(self) -> float:

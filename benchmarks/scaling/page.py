@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks.frame import render
 from benchmarks.scaling.model import Assumed, WorkflowCosts, drain
 
-SWEEPS = ((10_000, 10), (10_000, 600))
+SWEEPS = ((10_000, 60),)
 SETTINGS = (
     ("a job a run", 0.0, 1),
     ("jobs of one core", 300.0, 1),

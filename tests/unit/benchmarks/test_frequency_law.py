@@ -69,19 +69,6 @@ def test_flat_curves_have_no_power() -> None:
     assert power_of(curves, [s.wave_speed_m_s for s in curves]) is None
 
 
-def test_the_largest_rise_is_told_beside_a_fall_from_the_lowest_frequency() -> None:
-    runs = planted(0.0, 0.0)
-    noise_free = {15.0: 0.5, 21.0: 0.45, 30.0: 0.4, 42.0: 0.42, 60.0: 0.48, 85.0: 0.46}
-    runs[MEASURE] = runs[FREQUENCY].map(noise_free).fillna(0.3) + 1e-3 * (runs[REPLICATE] % 2)
-    curve = series_of("second top", runs, (SPEED, FREQUENCY), scenes())[0]
-    rise = curve.largest_rise
-    assert (rise.from_hz, rise.to_hz) == (30.0, 60.0)
-    assert rise.gain == pytest.approx(0.08)
-    # Fillings differ by the same at both frequencies, so pairs do not scatter.
-    assert rise.half_width == pytest.approx(0.0, abs=1e-12)
-    assert curve.fills.shape == (4, len(FREQUENCIES_HZ))
-
-
 def planted_settings(law: Callable[[float, float, float], float]) -> pd.DataFrame:
     """Settings of curves of three wave speeds, each with acceleration, velocity or stroke held."""
     series = []
