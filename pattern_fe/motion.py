@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.supports import Mask
+from sandmould.pattern_fe.supports import Mask
 
 Array = NDArray[np.float64]
 

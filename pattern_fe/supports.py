@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.space import Space
+from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

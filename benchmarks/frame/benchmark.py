@@ -15,8 +15,8 @@ from typing import Any
 from benchmarks.frame.parts import Parts
 from sandmould import ROOT
 from sandmould.digest import code_digest
+from sandmould.execution.simulate import provenance
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.simulate import provenance
 
 SCRATCH = ROOT / "results" / "benchmarks"
 PRODUCT = ("analysis", "pattern_fe", "sandmould")

@@ -12,7 +12,7 @@ from functools import cache, partial
 from benchmarks.frame import Benchmark
 from benchmarks.frame.benchmark import Results
 from benchmarks.reproduction.page import FIRST, PAGES, LedgerPage
-from sandmould.scenario.module_main import in_a_sentence
+from sandmould.module_main import in_a_sentence
 
 
 @cache

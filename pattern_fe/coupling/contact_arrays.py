@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pattern_fe.coupling.contact_step import ContactArrays
-from pattern_fe.surroundings import Surroundings
 from sandmould.arrays import Floats, Ints
+from sandmould.pattern_fe.coupling.contact_step import ContactArrays
+from sandmould.pattern_fe.surroundings import Surroundings
 
 
 def contact_arrays(

@@ -20,18 +20,18 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-from pattern_fe.coupling.body import StaticSolution
-from pattern_fe.loads import vertex_pressure_pa
-from pattern_fe.material import Foam
-from pattern_fe.mesh_file import read_mesh, write_mesh
-from pattern_fe.pattern import Pattern
-from pattern_fe.perimeter import Perimeter
-from pattern_fe.supports import Supports
-from pattern_fe.surroundings import Surroundings
+from sandmould.bad_input import BadInputError
+from sandmould.geometry.geometry import Scene, Wall
+from sandmould.geometry.outline import Outline
+from sandmould.pattern_fe.coupling.body import StaticSolution
+from sandmould.pattern_fe.loads import vertex_pressure_pa
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.mesh_file import read_mesh, write_mesh
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.perimeter import Perimeter
+from sandmould.pattern_fe.supports import Supports
+from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.runs.files import write_text
-from sandmould.scenario.bad_input import BadInputError
-from sandmould.scenario.geometry import Scene, Wall
-from sandmould.scenario.outline import Outline
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_yaml, validated
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import StaticSolution
-from pattern_fe.coupling.exchange import (
+from sandmould.engines.session import EngineStop, Session
+from sandmould.pattern_fe.coupling.body import StaticSolution
+from sandmould.pattern_fe.coupling.exchange import (
     LOADS,
     PATTERN,
     SOLUTION,
@@ -17,9 +18,8 @@ from pattern_fe.coupling.exchange import (
     write_loads,
     write_pattern,
 )
-from pattern_fe.pattern import Pattern
-from pattern_fe.surroundings import Surroundings
-from sandmould.engines.session import EngineStop, Session
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.runs.outcome import Outcome
 
 Array = NDArray[np.float64]

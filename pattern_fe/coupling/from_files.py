@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pattern_fe.coupling.exchange import LOADS, SOLUTION, read_loads, read_pattern, write_solution
-from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.large_displacement import LoadNotReachedError
-from sandmould.scenario.module_main import run_main
+from sandmould.module_main import run_main
+from sandmould.pattern_fe.coupling.exchange import (
+    LOADS,
+    SOLUTION,
+    read_loads,
+    read_pattern,
+    write_solution,
+)
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.large_displacement import LoadNotReachedError
 
 
 def solve_all(folder: Path) -> list[Path]:

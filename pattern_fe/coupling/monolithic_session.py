@@ -13,15 +13,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import ElasticBody
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog, force_n, rms_m
-from pattern_fe.coupling.delegating_session import DelegatingSession
-from pattern_fe.coupling.explicit_foam import ExplicitFoam
-from pattern_fe.coupling.pattern_rest import PatternRest
-from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
+from sandmould.pattern_fe.coupling.body import ElasticBody
+from sandmould.pattern_fe.coupling.convergence_log import (
+    CONVERGENCE_LOG,
+    ConvergenceLog,
+    force_n,
+    rms_m,
+)
+from sandmould.pattern_fe.coupling.delegating_session import DelegatingSession
+from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam
+from sandmould.pattern_fe.coupling.pattern_rest import PatternRest
+from sandmould.pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.runs.outcome import Outcome
 
 Array = NDArray[np.float64]

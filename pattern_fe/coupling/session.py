@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import ElasticBody, StaticSolution
-from pattern_fe.coupling.convergence_log import (
+from sandmould.engines.session import EngineStop, RefusedError, Session
+from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.step_counts import StepCounts
+from sandmould.pattern_fe.coupling.body import ElasticBody, StaticSolution
+from sandmould.pattern_fe.coupling.convergence_log import (
     CONVERGENCE_LOG,
     ConvergenceLog,
     WindowEntry,
@@ -20,21 +23,18 @@ from pattern_fe.coupling.convergence_log import (
     rms_m,
     work_of,
 )
-from pattern_fe.coupling.delegating_session import DelegatingSession
-from pattern_fe.coupling.gain import measure_gain
-from pattern_fe.coupling.pattern_rest import PatternRest
-from pattern_fe.coupling.relaxation import (
+from sandmould.pattern_fe.coupling.delegating_session import DelegatingSession
+from sandmould.pattern_fe.coupling.gain import measure_gain
+from sandmould.pattern_fe.coupling.pattern_rest import PatternRest
+from sandmould.pattern_fe.coupling.relaxation import (
     STRUCK,
     AitkenRelaxation,
     MeasuredRelaxation,
     relaxation_of,
 )
-from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
-from pattern_fe.large_displacement import LoadNotReachedError
-from pattern_fe.surroundings import Surroundings
-from sandmould.engines.session import EngineStop, RefusedError, Session
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.step_counts import StepCounts
+from sandmould.pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
+from sandmould.pattern_fe.large_displacement import LoadNotReachedError
+from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
 
 CORPUS = Path(__file__).with_name("corpus")
 
@@ -46,7 +46,7 @@ def _planned_run(path: Path) -> object:
 
 
 def _surface(path: Path) -> object:
-    from sandmould.scenario.mesh_file import read_surface
+    from sandmould.geometry.mesh_file import read_surface
 
     return read_surface(path)
 
@@ -61,7 +61,7 @@ def _picture(path: Path) -> object:
 
 
 def _pattern_mesh(path: Path) -> object:
-    from pattern_fe.mesh_file import read_mesh
+    from sandmould.pattern_fe.mesh_file import read_mesh
 
     return read_mesh(path)
 
@@ -88,7 +88,7 @@ def _snapshot(path: Path) -> object:
 
 
 def _exchange_pattern(path: Path) -> object:
-    from pattern_fe.coupling.exchange import MESH, PATTERN, read_pattern
+    from sandmould.pattern_fe.coupling.exchange import MESH, PATTERN, read_pattern
 
     path.replace(path.parent / PATTERN)
     shutil.copyfile(CORPUS / "pattern_mesh" / "square.vtu", path.parent / MESH)
@@ -96,8 +96,8 @@ def _exchange_pattern(path: Path) -> object:
 
 
 def _exchange_loads(path: Path) -> object:
-    from pattern_fe.coupling.exchange import read_loads
-    from pattern_fe.scene import pattern_of
+    from sandmould.pattern_fe.coupling.exchange import read_loads
+    from sandmould.pattern_fe.scene import pattern_of
     from sandmould.scenario.scenario import Scenario
     from tests.bent_run import SCENE
 
@@ -117,13 +117,13 @@ def _stress(path: Path) -> object:
 
 
 def _log(path: Path) -> object:
-    from sandmould.engines.own_deck.thermo import read_thermo
+    from sandmould.kinds.deck.own.thermo import read_thermo
 
     return read_thermo([path])
 
 
 def _pack(path: Path) -> object:
-    from sandmould.study.packs.unpack import unpack
+    from sandmould.execution.packs.unpack import unpack
 
     return unpack(path, path.parent / "results", checkpoints=True)
 

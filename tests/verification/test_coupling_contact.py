@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from pattern_fe.coupling.from_files import solve_all
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.loop_verdict import classify_loop
-from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
-from pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.engines.driver import Driver
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from sandmould.pattern_fe.coupling.from_files import solve_all
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.loop_verdict import classify_loop
+from sandmould.pattern_fe.coupling.opening import open_coupled
+from sandmould.pattern_fe.coupling.shapes_file import SHAPES, read_shapes
+from sandmould.pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Scheme
 from sandmould.scenario.reading import Origin, merge

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from pattern_fe.coupling.exchange import PATTERN, read_loads, read_pattern, read_solution
-from pattern_fe.coupling.files_body import EXCHANGE
-from pattern_fe.coupling.from_files import solve_all
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.coupling.shapes_file import SHAPES, read_shapes
-from pattern_fe.scene import pattern_of
 from sandmould.engines.driver import Driver
+from sandmould.kinds.sand.bending import verdict_of
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from sandmould.pattern_fe.coupling.exchange import PATTERN, read_loads, read_pattern, read_solution
+from sandmould.pattern_fe.coupling.files_body import EXCHANGE
+from sandmould.pattern_fe.coupling.from_files import solve_all
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.opening import open_coupled
+from sandmould.pattern_fe.coupling.shapes_file import SHAPES, read_shapes
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand.bending import verdict_of
 from tests.patterns import _one_thread  # noqa: F401
 from tests.workflow.runs import drive
 
@@ -111,7 +111,7 @@ def asked(stopped: Path, tmp_path: Path) -> Path:
 def test_command_answers_from_the_folder_alone(asked: Path, tmp_path: Path) -> None:
     alone = tmp_path / "elsewhere"
     asked.rename(alone)
-    command = [sys.executable, "-m", "pattern_fe.coupling.from_files", str(alone)]
+    command = [sys.executable, "-m", "sandmould.pattern_fe.coupling.from_files", str(alone)]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "1 answers written" in said
     pattern, _, _ = read_pattern(alone)

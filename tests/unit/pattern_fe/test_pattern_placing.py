@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.mesh_file import write_mesh
-from pattern_fe.shapes import bar, mesh_of
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.mesh_file import write_mesh
+from sandmould.pattern_fe.shapes import bar, mesh_of
 from sandmould.scenario.scenario import Scenario
 
 BAR: dict[str, Any] = {
