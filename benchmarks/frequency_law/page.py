@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import pandas as pd
 from benchmarks.frame import render
 from benchmarks.frequency_law import chart, groups, groups_chart
 from benchmarks.frequency_law.controls import RecordedCurves
-from benchmarks.frequency_law.series import FREQUENCY, Power, Series, power_of, series_of
+from benchmarks.frequency_law.series import FREQUENCY, series_of
 from sandmould import ROOT
 from sandmould.execution.records import RECORDS
 from sandmould.runs.formatting import number
@@ -42,16 +42,6 @@ FEWEST_CURVES = 3
 PREDICTED_M_S = (0.02, 0.04, 0.08)
 PREDICTED_IN_MODES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 """Where the page tabulates the law."""
-POWERS: dict[str, tuple[str, str, Callable[[Series], float]]] = {
-    "tube_law_springs": ("wave speed c", "1", lambda series: series.wave_speed_m_s),
-    "tube_law_depth": ("depth H of the bed", "-1", lambda series: series.depth_m),
-    "tube_law_width": (
-        "width of the tube",
-        "0",
-        lambda s: s.scenario.scene.bores[0].section_measure,
-    ),
-}
-"""What changes between the curves of a study, and its exponent were f in proportion to c/(4 H)."""
 
 
 def page(records: Path = RECORDS, picture: Path | None = None) -> str:
@@ -120,7 +110,6 @@ def _study(folder: Path) -> dict[str, Any]:
         "series": series,
         "record": record,
         "runs": len(summary),
-        "power": _power(folder.name, series),
     }
 
 
@@ -164,10 +153,3 @@ def _law(there: Mapping[str, dict[str, Any]], others: Sequence[RecordedCurves]) 
             if study.moments and len(study.curves) >= FEWEST_CURVES
         ],
     }
-
-
-def _power(study: str, series: list[Series]) -> tuple[str, str, Power | None] | None:
-    if study not in POWERS:
-        return None
-    what, expected, changed = POWERS[study]
-    return what, expected, power_of(series, [changed(s) for s in series])

@@ -8,18 +8,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from sandmould.runs.formatting import setting_text
 from sandmould.scenario.hardness import bed_hardness, column_mode_hz
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import usable_values
-from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.settings import number_blocks
 from sandmould.statistics.spring_dependence import CurveLimbs, find_limbs
 
-Array = NDArray[np.float64]
 FREQUENCY = "vibration.0.frequency_hz"
 MEASURE = "tube_fill_fraction"
 BED_HEIGHT = "bed_height_m"
@@ -76,16 +73,6 @@ class Series(FillCurve):
     def interval_hz(self) -> tuple[float, float]:
         """Where the optimum lies with 95 % probability."""
         return self.optimum.interval(FREQUENCY)
-
-    @property
-    def is_inner(self) -> bool:
-        """Whether a frequency inside the range beats both of its ends at 95 %."""
-        return self.limbs.shape == "inner"
-
-    @property
-    def drawn_hz(self) -> Array:
-        """Where surfaces drawn from all that the runs leave possible are best, (n,) float64."""
-        return self.optimum.points[self.optimum.picks, 0]
 
 
 def series_of(
@@ -148,36 +135,3 @@ def fill_curve(study: str, label: str, summary: pd.DataFrame, scenario: Scenario
 
 def _usable(summary: pd.DataFrame) -> pd.DataFrame:
     return summary.loc[usable_values(summary, MEASURE).dropna().index]
-
-
-@dataclass(frozen=True)
-class Power:
-    """f in proportion to a power of what changes between curves."""
-
-    exponent: float
-    ci: tuple[float, float]
-    """95 % interval."""
-
-
-def power_of(series: Sequence[Series], changed: Sequence[float]) -> Power | None:
-    """Fit log f over the logarithm of what changes, over all drawn optima.
-
-    Parameters
-    ----------
-    series : sequence of Series
-    changed : sequence of float
-        As many, such as wave speeds.
-
-    Returns
-    -------
-    Power or None
-        None of fewer than two curves with an inner optimum.
-    """
-    inner = [(s, x) for s, x in zip(series, changed, strict=True) if s.is_inner]
-    if len(inner) < 2:
-        return None
-    x = np.log([value for _, value in inner])
-    y = np.log(np.array([s.drawn_hz for s, _ in inner]))
-    slopes = (x - x.mean()) @ (y - y.mean(axis=0)) / ((x - x.mean()) ** 2).sum()
-    low, high = np.quantile(slopes, (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
-    return Power(float(np.median(slopes)), (float(low), float(high)))
