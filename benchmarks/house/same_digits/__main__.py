@@ -27,6 +27,7 @@ from sandmould.definition.run import Run
 from sandmould.digest import EQUAL_CODE, SHORT, code_digest, equal_code
 from sandmould.engines.registry import code_groups
 from sandmould.kinds.registry import KINDS
+from sandmould.module_main import run_main
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.expand import expand
@@ -132,12 +133,11 @@ def write_equal(before: dict[str, str], now: dict[str, str]) -> None:
     EQUAL_CODE.write_text("\n".join([HEAD, *lines]), encoding="utf-8")
 
 
-def main(arguments: list[str]) -> int:
+def main(commit: str) -> int:
     """Compare with a commit, or print the identities."""
-    if arguments == ["identities"]:
+    if commit == "identities":
         print(json.dumps(identities(), indent=1))
         return 0
-    (commit,) = arguments
     with tempfile.TemporaryDirectory() as name:
         tree = Path(name, commit)
         tree.mkdir()
@@ -160,4 +160,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+    run_main(main, "python -m benchmarks.house.same_digits COMMIT | identities", (1,))
