@@ -131,7 +131,7 @@ def test_a_module_tells_how_it_is_called(
 def test_the_process_that_renders_templates_says_that_it_is_started_by_us(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    path = ROOT / "sandmould" / "engines" / "own_deck" / "template_process.py"
+    path = ROOT / "sandmould" / "kinds" / "deck" / "own" / "template_process.py"
     for arguments in ([], ["--help"], ["one", "two", "three"]):
         assert str(end_of(path, arguments, monkeypatch)).startswith("usage: ")
 
