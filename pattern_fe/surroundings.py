@@ -99,7 +99,6 @@ class Surroundings:
         """Vertices as drawn, (nv, d) float64, m."""
         self._facets = outer.facets
         self._held = held.all(axis=1)
-        self.walls = scene.walls
         none = np.zeros((0, self.dimension))
         self._wall_normal = np.vstack([none, *(wall.normal for wall in scene.walls)])
         self._wall_at_m = np.array([wall.normal @ wall.point_m for wall in scene.walls])

@@ -221,7 +221,7 @@ class CoupledSession(DelegatingSession):
             self.sand.restore_checkpoint(checkpoint)
             displacement = ahead
         self._take(start, steps, iteration)
-        self._next = self._predicted(start, self._interface, ahead)
+        self._next = ahead
         self._write(steps, iterations, iteration)
         self._check()
 
@@ -259,12 +259,6 @@ class CoupledSession(DelegatingSession):
         """A displacement that enters nothing: steps beyond the solution may lead into a wall."""
         around = self._surroundings
         return displacement if around is None else around.pushed_out(displacement)
-
-    def _predicted(self, start: Array, displacement: Array, relaxed: Array) -> Array:
-        """Where the next window leads: part of the way to the solution, or on as in this one."""
-        if self._loop.predicts:
-            return self._outside(relaxed + (displacement - start))
-        return relaxed
 
     def _write(self, steps: int, iterations: int, iteration: _Iteration) -> None:
         displacement, load, solution = self._interface, iteration.load_n, iteration.solution
