@@ -178,9 +178,7 @@ class AitkenRelaxation:
         """Take up the last residual and factors."""
         self._last = arrays["last"] if len(arrays["last"]) else None
         self.factor = float(arrays["factor"][0])
-        # a run that an earlier version paused has one factor
-        self._led = float(arrays["led"][0]) if "led" in arrays else self.factor
-        self._iterations = int(arrays["iterations"][0]) if "iterations" in arrays else 0
+        self._led, self._iterations = float(arrays["led"][0]), int(arrays["iterations"][0])
 
 
 class QuasiNewtonRelaxation:

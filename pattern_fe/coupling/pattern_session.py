@@ -1,0 +1,166 @@
+"""What sessions of all schemes have: tables, checkpoints and the pattern in snapshots."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pattern_fe.coupling.body import ElasticBody
+from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog, WindowEntry
+from pattern_fe.coupling.delegating_session import DelegatingSession
+from pattern_fe.coupling.pattern_rest import PatternRest
+from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
+from sandmould.engines.session import Session
+from sandmould.engines.snapshot import Snapshot
+
+Array = NDArray[np.float64]
+CHECKPOINT = "pattern.npz"
+
+
+class PatternSession(DelegatingSession, ABC):
+    """A session whose sand presses on a pattern that gives way; else the engine's own."""
+
+    entry: type[Any] = WindowEntry
+    """What the convergence log is made of."""
+
+    def __init__(
+        self, sand: Session, body: ElasticBody, surface: str, load_tolerance: float | None = None
+    ) -> None:
+        """Start with no load; tables are opened by ``_begin``.
+
+        Parameters
+        ----------
+        sand : Session
+        body : ElasticBody
+            The pattern at rest under given loads.
+        surface : str
+            Its name in the engine, vertex for vertex that of the body.
+        load_tolerance : float, optional
+            See ``PatternRest``.
+        """
+        super().__init__(sand)
+        self._body, self._surface = body, surface
+        self._rest = PatternRest(sand, load_tolerance)
+        self._load = np.zeros_like(body.vertices_m)
+        """Of the sand on the vertices, as snapshots have it, (nv, d) float64, N."""
+
+    def _begin(self, work: Path, checkpoint: Path | None) -> None:
+        """Open the tables in a folder, afresh or with the state where a checkpoint left them."""
+        log_bytes, rows = None, 0
+        if checkpoint is not None:
+            with np.load(checkpoint / CHECKPOINT, allow_pickle=False) as saved:
+                self._load = saved["surface_load"]
+                log_bytes, rows = (int(number) for number in saved["trusted"])
+                self._take_up({name: saved[name] for name in saved.files})
+        self._log = ConvergenceLog(work / CONVERGENCE_LOG, log_bytes, self.entry)
+        self._shapes = ShapesFile(work / SHAPES, rows, *self._load.shape)
+
+    @property
+    @abstractmethod
+    def displacement_m(self) -> Array:
+        """Displacement of the surface, (nv, d) float64, m."""
+
+    @abstractmethod
+    def _state(self) -> dict[str, Array]:
+        """All that a continued run needs of the pattern, by name."""
+
+    @abstractmethod
+    def _take_up(self, state: dict[str, Array]) -> None:
+        """Go on from what ``_state`` gave."""
+
+    def snapshot(self) -> Snapshot:
+        """State of all grains relative to the box, and the pattern among them."""
+        moved_m = self._body.vertices_m + self.displacement_m
+        return replace(self.sand.snapshot(), pattern_m=moved_m, pattern_load_n=self._load)
+
+    def write_checkpoint(self, folder: Path) -> None:
+        """Write the engine's state and the pattern's."""
+        self.sand.write_checkpoint(folder)
+        self._shapes.flush()
+        trusted = np.array([self._log.size(), self._shapes.rows])
+        own: dict[str, Any] = {"surface_load": self._load, "trusted": trusted}
+        np.savez(folder / CHECKPOINT, **own | self._state())
+
+    def close(self) -> None:
+        """Close the tables and free the engine."""
+        self._log.close()
+        self._shapes.close()
+        self.sand.close()
+
+
+class SteppedFoam(Protocol):
+    """A pattern in motion."""
+
+    @property
+    def displacement_m(self) -> Array:
+        """Of the vertices of the outer line, (nv, d) float64, m."""
+
+    def state(self) -> dict[str, Array]:
+        """All that moves, by name."""
+
+    def restore(self, arrays: dict[str, Array]) -> None:
+        """Go on from what ``state`` gave."""
+
+
+Foam = TypeVar("Foam", bound=SteppedFoam)
+
+
+class SteppedSession(PatternSession, Generic[Foam]):
+    """A session whose pattern moves in every step."""
+
+    def __init__(
+        self,
+        sand: Session,
+        foam: Foam,
+        body: ElasticBody,
+        surface: str,
+        work: Path,
+        checkpoint: Path | None = None,
+        load_tolerance: float | None = None,
+    ) -> None:
+        """Start with the pattern at rest, or where a checkpoint left it.
+
+        Parameters
+        ----------
+        sand : Session
+        foam : SteppedFoam
+        body : ElasticBody
+            The same pattern at rest, for where the loads bend it.
+        surface : str
+            Its name in the engine, vertex for vertex that of the foam.
+        work : Path
+            Folder of the tables.
+        checkpoint : Path, optional
+            Folder that ``write_checkpoint`` wrote.
+        load_tolerance : float, optional
+            See ``PatternRest``.
+        """
+        super().__init__(sand, body, surface, load_tolerance)
+        self._foam = foam
+        self._begin(work, checkpoint)
+
+    @property
+    def displacement_m(self) -> Array:
+        """Displacement of the surface, (nv, d) float64, m."""
+        return self._foam.displacement_m
+
+    def _state(self) -> dict[str, Array]:
+        return self._foam.state()
+
+    def _take_up(self, state: dict[str, Array]) -> None:
+        self._foam.restore(state)
+
+    def save_checkpoint(self) -> Any:
+        """Copies of what grains and pattern are; the tables go on."""
+        return self.sand.save_checkpoint(), self._foam.state(), self._load
+
+    def restore_checkpoint(self, checkpoint: Any) -> None:
+        """Compute on from what ``save_checkpoint`` gave."""
+        grains, foam, self._load = checkpoint
+        self.sand.restore_checkpoint(grains)
+        self._foam.restore(foam)
