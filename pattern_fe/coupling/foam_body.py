@@ -62,7 +62,7 @@ class FoamBody:
         pattern = self._pattern
         load = self._on_nodes(load_n)
         if self._large:
-            moved, touched = pattern.solve_obstructed(load, self._obstructed)
+            moved, touched = pattern.solve_large(load, self._obstructed)
         else:
             moved, touched = self._linear(load)
         reaction = self._inner_force_n(moved) - load

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pattern_fe.coupling.body import ElasticBody
 from pattern_fe.coupling.convergence_log import rms_m
-from sandmould.engines.session import Session
+from sandmould.engines.session import SandSession
 
 Array = NDArray[np.float64]
 MOVED_M = 1e-6
@@ -34,7 +34,7 @@ class Gain:
 
 
 def measure_gain(
-    session: Session,
+    session: SandSession,
     body: ElasticBody,
     surface: str,
     displacement_m: Array,
@@ -45,7 +45,7 @@ def measure_gain(
 
     Parameters
     ----------
-    session : Session
+    session : SandSession
         Of an engine that repeats windows.
     body : ElasticBody
     surface : str

@@ -16,7 +16,7 @@ from pattern_fe.coupling.body import ElasticBody
 from pattern_fe.coupling.convergence_log import force_n, rms_m
 from pattern_fe.coupling.explicit_foam import ExplicitFoam
 from pattern_fe.coupling.pattern_session import SteppedSession
-from sandmould.engines.session import EngineStop, Session
+from sandmould.engines.session import EngineStop, SandSession
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 
@@ -60,7 +60,7 @@ class MonolithicSession(SteppedSession[ExplicitFoam]):
 
     def __init__(
         self,
-        sand: Session,
+        sand: SandSession,
         foam: ExplicitFoam,
         body: ElasticBody,
         surface: str,

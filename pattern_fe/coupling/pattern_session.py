@@ -15,7 +15,7 @@ from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog,
 from pattern_fe.coupling.delegating_session import DelegatingSession
 from pattern_fe.coupling.pattern_rest import PatternRest
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
-from sandmould.engines.session import Session
+from sandmould.engines.session import SandSession
 from sandmould.engines.snapshot import Snapshot
 
 Array = NDArray[np.float64]
@@ -29,13 +29,17 @@ class PatternSession(DelegatingSession, ABC):
     """What the convergence log is made of."""
 
     def __init__(
-        self, sand: Session, body: ElasticBody, surface: str, load_tolerance: float | None = None
+        self,
+        sand: SandSession,
+        body: ElasticBody,
+        surface: str,
+        load_tolerance: float | None = None,
     ) -> None:
         """Start with no load; tables are opened by ``_begin``.
 
         Parameters
         ----------
-        sand : Session
+        sand : SandSession
         body : ElasticBody
             The pattern at rest under given loads.
         surface : str
@@ -115,7 +119,7 @@ class SteppedSession(PatternSession, Generic[Foam]):
 
     def __init__(
         self,
-        sand: Session,
+        sand: SandSession,
         foam: Foam,
         body: ElasticBody,
         surface: str,
@@ -127,7 +131,7 @@ class SteppedSession(PatternSession, Generic[Foam]):
 
         Parameters
         ----------
-        sand : Session
+        sand : SandSession
         foam : SteppedFoam
         body : ElasticBody
             The same pattern at rest, for where the loads bend it.
@@ -154,13 +158,3 @@ class SteppedSession(PatternSession, Generic[Foam]):
 
     def _take_up(self, state: dict[str, Array]) -> None:
         self._foam.restore(state)
-
-    def save_checkpoint(self) -> Any:
-        """Copies of what grains and pattern are; the tables go on."""
-        return self.sand.save_checkpoint(), self._foam.state(), self._load
-
-    def restore_checkpoint(self, checkpoint: Any) -> None:
-        """Compute on from what ``save_checkpoint`` gave."""
-        grains, foam, self._load = checkpoint
-        self.sand.restore_checkpoint(grains)
-        self._foam.restore(foam)

@@ -28,7 +28,7 @@ from pattern_fe.coupling.relaxation import (
 )
 from pattern_fe.large_displacement import LoadNotReachedError
 from pattern_fe.surroundings import Surroundings
-from sandmould.engines.session import EngineStop, RefusedError, Session
+from sandmould.engines.session import EngineStop, SandSession
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
@@ -71,7 +71,7 @@ class CoupledSession(PatternSession):
 
     def __init__(
         self,
-        sand: Session,
+        sand: SandSession,
         body: ElasticBody,
         surface: str,
         loop: Loop,
@@ -85,7 +85,7 @@ class CoupledSession(PatternSession):
 
         Parameters
         ----------
-        sand : Session
+        sand : SandSession
             Of any engine that can move the surface.
         body : ElasticBody
             The pattern.
@@ -285,20 +285,6 @@ class CoupledSession(PatternSession):
                 f"largest_displacement_m = {self._loop.largest_displacement_m:g}, after "
                 f"{self.sand.time_s:.4g} s: a smaller factor or another scheme may hold",
             )
-
-    def save_checkpoint(self) -> Any:
-        """Refuse: the loop repeats its windows itself.
-
-        Raises
-        ------
-        RefusedError
-        """
-        valid = "a scheme without windows, where windows are repeated from outside"
-        raise RefusedError("pattern.loop.scheme", self._loop.scheme, valid)
-
-    def restore_checkpoint(self, checkpoint: Any) -> None:
-        """Refuse as ``save_checkpoint`` does."""
-        self.save_checkpoint()
 
     def _state(self) -> dict[str, Array]:
         memory = {f"relaxation_{name}": a for name, a in self._relaxation.state().items()}

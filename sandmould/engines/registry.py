@@ -14,7 +14,7 @@ from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
-from sandmould.engines.session import RefusedError, Session
+from sandmould.engines.session import RefusedError, SandSession
 from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.moving_walls import moving_wall
@@ -74,7 +74,7 @@ class EngineModule(Protocol):
     @staticmethod
     def open_session(
         program: Program, folder: Path, log: Path, checkpoint: Path | None = None
-    ) -> Session:
+    ) -> SandSession:
         """Open a session on a rendered deck, afresh or from a checkpoint."""
 
 

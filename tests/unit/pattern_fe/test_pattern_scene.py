@@ -15,7 +15,6 @@ from skfem import MeshTet
 from pattern_fe.coupling.foam_body import FoamBody
 from pattern_fe.coupling.interface import with_surface
 from pattern_fe.coupling.session import window_ends
-from pattern_fe.mesh_file import write_mesh
 from pattern_fe.scene import pattern_of
 from pattern_fe.shapes import bar, mesh_of, with_sides
 from sandmould.engines.snapshot import Snapshot, scene_at
@@ -25,6 +24,7 @@ from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.kinds.sand import planning as sand
+from tests.patterns import write_mesh
 
 L_SCENE: dict[str, Any] = {
     "box": {"width_m": 0.2, "height_m": 0.2},
