@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from pattern_fe.coupling.body import ElasticBody
 from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog, WindowEntry
 from pattern_fe.coupling.delegating_session import DelegatingSession
+from pattern_fe.coupling.explicit_foam import ExplicitFoam
+from pattern_fe.coupling.in_step_foam import InStepFoam
 from pattern_fe.coupling.pattern_rest import PatternRest
 from pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.engines.session import SandSession
@@ -97,21 +99,8 @@ class PatternSession(DelegatingSession, ABC):
         self.sand.close()
 
 
-class SteppedFoam(Protocol):
-    """A pattern in motion."""
-
-    @property
-    def displacement_m(self) -> Array:
-        """Of the vertices of the outer line, (nv, d) float64, m."""
-
-    def state(self) -> dict[str, Array]:
-        """All that moves, by name."""
-
-    def restore(self, arrays: dict[str, Array]) -> None:
-        """Go on from what ``state`` gave."""
-
-
-Foam = TypeVar("Foam", bound=SteppedFoam)
+Foam = TypeVar("Foam", ExplicitFoam, InStepFoam)
+"""A pattern in motion."""
 
 
 class SteppedSession(PatternSession, Generic[Foam]):
@@ -132,7 +121,7 @@ class SteppedSession(PatternSession, Generic[Foam]):
         Parameters
         ----------
         sand : SandSession
-        foam : SteppedFoam
+        foam : ExplicitFoam or InStepFoam
         body : ElasticBody
             The same pattern at rest, for where the loads bend it.
         surface : str
@@ -145,7 +134,7 @@ class SteppedSession(PatternSession, Generic[Foam]):
             See ``PatternRest``.
         """
         super().__init__(sand, body, surface, load_tolerance)
-        self._foam = foam
+        self._foam: Foam = foam
         self._begin(work, checkpoint)
 
     @property
