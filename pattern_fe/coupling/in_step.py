@@ -34,7 +34,7 @@ class InStepEntry(WindowEntry):
 class InStepSession(SteppedSession[InStepFoam]):
     """A session of an engine that calls the pattern's step in its own."""
 
-    entry = InStepEntry
+    entry, load_name = InStepEntry, "mean_load"
 
     def _begin(self, work: Path, checkpoint: Path | None) -> None:
         super()._begin(work, checkpoint)

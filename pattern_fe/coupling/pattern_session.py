@@ -29,6 +29,8 @@ class PatternSession(DelegatingSession, ABC):
 
     entry: type[Any] = WindowEntry
     """What the convergence log is made of."""
+    load_name = "load"
+    """Of the load in checkpoints."""
 
     def __init__(
         self,
@@ -60,9 +62,14 @@ class PatternSession(DelegatingSession, ABC):
         log_bytes, rows = None, 0
         if checkpoint is not None:
             with np.load(checkpoint / CHECKPOINT, allow_pickle=False) as saved:
-                self._load = saved["surface_load"]
-                log_bytes, rows = (int(number) for number in saved["trusted"])
-                self._take_up({name: saved[name] for name in saved.files})
+                state = {name: saved[name] for name in saved.files}
+            self._load = state[self.load_name]
+            # windows had two numbers of their own before
+            trusted = (
+                state["trusted"] if "trusted" in state else (state["ledger_bytes"], state["rows"])
+            )
+            log_bytes, rows = (int(number) for number in trusted)
+            self._take_up(state)
         self._log = ConvergenceLog(work / CONVERGENCE_LOG, log_bytes, self.entry)
         self._shapes = ShapesFile(work / SHAPES, rows, *self._load.shape)
 
@@ -89,7 +96,7 @@ class PatternSession(DelegatingSession, ABC):
         self.sand.write_checkpoint(folder)
         self._shapes.flush()
         trusted = np.array([self._log.size(), self._shapes.rows])
-        own: dict[str, Any] = {"surface_load": self._load, "trusted": trusted}
+        own: dict[str, Any] = {self.load_name: self._load, "trusted": trusted}
         np.savez(folder / CHECKPOINT, **own | self._state())
 
     def close(self) -> None:

@@ -288,13 +288,19 @@ class CoupledSession(PatternSession):
 
     def _state(self) -> dict[str, Array]:
         memory = {f"relaxation_{name}": a for name, a in self._relaxation.state().items()}
-        numbers = np.array([self._work_j, self._contact_j, self._gain])
-        moved = np.array([self._interface, self._next, self._solved])
-        return memory | {"moved": moved, "numbers": numbers}
+        return memory | {  # names on disk: paused runs of an earlier version go on
+            "shown": self._interface,
+            "next": self._next,
+            "answered": self._solved,
+            "work_j": np.array(self._work_j),
+            "contact_j": np.array(self._contact_j),
+            "gain": np.array(self._gain),
+        }
 
     def _take_up(self, state: dict[str, Array]) -> None:
-        self._interface, self._next, self._solved = state["moved"]
-        self._work_j, self._contact_j, self._gain = (float(x) for x in state["numbers"])
+        self._interface, self._next, self._solved = state["shown"], state["next"], state["answered"]
+        self._work_j, self._contact_j = float(state["work_j"]), float(state["contact_j"])
+        self._gain = float(state["gain"])
         start = "relaxation_"
         memory = {k.removeprefix(start): a for k, a in state.items() if k.startswith(start)}
         self._relaxation.restore(memory)
