@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pattern_fe.surroundings import Gaps, Surroundings
+from sandmould.pattern_fe.surroundings import Gaps, Surroundings
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

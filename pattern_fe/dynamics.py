@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import eigsh
 
-from pattern_fe.material import Foam
-from pattern_fe.space import Space
-from pattern_fe.supports import Mask
-from pattern_fe.weak_forms import element_mass_kg, element_stiffness_n_m
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.space import Space
+from sandmould.pattern_fe.supports import Mask
+from sandmould.pattern_fe.weak_forms import element_mass_kg, element_stiffness_n_m
 
 Array = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.contact import touch
-from pattern_fe.elasticity import displacement_gradient, element_tangent_n_m, internal_force_n
-from pattern_fe.factor import factorised
-from pattern_fe.material import Foam
-from pattern_fe.space import Space
-from pattern_fe.supports import Mask
-from pattern_fe.surroundings import Surroundings
+from sandmould.pattern_fe.contact import touch
+from sandmould.pattern_fe.elasticity import displacement_gradient, element_tangent_n_m, internal_force_n
+from sandmould.pattern_fe.factor import factorised
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.space import Space
+from sandmould.pattern_fe.supports import Mask
+from sandmould.pattern_fe.surroundings import Surroundings
 
 Array = NDArray[np.float64]
 _OVERLAP = 1e-6

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from skfem import MeshHex1, MeshQuad1, MeshTet1, MeshTri1
 from skfem.io.meshio import from_meshio
 
-from pattern_fe.checks import check_mesh
-from pattern_fe.shapes import with_sides
+from sandmould.pattern_fe.checks import check_mesh
+from sandmould.pattern_fe.shapes import with_sides
 
 Array = NDArray[np.float64]
 _SOLID = ("tetra", "tetra10", "hexahedron", "hexahedron27")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from pattern_fe.supports import Mask
+from sandmould.pattern_fe.supports import Mask
 
 Array = NDArray[np.float64]
 

@@ -11,25 +11,25 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU
 
-from pattern_fe import dynamics
-from pattern_fe.checks import check_mesh
-from pattern_fe.condensation import CondensedSurface, condensed_surface
-from pattern_fe.elasticity import (
+from sandmould.pattern_fe import dynamics
+from sandmould.pattern_fe.checks import check_mesh
+from sandmould.pattern_fe.condensation import CondensedSurface, condensed_surface
+from sandmould.pattern_fe.elasticity import (
     displacement_gradient,
     green_strain,
     small_strain,
     von_mises_pa,
 )
-from pattern_fe.factor import factorised
-from pattern_fe.large_displacement import NewtonSettings, Obstructed, solve_large
-from pattern_fe.material import Foam
-from pattern_fe.motion import CentralDifferences
-from pattern_fe.perimeter import perimeter_of
-from pattern_fe.space import space_of
-from pattern_fe.supports import Supports, check_held, fixed_components, loose_motions
-from pattern_fe.surroundings import Surroundings
-from pattern_fe.weak_forms import element_stiffness_n_m
-from sandmould.scenario.geometry import Scene
+from sandmould.pattern_fe.factor import factorised
+from sandmould.pattern_fe.large_displacement import NewtonSettings, Obstructed, solve_large
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.motion import CentralDifferences
+from sandmould.pattern_fe.perimeter import perimeter_of
+from sandmould.pattern_fe.space import space_of
+from sandmould.pattern_fe.supports import Supports, check_held, fixed_components, loose_motions
+from sandmould.pattern_fe.surroundings import Surroundings
+from sandmould.pattern_fe.weak_forms import element_stiffness_n_m
+from sandmould.geometry.geometry import Scene
 
 Array = NDArray[np.float64]
 _NEWTON = NewtonSettings()

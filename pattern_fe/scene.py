@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from skfem import MeshHex
 from threadpoolctl import threadpool_limits
 
-from pattern_fe.checks import check_inside
-from pattern_fe.material import Foam
-from pattern_fe.mesh_file import read_mesh
-from pattern_fe.pattern import Pattern
-from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
-from pattern_fe.supports import Supports
-from pattern_fe.surroundings import Surroundings
-from pattern_fe.volume_mesh import drawing_mesh
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.limits import PATTERN_ELEMENTS, SOLID_EQUATIONS
-from sandmould.scenario.mesh import TriangleMesh
+from sandmould.pattern_fe.checks import check_inside
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.mesh_file import read_mesh
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
+from sandmould.pattern_fe.supports import Supports
+from sandmould.pattern_fe.surroundings import Surroundings
+from sandmould.pattern_fe.volume_mesh import drawing_mesh
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.limits import PATTERN_ELEMENTS, SOLID_EQUATIONS
+from sandmould.geometry.mesh import TriangleMesh
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig, PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import drawn_surface, unit_hint

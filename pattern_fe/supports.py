@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.checks import place
-from pattern_fe.space import Space
+from sandmould.pattern_fe.checks import place
+from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.nearest import nearest_on_facets
-from pattern_fe.perimeter import Perimeter
-from sandmould.scenario.geometry import Scene, Solid, distance_within
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
-from sandmould.scenario.revolved import Revolved
+from sandmould.pattern_fe.nearest import nearest_on_facets
+from sandmould.pattern_fe.perimeter import Perimeter
+from sandmould.geometry.geometry import Scene, Solid, distance_within
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
+from sandmould.geometry.revolved import Revolved
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

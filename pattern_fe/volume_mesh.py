@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshTet
 
-from pattern_fe.shapes import with_sides
-from sandmould.scenario.limits import SOLID_ELEMENTS
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.mesher import is_step, step_tetrahedra, surface_tetrahedra
+from sandmould.pattern_fe.shapes import with_sides
+from sandmould.limits import SOLID_ELEMENTS
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.mesher import is_step, step_tetrahedra, surface_tetrahedra
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.solids import turn_about_vertical
 

@@ -14,11 +14,11 @@ from skfem import MeshQuad, MeshTet
 from skfem.io.meshio import to_meshio
 from threadpoolctl import threadpool_limits
 
-from pattern_fe.large_displacement import NewtonSettings
-from pattern_fe.material import Foam
-from pattern_fe.pattern import Pattern
-from pattern_fe.shapes import Rectangle, bar, l_shape, mesh_of, with_sides
-from pattern_fe.supports import Supports
+from sandmould.pattern_fe.large_displacement import NewtonSettings
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.shapes import Rectangle, bar, l_shape, mesh_of, with_sides
+from sandmould.pattern_fe.supports import Supports
 
 Array = NDArray[np.float64]
 THICKNESS_M = 0.25

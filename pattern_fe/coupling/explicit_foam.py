@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.contact import touch
-from pattern_fe.pattern import Pattern
-from pattern_fe.surroundings import Surroundings
+from sandmould.pattern_fe.contact import touch
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]

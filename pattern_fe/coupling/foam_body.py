@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.contact import touch
-from pattern_fe.coupling.body import StaticSolution
-from pattern_fe.elasticity import internal_force_n
-from pattern_fe.large_displacement import Obstructed
-from pattern_fe.pattern import Pattern
-from pattern_fe.surroundings import Surroundings
+from sandmould.pattern_fe.contact import touch
+from sandmould.pattern_fe.coupling.body import StaticSolution
+from sandmould.pattern_fe.elasticity import internal_force_n
+from sandmould.pattern_fe.large_displacement import Obstructed
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.surroundings import Surroundings
 
 Array = NDArray[np.float64]
 _LINEARISATIONS = 40

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import ElasticBody
-from pattern_fe.coupling.convergence_log import rms_m
+from sandmould.pattern_fe.coupling.body import ElasticBody
+from sandmould.pattern_fe.coupling.convergence_log import rms_m
 from sandmould.engines.session import SandSession
 
 Array = NDArray[np.float64]

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.condensation import CondensedSurface
-from pattern_fe.coupling.contact_rows import ContactRows
-from pattern_fe.coupling.contact_step import ContactArrays
-from pattern_fe.coupling.foam_step import (
+from sandmould.pattern_fe.condensation import CondensedSurface
+from sandmould.pattern_fe.coupling.contact_rows import ContactRows
+from sandmould.pattern_fe.coupling.contact_step import ContactArrays
+from sandmould.pattern_fe.coupling.foam_step import (
     CONTACT,
     DAMPED,
     OMEGA2,
@@ -21,9 +21,9 @@ from pattern_fe.coupling.foam_step import (
     FoamArrays,
     address_of_step,
 )
-from pattern_fe.coupling.selective_mass import SelectiveMass, selective_mass
-from pattern_fe.pattern import Pattern
-from pattern_fe.surroundings import Surroundings
+from sandmould.pattern_fe.coupling.selective_mass import SelectiveMass, selective_mass
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.dem.addresses import table_of
 from sandmould.engines.step_mover import StepMover
 

@@ -7,21 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from pattern_fe.coupling.explicit_foam import ExplicitFoam
-from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.free_body import FreeBody
-from pattern_fe.coupling.in_step import InStepSession
-from pattern_fe.coupling.monolithic_session import MonolithicSession
-from pattern_fe.coupling.schemes import explicit_foam, in_step_foam
-from pattern_fe.coupling.selective_mass import SelectiveMass
-from pattern_fe.coupling.session import CoupledSession
-from pattern_fe.pattern import Pattern
-from pattern_fe.scene import pattern_of, surroundings_of
+from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.coupling.free_body import FreeBody
+from sandmould.pattern_fe.coupling.in_step import InStepSession
+from sandmould.pattern_fe.coupling.monolithic_session import MonolithicSession
+from sandmould.pattern_fe.coupling.schemes import explicit_foam, in_step_foam
+from sandmould.pattern_fe.coupling.selective_mass import SelectiveMass
+from sandmould.pattern_fe.coupling.session import CoupledSession
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.engines.program import Program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
 from sandmould.engines.step_counts import StepCounts
-from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 

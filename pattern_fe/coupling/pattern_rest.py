@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.convergence_log import rms_m
+from sandmould.pattern_fe.coupling.convergence_log import rms_m
 from sandmould.engines.session import SandSession
 
 Array = NDArray[np.float64]

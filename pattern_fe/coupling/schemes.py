@@ -6,16 +6,16 @@ from typing import get_args
 
 from threadpoolctl import threadpool_limits
 
-from pattern_fe.coupling.contact_rows import ContactRows
-from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
-from pattern_fe.coupling.gain_prediction import predicted_gain
-from pattern_fe.coupling.in_step_foam import InStepFoam
-from pattern_fe.pattern import Pattern
-from pattern_fe.scene import surroundings_of
+from sandmould.pattern_fe.coupling.contact_rows import ContactRows
+from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
+from sandmould.pattern_fe.coupling.gain_prediction import predicted_gain
+from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.scene import surroundings_of
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_of, engines_that
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.limits import STEPPED_COMPONENTS
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.limits import STEPPED_COMPONENTS
 from sandmould.scenario.pattern import Loop, Scheme
 from sandmould.scenario.scenario import Scenario
 

@@ -10,24 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import ElasticBody, StaticSolution
-from pattern_fe.coupling.convergence_log import (
+from sandmould.pattern_fe.coupling.body import ElasticBody, StaticSolution
+from sandmould.pattern_fe.coupling.convergence_log import (
     WindowEntry,
     force_n,
     imbalance_n,
     rms_m,
     work_of,
 )
-from pattern_fe.coupling.gain import measure_gain
-from pattern_fe.coupling.pattern_session import PatternSession
-from pattern_fe.coupling.relaxation import (
+from sandmould.pattern_fe.coupling.gain import measure_gain
+from sandmould.pattern_fe.coupling.pattern_session import PatternSession
+from sandmould.pattern_fe.coupling.relaxation import (
     STRUCK,
     AitkenRelaxation,
     MeasuredRelaxation,
     relaxation_of,
 )
-from pattern_fe.large_displacement import LoadNotReachedError
-from pattern_fe.surroundings import Surroundings
+from sandmould.pattern_fe.large_displacement import LoadNotReachedError
+from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.engines.session import EngineStop, SandSession
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome

@@ -15,7 +15,7 @@ from sandmould.engines.deck import Deck, dialect_hash
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, SandSession
-from sandmould.scenario.bad_input import Problem
+from sandmould.bad_input import Problem
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.scenario import Scenario

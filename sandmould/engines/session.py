@@ -15,7 +15,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_periods import TablePeriod
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.bad_input import Problem
+from sandmould.bad_input import Problem
 
 Array = NDArray[np.float64]
 Shared = TypeVar("Shared")

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.limits import YAML_BYTES
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.limits import YAML_BYTES
 from sandmould.scenario.moved_keys import called, instead_of
 from sandmould.scenario.quantity import units_at
 from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths

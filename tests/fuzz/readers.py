@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
 
 CORPUS = Path(__file__).with_name("corpus")
 
@@ -45,7 +45,7 @@ def _planned_run(path: Path) -> object:
 
 
 def _surface(path: Path) -> object:
-    from sandmould.scenario.mesh_file import read_surface
+    from sandmould.geometry.mesh_file import read_surface
 
     return read_surface(path)
 
@@ -60,7 +60,7 @@ def _picture(path: Path) -> object:
 
 
 def _pattern_mesh(path: Path) -> object:
-    from pattern_fe.mesh_file import read_mesh
+    from sandmould.pattern_fe.mesh_file import read_mesh
 
     return read_mesh(path)
 
@@ -99,13 +99,13 @@ def _stress(path: Path) -> object:
 
 
 def _log(path: Path) -> object:
-    from sandmould.engines.own_deck.thermo import read_thermo
+    from sandmould.kinds.deck.own.thermo import read_thermo
 
     return read_thermo([path])
 
 
 def _pack(path: Path) -> object:
-    from sandmould.study.packs.unpack import unpack
+    from sandmould.execution.packs.unpack import unpack
 
     return unpack(path, path.parent / "results", checkpoints=True)
 

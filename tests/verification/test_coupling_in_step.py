@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.contact_rows import ContactRows, shares_along
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.coupling.selective_mass import selective_mass
-from pattern_fe.material import Foam
-from pattern_fe.pattern import Pattern
-from pattern_fe.shapes import bar, mesh_of
-from pattern_fe.supports import Supports
+from sandmould.pattern_fe.coupling.contact_rows import ContactRows, shares_along
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from sandmould.pattern_fe.coupling.opening import open_coupled
+from sandmould.pattern_fe.coupling.selective_mass import selective_mass
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.shapes import bar, mesh_of
+from sandmould.pattern_fe.supports import Supports
 from sandmould.dem import chunks as chunks_module
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop

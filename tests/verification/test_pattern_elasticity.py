@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from skfem import Basis, ElementVector, Functional, LinearForm
 
-from pattern_fe.elasticity import internal_force_n
-from pattern_fe.pattern import Pattern
-from pattern_fe.supports import Supports
+from sandmould.pattern_fe.elasticity import internal_force_n
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.supports import Supports
 from tests.patterns import (
     FOOT,
     KINDS,

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from pattern_fe.elasticity import element_tangent_n_m, internal_force_n
-from pattern_fe.large_displacement import LoadNotReachedError, NewtonSettings
-from pattern_fe.material import Foam
-from pattern_fe.pattern import Pattern
-from pattern_fe.shapes import bar, mesh_of
-from pattern_fe.supports import Supports
+from sandmould.pattern_fe.elasticity import element_tangent_n_m, internal_force_n
+from sandmould.pattern_fe.large_displacement import LoadNotReachedError, NewtonSettings
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.shapes import bar, mesh_of
+from sandmould.pattern_fe.supports import Supports
 from tests.patterns import (
     KINDS,
     THICKNESS_M,

@@ -9,14 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse.linalg import eigsh
 
-from pattern_fe.condensation import CondensedSurface
-from pattern_fe.coupling.contact_rows import ContactRows
-from pattern_fe.coupling.selective_mass import selective_mass
-from pattern_fe.dynamics import as_diagonal
-from pattern_fe.material import Foam
-from pattern_fe.pattern import Pattern
-from pattern_fe.shapes import bar, mesh_of
-from pattern_fe.supports import Supports
+from sandmould.pattern_fe.condensation import CondensedSurface
+from sandmould.pattern_fe.coupling.contact_rows import ContactRows
+from sandmould.pattern_fe.coupling.selective_mass import selective_mass
+from sandmould.pattern_fe.dynamics import as_diagonal
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.shapes import bar, mesh_of
+from sandmould.pattern_fe.supports import Supports
 from tests.patterns import (
     FOOT,
     KINDS,

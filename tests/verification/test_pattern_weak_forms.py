@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from skfem import Basis, ElementVector
 from skfem.models.elasticity import linear_elasticity
 
-from pattern_fe.elasticity import element_tangent_n_m
-from pattern_fe.space import _ELEMENTS
-from pattern_fe.weak_forms import element_mass_kg, element_stiffness_n_m
+from sandmould.pattern_fe.elasticity import element_tangent_n_m
+from sandmould.pattern_fe.space import _ELEMENTS
+from sandmould.pattern_fe.weak_forms import element_mass_kg, element_stiffness_n_m
 from tests.patterns import KINDS, _one_thread, distorted, mesh_of_kind, pattern_of_kind  # noqa: F401
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from sandmould.scenario.bad_input import Problem
-from sandmould.scenario.limits import RUNS
+from sandmould.bad_input import Problem
+from sandmould.limits import RUNS
 from sandmould.scenario.moved_keys import instead_of
 from sandmould.scenario.quantity import Section, fields_at, quantity
 from sandmould.scenario.reading import Tree

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.delegating_session import DelegatingSession
+from sandmould.pattern_fe.coupling.delegating_session import DelegatingSession
 from sandmould.engines.session import Session
 
 MEMBERS = [name for name in vars(Session) if not name.startswith("_")]

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from skfem import MeshQuad, MeshTri
 
-from pattern_fe.checks import check_inside, check_mesh
-from pattern_fe.material import Foam
-from pattern_fe.mesh_file import read_mesh
-from pattern_fe.pattern import Pattern
-from pattern_fe.shapes import bar, l_shape, mesh_of, t_shape, with_sides
-from pattern_fe.supports import Supports
+from sandmould.pattern_fe.checks import check_inside, check_mesh
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.mesh_file import read_mesh
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, t_shape, with_sides
+from sandmould.pattern_fe.supports import Supports
 from tests.patterns import (
     FOOT,
     KINDS,

@@ -12,18 +12,18 @@ import pytest
 from pydantic import ValidationError
 from skfem import MeshTet
 
-from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.session import window_ends
-from pattern_fe.scene import pattern_of
-from pattern_fe.shapes import bar, mesh_of, with_sides
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.session import window_ends
+from sandmould.pattern_fe.scene import pattern_of
+from sandmould.pattern_fe.shapes import bar, mesh_of, with_sides
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.step_counts import StepCounts
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
 from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand import planning as sand
+from sandmould.kinds.sand import planning as sand
 from tests.patterns import write_mesh
 
 L_SCENE: dict[str, Any] = {

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
 from sandmould.study.plan.load_study import open_study
 from tests.unit.refusing import refused
 

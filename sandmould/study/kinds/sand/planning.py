@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import pattern_fe
+import sandmould.pattern_fe
 from sandmould.digest import digest
 from sandmould.engines import registry
 from sandmould.engines.durations import grain_steps, run_s, stage_s
@@ -15,22 +15,22 @@ from sandmould.engines.program import build_program
 from sandmould.kernel_cache import are_compiled, cache_folder
 from sandmould.runs.formatting import number
 from sandmould.scenario import checks
-from sandmould.scenario.bad_input import Problem
+from sandmould.bad_input import Problem
 from sandmould.scenario.hardness import bed_hardness
-from sandmould.scenario.limits import FRAMES, RECORDS
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
+from sandmould.limits import FRAMES, RECORDS
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawing_notes, with_hash
 from sandmould.scenario.wall_thickness import thinnest_wall
-from sandmould.study.kinds.kind import Note, Planning, SpeedClass
-from sandmould.study.kinds.sand.hardness_text import hardness_lines
-from sandmould.study.kinds.sand.measures import MEASURES
-from sandmould.study.kinds.sand.narrow import narrow_spaces
-from sandmould.study.kinds.sand.speed import SPEED
-from sandmould.study.kinds.sand.table_motion import frequency_rule, table_lines
+from sandmould.kinds.kind import Note, Planning, SpeedClass
+from sandmould.kinds.sand.hardness_text import hardness_lines
+from sandmould.kinds.sand.measures import MEASURES
+from sandmould.kinds.sand.narrow import narrow_spaces
+from sandmould.kinds.sand.speed import SPEED
+from sandmould.kinds.sand.table_motion import frequency_rule, table_lines
 
 MEASURING = (
     *(f"analysis/{name}.py" for name in (
@@ -81,7 +81,7 @@ def resolved(scenario: Scenario) -> Scenario:
     """
     pattern = scenario.pattern
     if pattern is not None:
-        from pattern_fe.coupling.interface import with_surface  # scikit-fem: few studies need it
+        from sandmould.pattern_fe.coupling.interface import with_surface  # scikit-fem: few studies need it
 
         if isinstance(pattern.shape, PatternDrawing):
             shape = with_hash(pattern.shape)
@@ -168,7 +168,7 @@ def _foam_mb(scenario: Scenario) -> int:
     """Memory for the equations of a pattern in 3D; in 2D it is lost in the rest."""
     if scenario.pattern is None or scenario.dimension == 2:
         return 0
-    from pattern_fe.scene import pattern_of  # see resolved
+    from sandmould.pattern_fe.scene import pattern_of  # see resolved
 
     numbers = pattern_of(scenario).factor_numbers
     if scenario.pattern.loop.scheme == "in_step":
@@ -214,7 +214,7 @@ def _of_pattern_s(scenario: Scenario) -> float:
 
 def _stepped_components(scenario: Scenario) -> int:
     """Components of the surface of a scenario's pattern."""
-    from pattern_fe.scene import pattern_of  # see resolved
+    from sandmould.pattern_fe.scene import pattern_of  # see resolved
 
     return pattern_of(scenario).surface.vertices_m.size
 
@@ -306,8 +306,8 @@ def _pattern_notes(scenario: Scenario) -> list[Note]:
     """What was repaired in the drawing of a pattern, and how good its mesh is."""
     if scenario.pattern is None or not isinstance(scenario.pattern.shape, PatternDrawing):
         return []
-    from pattern_fe.quality import mesh_sentence
-    from pattern_fe.scene import pattern_of
+    from sandmould.pattern_fe.quality import mesh_sentence
+    from sandmould.pattern_fe.scene import pattern_of
 
     said = [
         *drawing_notes(scenario.pattern.shape, "pattern.shape"),
