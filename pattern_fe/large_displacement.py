@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.pattern_fe.contact import touch
-from sandmould.pattern_fe.elasticity import displacement_gradient, element_tangent_n_m, internal_force_n
+from sandmould.pattern_fe.elasticity import (
+    displacement_gradient,
+    element_tangent_n_m,
+    internal_force_n,
+)
 from sandmould.pattern_fe.factor import factorised
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.space import Space

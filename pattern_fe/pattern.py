@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sandmould.geometry.geometry import Scene
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU
 
@@ -29,7 +30,6 @@ from sandmould.pattern_fe.space import space_of
 from sandmould.pattern_fe.supports import Supports, check_held, fixed_components, loose_motions
 from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.pattern_fe.weak_forms import element_stiffness_n_m
-from sandmould.geometry.geometry import Scene
 
 Array = NDArray[np.float64]
 _NEWTON = NewtonSettings()

@@ -10,9 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.limits import PATTERN_ELEMENTS, SOLID_EQUATIONS
 from skfem import MeshHex
 from threadpoolctl import threadpool_limits
 
+from sandmould.bad_input import BadInputError, Problem
 from sandmould.pattern_fe.checks import check_inside
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.mesh_file import read_mesh
@@ -21,9 +24,6 @@ from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
 from sandmould.pattern_fe.supports import Supports
 from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.pattern_fe.volume_mesh import drawing_mesh
-from sandmould.bad_input import BadInputError, Problem
-from sandmould.limits import PATTERN_ELEMENTS, SOLID_EQUATIONS
-from sandmould.geometry.mesh import TriangleMesh
 from sandmould.scenario.pattern import Bar, Loop, LShape, MeshFile, PatternConfig, PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import drawn_surface, unit_hint

@@ -7,13 +7,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-
-from sandmould.pattern_fe.nearest import nearest_on_facets
-from sandmould.pattern_fe.perimeter import Perimeter
 from sandmould.geometry.geometry import Scene, Solid, distance_within
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
 from sandmould.geometry.revolved import Revolved
+
+from sandmould.pattern_fe.nearest import nearest_on_facets
+from sandmould.pattern_fe.perimeter import Perimeter
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.monolithic_session import MonolithicSession
@@ -20,7 +21,6 @@ from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.shapes import bar, mesh_of
 from sandmould.pattern_fe.supports import Supports
-from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_engine

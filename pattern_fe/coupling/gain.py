@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.engines.session import SandSession
 from sandmould.pattern_fe.coupling.body import ElasticBody
 from sandmould.pattern_fe.coupling.convergence_log import rms_m
-from sandmould.engines.session import SandSession
 
 Array = NDArray[np.float64]
 MOVED_M = 1e-6

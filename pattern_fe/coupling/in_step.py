@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from sandmould.engines.session import EngineStop
 from sandmould.pattern_fe.coupling.convergence_log import WindowEntry, force_n, imbalance_n, rms_m
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
 from sandmould.pattern_fe.coupling.pattern_session import SteppedSession
-from sandmould.engines.session import EngineStop
 from sandmould.runs.outcome import Outcome
 
 

@@ -8,6 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.dem.addresses import table_of
+from sandmould.engines.step_mover import StepMover
 from sandmould.pattern_fe.condensation import CondensedSurface
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 from sandmould.pattern_fe.coupling.contact_step import ContactArrays
@@ -24,8 +26,6 @@ from sandmould.pattern_fe.coupling.foam_step import (
 from sandmould.pattern_fe.coupling.selective_mass import SelectiveMass, selective_mass
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.surroundings import Surroundings
-from sandmould.dem.addresses import table_of
-from sandmould.engines.step_mover import StepMover
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -7,6 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.engines.program import Program
+from sandmould.engines.registry import engine_of
+from sandmould.engines.session import Session
+from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.free_body import FreeBody
@@ -17,11 +22,6 @@ from sandmould.pattern_fe.coupling.selective_mass import SelectiveMass
 from sandmould.pattern_fe.coupling.session import CoupledSession
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
-from sandmould.engines.program import Program
-from sandmould.engines.registry import engine_of
-from sandmould.engines.session import Session
-from sandmould.engines.step_counts import StepCounts
-from sandmould.bad_input import BadInputError, Problem
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.pattern_fe.coupling.convergence_log import rms_m
 from sandmould.engines.session import SandSession
+from sandmould.pattern_fe.coupling.convergence_log import rms_m
 
 Array = NDArray[np.float64]
 

@@ -10,15 +10,19 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.engines.session import SandSession
+from sandmould.engines.snapshot import Snapshot
 from sandmould.pattern_fe.coupling.body import ElasticBody
-from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, ConvergenceLog, WindowEntry
+from sandmould.pattern_fe.coupling.convergence_log import (
+    CONVERGENCE_LOG,
+    ConvergenceLog,
+    WindowEntry,
+)
 from sandmould.pattern_fe.coupling.delegating_session import DelegatingSession
 from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
 from sandmould.pattern_fe.coupling.pattern_rest import PatternRest
 from sandmould.pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
-from sandmould.engines.session import SandSession
-from sandmould.engines.snapshot import Snapshot
 
 Array = NDArray[np.float64]
 CHECKPOINT = "pattern.npz"

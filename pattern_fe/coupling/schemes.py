@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import get_args
 
+from sandmould.limits import STEPPED_COMPONENTS
 from threadpoolctl import threadpool_limits
 
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.registry import engine_of, engines_that
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from sandmould.pattern_fe.coupling.gain_prediction import predicted_gain
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.scene import surroundings_of
-from sandmould.engines.capabilities import Capabilities
-from sandmould.engines.registry import engine_of, engines_that
-from sandmould.bad_input import BadInputError, Problem
-from sandmould.limits import STEPPED_COMPONENTS
 from sandmould.scenario.pattern import Loop, Scheme
 from sandmould.scenario.scenario import Scenario
 

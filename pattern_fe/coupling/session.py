@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.engines.session import EngineStop, SandSession
+from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.body import ElasticBody, StaticSolution
 from sandmould.pattern_fe.coupling.convergence_log import (
     WindowEntry,
@@ -28,8 +30,6 @@ from sandmould.pattern_fe.coupling.relaxation import (
 )
 from sandmould.pattern_fe.large_displacement import LoadNotReachedError
 from sandmould.pattern_fe.surroundings import Surroundings
-from sandmould.engines.session import EngineStop, SandSession
-from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
 

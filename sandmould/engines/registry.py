@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 from sandmould import ROOT, SHIPPED
+from sandmould.bad_input import Problem
 from sandmould.digest import code_digest, digest
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, SandSession
-from sandmould.bad_input import Problem
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.scenario import Scenario

@@ -10,12 +10,12 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.bad_input import Problem
 from sandmould.engines.program import Stage
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_periods import TablePeriod
 from sandmould.runs.outcome import Outcome
-from sandmould.bad_input import Problem
 
 Array = NDArray[np.float64]
 Shared = TypeVar("Shared")

@@ -10,20 +10,20 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.typing import NDArray
+from sandmould.kinds.sand.bending import verdict_of
 
+from sandmould.engines.driver import Driver
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.loop_verdict import classify_loop
 from sandmould.pattern_fe.coupling.opening import open_coupled
 from sandmould.pattern_fe.coupling.shapes_file import SHAPES
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
-from sandmould.engines.driver import Driver
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Scheme
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
-from sandmould.kinds.sand.bending import verdict_of
 from tests.patterns import _one_thread, read_shapes  # noqa: F401
 from tests.workflow.runs import drive
 

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sandmould.dem import chunks as chunks_module
+from sandmould.engines.program import build_program
+from sandmould.engines.session import EngineStop
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows, shares_along
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.opening import open_coupled
@@ -18,9 +21,6 @@ from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.shapes import bar, mesh_of
 from sandmould.pattern_fe.supports import Supports
-from sandmould.dem import chunks as chunks_module
-from sandmould.engines.program import build_program
-from sandmould.engines.session import EngineStop
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.instep import bed_scene, in_step

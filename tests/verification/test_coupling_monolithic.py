@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sandmould.engines.program import build_program
+from sandmould.engines.session import EngineStop
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.opening import open_coupled
-from sandmould.engines.program import build_program
-from sandmould.engines.session import EngineStop
 from sandmould.runs.outcome import Outcome
 from tests.patterns import _one_thread  # noqa: F401
 from tests.verification.one_grain import RADIUS_M, one_grain_scene

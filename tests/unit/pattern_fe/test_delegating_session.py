@@ -9,8 +9,8 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from sandmould.pattern_fe.coupling.delegating_session import DelegatingSession
 from sandmould.engines.session import Session
+from sandmould.pattern_fe.coupling.delegating_session import DelegatingSession
 
 MEMBERS = [name for name in vars(Session) if not name.startswith("_")]
 GIVEN: dict[str, tuple[Any, ...]] = {

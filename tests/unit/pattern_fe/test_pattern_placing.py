@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from sandmould.bad_input import BadInputError
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.shapes import bar, mesh_of
-from sandmould.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import write_mesh
 

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from sandmould.kinds.sand import planning as sand
 from skfem import MeshTet
 
+from sandmould.bad_input import BadInputError
+from sandmould.engines.snapshot import Snapshot, scene_at
+from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.session import window_ends
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.pattern_fe.shapes import bar, mesh_of, with_sides
-from sandmould.engines.snapshot import Snapshot, scene_at
-from sandmould.engines.step_counts import StepCounts
-from sandmould.bad_input import BadInputError
 from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
-from sandmould.kinds.sand import planning as sand
 from tests.patterns import write_mesh
 
 L_SCENE: dict[str, Any] = {

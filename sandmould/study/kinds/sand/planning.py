@@ -8,29 +8,29 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import sandmould.pattern_fe
+from sandmould.bad_input import Problem
 from sandmould.digest import digest
 from sandmould.engines import registry
 from sandmould.engines.durations import grain_steps, run_s, stage_s
 from sandmould.engines.program import build_program
-from sandmould.kernel_cache import are_compiled, cache_folder
-from sandmould.runs.formatting import number
-from sandmould.scenario import checks
-from sandmould.bad_input import Problem
-from sandmould.scenario.hardness import bed_hardness
-from sandmould.limits import FRAMES, RECORDS
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
-from sandmould.scenario.pattern import PatternDrawing
-from sandmould.scenario.placement import plan_counts
-from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawing_notes, with_hash
-from sandmould.scenario.wall_thickness import thinnest_wall
+from sandmould.kernel_cache import are_compiled, cache_folder
 from sandmould.kinds.kind import Note, Planning, SpeedClass
 from sandmould.kinds.sand.hardness_text import hardness_lines
 from sandmould.kinds.sand.measures import MEASURES
 from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.kinds.sand.speed import SPEED
 from sandmould.kinds.sand.table_motion import frequency_rule, table_lines
+from sandmould.limits import FRAMES, RECORDS
+from sandmould.runs.formatting import number
+from sandmould.scenario import checks
+from sandmould.scenario.hardness import bed_hardness
+from sandmould.scenario.pattern import PatternDrawing
+from sandmould.scenario.placement import plan_counts
+from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawing_notes, with_hash
+from sandmould.scenario.wall_thickness import thinnest_wall
 
 MEASURING = (
     *(f"analysis/{name}.py" for name in (
@@ -81,7 +81,9 @@ def resolved(scenario: Scenario) -> Scenario:
     """
     pattern = scenario.pattern
     if pattern is not None:
-        from sandmould.pattern_fe.coupling.interface import with_surface  # scikit-fem: few studies need it
+        from sandmould.pattern_fe.coupling.interface import (
+            with_surface,  # scikit-fem: few studies need it
+        )
 
         if isinstance(pattern.shape, PatternDrawing):
             shape = with_hash(pattern.shape)
