@@ -82,7 +82,7 @@ lint-names: $(INSTALLED)
 twins: $(INSTALLED)
 	@for name in $(TWINS); do \
 	  $(MAKE) --no-print-directory study STUDY=config/studies/$$name.yaml \
-	    && $(BIN)/python -m sandmould.study.records record config/studies/$$name.yaml || exit 1; \
+	    && $(BIN)/python -m sandmould.execution.records record config/studies/$$name.yaml || exit 1; \
 	done
 	@$(BIN)/python -m benchmarks.agreement
 
@@ -176,8 +176,8 @@ decks: $(INSTALLED)
 
 ## config/schema.json, config/default.yaml and docs/{measures,limits,keys,files,commands}.md from the types
 schema: $(INSTALLED)
-	$(BIN)/python -m sandmould.study.schema
-	$(BIN)/python -m sandmould.study.reference
+	$(BIN)/python -m sandmould.reference.schema
+	$(BIN)/python -m sandmould.reference.reference
 	$(BIN)/python -m sandmould.cli.reference
 
 ## pin all dependencies in requirements.lock, for every Python and platform that is supported
@@ -191,7 +191,7 @@ lock-check: $(INSTALLED)
 
 ## list stale results of docs/results and compute the smallest again
 results-check: $(INSTALLED)
-	$(BIN)/python -m sandmould.study.records check
+	$(BIN)/python -m sandmould.execution.records check
 
 ## the page of each committed result, and their list docs/results/README.md
 results-pages: $(INSTALLED)

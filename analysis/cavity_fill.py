@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 from scipy.spatial import cKDTree
 
-from analysis.free_space import part_in_solid, polygon_below_m2
-from analysis.intersections import disc_segment_m2, sphere_cap_m3
-from analysis.mesh_parts import mesh_below_m3
+from sandmould.analysis.free_space import part_in_solid, polygon_below_m2
+from sandmould.analysis.intersections import disc_segment_m2, sphere_cap_m3
+from sandmould.analysis.mesh_parts import mesh_below_m3
+from sandmould.geometry.geometry import Array, Block, Cavity, Scene, distance_within
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
+from sandmould.geometry.revolved import Revolved
 from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, CavityGrid, cavity_grid
-from sandmould.scenario.geometry import Array, Block, Cavity, Scene, distance_within
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
-from sandmould.scenario.revolved import Revolved
 
 FILLED_SHARE = 0.5
 """Of the bed's solid fraction, from which on a slab of a cavity counts as filled."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.engines.neighbours import touching_pairs
-from sandmould.scenario.geometry import Array, Scene, Solid, Wall, distance_within
+from sandmould.geometry.geometry import Array, Scene, Solid, Wall, distance_within
 
 
 @dataclass(frozen=True)

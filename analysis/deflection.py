@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.scenario.outline import Outline
+from sandmould.geometry.outline import Outline
 
 Array = NDArray[np.float64]
 _SAME = 1e-9

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.free_space import free_part
-from analysis.intersections import disc_lens_m2, sphere_lens_m3
+from sandmould.analysis.free_space import free_part
+from sandmould.analysis.intersections import disc_lens_m2, sphere_lens_m3
 from sandmould.engines.neighbours import near_pairs
-from sandmould.scenario.geometry import Array, Scene
+from sandmould.geometry.geometry import Array, Scene
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.engines.snapshot import Snapshot
+from sandmould.geometry.geometry import Array, Block, Scene, Solid
+from sandmould.geometry.outline import Outline
+from sandmould.geometry.revolved import Revolved
 from sandmould.runs.files import replaced
-from sandmould.scenario.geometry import Array, Block, Scene, Solid
-from sandmould.scenario.outline import Outline
-from sandmould.scenario.revolved import Revolved
 
 _OF_ELEMENTS = ("frozen_s", "temperature_k", "melts")
 _COLUMNS = "id type x y z vx vy vz omegax omegay omegaz radius layer"

@@ -15,17 +15,17 @@ from itertools import product
 
 import numpy as np
 
-from analysis.intersections import (
+from sandmould.analysis.intersections import (
     cut_polygon,
     disc_outline_m2,
     disc_polygon_m2,
     polygon_area_m2,
     sphere_prism_m3,
 )
-from analysis.mesh_parts import mesh_below_m3, sphere_mesh_m3
-from sandmould.scenario.geometry import Array, Block, Scene, Solid, Wall
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
+from sandmould.analysis.mesh_parts import mesh_below_m3, sphere_mesh_m3
+from sandmould.geometry.geometry import Array, Block, Scene, Solid, Wall
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 
 _UPRIGHT = 1e-9
 """Largest slope at which a wall or a block counts as upright or level."""

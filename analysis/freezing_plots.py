@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from analysis.freezing import Freezing
+from sandmould.analysis.freezing import Freezing
 
 Array = NDArray[np.float64]
 MOST_SPOTS = 12

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 
 _NODES = 12
 """Gauss points an interval; see :func:`sphere_prism_m3` for the error this leaves."""

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from analysis.tube_fill import sand_in_bore
-from sandmould.scenario.geometry import Array, Bore
+from sandmould.analysis.tube_fill import sand_in_bore
+from sandmould.geometry.geometry import Array, Bore
 
 
 @dataclass(frozen=True)

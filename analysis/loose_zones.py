@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import label, maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
-from analysis.free_space import free_part
-from analysis.intersections import disc_lens_m2, sphere_lens_m3
-from sandmould.scenario.geometry import Array, Scene, Solid, Wall, distance_within
+from sandmould.analysis.free_space import free_part
+from sandmould.analysis.intersections import disc_lens_m2, sphere_lens_m3
+from sandmould.geometry.geometry import Array, Scene, Solid, Wall, distance_within
 
 LOOSE = 0.9
 """Of the bed's solid fraction, below which sand lies loose."""

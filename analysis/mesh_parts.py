@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sandmould.scenario.geometry import Array
-from sandmould.scenario.mesh import TriangleMesh
+from sandmould.geometry.geometry import Array
+from sandmould.geometry.mesh import TriangleMesh
 
 _CHUNK = 200_000
 """Pairs of sphere and triangle in memory together."""

@@ -16,10 +16,10 @@ from matplotlib.colors import Normalize
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
-from analysis.free_space import box_levels_m, box_section
-from analysis.sections import convex_section, solid_sections
+from sandmould.analysis.free_space import box_levels_m, box_section
+from sandmould.analysis.sections import convex_section, solid_sections
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.geometry import Array, Bore, Scene
+from sandmould.geometry.geometry import Array, Bore, Scene
 
 LAYER_COLOURS = (
     "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#999999",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from sandmould.scenario.geometry import Array, Block, Solid
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline, signed_area_m2
+from sandmould.geometry.geometry import Array, Block, Solid
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline, signed_area_m2
 
 
 def solid_sections(solid: Solid, cut_m: float) -> list[Array]:

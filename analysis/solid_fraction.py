@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.coordination import contacts
-from analysis.free_space import box_section, free_measure_between
-from analysis.intersections import disc_segment_m2, sphere_cap_m3
-from sandmould.scenario.geometry import Array, Scene
+from sandmould.analysis.coordination import contacts
+from sandmould.analysis.free_space import box_section, free_measure_between
+from sandmould.analysis.intersections import disc_segment_m2, sphere_cap_m3
+from sandmould.geometry.geometry import Array, Scene
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.intersections import depth_in_polygon_m, disc_polygon_m2, sphere_prism_m3
-from sandmould.scenario.geometry import Array, Bore
+from sandmould.analysis.intersections import depth_in_polygon_m, disc_polygon_m2, sphere_prism_m3
+from sandmould.geometry.geometry import Array, Bore
 
 
 @dataclass(frozen=True)

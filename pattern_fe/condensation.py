@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csc_array
 
-from pattern_fe.factor import factorised
-from pattern_fe.supports import Mask
+from sandmould.pattern_fe.factor import factorised
+from sandmould.pattern_fe.supports import Mask
 
 Array = NDArray[np.float64]
 _COLUMNS = 256

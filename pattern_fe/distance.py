@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pattern_fe.perimeter import Perimeter
-from sandmould.scenario.geometry import Array
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
+from sandmould.geometry.geometry import Array
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
+from sandmould.pattern_fe.perimeter import Perimeter
 
 
 @dataclass(frozen=True)

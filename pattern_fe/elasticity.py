@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.inner_forces import inner_forces
-from pattern_fe.material import Foam
-from pattern_fe.space import Space
+from sandmould.pattern_fe.inner_forces import inner_forces
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.distance import distance_from_drawing
-from pattern_fe.loads import vertex_pressure_pa
-from pattern_fe.perimeter import Perimeter, split_face
-from pattern_fe.space import Space
+from sandmould.pattern_fe.distance import distance_from_drawing
+from sandmould.pattern_fe.loads import vertex_pressure_pa
+from sandmould.pattern_fe.perimeter import Perimeter, split_face
+from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

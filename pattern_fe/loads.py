@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.perimeter import Perimeter
+from sandmould.pattern_fe.perimeter import Perimeter
 
 Array = NDArray[np.float64]
 _FACING = 0.5

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sandmould.geometry.geometry import Scene
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU
 
+from sandmould.geometry.geometry import Scene
 from sandmould.pattern_fe import dynamics
 from sandmould.pattern_fe.checks import check_mesh
 from sandmould.pattern_fe.condensation import CondensedSurface, condensed_surface

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.space import Space
+from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pattern_fe.pattern import Pattern
-from pattern_fe.scene import surroundings_of
-from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.scene import surroundings_of
 from sandmould.scenario.checks import problems
 from sandmould.scenario.pattern import MeshFile
 from sandmould.scenario.scenario import Scenario

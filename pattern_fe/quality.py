@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.pattern import Pattern
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.pattern_fe.pattern import Pattern
 from sandmould.runs.formatting import number
-from sandmould.scenario.mesh import TriangleMesh
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import drawn_surface

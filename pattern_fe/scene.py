@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sandmould.geometry.mesh import TriangleMesh
-from sandmould.limits import PATTERN_ELEMENTS, SOLID_EQUATIONS
 from skfem import MeshHex
 from threadpoolctl import threadpool_limits
 
 from sandmould.bad_input import BadInputError, Problem
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.limits import PATTERN_ELEMENTS, SOLID_EQUATIONS
 from sandmould.pattern_fe.checks import check_inside
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.mesh_file import read_mesh

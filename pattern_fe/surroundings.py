@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
 from sandmould.geometry.geometry import Scene, Solid, distance_within
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
 from sandmould.geometry.revolved import Revolved
-
 from sandmould.pattern_fe.nearest import nearest_on_facets
 from sandmould.pattern_fe.perimeter import Perimeter
 

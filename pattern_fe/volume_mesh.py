@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from skfem import MeshTet
+
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.mesher import is_step, step_tetrahedra, surface_tetrahedra
 from sandmould.limits import SOLID_ELEMENTS
-from skfem import MeshTet
-
 from sandmould.pattern_fe.shapes import with_sides
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.solids import turn_about_vertical

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from skfem import BilinearForm
 from skfem.models.poisson import mass
 
-from pattern_fe.material import Foam
-from pattern_fe.space import Space
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ SHIPPED = ROOT if IS_CHECKOUT else ROOT / "sandmould" / "shipped"
 
 
 _PLACES = {
-    "BadInputError": "sandmould.scenario.bad_input",
+    "BadInputError": "sandmould.bad_input",
     "Result": "sandmould.notebook",
     "plan": "sandmould.notebook",
     "run": "sandmould.notebook",

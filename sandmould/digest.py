@@ -5,12 +5,19 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
-from collections.abc import Iterable
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 _Block = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+_PATH = re.compile(r"\bsandmould[./][\w./]*")
+"""Where a file of the house lies, by its path or its name as a module."""
 SHORT = 12
 """Digits of a hash that names a state of some sources."""
+EQUAL_CODE = Path(__file__).with_name("equal_code.toml")
+"""Hashes of code by what replaced it and computes the same digits."""
 
 
 def digest(*parts: str | bytes) -> str:
@@ -30,30 +37,88 @@ def file_digest(path: Path) -> str:
     return digest(path.read_bytes())
 
 
-def sources_digest(paths: Iterable[Path], *parts: str) -> str:
-    """Short hash of texts and, after them, of files in the order of their paths."""
-    return digest(*parts, *(path.read_bytes() for path in sorted(paths)))[:SHORT]
+def code_identity(groups: Iterable[Iterable[Path]], *parts: str) -> str:
+    """Short hash of texts and of what groups of Python files compute: what results depend on.
 
-
-def code_digest(paths: Iterable[Path], *parts: str) -> str:
-    """Short hash of texts and of what Python files compute, in the order of their paths.
-
-    Comments, docstrings, layout and the annotations of functions and of their variables are left
-    out. Fields of classes are code: their annotations stay.
+    A group that ``EQUAL_CODE`` lists has the identity of the code that it replaced.
     """
-    return digest(*parts, *(_code_in(path.read_bytes()) for path in sorted(paths)))[:SHORT]
+    states = {code_digest(paths) for paths in groups}
+    return digest(*parts, *sorted(equal_code().get(state, state) for state in states))[:SHORT]
 
 
 @functools.cache
-def _code_in(source: bytes) -> str:
-    """What a Python file computes, as text; kept, since a plan asks for each of its runs."""
-    return ast.dump(_Computing().visit(ast.parse(source)))
+def equal_code() -> dict[str, str]:
+    """Hash of the code that was replaced, by the hash of the one with the same digits."""
+    listed = tomllib.loads(EQUAL_CODE.read_text(encoding="utf-8"))
+    return {state: before for pairs in listed.values() for state, before in pairs.items()}
+
+
+def code_digest(paths: Iterable[Path]) -> str:
+    """Short hash of the statements of Python files, equal on every Python that is supported.
+
+    Left out are comments, docstrings, layout, imports, names of files and modules of the house, the
+    annotations of functions and of their variables, and in which of the files a statement of a
+    module stands. Fields of classes are code: their annotations stay.
+    """
+    statements = [text for path in paths for text in _statements_in(path.read_bytes())]
+    return digest("\n".join(sorted(statements)))[:SHORT]
+
+
+@functools.cache
+def _statements_in(source: bytes) -> tuple[str, ...]:
+    """What each statement of a module computes; kept, since a plan asks for each of its runs."""
+    module = _Computing().visit(ast.parse(source))
+    return tuple(_text(statement) for statement in module.body if not _for_types(statement))
+
+
+def _for_types(statement: ast.stmt) -> bool:
+    """Whether a statement is one under ``if TYPE_CHECKING``."""
+    return (
+        isinstance(statement, ast.If)
+        and isinstance(statement.test, ast.Name)
+        and statement.test.id == "TYPE_CHECKING"
+    )
+
+
+def _text(node: Any) -> str:
+    """A node of a tree as text of our own: that of ``ast.dump`` differs from Python to Python."""
+    if isinstance(node, ast.Constant):
+        return f"Constant({_PATH.sub('a path', repr(node.value))})"
+    if isinstance(node, ast.AST):
+        parts = [f"{name}={_text(value)}" for name, value in _fields(node)]
+        return f"{type(node).__name__}({', '.join(parts)})"
+    return f"[{', '.join(map(_text, node))}]" if isinstance(node, list) else repr(node)
+
+
+def _fields(node: ast.AST) -> Iterator[tuple[str, Any]]:
+    """Fields that say something: later Pythons have more, which are empty in older code."""
+    for name, value in ast.iter_fields(node):
+        if value is not None and value != []:
+            yield name, _joined(value) if isinstance(node, ast.JoinedStr) else value
+
+
+def _joined(parts: list[ast.expr]) -> list[ast.expr]:
+    """Parts of an f-string, texts side by side as one: Pythons cut them in different places."""
+    joined: list[ast.expr] = []
+    for part in parts:
+        last = joined[-1] if joined else None
+        if isinstance(part, ast.Constant) and isinstance(last, ast.Constant):
+            joined[-1] = ast.Constant(str(last.value) + str(part.value))
+        elif not isinstance(part, ast.Constant) or part.value:
+            joined.append(part)
+    return joined
 
 
 class _Computing(ast.NodeTransformer):
     """Leaves of a tree what computes."""
 
     _in_class = False
+
+    def visit_Import(self, node: ast.Import) -> None:
+        return None
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
+        return None
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         node.returns = None

@@ -24,11 +24,11 @@ from sandmould.digest import SHORT, digest
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _COMPILES = "sandmould.compiled"
 """Files that import it hold kernels."""
-PACKAGES = ("sandmould", "pattern_fe", "analysis")
-"""Packages of the house; kernels elsewhere, in tests and benchmarks, may call those in here."""
+FOLDERS = ("sandmould", "sandmould/pattern_fe", "sandmould/analysis")
+"""Folders of the house, two of them links; kernels elsewhere, in tests and benchmarks, may call
+those in here."""
 _IMPORT = re.compile(
-    rb"^[ \t]*(?:from|import) ((?:%s)\b[\w.]*)(?: import (?:\(([^)]*)\)|([^\n(]*)))?"
-    % "|".join(PACKAGES).encode(),
+    rb"^[ \t]*(?:from|import) (sandmould\b[\w.]*)(?: import (?:\(([^)]*)\)|([^\n(]*)))?",
     re.MULTILINE,
 )
 
@@ -59,8 +59,8 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
     """
     texts = {
         ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path
-        for package in PACKAGES
-        for path in (root / package).rglob("*.py")
+        for folder in FOLDERS
+        for path in (root / folder).rglob("*.py")
     }
     modules = {name: path.read_bytes() for name, path in texts.items()}
     waiting = [name for name, text in modules.items() if _COMPILES in _imported(text)]

@@ -21,16 +21,16 @@ from typing import Any
 
 import pandas as pd
 
+from sandmould.bad_input import BadInputError, Problem
 from sandmould.cli.study_file import study_file
+from sandmould.drawing.figures import draw_layers
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import stored_snapshots
-from sandmould.report.figures import draw_layers
+from sandmould.reference.dictionary import study_text, write_study_file
 from sandmould.runs.columns import RUN
-from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, read_collected
-from sandmould.study.dictionary import study_text, write_study_file
 from sandmould.study.plan.build_plan import RESULTS, known_prices, open_plan
 from sandmould.study.plan.handover import checked_plan
 from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
-from pattern_fe.coupling.foam_body import FoamBody
 from sandmould.engines.snapshot import Snapshot
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
 
 FORCE_N = -0.2
 """On the tip of the flange, downwards."""

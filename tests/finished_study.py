@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from sandmould.execution.simulate import measure, render, simulate, write_crash
 from sandmould.study.collect import collect
 from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan
-from sandmould.study.simulate import measure, render, simulate, write_crash
 
 ELEMENTS_M = (0.01, 0.02)
 EXCHANGES = ("corrected", "faces", "difference")

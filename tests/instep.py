@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pattern_fe.coupling.contact_rows import ContactRows
-from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.in_step import InStepSession
-from pattern_fe.coupling.in_step_foam import InStepFoam
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.coupling.contact_rows import ContactRows
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.coupling.in_step import InStepSession
+from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.pattern import Pattern
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_engine
 

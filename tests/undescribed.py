@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from sandmould.definition.study import Study
+from sandmould.kinds.registry import kind_named
+from sandmould.reference.contents import MEASURES, OF_RUN, OF_STUDY, SWEPT
 from sandmould.runs.columns import PART, REPLICATE, RUN, SEED
 from sandmould.study.collect import read_study
-from sandmould.study.contents import MEASURES, OF_RUN, OF_STUDY, SWEPT
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.registry import kind_named
 
 
 def undescribed(folder: Path) -> list[str]:

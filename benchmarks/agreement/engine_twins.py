@@ -6,9 +6,9 @@ from pathlib import Path
 
 from benchmarks.agreement.recorded import read_all
 from benchmarks.frame import render
+from sandmould.execution.records import RECORDS
 from sandmould.runs.formatting import name_of, number, seconds
 from sandmould.statistics.agreement import interval_text
-from sandmould.study.records import RECORDS
 
 TWINS = "engine_twins"
 EFFECTS = ("damping_forms", "contact_readings", "rolling_axes", "frames")

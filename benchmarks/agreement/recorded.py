@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from sandmould import ROOT
 from sandmould.runs.columns import REPLICATE
 from sandmould.statistics.agreement import Compared, EngineSpeed, agreement_sentences, speeds
@@ -49,7 +47,6 @@ def read_recorded(folder: Path) -> Recorded:
     record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
     study = open_study(ROOT / record["study"]).study
     summary = read_summary(folder, words=["version"])
-    keys = swept_keys(pd.read_csv(folder / "runs.tsv", sep="\t"))
     return Recorded(
         folder.name,
         study.title,
@@ -57,7 +54,7 @@ def read_recorded(folder: Path) -> Recorded:
         study.equivalence.confidence,
         record,
         study.equivalence.keys,
-        compare_study(summary, keys, study),
+        compare_study(summary, swept_keys(summary), study),
         speeds(summary),
     )
 

@@ -9,11 +9,11 @@ import pandas as pd
 
 from benchmarks.agreement.recorded import Recorded, read_all
 from benchmarks.frame import render
+from sandmould.execution.records import RECORDS
 from sandmould.runs.formatting import name_of, number, seconds
 from sandmould.runs.outcome import Outcome
 from sandmould.statistics.agreement import Compared, value_label
 from sandmould.study.collect import read_summary
-from sandmould.study.records import RECORDS
 
 MEASURE = "heap_angle_deg"
 STUDIES = (

@@ -17,7 +17,7 @@ from benchmarks.arpm.page import page
 from benchmarks.arpm.space import REFERENCE_MM, space_rows
 from benchmarks.arpm.ways import way_rows
 from benchmarks.frame import Benchmark, BenchmarkRun
-from sandmould.casting.arpm.computation import source_hash
+from sandmould.casting.arpm import source_hash
 from sandmould.casting.arpm.plates_case import read_plates
 
 

@@ -11,10 +11,10 @@ from sandmould import ROOT
 from sandmould.engines.program import Stage, build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.step_counts import StepCounts
+from sandmould.kinds.sand.measure import measure_snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 from sandmould.scenario.vibration import STOP_PERIODS, VibrationStage
-from sandmould.study.kinds.sand.measure import measure_snapshot
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 

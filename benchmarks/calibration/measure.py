@@ -30,8 +30,8 @@ from benchmarks.calibration.oracle import (
 )
 from benchmarks.calibration.race import CAP, HELD_AFTER, run_race, summarised
 from sandmould import ROOT
+from sandmould.execution.simulate import provenance
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.simulate import provenance
 
 
 @dataclass(frozen=True)

@@ -15,18 +15,18 @@ from scipy.stats import chi2
 
 from benchmarks.frame import SCRATCH, Parts
 from sandmould import ROOT
+from sandmould.definition.run import Run
+from sandmould.execution.simulate import render_run, simulate
+from sandmould.kinds.registry import kind_of
+from sandmould.kinds.sand.measure import write_measures
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.statistics.evidence import usable_values
 from sandmould.study.collect import gather
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.registry import kind_of
-from sandmould.study.kinds.sand.measure import write_measures
 from sandmould.study.plan.expand import replicate_seed
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import write_plan
-from sandmould.study.simulate import render_run, simulate
 
 Floats = NDArray[np.float64]
 Measures = dict[str, float]

@@ -14,13 +14,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from benchmarks.frame import table
-from sandmould.scenario.module_main import run_main
+from sandmould.execution.records import RECORDS
+from sandmould.module_main import run_main
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.contrasts import Spread
 from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest, compare_means
 from sandmould.statistics.settings import by_block, group_settings
 from sandmould.study.collect import read_summary, swept_keys
-from sandmould.study.records import RECORDS
 
 STUDIES = 2000
 SIZES = ((2, 3), (4, 2), (4, 3), (4, 4), (4, 8), (6, 3), (12, 3), (12, 8))

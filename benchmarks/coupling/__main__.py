@@ -14,14 +14,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from pattern_fe.coupling.schemes import in_step_foam
-from pattern_fe.scene import pattern_of
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.module_main import run_main
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.execution.records import runs_in
+from sandmould.module_main import run_main
+from sandmould.pattern_fe.coupling.schemes import in_step_foam
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.records import runs_in
 
 STEPS = 50_000
 

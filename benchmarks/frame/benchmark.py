@@ -14,8 +14,8 @@ from typing import Any
 
 from benchmarks.frame.parts import Parts
 from sandmould import ROOT
+from sandmould.execution.simulate import provenance
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.simulate import provenance
 
 SCRATCH = ROOT / "results" / "benchmarks"
 Results = dict[str, Any]

@@ -10,11 +10,11 @@ import pandas as pd
 
 from benchmarks.frequency_law.series import FREQUENCY, MEASURE, FillCurve, fill_curve
 from sandmould import ROOT
+from sandmould.execution.records import OVER_TIME, TIMES, runs_in
 from sandmould.runs.columns import CONTROL, PART, RUN, SWEEP, VIBRATION_TIME_S
 from sandmould.statistics.control_case import SPRINGS
 from sandmould.study.collect import read_summary
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.records import OVER_TIME, TIMES, runs_in
 
 OF_SPRINGS = f"{CONTROL}{SPRINGS} "
 FEWEST = 5

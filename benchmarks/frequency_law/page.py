@@ -14,12 +14,12 @@ from benchmarks.frequency_law import chart, groups, groups_chart
 from benchmarks.frequency_law.controls import RecordedCurves
 from benchmarks.frequency_law.series import FREQUENCY, Power, Series, power_of, series_of
 from sandmould import ROOT
+from sandmould.execution.records import RECORDS
 from sandmould.runs.formatting import number, seconds
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.records import RECORDS
 
 STUDIES = (
     "tube_law_springs",
@@ -89,7 +89,7 @@ def _study(folder: Path) -> dict[str, Any]:
     record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
     opened = open_study(ROOT / record["study"])
     summary = read_summary(folder)
-    keys = swept_keys(pd.read_csv(folder / "runs.tsv", sep="\t"))
+    keys = swept_keys(summary)
     other = next((key for key in keys if key != FREQUENCY), None)
     scenarios: dict[Any, Scenario] = {}
     for run in expand(opened):

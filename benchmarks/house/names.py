@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sandmould import ROOT
-from sandmould.scenario.module_main import run_main
+from sandmould.module_main import run_main
 
 FOLDERS = ("sandmould", "analysis", "pattern_fe", "benchmarks")
 OTHERS_IDIOMS = ("benchmarks/peers/sweep",)

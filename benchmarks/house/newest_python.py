@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from packaging.markers import Marker, default_environment
 
 from sandmould import ROOT
-from sandmould.scenario.module_main import run_main
+from sandmould.module_main import run_main
 
 NEWEST = "3.13"
 SOURCE_ALONE = {"connection-pool"}

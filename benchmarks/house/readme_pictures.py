@@ -15,10 +15,10 @@ from pathlib import Path
 from PIL import Image
 
 from sandmould import ROOT
-from sandmould.report.figures import draw_layers
-from sandmould.scenario.module_main import run_main
+from sandmould.drawing.figures import draw_layers
+from sandmould.kinds.sand.moments import list_moments
+from sandmould.module_main import run_main
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand.moments import list_moments
 from sandmould.study.plan.plan_files import read_run
 
 WINDOW = (1200, 1150)

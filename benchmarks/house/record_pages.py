@@ -17,14 +17,14 @@ from typing import Any
 import jinja2
 
 from sandmould import ROOT
+from sandmould.execution.packs.recorded import RECORDS
+from sandmould.execution.records import DEFAULTS
+from sandmould.module_main import run_main
 from sandmould.runs.columns import OUTCOME, RUN, finished
 from sandmould.runs.formatting import listed
 from sandmould.runs.progress import duration_text
-from sandmould.scenario.module_main import run_main
 from sandmould.study.collect import read_summary
-from sandmould.study.packs.recorded import RECORDS
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.records import DEFAULTS
 
 RECORD = "## Record\n"
 ANSWER = "**Answer.** "
@@ -82,11 +82,10 @@ class RecordPage:
     @property
     def runs(self) -> str:
         """How many there were, and which failed."""
-        number = len((self.folder / "runs.tsv").read_text("utf-8").splitlines()) - 1
         summary = read_summary(self.folder)
         bad = summary[~finished(summary)]
         failed = [f"{run} ({why})" for run, why in zip(bad[RUN], bad[OUTCOME], strict=True)]
-        return f"{number}; failed: {listed(failed)}" if failed else f"{number}, all finished"
+        return f"{len(summary)}" + (f"; failed: {listed(failed)}" if failed else ", all finished")
 
     @property
     def took(self) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 PACKAGE = "sandmould"
 """Its folders and modules are rooms of their own."""
-FOLDERS = ("analysis", "pattern_fe", "workflow", "benchmarks")
+FOLDERS = ("workflow", "benchmarks")
 """Rooms beside it."""
 CODE = (".py", ".smk")
 OTHERS = "peers"
@@ -30,7 +30,7 @@ class Room:
     """One room."""
 
     name: str
-    """As the import contract has it, such as ``sandmould.dem`` or ``analysis``."""
+    """As the import contract has it, such as ``sandmould.dem``."""
     files: int
     lines: int
 

@@ -14,7 +14,7 @@ from benchmarks.mps.page import RECOMMENDED, draw, page
 from benchmarks.mps.peers import peer_rows
 from benchmarks.mps.runs import SCHEMES, large_row, scheme_rows
 from benchmarks.mps.solvers import solver_rows
-from sandmould.casting.mps.computation import source_hash
+from sandmould.casting.mps import source_hash
 
 AGAIN = 2
 """Runs of the setting to take besides its row, for the spread of its cost."""

@@ -21,10 +21,10 @@ from benchmarks.frame import Benchmark, BenchmarkRun
 from sandmould import ROOT
 from sandmould.engines.guard import Guard
 from sandmould.engines.snapshot import Snapshot
-from sandmould.study.kinds.sand.measure import measure_snapshot
+from sandmould.execution.simulate import provenance
+from sandmould.kinds.sand.measure import measure_snapshot
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.simulate import provenance
 
 STUDY = Path(__file__).with_name("ten_minutes.yaml")
 REPEATS = 5

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis import repose
 from benchmarks.frame import table
+from sandmould.analysis import repose
+from sandmould.bad_input import BadInputError, Problem
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.module_main import run_main
+from sandmould.kinds.sand.moments import list_moments
+from sandmould.kinds.sand.outflow import slopes
+from sandmould.module_main import run_main
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand.moments import list_moments
-from sandmould.study.kinds.sand.outflow import slopes
 from sandmould.study.plan.plan_files import read_run
 
 FEET = (0.2, 0.3, repose.HEAP_FOOT, 0.4, 0.5)

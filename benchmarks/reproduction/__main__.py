@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from benchmarks.frame import Benchmark
 from benchmarks.reproduction.page import LedgerPage
-from sandmould.scenario.module_main import in_a_sentence
+from sandmould.module_main import in_a_sentence
 
 BENCHMARK = Benchmark(
     __file__,

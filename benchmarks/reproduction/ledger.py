@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from sandmould.scenario.bad_input import display_path
+from sandmould.bad_input import display_path
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import ModelT, Origin, merge, read_yaml, validated
 

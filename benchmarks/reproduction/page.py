@@ -29,10 +29,10 @@ from benchmarks.reproduction.recorded_numbers import (
     table_rows,
 )
 from sandmould import ROOT
+from sandmould.bad_input import BadInputError, Problem, display_path
+from sandmould.execution.records import OLD_DEFAULTS, OLDER_SOLVER
 from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed, number, seconds
-from sandmould.scenario.bad_input import BadInputError, Problem, display_path
-from sandmould.study.records import OLD_DEFAULTS, OLDER_SOLVER
 
 PAPERS = ("rojek_2004", "hirata_2019", "hirata_2017")
 VERIFICATION = ROOT / "docs" / "verification.md"

@@ -17,20 +17,19 @@ import pandas as pd
 from benchmarks.reproduction.ledger import OurSource
 from benchmarks.reproduction.our_number import OurNumber, less, over, taken
 from sandmould import ROOT
-from sandmould.casting.arpm import computation as arpm
-from sandmould.casting.mps import computation as mps
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.casting import arpm, mps
+from sandmould.execution.records import RECORDS, why_stale
+from sandmould.kinds.registry import kind_named
 from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed
-from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.reading import read_yaml
 from sandmould.statistics.agreement import sweep_part
 from sandmould.study.collect import read_summary, swept_keys
-from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.price import Prices
-from sandmould.study.records import RECORDS, why_stale
 
 STUDIES = ROOT / "config" / "studies"
 MATERIALS = ROOT / "config" / "materials"

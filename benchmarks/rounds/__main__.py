@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.frame import table
-from sandmould.scenario.module_main import run_main
+from sandmould.module_main import run_main
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
 

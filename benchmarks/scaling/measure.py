@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.scaling.study import REPLICATES, SHARED, Place, ProcessCost, graft
-from sandmould.scenario.limits import RUNS
+from sandmould.limits import RUNS
 from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
 
 _COLLECT = "from pathlib import Path; from sandmould.study.collect import collect; collect({0})"

@@ -9,15 +9,15 @@ from statistics import median
 
 from benchmarks.scaling.measure import cpu_s
 from benchmarks.scaling.study import Place
+from sandmould.execution.simulate import measure_run, render_run
 from sandmould.study.plan.build_plan import open_plan
-from sandmould.study.simulate import measure_run, render_run
 
 REPEATS = 5
 IMPORTED = {
     "preamble of a script": "snakemake.script",
-    "imports of a run": "sandmould.study.simulate",
-    "imports of measuring": "sandmould.study.kinds.sand.measure",
-    "imports of a shared job": "sandmould.study.batch_job",
+    "imports of a run": "sandmould.execution.simulate",
+    "imports of measuring": "sandmould.kinds.sand.measure",
+    "imports of a shared job": "sandmould.execution.batch_job",
 }
 
 
@@ -42,7 +42,7 @@ def parts(place: Place, runs: int) -> dict[str, float]:
         shutil.rmtree(copy, ignore_errors=True)
         shutil.copytree(run, copy)
         (copy / "outcome.json").unlink()
-        whole.append(place.python("-m", "sandmould.study.simulate", str(copy)).cpu_s)
+        whole.append(place.python("-m", "sandmould.execution.simulate", str(copy)).cpu_s)
     cpu_s_of["process of a run"] = _median(whole)
     with chdir(place.folder):
         cpu_s_of["rendering"] = _median([cpu_s(lambda: render_run(copy)) for _ in range(REPEATS)])

@@ -9,10 +9,10 @@ import pandas as pd
 from benchmarks.frame.shaken import shaken
 from sandmould import ROOT
 from sandmould.engines.snapshot import Snapshot
+from sandmould.kinds.sand.measure import measure_snapshot
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.equivalence import agree
-from sandmould.study.kinds.sand.measure import measure_snapshot
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 

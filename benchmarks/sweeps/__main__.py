@@ -26,10 +26,10 @@ import yaml
 
 from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, children_s, render
 from sandmould import ROOT
+from sandmould.runs.run_tables import read_costs
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import read_summary
-from sandmould.study.run_tables import read_costs
 from tests.workflow.slurm_node import SlurmNode
 
 CORES = 2

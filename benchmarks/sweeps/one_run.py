@@ -10,13 +10,13 @@ import json
 import time
 from pathlib import Path
 
-from sandmould.scenario.module_main import run_main
-from sandmould.study.batch_job import compute_batch
+from sandmould.execution.batch_job import compute_batch
+from sandmould.execution.simulate import measure, render, simulate
+from sandmould.execution.worker import load
+from sandmould.module_main import run_main
 from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, prepare
 from sandmould.study.plan.lacking import lack_of
 from sandmould.study.plan.plan_files import read_run
-from sandmould.study.simulate import measure, render, simulate
-from sandmould.study.worker import load
 
 WARM_UP = 2
 """Runs that come first and do not count: they load what all others find loaded."""

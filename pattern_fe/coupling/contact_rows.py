@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from pattern_fe.coupling.explicit_foam import ContactBound
-from pattern_fe.pattern import Pattern
-from pattern_fe.perimeter import Perimeter
+from sandmould.pattern_fe.coupling.explicit_foam import ContactBound
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.perimeter import Perimeter
 from sandmould.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pattern_fe.coupling.body import StaticSolution
+from sandmould.pattern_fe.coupling.body import StaticSolution
 
 Array = NDArray[np.float64]
 CONVERGENCE_LOG = "pattern.tsv"

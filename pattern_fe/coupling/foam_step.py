@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 from numba import carray
 
-from pattern_fe.coupling.contact_step import hold_out
 from sandmould.compiled import cfunc, njit
 from sandmould.dem.addresses import Floats, Ints, int_line_at, line_at, rows_at, to_ints
 from sandmould.dem.vectors import OPTIONS
+from sandmould.pattern_fe.coupling.contact_step import hold_out
 
 STEP, KEEPS, GAINS, OMEGA2, DAMPING, LIMIT = range(6)
 """Places in ``FoamArrays.numbers``."""

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.sparse.linalg import SuperLU
 
-from pattern_fe.coupling.body import StaticSolution
-from pattern_fe.coupling.foam_body import cross
-from pattern_fe.coupling.in_step_foam import InStepFoam
-from pattern_fe.factor import factorised
-from pattern_fe.pattern import Pattern
-from pattern_fe.supports import rigid_motions
+from sandmould.pattern_fe.coupling.body import StaticSolution
+from sandmould.pattern_fe.coupling.foam_body import cross
+from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
+from sandmould.pattern_fe.factor import factorised
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.supports import rigid_motions
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from pattern_fe.coupling.contact_rows import shares_along, shares_on_top
-from pattern_fe.coupling.explicit_foam import ContactBound
-from pattern_fe.coupling.gain import Gain
-from pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.coupling.contact_rows import shares_along, shares_on_top
+from sandmould.pattern_fe.coupling.explicit_foam import ContactBound
+from sandmould.pattern_fe.coupling.gain import Gain
+from sandmould.pattern_fe.pattern import Pattern
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 

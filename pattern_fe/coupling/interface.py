@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pattern_fe.coupling.schemes import refuse_scheme
-from pattern_fe.placing import refuse_place
-from pattern_fe.scene import pattern_of
+from sandmould.pattern_fe.coupling.schemes import refuse_scheme
+from sandmould.pattern_fe.placing import refuse_place
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.scenario.box import Polygon
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import Triangles

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import get_args
 
-from sandmould.limits import STEPPED_COMPONENTS
 from threadpoolctl import threadpool_limits
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_of, engines_that
+from sandmould.limits import STEPPED_COMPONENTS
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from sandmould.pattern_fe.coupling.gain_prediction import predicted_gain

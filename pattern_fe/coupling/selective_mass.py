@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pattern_fe.condensation import CondensedSurface
-from pattern_fe.coupling.contact_rows import ContactRows
+from sandmould.pattern_fe.condensation import CondensedSurface
+from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 
 Array = NDArray[np.float64]
 STABLE_SHARE = 0.8

@@ -13,9 +13,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from sandmould.bad_input import BadInputError, Problem
 from sandmould.cli.new import new
 from sandmould.cli.study_file import shipped_studies, study_file
-from sandmould.scenario.bad_input import BadInputError, Problem
 
 StudyFile = Annotated[
     Path,
@@ -56,7 +56,7 @@ class _Verbs(TyperGroup):
 
 
 def _key_paths(start: str) -> list[str]:
-    from sandmould.study.keys import key_paths
+    from sandmould.reference.keys import key_paths
 
     return key_paths(start)
 
@@ -124,7 +124,7 @@ def run(
     ] = False,
 ) -> None:
     """Compute a study, or what is missing of it; write its report."""
-    from sandmould.study.run_study import run_study
+    from sandmould.execution.run_study import run_study
 
     if adopt:
         _adopt(study)
@@ -140,7 +140,7 @@ def demo(
     cores: Cores = None,
 ) -> None:
     """Compute the demonstration: a coarse tube at a few settings."""
-    from sandmould.study.run_study import run_study
+    from sandmould.execution.run_study import run_study
 
     study = study_file("tube_quick" if quick else "tube_demo")
     opening = "The installation works." if quick else ""
@@ -159,9 +159,9 @@ def again(
     ] = False,
 ) -> None:
     """Compute runs once more, such as failed ones."""
-    from sandmould.study.again import forget
+    from sandmould.execution.again import forget
+    from sandmould.execution.run_study import run_study
     from sandmould.study.plan.build_plan import RESULTS
-    from sandmould.study.run_study import run_study
 
     studies = forget(runs, RESULTS)
     if not later:
@@ -173,8 +173,8 @@ def again(
 @app.command(epilog="Example: sandmould status my_study.yaml")
 def status(study: StudyFile, cores: Cores = None) -> None:
     """Say where a study stands and what is left of it."""
+    from sandmould.execution.status import status_text
     from sandmould.study.plan.build_plan import RESULTS, open_plan
-    from sandmould.study.status import status_text
 
     typer.echo(status_text(open_plan(study), RESULTS, cores or _all_cores()))
 
@@ -185,9 +185,9 @@ def tidy(
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask first.")] = False,
 ) -> None:
     """Remove run folders that a study no longer lists."""
+    from sandmould.execution.tidy import leftovers, remove
     from sandmould.runs.formatting import size_text
     from sandmould.study.plan.build_plan import RESULTS, open_plan
-    from sandmould.study.tidy import leftovers, remove
 
     opened = open_plan(study)
     found = leftovers(opened, RESULTS)
@@ -228,7 +228,7 @@ def pack(
     ] = False,
 ) -> None:  # fmt: skip
     """Pack the finished runs of a study into one file."""
-    from sandmould.study.packs.pack import pack as pack_study
+    from sandmould.execution.packs.pack import pack as pack_study
     from sandmould.study.plan.build_plan import RESULTS, open_plan
 
     packed = pack_study(
@@ -251,7 +251,7 @@ def unpack(
     ] = False,
 ) -> None:
     """Take packed runs into ./results."""
-    from sandmould.study.packs.unpack import unpack as unpack_runs
+    from sandmould.execution.packs.unpack import unpack as unpack_runs
     from sandmould.study.plan.build_plan import RESULTS
 
     for file in files:
@@ -261,8 +261,8 @@ def unpack(
 @app.command(epilog="Example: sandmould measures tube_demo")
 def measures(study: StudyFile) -> None:
     """List what runs of a study can be measured by, with units."""
+    from sandmould.reference.reference import measures_text
     from sandmould.study.plan.load_study import open_study
-    from sandmould.study.reference import measures_text
 
     typer.echo(measures_text(open_study(study)))
 
@@ -277,7 +277,7 @@ def keys(
     ] = "",
 ) -> None:
     """Explain the keys of a study's file: unit, default, meaning."""
-    from sandmould.study.keys import keys_text
+    from sandmould.reference.keys import keys_text
 
     typer.echo(keys_text(path))
 
@@ -285,7 +285,7 @@ def keys(
 @app.command(epilog="Example: sandmould doctor")
 def doctor() -> None:
     """Say what the installation has, and what is missing."""
-    from sandmould.study.installation import doctor_text, findings
+    from sandmould.reference.installation import doctor_text, findings
     from sandmould.study.plan.build_plan import RESULTS
 
     typer.echo(doctor_text(findings(RESULTS)))
@@ -323,11 +323,11 @@ def show(
 @app.command(epilog="Example: sandmould report my_study.yaml")
 def report(study: StudyFile) -> None:
     """Write the report of a study again from its results."""
+    from sandmould.execution.screen.ending import last_line
     from sandmould.report.page import write_report
     from sandmould.study.plan.build_plan import RESULTS
     from sandmould.study.plan.ownership import check_owner
     from sandmould.study.plan.plan_files import SUMMARY
-    from sandmould.study.screen.ending import last_line
 
     folder = RESULTS / study.stem
     check_owner(study, folder)

@@ -80,8 +80,8 @@ def new(
     """Write a study: it asks for drive, box, hole and sand."""
     given = {n: v for n, v in locals().items() if n not in ("file", "yes", "overwrite")}
     from sandmould.cli.questions import answers
-    from sandmould.study.new_answers import remarks
-    from sandmould.study.new_study import refuse_present, write_new_study
+    from sandmould.reference.new_answers import remarks
+    from sandmould.reference.new_study import refuse_present, write_new_study
 
     if not overwrite:
         refuse_present(file)

@@ -8,8 +8,8 @@ from typing import Any, get_args
 
 import typer
 
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.new_answers import (
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.reference.new_answers import (
     HELD,
     HOLES,
     WHY_HELD,

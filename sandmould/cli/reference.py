@@ -9,7 +9,7 @@ from typer.main import get_command
 
 from sandmould import ROOT
 from sandmould.cli.commands import app
-from sandmould.scenario.module_main import run_main
+from sandmould.module_main import run_main
 
 COMMANDS = ROOT / "docs" / "commands.md"
 _WIDTH = 100

@@ -6,7 +6,7 @@ import difflib
 from pathlib import Path
 
 from sandmould import SHIPPED
-from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem
 
 STUDIES = SHIPPED / "config" / "studies"
 

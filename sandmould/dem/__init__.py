@@ -7,7 +7,7 @@ its arrays says whether it computes discs (2) or spheres (3); nothing else diffe
 from importlib.metadata import version
 from pathlib import Path
 
-from sandmould.digest import code_digest
+from sandmould.digest import code_identity
 
 
 def source_files() -> list[Path]:
@@ -17,4 +17,4 @@ def source_files() -> list[Path]:
 
 def source_hash() -> str:
     """Hash of what this room computes: what a compiled kernel, and so a result, depends on."""
-    return code_digest(source_files(), version("numba"))
+    return code_identity([source_files()], version("numba"))

@@ -31,13 +31,13 @@ def follows_bed(scenario: Scenario) -> bool:
     return scenario.time_step.bed_fraction is not None and scenario.time_step.step_s is not None
 
 
-def sources_of_step(scenario: Scenario) -> list[Path]:
+def sources_of_step(scenario: Scenario) -> list[list[Path]]:
     """Files of ours that find the step of a bed that another engine computes; none without one."""
     if scenario.time_step.bed_fraction is None:
         return []
     here = Path(__file__).parent
     names = ("bed_deck.py", "bed_limit.py", "solid_surfaces.py", "reference/model.py")
-    return [*source_files(), *(here / name for name in names)]
+    return [source_files(), [here / name for name in names]]
 
 
 def step_line(lines: Lines) -> str:

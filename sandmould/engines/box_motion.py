@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sandmould.engines.program import Stage
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 from sandmould.scenario.scenario import Scenario
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sandmould import SHIPPED
-from sandmould.digest import sources_digest
+from sandmould.digest import SHORT, digest
 from sandmould.runs.files import write_text
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ TEMPLATES = SHIPPED / "templates"
 _LONGEST_REMARK = 200
 """Characters; LIGGGHTS reads lines of 2048."""
 _BLOCK = re.compile(r"^#--- block: (\w+) ---.*?\n(.*?)^#--- end: \1 ---$", re.M | re.S)
+_COMMENT = re.compile(r"\{#.*?#\}|^[ \t]*#(?!---)[^{\n]*$|^[ \t]+|[ \t]+$|\n(?=\n)", re.M | re.S)
+"""Of a template: its comments, those of its deck that print no value, indents and empty lines."""
 _RUNS = re.compile(r'(?:^(?:run|if [^\n]* then "run) (?!0\b)[^\n]*\n)+', re.M)
 
 
@@ -70,9 +72,15 @@ def environment(dialect: str) -> jinja2.Environment:
     return env
 
 
+def template_files(dialect: str) -> list[Path]:
+    """All templates of one dialect."""
+    return sorted((TEMPLATES / dialect).glob("*.j2"))
+
+
 def dialect_hash(dialect: str) -> str:
-    """Hash of all templates of one dialect."""
-    return sources_digest((TEMPLATES / dialect).glob("*.j2"))
+    """Hash of what the templates of one dialect command: comments and layout are left out."""
+    texts = (path.read_text(encoding="utf-8") for path in template_files(dialect))
+    return digest(*(_COMMENT.sub("", text) for text in texts))[:SHORT]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 
 _CHUNK = 32_768
 """Grains whose pairs are held in memory together."""

@@ -5,20 +5,23 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from sandmould import ROOT, SHIPPED
+from sandmould import ROOT, geometry
 from sandmould.bad_input import Problem
-from sandmould.digest import code_digest, digest
+from sandmould.digest import code_identity, digest
 from sandmould.engines.capabilities import Capabilities
-from sandmould.engines.deck import Deck, dialect_hash
+from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, SandSession
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.moving_walls import moving_wall
+from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import SolidMesh
 from sandmould.scenario.unbalance_checks import unbalance_key
 
 _OF_EVERY_ENGINE = (
@@ -37,6 +40,8 @@ class EngineModule(Protocol):
     """Speed of one core in 2D that batches are filled by (docs/speed.md); fixed, so that a study
     has the same batches on every machine."""
     RANKS: Ranks
+    RUNS_ITS_DECK: bool
+    """Whether what a deck commands is what is computed; else it only lists the numbers."""
 
     @staticmethod
     def installed_version() -> int | str:
@@ -61,8 +66,11 @@ class EngineModule(Protocol):
         """Write ``deck.in`` and ``layers/``; the deck last."""
 
     @staticmethod
-    def session_sources(scenario: Scenario) -> list[Path]:
-        """Files of ours that compute beside what the deck commands: its session, our kernels."""
+    def session_sources(scenario: Scenario) -> list[list[Path]]:
+        """Files of ours that compute beside what the deck commands: its session, our kernels.
+
+        Files that are used together make one group.
+        """
 
     @staticmethod
     def load_session(scenario: Scenario) -> None:
@@ -144,7 +152,7 @@ def mpi_ranks(scenario: Scenario) -> int:
 
 def calls_our_kernels(scenario: Scenario) -> bool:
     """Whether compiled code of the house takes part, as the engine or beside it."""
-    sources = engine_of(scenario).session_sources(scenario)
+    sources = chain(*engine_of(scenario).session_sources(scenario))
     return any(path.is_relative_to(ROOT / "sandmould" / "dem") for path in sources)
 
 
@@ -156,14 +164,16 @@ def communicator_of(scenario: Scenario) -> Any:
 
 
 def deck_hash(scenario: Scenario) -> str:
-    """Hash of all that turns a scenario into a deck, and of our code that computes beside it."""
-    return _code_hash(scenario) + dialect_hash(scenario.engine.name)
+    """Hash of all that turns a scenario into commands, and of our code that computes beside it."""
+    runs_its_deck = engine_of(scenario).RUNS_ITS_DECK
+    return _code_hash(scenario) + (dialect_hash(scenario.engine.name) if runs_its_deck else "")
 
 
 def deck_sources(scenario: Scenario) -> list[Path]:
     """Files of the repository that ``deck_hash`` is made from."""
-    templates = (SHIPPED / "templates" / scenario.engine.name).glob("*.j2")
-    return sorted([*templates, *_code_files(scenario)])
+    engine = scenario.engine.name
+    templates = template_files(engine) if engine_of(scenario).RUNS_ITS_DECK else []
+    return sorted({*templates, *chain(*code_groups(scenario))})
 
 
 def computed_hash(scenario: Scenario) -> str:
@@ -176,13 +186,19 @@ def computed_hash(scenario: Scenario) -> str:
 
 
 def _code_hash(scenario: Scenario) -> str:
-    return code_digest(_code_files(scenario), version("numba"))
+    return code_identity(code_groups(scenario), version("numba"))
 
 
-def _code_files(scenario: Scenario) -> list[Path]:
+def code_groups(scenario: Scenario) -> list[list[Path]]:
     """Files that decide what is computed on any engine, and those of the scenario's engine."""
-    return [*(ROOT / "sandmould" / name for name in _OF_EVERY_ENGINE),
-            *engine_of(scenario).session_sources(scenario)]  # fmt: skip
+    of_every_engine = [ROOT / "sandmould" / name for name in _OF_EVERY_ENGINE]
+    pattern = (scenario.pattern.shape,) if scenario.pattern else ()
+    drawn = any(
+        isinstance(solid, SolidMesh | PatternDrawing)
+        for solid in (*scenario.obstacles, *scenario.cavities, *pattern)
+    )
+    surfaces = [geometry.source_files()] if drawn else []
+    return [of_every_engine, *surfaces, *engine_of(scenario).session_sources(scenario)]
 
 
 def engine_problem(scenario: Scenario) -> Problem | None:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.geometry.geometry import Scene
 from sandmould.runs.files import replaced
-from sandmould.scenario.geometry import Scene
 from sandmould.scenario.scenario import Scenario
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sandmould.dem.surfaces import Surfaces
-from sandmould.scenario.geometry import Scene
+from sandmould.geometry.geometry import Scene
 
 
 def add_solids(surfaces: Surfaces, scene: Scene) -> None:

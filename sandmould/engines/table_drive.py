@@ -8,7 +8,7 @@ import numpy as np
 
 from sandmould.dem.table import MountedTable, TableDrive
 from sandmould.engines.program import Program, Stage
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.unbalance import BRAKE_PERIODS, Unbalance
 from sandmould.scenario.vibration import STOP_PERIODS, VibrationStage

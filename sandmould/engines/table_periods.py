@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:  # compiled: no plan waits for it

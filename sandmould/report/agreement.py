@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from sandmould.report.chart import PLAIN, Chart, Mark, Tint
+from sandmould.definition.study import Study
+from sandmould.drawing.chart import PLAIN, Chart, Mark, Tint
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled
 from sandmould.statistics.agreement import (
@@ -18,7 +19,6 @@ from sandmould.statistics.agreement import (
     speeds,
 )
 from sandmould.study.collect import Collected, compare_study
-from sandmould.study.definition.study import Study
 
 _TINTS = {
     "equivalent": Tint("#00694b", "#5fd0a5"),

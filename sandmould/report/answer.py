@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from sandmould.definition.certificate import frequency_among
 from sandmould.report.drive import drive_at
 from sandmould.report.filling import FULL_SHARE
 from sandmould.report.next_steps import NextSteps
@@ -30,7 +31,6 @@ from sandmould.scenario.drive import DISPLACEMENT, VELOCITY, BoxDrive
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
-from sandmould.study.definition.certificate import frequency_among
 
 MOST_CHOICES = 4
 """Settings that are shown in words of the machine where several may be the best."""

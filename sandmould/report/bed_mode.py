@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.spectrum import first_resonance_hz
+from sandmould.analysis.spectrum import first_resonance_hz
 from sandmould.runs.columns import BED_HEIGHT_M
 from sandmould.runs.formatting import number
 from sandmould.scenario.hardness import bed_hardness, column_mode_hz, column_speed_m_s

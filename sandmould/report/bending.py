@@ -12,16 +12,18 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 
-from pattern_fe.coupling.loop_verdict import LoopVerdict, study_sentence
-from pattern_fe.quality import mesh_sentence
-from pattern_fe.scene import pattern_of
+from sandmould.bad_input import BadInputError
+from sandmould.drawing.chart import Area, Chart
+from sandmould.drawing.convergence_charts import ConvergenceChart, convergence_charts
+from sandmould.drawing.thinning import drawn_part, listed_runs
+from sandmould.kinds.sand.bending import convergence_log_of, verdict_of
+from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, study_sentence
+from sandmould.pattern_fe.quality import mesh_sentence
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figure import draw_outlines
-from sandmould.report.chart import Area, Chart
-from sandmould.report.convergence_charts import ConvergenceChart, convergence_charts
 from sandmould.report.coupling_map import CouplingMap, coupling_map
 from sandmould.report.curves import runs_of, setting_tints, time_chart
 from sandmould.report.tables import Cell, Column, Table
-from sandmould.report.thinning import drawn_part, listed_runs
 from sandmould.runs.columns import (
     RUN,
     SOLID_FRACTION,
@@ -29,14 +31,12 @@ from sandmould.runs.columns import (
     VIBRATION_TIME_S,
 )
 from sandmould.runs.formatting import number, setting_text, with_margin
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred, usable_values
 from sandmould.statistics.settings import group_settings, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.kinds.sand.bending import convergence_log_of, verdict_of
 
 TIP = "pattern_tip_deflection_m"
 RECOVERED = "pattern_tip_recovered_m"

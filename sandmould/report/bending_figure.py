@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from sandmould.report.figures import png
-from sandmould.scenario.geometry import Array, Solid
-from sandmould.scenario.mesh import TriangleMesh
+from sandmould.drawing.figures import png
+from sandmould.geometry.geometry import Array, Solid
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.kinds.sand.bent_files import shape_moments
+from sandmould.kinds.sand.moments import list_moments
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand.bent_files import shape_moments
-from sandmould.study.kinds.sand.moments import list_moments
 
 _MM = 1e3
 _WIDTH_IN = 7.0

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from sandmould.report.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.definition.study import Study
+from sandmould.drawing.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
+from sandmould.drawing.templates import page_environment
 from sandmould.report.tables import Cell, Column, Table
-from sandmould.report.templates import page_environment
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import (
     display_scale,
@@ -22,11 +24,9 @@ from sandmould.runs.formatting import (
     titled,
     with_margin,
 )
-from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import FEW, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_study
-from sandmould.study.definition.study import Study
 from sandmould.study.plan.plan_files import SUMMARY, VERDICT_FILE
 
 _LEFT_OUT = ("title", "based_on", "sweep")

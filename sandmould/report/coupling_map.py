@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pattern_fe.coupling.loop_verdict import State
-from sandmould.report.figures import png
+from sandmould.drawing.figures import png
+from sandmould.pattern_fe.coupling.loop_verdict import State
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import name_of, setting_text
 from sandmould.study.collect import Collected

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sandmould.report.chart import PLAIN, Chart, Line, Mark, Tint, tints
+from sandmould.definition.study import Study
+from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, Tint, tints
 from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import (
     display_scale,
@@ -34,7 +35,6 @@ from sandmould.statistics.evidence import (
 from sandmould.statistics.settings import Setting, group_settings
 from sandmould.statistics.verdict import FEW, Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.definition.study import Study
 
 _POINTS = 12_000
 """Points of all curves of one chart; more would only make the page heavy."""

@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sandmould.report.figure_files import pictures, strip
+from sandmould.definition.study import Study
+from sandmould.drawing.figure_files import pictures, strip
+from sandmould.kinds.kind import AnyScenario
 from sandmould.report.heaps import Heap
 from sandmould.report.kinds.registry import heaps_of
 from sandmould.report.repose_figures import draw_map, draw_posterior, plotted
@@ -25,8 +27,6 @@ from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.calibration.run import read_calibrated
 from sandmould.study.collect import Collected
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import AnyScenario
 
 NOTHING = 1e-3
 """Share of the largest value below which one is told as none."""

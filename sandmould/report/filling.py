@@ -10,8 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from analysis.filling import Limb, first_reach_s, fit_limbs
-from sandmould.report.chart import Chart, Line, tints
+from sandmould.analysis.filling import Limb, first_reach_s, fit_limbs
+from sandmould.definition.study import Study
+from sandmould.drawing.chart import Chart, Line, tints
 from sandmould.report.curves import reported_lines, runs_by_setting, runs_of
 from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
@@ -21,7 +22,6 @@ from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.settings import Setting, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.definition.study import Study
 
 FULL_SHARE = 0.95
 """Of the sand that a cavity holds when it is packed as the bed is."""

@@ -14,12 +14,12 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.flow_plots import draw_frame, frame_of
+from sandmould.analysis.flow_plots import draw_frame, frame_of
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
 from sandmould.casting.mps.stability import StabilityRating
-from sandmould.report.figures import png
-from sandmould.report.flow_film import SHADES, FlowFilm, make_flow_film
+from sandmould.drawing.figures import png
+from sandmould.drawing.flow_film import SHADES, FlowFilm, make_flow_film
 from sandmould.report.flow_map import condition_text, said_of, stability_map
 from sandmould.report.method import Row
 from sandmould.report.next_steps import NextStep

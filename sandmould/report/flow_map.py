@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sandmould.casting.mps.stability import COUNTS, SHARES, STEPS_S, StabilityRating
-from sandmould.report.figures import png
+from sandmould.drawing.figures import png
 from sandmould.runs.columns import CLASSIFICATION
 from sandmould.runs.formatting import setting_text
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from sandmould.kinds.sand.moments import list_moments
 from sandmould.report.repose_figures import draw_heap
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import number
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.verdict import Verdict
-from sandmould.study.kinds.sand.moments import list_moments
 
 PICTURED_HEAPS = 3
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from sandmould.kinds.sand.loose import LOOSE_ZONES
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import listed, number
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand.loose import LOOSE_ZONES
 
 _LISTED = 8
 _SIDES = {"under": "straight under", "over": "straight over", "beside": "beside"}

@@ -8,6 +8,8 @@ from typing import Any
 
 import pandas as pd
 
+from sandmould.definition.study import Objective
+from sandmould.kinds.sand.hardness_text import hardness_text
 from sandmould.runs.columns import (
     BED_LIMIT_S,
     ENGINE,
@@ -28,8 +30,6 @@ from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.unbalance import Unbalance
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.definition.study import Objective
-from sandmould.study.kinds.sand.hardness_text import hardness_text
 
 _NO_TENSION = {
     "total": "the total normal force, spring and dashpot together, is never allowed to pull",

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from sandmould.definition.certificate import frequency_key
+from sandmould.definition.study import Study
 from sandmould.report.agreement import AgreementPages
 from sandmould.report.curves import best_passage
 from sandmould.report.optimum import OptimumPages
@@ -18,8 +20,6 @@ from sandmould.runs.formatting import listed, name_of, value_text
 from sandmould.statistics.config import fewest_points
 from sandmould.statistics.verdict import FEW, MANY, MOST_NAMED, Verdict, further_replicates
 from sandmould.study.collect import Collected
-from sandmould.study.definition.certificate import frequency_key
-from sandmould.study.definition.study import Study
 from sandmould.study.plan.ownership import owner_of, shipped_name
 
 WORTH = 30

@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
+from sandmould.definition.certificate import frequency_key
+from sandmould.definition.study import Study
+from sandmould.drawing.chart import PLAIN, Chart, Line, tints
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.curves import reported_lines
 from sandmould.report.drive import amplitudes_text, drive_at
 from sandmould.report.robustness import RobustnessPages, opening_sentences
@@ -30,8 +32,6 @@ from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.recommendation import Recommendation, recommend
-from sandmould.study.definition.certificate import frequency_key
-from sandmould.study.definition.study import Study
 from sandmould.study.rounds.round_log import RoundLog, read_rounds
 
 WRONG = {"frequency_hz": 10.0}

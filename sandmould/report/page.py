@@ -14,8 +14,18 @@ from urllib.parse import quote
 import pandas as pd
 from jinja2 import Environment
 
+from sandmould.bad_input import BadInputError
+from sandmould.definition.certificate import frequency_among
+from sandmould.definition.study import Study
+from sandmould.drawing.animation import BUDGET_BYTES
+from sandmould.drawing.chart import NARROW, SMALL, WIDE, Chart, lay_out
+from sandmould.drawing.figure_files import numbered, write_figures
+from sandmould.drawing.small_multiples import small_multiples
+from sandmould.drawing.templates import page_environment
+from sandmould.drawing.thinning import drawn_note, drawn_part, listed_settings
+from sandmould.kinds.kind import AnyScenario
+from sandmould.kinds.registry import kind_named
 from sandmould.report.agreement import AgreementPages, agreement_pages
-from sandmould.report.animation import BUDGET_BYTES
 from sandmould.report.answer import (
     Answer,
     choices_of,
@@ -25,11 +35,9 @@ from sandmould.report.answer import (
     optimum_headline,
 )
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.report.curves import objective_charts
 from sandmould.report.drive import with_amplitudes
 from sandmould.report.estimate_section import EstimatePages, estimate_figures, estimate_pages
-from sandmould.report.figure_files import numbered, write_figures
 from sandmould.report.kinds.kind import KindPages
 from sandmould.report.kinds.registry import (
     drives_of,
@@ -59,7 +67,6 @@ from sandmould.report.optimum import (
 )
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sand import pictured_runs
-from sandmould.report.small_multiples import small_multiples
 from sandmould.report.sureness import certificate_ground, finished_ground
 from sandmould.report.tables import (
     KeyNumber,
@@ -68,19 +75,12 @@ from sandmould.report.tables import (
     runs_table,
     settings_table,
 )
-from sandmould.report.templates import page_environment
-from sandmould.report.thinning import drawn_note, drawn_part, listed_settings
 from sandmould.runs.columns import RUN
 from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, setting_text
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
-from sandmould.study.definition.certificate import frequency_among
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sandmould.report.chart import Chart, Line, tints
+from sandmould.drawing.chart import Chart, Line, tints
 from sandmould.runs.columns import TIME_S
 
 BINS = 300

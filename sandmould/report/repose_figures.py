@@ -9,16 +9,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.plots import draw_grains
-from analysis.repose import Slope
+from sandmould.analysis.plots import draw_grains
+from sandmould.analysis.repose import Slope
+from sandmould.drawing.figures import cut_m, panel, png
 from sandmould.engines.snapshot import Snapshot
-from sandmould.report.figures import cut_m, panel, png
+from sandmould.kinds.sand.outflow import slopes
 from sandmould.runs.formatting import name_of, unit_of
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.posterior import axes_of, surface
 from sandmould.statistics.calibration.sands import CalibratedSand
 from sandmould.statistics.emulator import Emulator
-from sandmould.study.kinds.sand.outflow import slopes
 
 _LINE = "#C00000"
 _BANDS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

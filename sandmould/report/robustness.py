@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.spectrum import transfer
+from sandmould.analysis.spectrum import transfer
+from sandmould.definition.certificate import frequency_key
+from sandmould.definition.study import Study
+from sandmould.drawing.chart import PLAIN, Chart, Line, tints
 from sandmould.report.bed_mode import BedMode, Response, bed_mode
-from sandmould.report.chart import PLAIN, Chart, Line, tints
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import STAGE, TIME_S
 from sandmould.runs.formatting import name_of, number
@@ -22,8 +24,6 @@ from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.robustness import Robustness, assess_robustness, shaken_runs
 from sandmould.statistics.spring_dependence import FOLLOWS, SpringCheck, assess_springs
 from sandmould.study.collect import Collected
-from sandmould.study.definition.certificate import frequency_key
-from sandmould.study.definition.study import Study
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.robustness.controls import SHAKE_G, cases
 from sandmould.study.rounds.round_log import read_rounds

@@ -13,13 +13,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.layers import layer_table
-from analysis.plots import LAYER_COLOURS
+from sandmould.analysis.layers import layer_table
+from sandmould.analysis.plots import LAYER_COLOURS
+from sandmould.bad_input import BadInputError
+from sandmould.drawing import figures
+from sandmould.drawing.animation import BENT_M, Film, make_film
+from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
+from sandmould.drawing.sphere_scene import sphere_scene
 from sandmould.engines.snapshot import Snapshot
-from sandmould.report import figures
-from sandmould.report.animation import BENT_M, Film, make_film
-from sandmould.report.sphere_film import SphereFilm, sphere_frames
-from sandmould.report.sphere_scene import sphere_scene
+from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.report.time_series import (
     Curve,
     late_conclusion,
@@ -35,11 +37,9 @@ from sandmould.runs.columns import (
     finished,
 )
 from sandmould.runs.formatting import listed, name_of, number, setting_text
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict, rank_runs
 from sandmould.study.collect import Collected
-from sandmould.study.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.study.plan.plan_files import SPHERES, read_run
 
 _SECONDARY = (

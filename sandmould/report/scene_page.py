@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from analysis.plots import LAYER_COLOURS
-from sandmould.engines.snapshot import Snapshot
-from sandmould.report.figures import (
+from sandmould.analysis.plots import LAYER_COLOURS
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.drawing.figures import (
     DensityScale,
     cut_m,
     dimensioned,
@@ -18,14 +18,14 @@ from sandmould.report.figures import (
     png_bytes,
     svg_bytes,
 )
+from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
+from sandmould.drawing.sphere_scene import sphere_scene
+from sandmould.drawing.templates import page_environment
+from sandmould.engines.snapshot import Snapshot
+from sandmould.geometry.geometry import Bore, Cavity
 from sandmould.report.method import Row
-from sandmould.report.sphere_film import SphereFilm, sphere_frames
-from sandmould.report.sphere_scene import sphere_scene
-from sandmould.report.templates import page_environment
 from sandmould.runs.files import replaced
 from sandmould.runs.formatting import listed, number
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.scenario.geometry import Bore, Cavity
 from sandmould.scenario.likely_bed import LikelyBed, likely_bed
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario

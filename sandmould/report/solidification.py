@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.freezing import freezing
-from analysis.freezing_plots import draw_freezing, draw_temperature
-from sandmould.report.chart import Chart, Mark, tints
-from sandmould.report.figures import png
+from sandmould.analysis.freezing import freezing
+from sandmould.analysis.freezing_plots import draw_freezing, draw_temperature
+from sandmould.definition.sweep import Point
+from sandmould.drawing.chart import Chart, Mark, tints
+from sandmould.drawing.figures import png
 from sandmould.report.method import Row
 from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
@@ -24,7 +25,6 @@ from sandmould.runs.formatting import listed, name_of, number, seconds, setting_
 from sandmould.scenario.solidification import MouldMaterial, Solidification
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.definition.sweep import Point
 from sandmould.study.plan.plan_files import read_run
 
 NEAR_PERCENT = 5.0

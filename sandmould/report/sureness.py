@@ -8,6 +8,10 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from sandmould.definition.certificate import frequency_key
+from sandmould.definition.study import Study
+from sandmould.kinds.sand.narrow import narrow_spaces
+from sandmould.kinds.sand.table_motion import throws_no_sand
 from sandmould.report.robustness import RobustnessPages
 from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed, name_of, number
@@ -16,10 +20,6 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import loop_barred
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
-from sandmould.study.definition.certificate import frequency_key
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.sand.narrow import narrow_spaces
-from sandmould.study.kinds.sand.table_motion import throws_no_sand
 
 
 @dataclass(frozen=True)

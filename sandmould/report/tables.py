@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import pandas as pd
 
-from sandmould.report.thinning import listed_note, listed_runs, listed_settings
+from sandmould.drawing.thinning import listed_note, listed_runs, listed_settings
 from sandmould.runs.columns import (
     CPU_S,
     DETAIL,

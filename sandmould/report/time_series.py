@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from sandmould.report.chart import Chart
+from sandmould.drawing.chart import Chart
+from sandmould.drawing.figure_files import numbered
+from sandmould.drawing.thinning import drawn_part
 from sandmould.report.curves import best_passage, time_chart
-from sandmould.report.figure_files import numbered
-from sandmould.report.thinning import drawn_part
 from sandmould.runs.formatting import display_scale, name_of, number
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected

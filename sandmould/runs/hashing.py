@@ -2,28 +2,65 @@
 
 from __future__ import annotations
 
+import functools
 import json
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from sandmould.digest import digest
-from sandmould.scenario.quantity import Section
+from sandmould.scenario.quantity import Section, first_default
+
+_ALWAYS = object()
+"""In place of a default: the value counts whatever it is."""
 
 
 def scenario_hash(scenario: Section) -> str:
     """Hash of everything that a scenario says, whatever the order of its keys.
 
-    What is absent is left out: a key that comes later, absent unless given, changes no hash.
+    A value at the key's first default says nothing: a key that comes or goes later changes no
+    hash of a scenario that leaves it alone.
     """
-    return digest(json.dumps(present(scenario.model_dump(mode="json")), sort_keys=True))
+    return digest(json.dumps(said(scenario), sort_keys=True))
 
 
-def present(tree: Any) -> Any:
-    """A tree without keys whose value is None or an empty list."""
-    if isinstance(tree, dict):
-        return {key: present(value) for key, value in tree.items() if value not in (None, [])}
-    return [present(item) for item in tree] if isinstance(tree, list) else tree
+def said(scenario: Section) -> dict[str, Any]:
+    """The values of a scenario that differ from the first defaults of their keys, as JSON has them.
+
+    The name of a variant, such as ``kind: tube``, is always among them.
+    """
+    return _said(scenario, scenario.model_dump(mode="json"))
+
+
+def _said(value: Any, dumped: Any) -> Any:
+    if isinstance(value, Section):
+        defaults = _defaults(type(value))
+        return {
+            key: _said(getattr(value, key), dumped[key])
+            for key, default in defaults.items()
+            if key in dumped and (default is _ALWAYS or getattr(value, key) != default)
+        }
+    if isinstance(value, dict):
+        return {key: _said(value[key], dumped[key]) for key in dumped}
+    if isinstance(value, (list, tuple)):
+        return [_said(item, part) for item, part in zip(value, dumped, strict=True)]
+    return dumped
+
+
+@functools.cache
+def _defaults(section: type[Section]) -> dict[str, Any]:
+    """First default of each key; ``_ALWAYS`` where a key has none or names a variant."""
+    return {
+        key: _ALWAYS
+        if field.is_required() or _names_variant(field.annotation)
+        else first_default(section, key)
+        for key, field in section.model_fields.items()
+    }
+
+
+def _names_variant(annotation: Any) -> bool:
+    return get_origin(annotation) is Literal and len(get_args(annotation)) == 1
 
 
 def solution_hash(scenario: Section, solver: str) -> str:
     """Hash of a scenario without its seed, and of the solver that computes it."""
-    return digest(scenario.model_dump_json(exclude={"seed"}), solver)
+    values = {key: value for key, value in said(scenario).items() if key != "seed"}
+    return digest(json.dumps(values, sort_keys=True), solver)

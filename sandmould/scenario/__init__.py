@@ -1,1 +1,1 @@
-"""What is simulated: the typed scenario, its geometry, its sand and its materials."""
+"""What is simulated: the typed scenario, its sand and its materials."""

@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from sandmould.scenario.geometry import Array, Block, Bore, Scene, Wall
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline, signed_area_m2
+from sandmould.geometry.geometry import Array, Block, Bore, Scene, Wall
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline, signed_area_m2
+from sandmould.geometry.revolved import Revolved
 from sandmould.scenario.quantity import Section, quantity
-from sandmould.scenario.revolved import Revolved
 from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.solids import Cylinder, SolidMesh, Triangles, cylinder_solid, mesh_solid
 

@@ -14,12 +14,12 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError, Problem, display_path
-from sandmould.scenario.drawing_file import MeshFileError, file_hash
-from sandmould.scenario.geometry import Block
-from sandmould.scenario.limits import PIXELS
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline, outline_fault
+from sandmould.bad_input import BadInputError, Problem, display_path
+from sandmould.geometry.drawing_file import MeshFileError, file_hash
+from sandmould.geometry.geometry import Block
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline, outline_fault
+from sandmould.limits import PIXELS
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.solids import SolidMesh, mesh_solid, with_hash
 

@@ -11,9 +11,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.geometry.geometry import Array, Cavity
 from sandmould.scenario.box import Plate, Polygon, plate_blocks, polygon_outline
-from sandmould.scenario.geometry import Array, Cavity
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.solids import SolidMesh, cylinder_along, mesh_solid

@@ -8,7 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.geometry.geometry import Cavity
+from sandmould.geometry.outline import outline_fault
 from sandmould.scenario.box import AnyObstacle, Box, Tube, build_scene
 from sandmould.scenario.cavities import (
     CAVITY_KINDS,
@@ -21,8 +23,6 @@ from sandmould.scenario.cavities import (
     inward,
 )
 from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, cavity_grid
-from sandmould.scenario.geometry import Cavity
-from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.scenario import Scenario
 
 _MOST_POINTS = 200_000

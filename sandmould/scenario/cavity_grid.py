@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sandmould.scenario.geometry import Array, Cavity
+from sandmould.geometry.geometry import Array, Cavity
 
 CELLS_A_GRAIN = {2: 16, 3: 8}
 """Cells along a grain's diameter, by dimension."""

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.geometry.drawing_file import MeshFileError
+from sandmould.geometry.outline import outline_fault
+from sandmould.limits import GRAINS
 from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_blocks, tube_wall
 from sandmould.scenario.cavity_checks import cavity_problems
-from sandmould.scenario.drawing_file import MeshFileError
-from sandmould.scenario.limits import GRAINS
 from sandmould.scenario.moving_walls import piston_problems
-from sandmould.scenario.outline import outline_fault
 from sandmould.scenario.placed_checks import placed_problems
 from sandmould.scenario.placement import fall_s, plan_counts, portion_of, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
@@ -164,7 +164,7 @@ def _mesh(s: Scenario, solid: SolidMesh, key: str) -> Iterator[Problem]:
 
 
 def _triangles(s: Scenario, solid: Triangles, key: str) -> Iterator[Problem]:
-    from sandmould.scenario.mesh_file import check_surface  # slow to import, and few scenes have it
+    from sandmould.geometry.mesh_file import check_surface  # slow to import, and few scenes have it
 
     size = f"{len(solid.triangles)} triangles"
     try:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from sandmould.geometry.geometry import Array
 from sandmould.scenario.box import Plate, plate_blocks
 from sandmould.scenario.fill import Settling
-from sandmould.scenario.geometry import Array
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.scenario.geometry import Array, distance_within
+from sandmould.geometry.geometry import Array, distance_within
 from sandmould.scenario.placement import (
     filled_measure,
     nominal_fraction,

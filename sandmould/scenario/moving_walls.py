@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from sandmould.scenario.bad_input import Problem
+from sandmould.bad_input import Problem
 from sandmould.scenario.box import piston_wall
 from sandmould.scenario.scenario import Scenario
 

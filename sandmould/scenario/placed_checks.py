@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandmould.scenario.bad_input import Problem
+from sandmould.bad_input import Problem
 from sandmould.scenario.placement import placed_grains
 from sandmould.scenario.scenario import Scenario
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 from sandmould.scenario.scenario import Scenario
 
 if TYPE_CHECKING:

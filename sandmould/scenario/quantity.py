@@ -7,9 +7,13 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
 NAME = r"^[a-z][a-z0-9_]*$"
 """Pattern of names that become files, columns or labels."""
+NO_DEFAULT = PydanticUndefined
+"""In place of a default that there is none of."""
+FIRST = "first_default"
 
 
 class Section(BaseModel):
@@ -20,7 +24,15 @@ class Section(BaseModel):
     )
 
 
-def quantity(default: Any, description: str, *, unit: str = "1", source: str, **limits: Any) -> Any:
+def quantity(
+    default: Any,
+    description: str,
+    *,
+    unit: str = "1",
+    source: str,
+    first: Any = NO_DEFAULT,
+    **limits: Any,
+) -> Any:
     """Declare a field with its unit and the source of its default.
 
     Parameters
@@ -33,15 +45,28 @@ def quantity(default: Any, description: str, *, unit: str = "1", source: str, **
         SI unit as written in decks and the schema; ``1`` for a pure number.
     source : str
         Where the default comes from.
+    first : any
+        The default that the key had first, where it has another one now: results of scenes that
+        leave the key alone are then those of another value, and their identity changes.
     **limits
         Constraints of ``pydantic.Field``, such as ``gt=0``.
     """
+    about: dict[str, Any] = {"unit": unit, "source": source}
     return Field(
         default,
         description=description,
-        json_schema_extra={"unit": unit, "source": source},
+        json_schema_extra=about if first is NO_DEFAULT else about | {FIRST: first},
         **limits,
     )
+
+
+def first_default(section: type[BaseModel], key: str) -> Any:
+    """The default that a key had first: a value equal to it is left out of a scenario's hash."""
+    field = section.model_fields[key]
+    about = field.json_schema_extra
+    if isinstance(about, dict) and FIRST in about:
+        return about[FIRST]
+    return field.get_default(call_default_factory=True)
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:

@@ -11,13 +11,13 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field
 
+from sandmould.geometry.geometry import Scene
 from sandmould.scenario.box import Box, Obstacle, Piston, Plate, build_scene, piston_wall
 from sandmould.scenario.cavities import CavityKey, cavity_space
 from sandmould.scenario.contact import BackgroundDamping, Contact
 from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.engine import Engine
 from sandmould.scenario.fill import Fill
-from sandmould.scenario.geometry import Scene
 from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.rest import Rest

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError, Problem, display_path
-from sandmould.scenario.drawing_file import MeshFileError, file_hash
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.mesher import is_step
+from sandmould.bad_input import BadInputError, Problem, display_path
+from sandmould.geometry.drawing_file import MeshFileError, file_hash
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.mesher import is_step
+from sandmould.geometry.revolved import Revolved
 from sandmould.scenario.quantity import Section, quantity
-from sandmould.scenario.revolved import Revolved
 
 Array = NDArray[np.float64]
 MANY_TRIANGLES = 100_000
@@ -200,7 +200,7 @@ def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]
     BadInputError
         As :func:`mesh_solid`.
     """
-    from sandmould.scenario.mesh_file import read_surface  # slow to import, and few scenes have it
+    from sandmould.geometry.mesh_file import read_surface  # slow to import, and few scenes have it
 
     file_name = display_path(drawing.path)
     if is_step(drawing.path) and drawing.unit_m != 1.0:
@@ -249,7 +249,7 @@ def drawing_notes(drawing: Drawing, key: str) -> list[str]:
     key : str
         Key path, for the sentences.
     """
-    from sandmould.scenario.mesh_file import read_surface, repairs  # see drawn_surface
+    from sandmould.geometry.mesh_file import read_surface, repairs  # see drawn_surface
 
     done, triangles = repairs(drawing.path), len(read_surface(drawing.path)[1])
     said = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from sandmould.scenario.bad_input import Problem
+from sandmould.bad_input import Problem
 from sandmould.scenario.placement import filled_measure
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.unbalance import Unbalance

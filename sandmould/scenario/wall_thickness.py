@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.geometry.geometry import Block
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 from sandmould.scenario.casting_shapes import Body, Pixels, held_by
-from sandmould.scenario.geometry import Block
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

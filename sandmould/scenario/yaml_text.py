@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from sandmould.scenario.limits import YAML_ALIASES, YAML_DEPTH, YAML_VALUES
+from sandmould.limits import YAML_ALIASES, YAML_DEPTH, YAML_VALUES
 
 
 def _mapping(loader: Any, node: yaml.MappingNode) -> dict[str, Any]:

@@ -1,1 +1,1 @@
-"""Studies: what is swept, how it becomes runs, and how these are computed."""
+"""Studies: how a file becomes runs, what they cost, what comes of them."""

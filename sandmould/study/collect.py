@@ -18,6 +18,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sandmould.definition.own_measures import with_own_measures
+from sandmould.definition.study import Study
+from sandmould.kinds.registry import DEFAULT_KIND, kind_named
 from sandmould.runs.columns import (
     CLOCK,
     CROSS_CHECK,
@@ -42,6 +45,14 @@ from sandmould.runs.columns import (
 from sandmould.runs.files import replaced
 from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.run_tables import (
+    PLACE,
+    UNREADABLE,
+    RunTables,
+    problem_text,
+    read_costs,
+    read_tables,
+)
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.agreement import (
     Compared,
@@ -50,19 +61,8 @@ from sandmould.statistics.agreement import (
     compare_pair,
     sweep_part,
 )
-from sandmould.study.definition.own_measures import with_own_measures
-from sandmould.study.definition.study import Study
 from sandmould.study.fill_costs import shares_of_fills
-from sandmould.study.kinds.registry import DEFAULT_KIND, kind_named
 from sandmould.study.plan.plan_files import CHECKS, CURVES, STUDY_FILE, SUMMARY
-from sandmould.study.run_tables import (
-    PLACE,
-    UNREADABLE,
-    RunTables,
-    problem_text,
-    read_costs,
-    read_tables,
-)
 
 NO_OUTCOME = "no outcome written"
 _PARAMETER_FREE = (RUN, REPLICATE, SEED, PART)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
+from sandmould.definition.run import FILLS
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, WALL_S
-from sandmould.study.definition.run import FILLS
-from sandmould.study.run_tables import PLACE, read_costs
+from sandmould.runs.run_tables import PLACE, read_costs
 
 
 def shares_of_fills(fills: pd.Series[str], study_folder: Path) -> dict[str, pd.Series[float]]:

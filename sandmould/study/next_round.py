@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sandmould.definition.study import Study
 from sandmould.statistics.agreement import sweep_part
 from sandmould.study.collect import read_summary, swept_keys
-from sandmould.study.definition.study import Study
 from sandmould.study.rounds.decide import decision_text, next_runs
 from sandmould.study.rounds.round_log import RoundLog, read_rounds, write_rounds
 

@@ -1,4 +1,4 @@
-// Films of the runs: unpacks what sandmould/report/animation.py packed, and draws it.
+// Films of the runs: unpacks what sandmould/drawing/animation.py packed, and draws it.
 {
   const byId = (id) => document.getElementById(id);
   const canvas = byId("film-canvas"), slider = byId("film-slider"), play = byId("film-play");

@@ -1,4 +1,4 @@
-// What films are packed as by sandmould/report/animation.py.
+// What films are packed as by sandmould/drawing/animation.py.
 async function inflate(data) {
   const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));

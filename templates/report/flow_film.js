@@ -1,4 +1,4 @@
-// Films of metal: unpacks what sandmould/report/flow_film.py packed, and draws it.
+// Films of metal: unpacks what sandmould/drawing/flow_film.py packed, and draws it.
 {
   const byId = (id) => document.getElementById(id);
   const canvas = byId("flow-canvas"), slider = byId("flow-slider"), play = byId("flow-play");

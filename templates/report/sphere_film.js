@@ -1,4 +1,4 @@
-// The 3D view of the page: unpacks what sandmould/report/sphere_film.py packed; turn, zoom, cut, colour.
+// The 3D view of the page: unpacks what sandmould/drawing/sphere_film.py packed; turn, zoom, cut, colour.
 {
   const byId = (id) => document.getElementById(id);
   const canvas = byId("film-canvas"), slider = byId("film-slider"), play = byId("film-play");

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sandmould.scenario.geometry import Block
-from sandmould.scenario.mesh import TriangleMesh
+from sandmould.geometry.geometry import Block
+from sandmould.geometry.mesh import TriangleMesh
 from tests.bracket import bracket
 
 CUBE = Block("cube", np.array([0.5, 0.5, 0.5]), np.array([0.5, 0.5, 0.5]), np.eye(3))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 

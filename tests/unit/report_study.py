@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from sandmould.definition.run import Run
 from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.box import Box, Tube
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.definition.run import Run
 from sandmould.study.plan.plan_files import write_plan
 
 KEY = "vibration.0.frequency_hz"

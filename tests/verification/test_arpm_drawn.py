@@ -21,10 +21,10 @@ from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Cut, Raster, painted
 from sandmould.casting.arpm.solidification import SolidificationResult, solidify
+from sandmould.geometry.geometry import Block
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 from sandmould.scenario.casting_shapes import Body, Pixels
-from sandmould.scenario.geometry import Block
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
 from tests.radial_casting import lumped_s, radial_frozen_s
 
 STEEL = ThermalMaterial("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)

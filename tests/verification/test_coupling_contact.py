@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.typing import NDArray
-from sandmould.kinds.sand.bending import verdict_of
 
 from sandmould.engines.driver import Driver
+from sandmould.kinds.sand.bending import verdict_of
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.loop_verdict import classify_loop

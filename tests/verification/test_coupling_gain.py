@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from pattern_fe.coupling.gain import Gain, measure_gain
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from sandmould.pattern_fe.coupling.gain import Gain, measure_gain
 from tests.patterns import _one_thread  # noqa: F401
 from tests.verification.one_grain import RADIUS_M
 from tests.wedge import (

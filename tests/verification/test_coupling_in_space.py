@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from pattern_fe.coupling.foam_body import cross
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.loop_verdict import classify_loop
-from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.pattern import Pattern
-from pattern_fe.scene import pattern_of
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from sandmould.pattern_fe.coupling.foam_body import cross
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.loop_verdict import classify_loop
+from sandmould.pattern_fe.coupling.opening import open_coupled
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import _one_thread  # noqa: F401

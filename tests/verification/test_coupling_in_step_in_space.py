@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.contact_rows import ContactRows, products_over
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from pattern_fe.coupling.explicit_foam import ContactBound
-from pattern_fe.coupling.loop_verdict import classify_loop
-from pattern_fe.coupling.selective_mass import selective_mass
-from pattern_fe.scene import pattern_of
+from sandmould.pattern_fe.coupling.contact_rows import ContactRows, products_over
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from sandmould.pattern_fe.coupling.explicit_foam import ContactBound
+from sandmould.pattern_fe.coupling.loop_verdict import classify_loop
+from sandmould.pattern_fe.coupling.selective_mass import selective_mass
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import _one_thread  # noqa: F401
 from tests.verification.test_coupling_in_space import opened, plank_scene

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.loop_verdict import classify_loop
-from pattern_fe.coupling.opening import open_coupled
 from sandmould.engines.driver import Driver
 from sandmould.engines.liggghts.bending_mesh import BendingMesh
 from sandmould.engines.liggghts.mesh_files import outline_strips
 from sandmould.engines.liggghts.vtk_stress import TriangleLoads
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.loop_verdict import classify_loop
+from sandmould.pattern_fe.coupling.opening import open_coupled
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import needs_liggghts

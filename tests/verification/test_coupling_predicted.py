@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.gain import measure_gain
-from pattern_fe.coupling.gain_prediction import predicted_gain
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop
-from pattern_fe.coupling.session import CoupledSession
-from pattern_fe.scene import pattern_of
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.step_counts import StepCounts
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.coupling.gain import measure_gain
+from sandmould.pattern_fe.coupling.gain_prediction import predicted_gain
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop
+from sandmould.pattern_fe.coupling.session import CoupledSession
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import _one_thread  # noqa: F401
 

@@ -9,18 +9,18 @@ import pytest
 from numpy.typing import NDArray
 from skfem import MeshQuad
 
-from pattern_fe.contact import _least_squares, reactions_n
-from pattern_fe.coupling.body import StaticSolution
-from pattern_fe.coupling.contact_rows import ContactRows
-from pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
-from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.foam_step import step_foam
-from pattern_fe.coupling.in_step_foam import InStepFoam
-from pattern_fe.material import Foam
-from pattern_fe.pattern import Pattern
-from pattern_fe.shapes import bar, mesh_of, with_sides
-from pattern_fe.supports import Supports
-from pattern_fe.surroundings import Surroundings
+from sandmould.pattern_fe.contact import _least_squares, reactions_n
+from sandmould.pattern_fe.coupling.body import StaticSolution
+from sandmould.pattern_fe.coupling.contact_rows import ContactRows
+from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.coupling.foam_step import step_foam
+from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
+from sandmould.pattern_fe.material import Foam
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.shapes import bar, mesh_of, with_sides
+from sandmould.pattern_fe.supports import Supports
+from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.scenario.box import AnyObstacle, Box, Plate, Polygon, build_scene
 from sandmould.scenario.solids import Cylinder
 from tests.patterns import THICKNESS_M, _one_thread  # noqa: F401

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sandmould.dem.surfaces import Surfaces
-from tests.unit.scenario.test_mesh_union import Part, box, mesh_of
+from tests.unit.geometry.test_mesh_union import Part, box, mesh_of
 from tests.verification.probe import LAW, RADIUS_M, STEP_S, Probe
 
 MM = 1e-3

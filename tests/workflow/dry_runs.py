@@ -17,8 +17,8 @@ from sandmould import ROOT
 _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(
     [
-        "snakemake.api", "snakemake.cli", "snakemake.workflow", "sandmould.study.run_study",
-        *(f"sandmould.study.kinds.{kind}.planning" for kind in ("sand", "flow", "solidification")),
+        "snakemake.api", "snakemake.cli", "snakemake.workflow", "sandmould.execution.run_study",
+        *(f"sandmould.kinds.{kind}.planning" for kind in ("sand", "flow", "solidification")),
         __name__,
     ]
 )  # fmt: skip

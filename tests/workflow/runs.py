@@ -13,19 +13,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from sandmould.definition.run import Run
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.execution.simulate import render_run
+from sandmould.kinds.sand.execution import EXECUTION
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import RunOutcome
 from sandmould.runs.products import finish
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.sand.execution import EXECUTION
 from sandmould.study.plan.plan_files import write_plan
-from sandmould.study.simulate import render_run
 
 SOON: dict[str, Any] = {"rms_speed_m_s": 0.05, "load_tolerance": 0.1, "checks": 3}
 """Rest that a bed finds soon, in a third of the steps: for runs asked about other things."""
@@ -41,7 +41,7 @@ def run_folder(scenario: Scenario, folder: Path) -> Path:
 
 def simulating(folder: Path) -> list[str]:
     """Give the command that computes a run."""
-    return [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
+    return [sys.executable, "-m", "sandmould.execution.simulate", str(folder)]
 
 
 def simulate(folder: Path, largest_file_bytes: int | None = None) -> int:

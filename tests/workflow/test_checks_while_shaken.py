@@ -9,18 +9,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.definition.run import Run
 from sandmould.engines.registry import engine_problem
 from sandmould.engines.step_counts import StepCounts
+from sandmould.kinds.sand.planning import PLANNING
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
+from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.checks import problems
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.sand.planning import PLANNING
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKEN_HZ, _shaken
-from sandmould.study.run_tables import read_costs
 from tests.scenes import tube_scene
 from tests.workflow.runs import SOON, kill_after_a_checkpoint, last_snapshot, run_folder
 from tests.workflow.test_shared_fill import REFERENCE, assert_same, compute

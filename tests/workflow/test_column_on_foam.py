@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.opening import open_coupled
+from sandmould.bad_input import BadInputError
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
+from sandmould.kinds.sand import planning
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.opening import open_coupled
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand import planning
 from tests.patterns import _one_thread  # noqa: F401
 from tests.workflow.runs import last_snapshot
 

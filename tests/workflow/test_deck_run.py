@@ -13,12 +13,12 @@ from typing import Any
 import pandas as pd
 import yaml
 
+from sandmould.execution.simulate import measure_run, render_run, simulate
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import write_plan
-from sandmould.study.run_tables import read_costs
-from sandmould.study.simulate import measure_run, render_run, simulate
 
 FALLING = """\
 {% if restart %}
@@ -106,7 +106,7 @@ def compute(folder: Path) -> int:
 
 
 def _command(folder: Path) -> list[str]:
-    return [sys.executable, "-m", "sandmould.study.simulate", str(folder)]
+    return [sys.executable, "-m", "sandmould.execution.simulate", str(folder)]
 
 
 LAMMPS = {

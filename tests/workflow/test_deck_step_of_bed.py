@@ -21,9 +21,9 @@ from sandmould.engines.program import build_program
 from sandmould.engines.session import Array
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT
 from sandmould.runs.outcome import Outcome
+from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import TimeStep
-from sandmould.study.run_tables import read_costs
 from tests.hopper import hopper_scene
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts, open_liggghts
 from tests.scenes import open_lammps, tube_scene

@@ -14,10 +14,10 @@ import pytest
 
 from sandmould.engines.driver import Driver
 from sandmould.engines.session import Session
+from sandmould.kinds.sand.measure import write_measures
 from sandmould.runs.checkpoint_folders import newest_checkpoint
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.placement import NOMINAL_FRACTION, filled_measure
-from sandmould.study.kinds.sand.measure import write_measures
 from sandmould.study.plan.plan_files import read_run
 from tests.hopper import (
     BOX_WIDTH_M,

@@ -15,7 +15,7 @@ import yaml
 
 from sandmould import ROOT
 from sandmould.cli.commands import app
-from sandmould.study.cluster.settings import read_cluster
+from sandmould.execution.cluster.settings import read_cluster
 from sandmould.study.plan.build_plan import open_plan
 from tests.workflow.pages import BLOCK, PAGES, blocks
 

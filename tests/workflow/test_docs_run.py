@@ -15,10 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sandmould.kinds.sand import speed
-from sandmould.kinds.sand.speed import SPEED
 
 from sandmould.cli.study_file import study_file
+from sandmould.kinds.sand import speed
+from sandmould.kinds.sand.speed import SPEED
 from sandmould.study.plan.build_plan import open_plan
 from tests.workflow.pages import PAGES, blocks
 

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BAD_INPUT_EXIT, BadInputError
-from sandmould.study import run_study
+from sandmould.bad_input import BAD_INPUT_EXIT, BadInputError
+from sandmould.execution import run_study
 from sandmould.study.plan import trust
 from sandmould.study.plan.load_study import open_study
 from tests.scenes import open_lammps, tube_scene

@@ -13,7 +13,7 @@ from sandmould.engines.liggghts.render import write_deck
 from sandmould.engines.program import build_program
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.run_tables import read_costs
+from sandmould.runs.run_tables import read_costs
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.workflow.runs import (
     computed,

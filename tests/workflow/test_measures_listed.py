@@ -8,6 +8,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from sandmould.definition.run import Run
+from sandmould.execution.simulate import measure_run, render_run, simulate
+from sandmould.kinds.registry import kind_of
 from sandmould.runs.columns import CLOCK
 from sandmould.runs.measures import measures_of
 from sandmould.scenario.flow import MetalFlow
@@ -15,10 +18,7 @@ from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solidification import Solidification
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.plan_files import write_plan
-from sandmould.study.simulate import measure_run, render_run, simulate
 from tests.hopper import DEEP, hopper_scene
 from tests.instep import bed_scene
 from tests.scenes import tube_scene

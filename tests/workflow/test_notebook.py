@@ -12,7 +12,7 @@ import yaml
 
 import sandmould
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
 from sandmould.study.plan.build_plan import open_plan
 from tests.undescribed import undescribed
 from tests.workflow.pages import PAGES, blocks

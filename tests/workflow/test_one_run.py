@@ -17,10 +17,10 @@ from sandmould.engines.program import build_program
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.engines.step_mover import StepMover
+from sandmould.execution.process import _folder_lock, launch
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.process import _folder_lock, launch
-from sandmould.study.run_tables import read_costs
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import computed, drive, last_snapshot, run_folder
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.opening import open_coupled
 from sandmould.engines.deck import Deck
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.snapshot import Snapshot
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.opening import open_coupled
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts

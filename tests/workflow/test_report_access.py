@@ -14,7 +14,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
-from sandmould.report import figures
+from sandmould.drawing import figures
 from sandmould.report.page import write_report
 from sandmould.report.scene_page import draw_scene_file
 from sandmould.scenario.fill import Fill, Layer

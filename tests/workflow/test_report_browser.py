@@ -20,7 +20,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
-from sandmould.report import figures, sphere_film
+from sandmould.drawing import figures, sphere_film
 from sandmould.report.page import write_report
 from sandmould.report.scene_page import draw_scene_file
 from sandmould.scenario.fill import Fill, Layer

@@ -12,13 +12,13 @@ from sandmould import ROOT
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
 from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.execution.process import RESTARTABLE_EXIT
 from sandmould.runs.checkpoint_folders import newest_checkpoint
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.process import RESTARTABLE_EXIT
-from sandmould.study.run_tables import read_costs
 from tests.scenes import open_lammps, tube_scene
 from tests.workflow.runs import (
     SOON,

@@ -17,27 +17,27 @@ import pandas as pd
 import pytest
 import yaml
 
-from pattern_fe.coupling.interface import with_surface
+from sandmould.definition.run import FILLS, Run
 from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.execution.again import _failed_fill
+from sandmould.execution.batch_job import compute_batch
+from sandmould.execution.packs import recorded
+from sandmould.execution.packs.pack import pack
+from sandmould.execution.packs.unpack import unpack
+from sandmould.execution.process import launch
+from sandmould.execution.simulate import render_run, simulate
+from sandmould.execution.status import status_text
+from sandmould.kinds.sand.planning import PLANNING
+from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT, read_mark, seal
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.again import _failed_fill
-from sandmould.study.batch_job import compute_batch
 from sandmould.study.collect import collect
-from sandmould.study.definition.run import FILLS, Run
-from sandmould.study.kinds.sand.planning import PLANNING
-from sandmould.study.packs import recorded
-from sandmould.study.packs.pack import pack
-from sandmould.study.packs.unpack import unpack
 from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan, prepare
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run, write_plan
-from sandmould.study.process import launch
-from sandmould.study.run_tables import read_costs
-from sandmould.study.simulate import render_run, simulate
-from sandmould.study.status import status_text
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.patterns import _one_thread  # noqa: F401
 from tests.scenes import TUBE_SCENE, tube_scene

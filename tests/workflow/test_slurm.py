@@ -14,8 +14,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sandmould.study.forked import PROCESS_NAME
-from sandmould.study.run_tables import read_costs
+from sandmould.execution.forked import PROCESS_NAME
+from sandmould.runs.run_tables import read_costs
 from tests.workflow.slurm_node import SlurmNode, missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=f"needs Debian's slurmd: {missing()}")

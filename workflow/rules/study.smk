@@ -7,10 +7,10 @@ import sys
 from sandmould import SHIPPED
 from sandmould.runs.columns import SWEEP
 from sandmould.runs.words import say
-from sandmould.scenario.bad_input import BAD_INPUT_EXIT, BadInputError
-from sandmould.study.cluster.settings import goes_to_slurm, may_be_elsewhere
-from sandmould.study.cluster.submission import open_submission
-from sandmould.study.packs.recorded import take_up
+from sandmould.bad_input import BAD_INPUT_EXIT, BadInputError
+from sandmould.execution.cluster.settings import goes_to_slurm, may_be_elsewhere
+from sandmould.execution.cluster.submission import open_submission
+from sandmould.execution.packs.recorded import take_up
 from sandmould.study.plan.batches import alone
 from sandmould.study.plan.build_plan import (
     RESULTS,
@@ -22,8 +22,8 @@ from sandmould.study.plan.build_plan import (
 from sandmould.study.plan.plan_files import CHECKS as CHECK_TABLES
 from sandmould.study.plan.handover import plan_of
 from sandmould.study.plan.lacking import Need, notes_of
-from sandmould.study.process import take_turn
-from sandmould.study.definition.run import FILL, RUN_NAME
+from sandmould.execution.process import take_turn
+from sandmould.definition.run import FILL, RUN_NAME
 
 OVERRIDES = dict(workflow.config_settings.config)
 # Set by a profile: how long a job should last at least, where jobs cost more than short runs, how

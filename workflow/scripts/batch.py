@@ -1,7 +1,7 @@
 """Compute and measure several runs in one job."""
 
 import sandmould.runs.silent_interrupt  # noqa: F401
-from sandmould.study.standby import do_job
+from sandmould.execution.standby import do_job
 
 do_job(
     "compute_batch",

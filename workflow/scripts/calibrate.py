@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import sandmould.runs.silent_interrupt  # noqa: F401
+from sandmould.execution.job_log import to_log
 from sandmould.study.calibration.run import write_calibration
-from sandmould.study.job_log import to_log
 from sandmould.study.plan.load_study import CALIBRATED
 
 with to_log(snakemake.log[0]):

@@ -1,7 +1,7 @@
 """Compute one run in a process of its own."""
 
 import sandmould.runs.silent_interrupt  # noqa: F401
-from sandmould.study.standby import do_job
+from sandmould.execution.standby import do_job
 
 do_job(
     "simulate_run",

@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from sandmould import ROOT
-from sandmould.casting.arpm import scene
+from sandmould.casting.arpm import scene, source_hash
+from sandmould.casting.arpm import source_files as source_files
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.estimates import least_sand_share
 from sandmould.casting.arpm.filling import Filling
@@ -25,7 +24,6 @@ from sandmould.casting.arpm.solidification import (
     UnstableError,
     solidify,
 )
-from sandmould.digest import code_digest
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -50,34 +48,6 @@ class ElementCost(Cost):
         names = ("engine", "version", "ranks", "elements", "element_steps", "time_step_s",
                  "wall_s", "engine_wall_s", "cpu_s", "peak_memory_bytes")  # fmt: skip
         return {name: getattr(self, name) for name in names} | {"element_steps_per_s": rate}
-
-
-def source_files() -> list[Path]:
-    """Files of the solver, and those of the scenario that compute for it."""
-    shared = (
-        ROOT / "sandmould" / "scenario" / name
-        for name in (
-            "casting_shapes.py",
-            "geometry.py",
-            "mesh.py",
-            "mesh_cuts.py",
-            "mesh_file.py",
-            "mesh_search.py",
-            "mesh_shells.py",
-            "mesh_union.py",
-            "mesh_winding.py",
-            "outline.py",
-            "plane_triangulation.py",
-            "solidification.py",
-            "solids.py",
-        )
-    )
-    return sorted([*Path(__file__).parent.glob("*.py"), *shared])
-
-
-def source_hash() -> str:
-    """State of the solver, which stands in place of a version."""
-    return code_digest(source_files(), version("numba"))
 
 
 def computed_hash(scenario: Solidification) -> str:

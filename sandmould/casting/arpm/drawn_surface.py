@@ -8,10 +8,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from sandmould.arrays import Flags, Floats, Ints
+from sandmould.geometry.geometry import Block
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 from sandmould.scenario.casting_shapes import Body, Pixels
-from sandmould.scenario.geometry import Block
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
 
 SMOOTH_PIXELS = 2.0
 """Standard deviation over which the direction of a picture's edge is taken: a staircase of pixels

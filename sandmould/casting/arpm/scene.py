@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.bad_input import BadInputError, Problem
 from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.estimates import Cooled, cooled, freezes_s
@@ -18,7 +19,6 @@ from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.super_steps import STAGES
-from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.casting_shapes import Body, Rectangle, solid_of
 from sandmould.scenario.solidification import Solidification
 

@@ -6,18 +6,16 @@ import contextlib
 import math
 import time
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sandmould import ROOT
-from sandmould.casting.mps import scene
+from sandmould.casting.mps import scene, source_hash
+from sandmould.casting.mps import source_files as source_files
 from sandmould.casting.mps.flow import EscapedError, Flow, FlowProgress
 from sandmould.casting.mps.pressure import ClosedRegionError
 from sandmould.casting.mps.record import OF_FLUID, FlowRecord
-from sandmould.digest import code_digest
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -47,17 +45,6 @@ class FlowCost(Cost):
                  "poisson_iterations", "solver_fraction", "time_step_s", "wall_s", "engine_wall_s",
                  "cpu_s", "peak_memory_bytes")  # fmt: skip
         return {name: getattr(self, name) for name in names} | {"particle_solves_per_s": rate}
-
-
-def source_files() -> list[Path]:
-    """Files of the solver, and those of the scenario that compute for it."""
-    shared = (ROOT / "sandmould" / "scenario" / name for name in ("flow.py",))
-    return sorted([*Path(__file__).parent.glob("*.py"), *shared])
-
-
-def source_hash() -> str:
-    """State of the solver, which stands in place of a version."""
-    return code_digest(source_files(), version("numba"))
 
 
 def computed_hash(scenario: MetalFlow) -> str:

@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from sandmould.bad_input import Problem
 from sandmould.casting.mps.flow import Flow, solves
 from sandmould.casting.mps.particles import Floats
 from sandmould.casting.mps.scheme import VISCOUS_SHARE, LiquidMetal, Scheme
@@ -22,7 +23,6 @@ from sandmould.casting.mps.shoulder import (
     stream,
 )
 from sandmould.casting.mps.tank import open_tank
-from sandmould.scenario.bad_input import Problem
 from sandmould.scenario.flow import MetalFlow, PressureProbe, ShoulderedCylinder, StillTank
 
 FEWEST = 4

@@ -22,6 +22,7 @@ from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 2.5e6
 RANKS = Ranks.PROCESSES
+RUNS_ITS_DECK = True
 CAPABILITIES = Capabilities(
     bends_meshes=(2, 3),
     bends_in_frames=("box", "laboratory"),
@@ -54,14 +55,14 @@ def installation_problem() -> str | None:
     return None
 
 
-def session_sources(scenario: Scenario) -> list[Path]:
+def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The session, and our solver where LAMMPS is given forces of surfaces and damping by it."""
     here = Path(__file__).parent
-    session = [here / "session.py", here / "wall_loads.py", *sources_of_step(scenario)]
+    session = [[here / "session.py", here / "wall_loads.py"], *sources_of_step(scenario)]
     if not needs_callback(scenario):
         return session
     callback = [here / name for name in ("bridge.py", "callback.py", "surface_kernel.py")]
-    return [*source_files(), *session, *callback, here.parent / "solid_surfaces.py"]
+    return [*session, source_files(), [*callback, here.parent / "solid_surfaces.py"]]
 
 
 def load_session(scenario: Scenario) -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sandmould.engines.deck import exact, vector
-from sandmould.scenario.geometry import Block, Wall
+from sandmould.geometry.geometry import Block, Wall
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import Shaking
 

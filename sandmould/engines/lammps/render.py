@@ -17,7 +17,7 @@ from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.dashpots import Dashpots
 from sandmould.engines.lammps.near_grains import NearGrains
 from sandmould.engines.program import Program
-from sandmould.scenario.geometry import Array, Block
+from sandmould.geometry.geometry import Array, Block
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 

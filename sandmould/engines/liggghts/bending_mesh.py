@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sandmould.engines.liggghts.vtk_stress import TriangleLoads
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 from sandmould.scenario.scenario import Scenario
 
 

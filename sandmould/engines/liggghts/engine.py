@@ -19,6 +19,7 @@ from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 3e6
 RANKS = Ranks.ONE
+RUNS_ITS_DECK = True
 CAPABILITIES = Capabilities(
     bends_meshes=(2,),
     bends_in_frames=("box",),
@@ -52,12 +53,12 @@ def _numbers(version: str) -> list[int]:
     return [int(part) for part in version.split(".")]
 
 
-def session_sources(scenario: Scenario) -> list[Path]:
+def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The session and the files that pass between it and the engine."""
     names = ("session.py", "process.py", "grains_file.py", "mesh_files.py", "bending_mesh.py",
              "vtk_stress.py")  # fmt: skip
     session = [Path(__file__).with_name(name) for name in names]
-    return [*session, *sources_of_step(scenario)]
+    return [session, *sources_of_step(scenario)]
 
 
 def load_session(scenario: Scenario) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 
 _HEADER = struct.Struct("=qq7i6dii")
 """Step, rows, triclinic, six kinds of boundary, six bounds, columns, processors."""

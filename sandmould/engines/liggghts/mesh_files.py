@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sandmould.scenario.geometry import Array, Block, Wall
-from sandmould.scenario.outline import signed_area_m2
+from sandmould.geometry.geometry import Array, Block, Wall
+from sandmould.geometry.outline import signed_area_m2
 from sandmould.scenario.scenario import Scenario
 
 LONGEST_OVER_WIDE = 20.0

@@ -22,7 +22,7 @@ from sandmould.engines.liggghts.mesh_files import (
     write_stl,
 )
 from sandmould.engines.program import Program
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 
 
 @dataclass(frozen=True)

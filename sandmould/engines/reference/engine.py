@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 GRAIN_STEPS_PER_S = 1.5e7
 RANKS = Ranks.THREADS
+RUNS_ITS_DECK = False
 _LAWS = (("grain", "contact.grain_grain"), ("wall", "contact.grain_wall"))
 
 CAPABILITIES = Capabilities(
@@ -54,12 +55,12 @@ def refuse(scenario: Scenario) -> None:
     """Refuse nothing: every term of the paper is there."""
 
 
-def session_sources(scenario: Scenario) -> list[Path]:
+def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The solver, and how it is given a scene."""
     here = Path(__file__).parent
     session = [here / name for name in ("model.py", "moved_solver.py", "session.py")]
     shared = [here.parent / name for name in ("solid_surfaces.py", "table_drive.py")]
-    return [*source_files(), *session, *shared]
+    return [source_files(), [*session, *shared]]
 
 
 def render_deck(program: Program, sources: Mapping[str, str], run: str, study: str) -> Deck:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sandmould.report.figure_files import numbered, pictures
+from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.report.flow import flow_method, flow_pages
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.scenario.flow import MetalFlow, StillTank

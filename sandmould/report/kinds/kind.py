@@ -9,8 +9,10 @@ from typing import Any, Generic
 
 import pandas as pd
 
+from sandmould.definition.study import Study
+from sandmould.drawing.chart import Chart
+from sandmould.kinds.kind import ScenarioT
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.chart import Chart
 from sandmould.report.heaps import Heap
 from sandmould.report.method import Row
 from sandmould.report.next_steps import NextStep
@@ -18,8 +20,6 @@ from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sureness import Ground
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import ScenarioT
 
 
 @dataclass(frozen=True)

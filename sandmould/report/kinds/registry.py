@@ -8,6 +8,9 @@ from typing import Any, cast
 
 import pandas as pd
 
+from sandmould.definition.study import Study
+from sandmould.kinds.kind import AnyScenario, ScenarioT
+from sandmould.kinds.registry import kind_of
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.drive import drive_of
 from sandmould.report.heaps import Heap
@@ -21,9 +24,6 @@ from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import AnyScenario, ScenarioT
-from sandmould.study.kinds.registry import kind_of
 
 REPORTS: dict[str, KindReport[Any]] = {
     "sand": SAND_REPORT,

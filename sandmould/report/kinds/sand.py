@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from sandmould.drawing.chart import Chart
+from sandmould.drawing.figure_files import pictures, strip
+from sandmould.kinds.sand.hardness_text import softness_warning
 from sandmould.report.bed_mode import bed_mode
-from sandmould.report.chart import Chart
-from sandmould.report.figure_files import pictures, strip
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.hard_limit_text import hard_limit_text
 from sandmould.report.heaps import steepest_heaps
@@ -25,7 +26,6 @@ from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import sand_notes
 from sandmould.study.collect import Collected
-from sandmould.study.kinds.sand.hardness_text import softness_warning
 
 if TYPE_CHECKING:
     from sandmould.report.bending import BendingPages

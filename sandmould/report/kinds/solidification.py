@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pandas as pd
 
-from sandmould.report.figure_files import numbered, pictures
+from sandmould.drawing.figure_files import numbered, pictures
+from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.next_steps import NextStep
 from sandmould.report.solidification import choose_pictured_run, solid_method, solid_pages
@@ -12,7 +13,6 @@ from sandmould.report.time_series import curve_figures
 from sandmould.scenario.solidification import Solidification
 from sandmould.statistics.verdict import Verdict, rank_runs
 from sandmould.study.collect import Collected
-from sandmould.study.kinds.solidification.kind import SolidificationStudy
 
 
 def _solidification_notes(

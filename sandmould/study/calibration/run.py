@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from sandmould.definition.study import Study
 from sandmould.runs.columns import RUN
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.calibration.sands import Calibrated, calibrate, write_materials
 from sandmould.study.collect import read_study, read_summary, swept_keys
-from sandmould.study.definition.study import Study
 from sandmould.study.plan.plan_files import read_run
 
 

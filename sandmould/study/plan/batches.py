@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from sandmould.study.definition.run import FILL, FILLS, LAST_MEASURED, Run
-from sandmould.study.kinds.registry import kind_of
+from sandmould.definition.run import FILL, FILLS, LAST_MEASURED, Run
+from sandmould.kinds.registry import kind_of
 from sandmould.study.plan.fills import predicted_s
 
 START_S = 0.3

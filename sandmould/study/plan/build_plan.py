@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sandmould import SHIPPED
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.definition.certificate import provisional_hz
+from sandmould.definition.comparing import ENGINE
+from sandmould.definition.run import Run
+from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
+from sandmould.kinds.registry import kind_named
 from sandmould.runs.words import say
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.definition.certificate import provisional_hz
-from sandmould.study.definition.comparing import ENGINE
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
-from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.batches import Batch, mark_done, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.fills import share_fills

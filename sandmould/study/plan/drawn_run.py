@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.definition.run import Run
 from sandmould.runs.formatting import listed
-from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.definition.run import Run
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
 

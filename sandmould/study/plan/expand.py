@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.definition.certificate import frequency_key, spanned_hz
+from sandmould.definition.comparing import ENGINE
+from sandmould.definition.run import Part, Run
+from sandmould.definition.sweep import Point, points, value_at
+from sandmould.kinds.kind import AnyScenario
+from sandmould.kinds.registry import kind_named
 from sandmould.runs.columns import CROSS_CHECK, CROSS_CHECK_OWN
 from sandmould.runs.hashing import scenario_hash
-from sandmould.scenario.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.definition.certificate import frequency_key, spanned_hz
-from sandmould.study.definition.comparing import ENGINE
-from sandmould.study.definition.run import Part, Run
-from sandmould.study.definition.sweep import Point, points, value_at
-from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.labels import Labels, letters
 from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.plan.measured import problems as measure_problems

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from sandmould.definition.run import FILL, Run
+from sandmould.kinds.kind import Planning
+from sandmould.kinds.registry import kind_of
 from sandmould.runs.hashing import scenario_hash
-from sandmould.study.definition.run import FILL, Run
-from sandmould.study.kinds.kind import Planning
-from sandmould.study.kinds.registry import kind_of
 
 LEAST_RUNS = 2
 """A fill that one run needs is computed by that run."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
+from sandmould.definition.comparing import ENGINE
+from sandmould.definition.sweep import Point
 from sandmould.runs.formatting import mark
 from sandmould.scenario.quantity import Section, fields_at
-from sandmould.study.definition.comparing import ENGINE
-from sandmould.study.definition.sweep import Point
 
 
 class Labels:

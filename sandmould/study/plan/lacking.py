@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from enum import IntEnum
 from pathlib import Path
 
+from sandmould.definition.run import FILL, LAST_MEASURED, Run
+from sandmould.kinds.registry import kind_of
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT, read_mark
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import scenario_hash
@@ -23,8 +25,6 @@ from sandmould.runs.manifest import (
     read_origin,
 )
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.definition.run import FILL, LAST_MEASURED, Run
-from sandmould.study.kinds.registry import kind_of
 
 UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError)
 """What reading a broken file may raise."""

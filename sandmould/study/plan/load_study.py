@@ -14,11 +14,8 @@ from typing import Any
 from pydantic import BaseModel
 
 from sandmould import ROOT, SHIPPED
-from sandmould.scenario.bad_input import BadInputError, Problem, display_path
-from sandmould.scenario.quantity import NAME, units_at
-from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
-from sandmould.scenario.units import in_unit
-from sandmould.study.definition import (
+from sandmould.bad_input import BadInputError, Problem, display_path
+from sandmould.definition import (
     calibration,
     certificate,
     comparing,
@@ -26,9 +23,12 @@ from sandmould.study.definition import (
     refinement,
     sweep,
 )
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import Kind
-from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named
+from sandmould.definition.study import Study
+from sandmould.kinds.kind import Kind
+from sandmould.kinds.registry import DEFAULT_KIND, KINDS, kind_named
+from sandmould.scenario.quantity import NAME, units_at
+from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
+from sandmould.scenario.units import in_unit
 
 STUDIES = (SHIPPED / "config" / "studies", SHIPPED / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from sandmould.bad_input import Problem
+from sandmould.definition import own_measures
+from sandmould.definition.study import Study
+from sandmould.kinds.kind import AnyScenario, Kind
 from sandmould.runs.measures import Measure, measures_of
-from sandmould.scenario.bad_input import Problem
 from sandmould.statistics.config import Objective
-from sandmould.study.definition import own_measures
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import AnyScenario, Kind
 
 NEAREST = 3
 

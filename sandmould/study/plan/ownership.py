@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from sandmould import SHIPPED
+from sandmould.bad_input import BadInputError, Problem
 from sandmould.runs.files import write_text
-from sandmould.scenario.bad_input import BadInputError, Problem
 
 OWNER_FILE = "study_file.txt"
 """In the folder of a study's results: the study's file as seen from the working folder."""

@@ -11,16 +11,16 @@ from typing import Any
 import yaml
 from pydantic import create_model
 
+from sandmould.definition.run import FILL, Part, Run
+from sandmould.definition.study import Study
+from sandmould.kinds.kind import Note
+from sandmould.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import size_text
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, read_planned, validated
 from sandmould.statistics.control_case import SPRINGS
-from sandmould.study.definition.run import FILL, Part, Run
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.kind import Note
-from sandmould.study.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
 from sandmould.study.plan.price import Prices, study_s
 
 STUDY_FILE = "study.yaml"

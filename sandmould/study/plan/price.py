@@ -10,11 +10,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from sandmould.definition.run import Run
+from sandmould.kinds.kind import CORE_SECONDS, SpeedClass
+from sandmould.kinds.registry import kind_of
 from sandmould.runs.columns import WALL_S
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import CORE_SECONDS, SpeedClass
-from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.fills import own_work, predicted_s
 
@@ -121,7 +121,7 @@ def _class_of(run: Run) -> SpeedClass:
 
 def computed_wall_s(folder: Path) -> float:
     """Wall time that a finished run's computation took; NaN where it failed or none is written."""
-    from sandmould.study.run_tables import read_costs  # pandas: no start waits for it
+    from sandmould.runs.run_tables import read_costs  # pandas: no start waits for it
 
     with contextlib.suppress(*_DAMAGED):
         if RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sandmould import ROOT
+from sandmould.bad_input import BadInputError, Problem, display_path
+from sandmould.definition.run import Run
+from sandmould.kinds.kind import AnyScenario
+from sandmould.kinds.registry import kind_named
 from sandmould.runs.formatting import listed
-from sandmould.scenario.bad_input import BadInputError, Problem, display_path
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import AnyScenario
-from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.load_study import OpenStudy
 
 

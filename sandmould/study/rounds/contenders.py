@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from sandmould.definition.study import Study
+from sandmould.definition.sweep import Point
 from sandmould.runs.columns import REPLICATE
 from sandmould.runs.formatting import number
 from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings
-from sandmould.study.definition.study import Study
-from sandmould.study.definition.sweep import Point
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import pandas as pd
 
+from sandmould.definition.certificate import round_best_hz
+from sandmould.definition.refinement import Refinement
+from sandmould.definition.study import Study
+from sandmould.definition.sweep import is_whole, points
 from sandmould.runs.columns import CPU_S, REPLICATE, total_s
 from sandmould.runs.formatting import listed, name_of, number, setting_text, unit_of
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
-from sandmould.study.definition.certificate import round_best_hz
-from sandmould.study.definition.refinement import Refinement
-from sandmould.study.definition.study import Study
-from sandmould.study.definition.sweep import is_whole, points
 from sandmould.study.rounds.contenders import find_contenders, why_decided
 from sandmould.study.rounds.round_log import Round, RoundLog
 

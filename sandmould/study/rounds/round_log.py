@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.definition.study import Study
+from sandmould.definition.sweep import Point
 from sandmould.digest import digest
 from sandmould.runs.files import write_text
-from sandmould.runs.hashing import present
-from sandmould.scenario.bad_input import BadInputError, Problem
-from sandmould.study.definition.study import Study
-from sandmould.study.definition.sweep import Point
+from sandmould.runs.hashing import said
 
 ROUNDS_FILE = "rounds.json"
 
@@ -51,9 +51,8 @@ class RoundLog:
 
 def basis_of(study: Study) -> str:
     """Hash of what a study's rounds rest on: its scene, its objective and which keys it sweeps."""
-    tree = study.model_dump(mode="json", include={"scenario", "objective"})
-    text = json.dumps([present(tree), study.sweep.swept], sort_keys=True)
-    return digest(text)
+    rests_on = [said(study.scenario), said(study.objective), study.sweep.swept]
+    return digest(json.dumps(rests_on, sort_keys=True))
 
 
 def read_rounds(folder: Path, study: Study) -> RoundLog:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from analysis.cavity_fill import cavity_fill, cavity_voids
-from analysis.free_space import part_in_solid
-from analysis.intersections import disc_lens_m2
-from sandmould.scenario.geometry import Block, Cavity, Scene, Wall
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
+from sandmould.analysis.cavity_fill import cavity_fill, cavity_voids
+from sandmould.analysis.free_space import part_in_solid
+from sandmould.analysis.intersections import disc_lens_m2
+from sandmould.geometry.geometry import Block, Cavity, Scene, Wall
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 from sandmould.scenario.solids import cylinder_along
 from tests.unit.meshes import FACETS
 

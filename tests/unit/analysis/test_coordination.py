@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from analysis.coordination import contacts
-from sandmould.scenario.geometry import Block, Scene, Wall
-from sandmould.scenario.outline import Outline
-from sandmould.scenario.revolved import Revolved
+from sandmould.analysis.coordination import contacts
+from sandmould.geometry.geometry import Block, Scene, Wall
+from sandmould.geometry.outline import Outline
+from sandmould.geometry.revolved import Revolved
 
 
 def hexagon():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.deflection import deflection, farthest_corner, fill_under
+from sandmould.analysis.deflection import deflection, farthest_corner, fill_under
 
 L_M = np.array([[0, 0], [2, 0], [2, 8], [12, 8], [12, 10], [0, 10]], dtype=float)
 FOOT_M = L_M[:2]

@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.distance import pdist, squareform
 
-from analysis.density import apparent_density
+from sandmould.analysis.density import apparent_density
 from sandmould.engines import neighbours
-from sandmould.scenario.geometry import Block, Scene, Wall
+from sandmould.geometry.geometry import Block, Scene, Wall
 
 RHO = 2400.0
 

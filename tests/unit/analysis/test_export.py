@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from analysis.export import solids_to_vtk, to_ovito, to_vtk
+from sandmould.analysis.export import solids_to_vtk, to_ovito, to_vtk
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.geometry import Block, Scene
-from sandmould.scenario.outline import Outline
-from sandmould.scenario.revolved import Revolved
+from sandmould.geometry.geometry import Block, Scene
+from sandmould.geometry.outline import Outline
+from sandmould.geometry.revolved import Revolved
 
 
 @pytest.fixture(params=[2, 3], ids=["2D", "3D"])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from analysis.layers import layer_table, mixing_index
-from sandmould.scenario.geometry import Bore
+from sandmould.analysis.layers import layer_table, mixing_index
+from sandmould.geometry.geometry import Bore
 
 
 def square_lattice(side):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.loose_zones import SIDES, LooseSand, find_loose_sand
-from sandmould.scenario.geometry import Block, Scene, Wall
+from sandmould.analysis.loose_zones import SIDES, LooseSand, find_loose_sand
+from sandmould.geometry.geometry import Block, Scene, Wall
 
 GRAIN_M = 0.001
 ACROSS, DEEP = 14, 16

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.testing import assert_allclose
 
-from analysis import plots
+from sandmould.analysis import plots
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.geometry import Block, Bore, Scene, Wall
-from sandmould.scenario.outline import Outline
-from sandmould.scenario.revolved import Revolved
+from sandmould.geometry.geometry import Block, Bore, Scene, Wall
+from sandmould.geometry.outline import Outline
+from sandmould.geometry.revolved import Revolved
 
 
 def box(size, blocks=(), bores=()):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.repose import (
+from sandmould.analysis.repose import (
     Surface,
     fit_flank,
     free_surface,

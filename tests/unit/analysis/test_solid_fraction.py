@@ -5,13 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
-from analysis.free_space import free_measure_between
-from analysis.solid_fraction import (
+from sandmould.analysis.free_space import free_measure_between
+from sandmould.analysis.solid_fraction import (
     bed_surface_height_m,
     mean_solid_fraction,
     solid_fraction_profile,
 )
-from sandmould.scenario.geometry import Block, Scene, Wall
+from sandmould.geometry.geometry import Block, Scene, Wall
 
 
 def box(size, blocks=()):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from analysis.tube_fill import sand_in_bore, tube_fill
-from sandmould.scenario.geometry import Bore
+from sandmould.analysis.tube_fill import sand_in_bore, tube_fill
+from sandmould.geometry.geometry import Bore
 
 ANGLE = 0.5
 C, S = np.cos(ANGLE), np.sin(ANGLE)

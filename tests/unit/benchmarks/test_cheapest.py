@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.agreement.recorded import Recorded
 from benchmarks.agreement.repose_settings import Factor, factors_of
+from sandmould.kinds.sand.kind import SandStudy
 from sandmould.study.collect import compare_study
-from sandmould.study.kinds.sand.kind import SandStudy
 
 KEY = "time_step.fraction"
 

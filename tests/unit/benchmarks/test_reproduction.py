@@ -17,7 +17,7 @@ from benchmarks.reproduction.ledger import CLAIMS, LedgerRow, OurSource, read_pa
 from benchmarks.reproduction.our_number import OurNumber
 from benchmarks.reproduction.page import LedgerPage
 from benchmarks.reproduction.recorded_numbers import RecordedNumbers, StudyRecord
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
 
 HZ = "vibration.0.frequency_hz"
 README = """\

@@ -7,8 +7,8 @@ from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.faces import faces_of
 from sandmould.casting.arpm.kernel import kernel_exchange, neighbours, volume_weight, weight
 from sandmould.casting.arpm.raster import Raster, painted
-from sandmould.scenario.mesh import TriangleMesh
-from sandmould.scenario.outline import Outline
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 from tests.unit.meshes import CORNERS, FACETS
 
 

@@ -10,7 +10,7 @@ import pytest
 from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.raster import painted
-from tests.unit.scenario.test_mesh_union import SCENES, mesh_of
+from tests.unit.geometry.test_mesh_union import SCENES, mesh_of
 
 OFF = np.array([0.7, 0.4, 0.6])
 """From the grid, whose cells are 2 wide."""

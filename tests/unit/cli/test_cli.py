@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner, Result
 
+from sandmould.bad_input import BadInputError
 from sandmould.cli.commands import app
 from sandmould.cli.study_file import STUDIES, shipped_studies, study_file
-from sandmould.scenario.bad_input import BadInputError
 
 COARSE = """\
 based_on: plates
@@ -148,7 +148,7 @@ def test_run_hands_options_on_to_snakemake(monkeypatch: pytest.MonkeyPatch) -> N
         calls.append((path, options))
         return 7
 
-    monkeypatch.setattr("sandmould.study.run_study.run_study", run_study)
+    monkeypatch.setattr("sandmould.execution.run_study.run_study", run_study)
     said = sandmould("run", "tube_demo", "--cores", "2", "--", "--quiet", "rules", "host")
     assert said.exit_code == 7
     assert sandmould("run", "tube_demo").exit_code == 7
@@ -159,7 +159,7 @@ def test_run_hands_options_on_to_snakemake(monkeypatch: pytest.MonkeyPatch) -> N
 def test_the_quick_demo_says_that_the_installation_works(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from sandmould.study import run_study
+    from sandmould.execution import run_study
 
     folder = tmp_path / "results" / "tube_quick"
     folder.mkdir(parents=True)

@@ -8,10 +8,9 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
+from sandmould.bad_input import BadInputError
 from sandmould.cli.commands import app
-from sandmould.scenario.bad_input import BadInputError
-from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
-from sandmould.study.new_answers import (
+from sandmould.reference.new_answers import (
     WHY_HELD,
     NewStudy,
     applies,
@@ -19,7 +18,8 @@ from sandmould.study.new_answers import (
     number_in,
     remarks,
 )
-from sandmould.study.new_study import write_new_study
+from sandmould.reference.new_study import write_new_study
+from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.study.plan.build_plan import open_plan
 
 

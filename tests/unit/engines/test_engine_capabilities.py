@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.schemes import SCHEMES, can_couple
+from sandmould.bad_input import BadInputError
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_module, engines_that
 from sandmould.engines.staged_session import StagedSession
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.schemes import SCHEMES, can_couple
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.scenario import Scenario
 

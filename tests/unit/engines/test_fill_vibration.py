@@ -13,9 +13,9 @@ from sandmould.engines.box_motion import displacements
 from sandmould.engines.durations import grain_steps, stage_s
 from sandmould.engines.program import build_program
 from sandmould.engines.step_counts import StepCounts
+from sandmould.kinds.sand.planning import PLANNING
 from sandmould.scenario.checks import problems
 from sandmould.scenario.fill import FillVibration
-from sandmould.study.kinds.sand.planning import PLANNING
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.load_study import open_study

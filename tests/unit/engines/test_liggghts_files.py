@@ -22,7 +22,7 @@ from sandmould.engines.liggghts.render import (
 )
 from sandmould.engines.liggghts.vtk_stress import read_triangle_loads
 from sandmould.engines.program import Program, build_program
-from sandmould.scenario.geometry import Array
+from sandmould.geometry.geometry import Array
 from tests.liggghts_scenes import liggghts_scene
 
 EXPORT = """# vtk DataFile Version 5.1

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sandmould.bad_input import BadInputError
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sandmould.bad_input import BadInputError
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
 from sandmould.engines.rest import RestWatch
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sandmould.bad_input import BadInputError
 from sandmould.engines.box_motion import displacements
 from sandmould.engines.driver import Driver
 from sandmould.engines.durations import grain_steps, run_s, stage_s
@@ -17,14 +18,13 @@ from sandmould.engines.program import Stage, build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_of
 from sandmould.engines.step_counts import StepCounts
+from sandmould.kinds.sand.measure import measure_snapshot
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 from sandmould.scenario.vibration import STOP_PERIODS, RestStage, VibrationStage
-from sandmould.study.kinds.sand.measure import measure_snapshot
 from tests.scenes import tube_scene
 from tests.verification.cases.bench import Bench, scene, vector
 

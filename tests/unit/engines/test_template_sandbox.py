@@ -13,8 +13,8 @@ from jinja2.filters import FILTERS
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from sandmould.engines.deck import environment
-from sandmould.engines.own_deck import template
-from sandmould.engines.own_deck.template import TemplateError, names_in, rendered
+from sandmould.kinds.deck.own import template
+from sandmould.kinds.deck.own.template import TemplateError, names_in, rendered
 
 NESTED = "{% for i in range(99999) %}{% for j in range(99999) %}{% endfor %}{% endfor %}"
 

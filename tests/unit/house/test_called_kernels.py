@@ -10,7 +10,7 @@ import pytest
 from sandmould import called_kernels
 from sandmould.called_kernels import keep_kernels, kept_kernels, load_kernels, loaded_kernels
 from sandmould.compiled import njit
-from sandmould.study import worker
+from sandmould.execution import worker
 from tests.scenes import tube_scene
 
 

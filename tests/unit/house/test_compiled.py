@@ -13,24 +13,23 @@ from types import SimpleNamespace
 
 import pytest
 
-from pattern_fe.inner_forces import _BY_DIMENSION
 from sandmould import ROOT, kernel_cache
 from sandmould.kernel_cache import (
-    PACKAGES,
+    FOLDERS,
     are_compiled,
     cache_folder,
     cache_key,
     is_own,
     kernel_sources,
 )
+from sandmould.pattern_fe.inner_forces import _BY_DIMENSION
 
 
 @pytest.fixture
 def house(tmp_path: Path) -> Path:
     """A copy of all rooms with a cache of its own, where sources may be edited."""
-    for package in PACKAGES:
-        target = tmp_path / "house" / package
-        shutil.copytree(ROOT / package, target, ignore=shutil.ignore_patterns("__pycache__"))
+    target = tmp_path / "house" / "sandmould"
+    shutil.copytree(ROOT / "sandmould", target, ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path / "house"
 
 
@@ -81,7 +80,7 @@ velocity = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 print(collisions(near, velocity, np.zeros(2, np.int8), 1.0, 0.0)[0, 0])
 """
 PATTERN = """
-from pattern_fe.coupling.foam_step import FoamArrays, _open
+from sandmould.pattern_fe.coupling.foam_step import FoamArrays, _open
 from sandmould.dem.addresses import table_of
 import numpy as np
 ints, rows = ("pressed",), ("inverse", "load", "speed", "load_sum")
@@ -273,8 +272,8 @@ def test_without_such_a_folder_nothing_is_kept(house: Path, of_others: bool) -> 
 
 def test_every_kernel_of_the_house_is_compiled_in_this_one_way() -> None:
     sources = kernel_sources(ROOT)
-    for package in PACKAGES:
-        for path in (ROOT / package).rglob("*.py"):
+    for folder in FOLDERS:
+        for path in (ROOT / folder).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             if path.name == "compiled.py":
                 continue

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from sandmould import ROOT
-from sandmould.study.kinds.kind import Kind
-from sandmould.study.kinds.registry import KINDS
+from sandmould.kinds.kind import Kind
+from sandmould.kinds.registry import KINDS
 
-HOUSES = ("analysis.", "sandmould.study.kinds.")
+HOUSES = ("sandmould.analysis.", "sandmould.kinds.")
 DRAW_OR_DESCRIBE = (
     "plots", "flow_plots", "freezing_plots", "export", "bent_files", "kind", "measures",
 )  # fmt: skip

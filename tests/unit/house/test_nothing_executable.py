@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 from sandmould import ROOT
+from sandmould.bad_input import BadInputError
 from sandmould.digest import digest
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.scenario import reading, yaml_text
-from sandmould.scenario.bad_input import BadInputError
 
 ROOMS = ("sandmould", "pattern_fe", "analysis", "workflow", "benchmarks")
 EXECUTING = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}

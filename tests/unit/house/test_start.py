@@ -33,7 +33,7 @@ def test_a_sweep_of_sand_is_planned_without_what_computes_or_draws(
     (tmp_path / "trial.yaml").write_text(text % engine)
     code = (
         "from pathlib import Path\n"
-        "import sandmould.study.run_study, sandmould.study.screen.screen\n"
+        "import sandmould.execution.run_study, sandmould.execution.screen.screen\n"
         "from sandmould.study.plan.handover import checked_plan\n"
         "assert len(checked_plan(Path('trial.yaml')).runs) == 2"
     )

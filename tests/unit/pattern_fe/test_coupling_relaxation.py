@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.relaxation import (
+from sandmould.pattern_fe.coupling.relaxation import (
     AitkenRelaxation,
     Array,
     FixedRelaxation,

@@ -8,9 +8,9 @@ import meshio
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from sandmould.geometry.mesh import signed_volumes_m3
 from sandmould.geometry.mesh_file import read_surface
-
 from sandmould.pattern_fe.distance import Distance, distance_from_drawing
 from sandmould.pattern_fe.export import write_stl, write_surface
 from sandmould.pattern_fe.loads import pressure_above_and_below_pa, vertex_pressure_pa

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop, study_sentence
+from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop, study_sentence
 
 WINDOWS = 200
 

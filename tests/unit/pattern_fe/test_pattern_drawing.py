@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from skfem import MeshTet
 
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.coupling.opening import open_coupled
-from pattern_fe.quality import mesh_sentence, tetrahedron_quality
-from pattern_fe.scene import pattern_of
+from sandmould.bad_input import BadInputError
 from sandmould.engines.program import build_program
+from sandmould.kinds.sand import planning as sand
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.opening import open_coupled
+from sandmould.pattern_fe.quality import mesh_sentence, tetrahedron_quality
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending import drawing_sentences
 from sandmould.scenario import solids
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import Triangles, drawing_notes
-from sandmould.study.kinds.sand import planning as sand
 from tests.bracket import BRACKET, STEP
 from tests.patterns import _one_thread  # noqa: F401
 from tests.unit.meshes import CORNERS, FACETS, SHIPPED

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from sandmould.kinds.sand import planning as sand
 from skfem import MeshTet
 
 from sandmould.bad_input import BadInputError
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.step_counts import StepCounts
+from sandmould.kinds.sand import planning as sand
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.session import window_ends

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.pattern import Pattern
-from pattern_fe.scene import pattern_of
-from pattern_fe.supports import Supports
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.scene import pattern_of
+from sandmould.pattern_fe.supports import Supports
 from sandmould.scenario.pattern import SupportsConfig
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario

@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sandmould.kinds.sand.kind import SandStudy
 from sandmould.report.answer import choices_of, choices_table, headline_of
 from sandmould.report.next_steps import NextSteps, next_steps, setting_steps
 from sandmould.report.sureness import certificate_ground, sand_grounds, weak_ground
@@ -17,7 +18,6 @@ from sandmould.runs.columns import CROSS_CHECK, OUTCOME_CODE, PART, RUN, SWEEP
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected
-from sandmould.study.kinds.sand.kind import SandStudy
 from sandmould.study.plan.ownership import OWNER_FILE
 from tests.unit.report_study import scenario
 

@@ -10,11 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
-from pattern_fe.coupling.foam_body import FoamBody
-from pattern_fe.coupling.interface import with_surface
-from pattern_fe.scene import pattern_of
-from sandmould.report import figures
+from sandmould.definition.run import Run
+from sandmould.drawing import figures
+from sandmould.kinds.sand.measure import write_exports, write_measures
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending import (
     ROJEK,
     TIP,
@@ -29,8 +31,6 @@ from sandmould.scenario.pattern import Bar
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, collect, gather
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.sand.measure import write_exports, write_measures
 from sandmould.study.plan.plan_files import read_run, write_plan
 from tests.bent_run import SCENE, write_bent_run
 from tests.unit.report.test_page import Page

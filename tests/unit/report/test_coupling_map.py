@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from pattern_fe.coupling.loop_verdict import State
+from sandmould.pattern_fe.coupling.loop_verdict import State
 from sandmould.report.coupling_map import FACTOR, LIMIT, MODULUS, SCHEME, coupling_map
 from sandmould.study.collect import Collected
 

@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.definition.run import Run
 from sandmould.engines.cost import cost_before
 from sandmould.engines.snapshot import Snapshot
+from sandmould.kinds.sand.measure import write_measures
 from sandmould.report.estimate_section import _headline
 from sandmould.report.page import write_report
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -22,8 +24,6 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import setting_of
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.sand.measure import write_measures
 from sandmould.study.plan.plan_files import read_run, write_plan
 
 FRICTION = "contact.grain_grain.friction"

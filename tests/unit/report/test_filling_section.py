@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from sandmould.kinds.sand.kind import SandStudy
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.page import write_report
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import collect, gather, read_study
-from sandmould.study.kinds.sand.kind import SandStudy
 from tests.unit.report_study import DURATION_S, KEY, scenario, write_study
 
 BEST_HZ = 40.0

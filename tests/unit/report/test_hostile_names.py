@@ -15,12 +15,12 @@ import pytest
 import yaml
 from PIL import Image
 
-from sandmould.report.figure_files import strip
+from sandmould.bad_input import BadInputError
+from sandmould.definition.run import RUN_NAME
+from sandmould.drawing.figure_files import strip
 from sandmould.report.page import write_report
 from sandmould.runs.columns import RUN
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.study.collect import collect
-from sandmould.study.definition.run import RUN_NAME
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import read_run, write_plan, write_study

@@ -9,16 +9,16 @@ import pandas as pd
 import pytest
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.report.loose_sand import loose_sand_pages
-from sandmould.runs.columns import RUN
-from sandmould.scenario.sand import Sand
-from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand.loose import (
+from sandmould.kinds.sand.loose import (
     LOOSE_ZONES,
     add_loose_sand,
     last_loose_sand,
     write_loose_zones,
 )
+from sandmould.report.loose_sand import loose_sand_pages
+from sandmould.runs.columns import RUN
+from sandmould.scenario.sand import Sand
+from sandmould.scenario.scenario import Scenario
 
 GRAIN_M = 0.001
 PLATE = {"kind": "plate", "name": "part", "centre_m": [0.007, 0.007, 0.009],

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sandmould.drawing.chart import Chart
+from sandmould.kinds.sand.kind import SandStudy
 from sandmould.report.answer import optimum_choice, optimum_headline
-from sandmould.report.chart import Chart
 from sandmould.report.next_steps import optimum_steps
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.page import write_report
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import collect, gather, read_study
-from sandmould.study.kinds.sand.kind import SandStudy
 from sandmould.study.rounds.decide import next_round
 from sandmould.study.rounds.round_log import RoundLog, basis_of, write_rounds
 from tests.unit.report_study import KEY, write_study

@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.drawing import figures
+from sandmould.drawing.templates import page_environment
 from sandmould.engines.snapshot import Snapshot
-from sandmould.report import figures
 from sandmould.report.method import provenance_rows
 from sandmould.report.page import LIMIT_BYTES, write_report
 from sandmould.report.sand import _layer_conclusion
 from sandmould.report.tables import Column, Table
-from sandmould.report.templates import page_environment
 from sandmould.study.collect import collect
 from tests.unit.report_study import (
     ENGINES,

@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sandmould.definition.certificate import spanned_hz
+from sandmould.definition.run import Run
 from sandmould.report.answer import optimum_choice, optimum_headline
 from sandmould.report.next_steps import optimum_steps
 from sandmould.report.optimum import optimum_pages
@@ -18,8 +20,6 @@ from sandmould.report.robustness import robustness_pages
 from sandmould.statistics.config import SandWaveSpeed
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, collect, gather, read_study
-from sandmould.study.definition.certificate import spanned_hz
-from sandmould.study.definition.run import Run
 from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKE_G, SHAKEN_HZ, cases
 from sandmould.study.rounds.round_log import RoundLog, basis_of, write_rounds

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from sandmould.execution.process import _folder_lock, is_locked
 from sandmould.runs import claim
 from sandmould.runs.claim import CLAIM_FILE, Claim, owner_of
-from sandmould.study.process import _folder_lock, is_locked
 
 
 @pytest.fixture(autouse=True)

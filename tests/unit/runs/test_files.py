@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sandmould.digest import SHORT, digest, file_digest, sources_digest
+from sandmould.digest import digest, file_digest
 from sandmould.runs.files import replaced, write_text
 
 
@@ -35,5 +35,3 @@ def test_digests_are_those_of_the_bytes(tmp_path: Path) -> None:
     first.write_bytes(b"one")
     second.write_bytes(b"two")
     assert digest("on", b"e") == file_digest(first) == hashlib.sha256(b"one").hexdigest()
-    whole = hashlib.sha256(b"0.1onetwo").hexdigest()[:SHORT]
-    assert sources_digest([second, first], "0.1") == whole

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sandmould.runs.hashing import present, scenario_hash
+from sandmould.bad_input import BadInputError
+from sandmould.kinds.sand.measures import MEASURES
+from sandmould.kinds.sand.planning import resolved
+from sandmould.reference.reference import measures_text
+from sandmould.runs.hashing import said, scenario_hash
 from sandmould.runs.measures import measures_of
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.cavities import (
     BoxCavity,
     CylinderCavity,
@@ -21,10 +24,7 @@ from sandmould.scenario.cavities import (
 )
 from sandmould.scenario.cavity_checks import cavity_problems, free_share
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.kinds.sand.measures import MEASURES
-from sandmould.study.kinds.sand.planning import resolved
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.reference import measures_text
 from tests.unit.meshes import CORNERS, FACETS
 from tests.unit.refusing import refused
 
@@ -69,7 +69,7 @@ def test_other_shapes_open_in_any_direction() -> None:
 
 
 def test_a_scene_without_cavities_keeps_its_hash() -> None:
-    assert "cavities" not in present(Scenario().model_dump(mode="json"))
+    assert "cavities" not in said(Scenario())
     assert scenario_hash(Scenario(cavities=(box(),))) != scenario_hash(Scenario())
 
 

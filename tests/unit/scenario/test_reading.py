@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sandmould.scenario.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem
 from sandmould.scenario.quantity import fields_at, keys_at
 from sandmould.scenario.reading import Origin, merge, read_planned, read_yaml, validated
 from sandmould.scenario.scenario import Scenario

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from benchmarks.agreement import engine_twins
+from sandmould.definition.study import Equivalence
 from sandmould.report.agreement import row_name
 from sandmould.runs.columns import CROSS_CHECK, CROSS_CHECK_OWN, PART
 from sandmould.statistics.agreement import (
@@ -22,7 +23,6 @@ from sandmould.statistics.agreement import (
     sweep_part,
 )
 from sandmould.study.collect import collect, compare_study, gather, read_study
-from sandmould.study.definition.study import Equivalence
 from tests.unit.report_study import ENGINES, KEY, write_cross_check, write_twins
 
 FILL = "tube_fill_fraction"
@@ -188,8 +188,7 @@ def records(folder: Path) -> Path:
         collect(made)
         kept = folder / "records" / name
         kept.mkdir(parents=True)
-        for file in ("runs.tsv", "summary.tsv"):
-            shutil.copy(made / file, kept / file)
+        shutil.copy(made / "summary.tsv", kept / "summary.tsv")
         record = {"study": f"config/studies/{engine_twins.TWINS}.yaml", "commit": "abc1234",
                   "machine": {"processor": "one", "cores": 2}}  # fmt: skip
         (kept / "record.json").write_text(json.dumps(record))

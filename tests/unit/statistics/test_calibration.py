@@ -10,13 +10,13 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould.definition.calibration import problems
+from sandmould.definition.sweep import Sweep
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.config import Calibration, Target
 from sandmould.statistics.calibration.posterior import OffTheMapError, iso_line, posterior
 from sandmould.statistics.calibration.sands import calibrate, write_materials
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
-from sandmould.study.definition.calibration import problems
-from sandmould.study.definition.sweep import Sweep
 
 KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fraction")
 NOISE_DEG = 0.5

@@ -11,16 +11,16 @@ import pandas as pd
 import pytest
 import yaml
 
-from analysis.spectrum import first_resonance_hz, transfer
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.analysis.spectrum import first_resonance_hz, transfer
+from sandmould.bad_input import BadInputError
+from sandmould.definition.certificate import RobustnessChecks, frequency_key, spanned_hz
+from sandmould.definition.study import Study
+from sandmould.kinds.registry import kind_named
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.robustness import Robustness, assess_robustness
 from sandmould.statistics.spring_dependence import assess_springs
-from sandmould.study.definition.certificate import RobustnessChecks, frequency_key, spanned_hz
-from sandmould.study.definition.study import Study
-from sandmould.study.kinds.registry import kind_named
 from sandmould.study.plan.build_plan import open_plan, price
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import share_fills

@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
+from sandmould.definition.certificate import round_best_hz, spanned_hz
 from sandmould.scenario.reading import Origin, validated
 from sandmould.statistics.config import Objective, SandWaveSpeed
 from sandmould.statistics.control_case import SPRINGS, ControlCase
@@ -24,7 +25,6 @@ from sandmould.statistics.spring_dependence import (
     find_limbs,
     held_text,
 )
-from sandmould.study.definition.certificate import round_best_hz, spanned_hz
 
 KEY, FILL = "vibration.0.frequency_hz", "tube_fill_fraction"
 CERTIFIED_HZ = round_best_hz(40.0, 1.41)

@@ -11,14 +11,14 @@ from typing import Any
 import pytest
 import yaml
 
+from sandmould.definition.run import LAST_MEASURED, Run
 from sandmould.engines.registry import deck_hash
+from sandmould.execution import batch_job
+from sandmould.execution.batch_job import compute_batch
+from sandmould.kinds.registry import kind_of
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study import batch_job
-from sandmould.study.batch_job import compute_batch
-from sandmould.study.definition.run import LAST_MEASURED, Run
-from sandmould.study.kinds.registry import kind_of
 from sandmould.study.plan.batches import START_S, alone, is_done, plan_batches, planned_wall_s
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand

@@ -9,8 +9,11 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould.definition.study import Objective
+from sandmould.execution.check import failed_runs
+from sandmould.kinds.sand.kind import SandStudy
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.check import failed_runs
+from sandmould.runs.run_tables import PLACE, read_tables
 from sandmould.study.collect import (
     NO_OUTCOME,
     collect,
@@ -19,9 +22,6 @@ from sandmould.study.collect import (
     read_provenance,
     read_study,
 )
-from sandmould.study.definition.study import Objective
-from sandmould.study.kinds.sand.kind import SandStudy
-from sandmould.study.run_tables import PLACE, read_tables
 from tests.unit.report_study import (
     DURATION_S,
     FAILED,

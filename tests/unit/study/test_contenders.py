@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 import yaml
 
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
+from sandmould.definition.study import Study
 from sandmould.statistics.verdict import Verdict, compare_settings
-from sandmould.study.definition.study import Study
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.rounds.contenders import find_contenders
 from sandmould.study.rounds.decide import decision_text, next_replicates

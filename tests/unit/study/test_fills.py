@@ -10,12 +10,14 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould.definition.run import FILL
+from sandmould.execution.status import status_text
+from sandmould.execution.tidy import orphans
+from sandmould.kinds.sand.planning import PLANNING
 from sandmould.report.tables import key_numbers
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, total_s
 from sandmould.runs.formatting import size_text
-from sandmould.study.definition.run import FILL
 from sandmould.study.fill_costs import shares_of_fills
-from sandmould.study.kinds.sand.planning import PLANNING
 from sandmould.study.plan.build_plan import Plan, announce, open_plan, prepare
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import own_work, predicted_s, share_fills
@@ -23,8 +25,6 @@ from sandmould.study.plan.lacking import Need
 from sandmould.study.plan.load_study import STUDIES, open_study
 from sandmould.study.plan.plan_files import plan_table, read_run
 from sandmould.study.plan.price import Prices
-from sandmould.study.status import status_text
-from sandmould.study.tidy import orphans
 
 FREQUENCY = "vibration.0.frequency_hz"
 

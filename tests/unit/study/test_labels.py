@@ -14,7 +14,7 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
 from sandmould.study.plan.price import Prices
-from tests.unit.study.test_solidification_study import opened
+from tests.unit.kinds.test_solidification_study import opened
 
 
 def corner(far: float) -> list[list[float]]:

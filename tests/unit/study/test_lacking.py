@@ -11,13 +11,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sandmould.execution.batch_job import compute_batch
+from sandmould.execution.simulate import measure_run
+from sandmould.execution.status import run_status, status_text
 from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, OLDER_COST, OLDER_ORIGIN
-from sandmould.study.batch_job import compute_batch
+from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of, notes_of
-from sandmould.study.run_tables import read_costs
-from sandmould.study.simulate import measure_run
-from sandmould.study.status import run_status, status_text
 from tests.finished_study import finished_study, study_text
 
 

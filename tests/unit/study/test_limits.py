@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from sandmould.scenario.bad_input import BadInputError
-from sandmould.scenario.limits import LIMITS, PIXELS, YAML_DEPTH, YAML_VALUES
+from sandmould.bad_input import BadInputError
+from sandmould.limits import LIMITS, PIXELS, YAML_DEPTH, YAML_VALUES
 from sandmould.scenario.reading import read_yaml
 from tests.unit.refusing import refused
 

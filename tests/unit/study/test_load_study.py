@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
 from sandmould.scenario.contact import WALL_LAW
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.expand import expand

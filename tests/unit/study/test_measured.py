@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.kinds.registry import KINDS
+from sandmould.bad_input import BadInputError
+from sandmould.kinds.registry import KINDS
+from sandmould.reference.reference import PAGES, measures_text
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.reference import PAGES, measures_text
 from tests.unit.refusing import refused
 
 POLYGON = "{kind: polygon, vertices_m: [[0.05, 0.01], [0.1, 0.01], [0.1, 0.03]]}"
@@ -119,7 +119,7 @@ def test_every_kind_says_what_each_measure_means() -> None:
 
 
 def test_pages_are_in_step_with_the_code() -> None:
-    refresh = "run `python -m sandmould.study.reference` and commit the pages"
+    refresh = "run `python -m sandmould.reference.reference` and commit the pages"
     for path, page in PAGES.items():
         assert path.read_text(encoding="utf-8") == page(), refresh
 

@@ -15,8 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sandmould import ROOT
-from sandmould.scenario.bad_input import BadInputError
-from sandmould.study.definition.sweep import key_paths, value_at
+from sandmould.bad_input import BadInputError
+from sandmould.definition.sweep import key_paths, value_at
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 

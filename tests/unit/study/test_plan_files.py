@@ -13,18 +13,18 @@ import pandas as pd
 import pytest
 
 from sandmould import ROOT
+from sandmould.bad_input import BadInputError
+from sandmould.definition.run import RUN_NAME, Run
 from sandmould.engines.durations import REST_AFTER_FALL_S, REST_AFTER_MOTION_S, run_s, stage_s
 from sandmould.engines.program import build_program
+from sandmould.kinds.sand import speed
+from sandmould.kinds.sand.planning import planned_steps, planned_work, predicted_s
+from sandmould.kinds.stored_speed import STORED
 from sandmould.runs.progress import duration_text
-from sandmould.scenario.bad_input import BadInputError
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import stage_kind
 from sandmould.scenario.vibration import STOP_PERIODS
-from sandmould.study.definition.run import RUN_NAME, Run
-from sandmould.study.kinds.sand import speed
-from sandmould.study.kinds.sand.planning import planned_steps, planned_work, predicted_s
-from sandmould.study.kinds.stored_speed import STORED
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.build_plan import announce, measure_speeds, open_plan
 from sandmould.study.plan.expand import expand
@@ -243,8 +243,8 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
     ("module", "heavy"),
     [
         # scikit-learn and scipy.stats take a second each.
-        ("sandmould.study.simulate", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
-        ("sandmould.study.batch_job", ("sklearn", "scipy.stats", "snakemake")),
+        ("sandmould.execution.simulate", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
+        ("sandmould.execution.batch_job", ("sklearn", "scipy.stats", "snakemake")),
         ("sandmould.study.plan.build_plan", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
     ],
 )

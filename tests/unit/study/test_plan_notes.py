@@ -11,20 +11,20 @@ import pytest
 import yaml
 from PIL import Image
 
+from sandmould.bad_input import BadInputError
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.estimates import cooled, freezes_s
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.kinds.sand import planning
 from sandmould.scenario.wall_thickness import thinnest_wall
-from sandmould.study.kinds.sand import planning
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
 from sandmould.study.plan.price import Prices
 from tests.scenes import TUBE_SCENE
-from tests.unit.scenario.test_mesh_union import CUBE, box, file_of
-from tests.unit.study.test_solidification_study import opened
+from tests.unit.geometry.test_mesh_union import CUBE, box, file_of
+from tests.unit.kinds.test_solidification_study import opened
 
 DISC = [[0.04 + 0.02 * math.cos(t), 0.04 + 0.02 * math.sin(t)]
         for t in np.linspace(0, 2 * np.pi, 65)[:-1]]  # fmt: skip
@@ -72,8 +72,8 @@ def test_thickness_of_walls_off_the_axes(dimension: int) -> None:
     """A disc and a cube have none; a slanting plate of 3 mm has, whatever its direction."""
     from scipy.spatial.transform import Rotation
 
-    from sandmould.scenario.geometry import Block
-    from sandmould.scenario.outline import Outline
+    from sandmould.geometry.geometry import Block
+    from sandmould.geometry.outline import Outline
 
     turn = Rotation.random(random_state=4).as_matrix() if dimension == 3 else np.array(
         [[0.8, 0.6], [-0.6, 0.8]])  # fmt: skip

@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 
 from sandmould import ROOT
-from sandmould.study.definition.run import Run
-from sandmould.study.kinds.kind import SpeedClass
-from sandmould.study.kinds.sand import planning
-from sandmould.study.kinds.sand.planning import (
+from sandmould.definition.run import Run
+from sandmould.execution.time_left import TimeLeft
+from sandmould.kinds.kind import SpeedClass
+from sandmould.kinds.sand import planning
+from sandmould.kinds.sand.planning import (
     MEASURING_3D_S,
     PASS_S,
     PASSES,
@@ -29,7 +30,6 @@ from sandmould.study.plan.price import (
     spread_s,
     study_s,
 )
-from sandmould.study.time_left import TimeLeft
 
 REFERENCE: SpeedClass = ("reference", 2)
 RATES = {REFERENCE: 1e7, ("lammps", 2): 1e6}

@@ -12,11 +12,11 @@ import pandas as pd
 import pytest
 import yaml
 
-from sandmould.scenario.bad_input import BadInputError
+from sandmould.bad_input import BadInputError
+from sandmould.execution import run_study
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import NEAR, propose
-from sandmould.study import run_study
 from sandmould.study.collect import collect
 from sandmould.study.plan.build_plan import Plan, announce
 from sandmould.study.plan.expand import expand

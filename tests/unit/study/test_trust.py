@@ -10,10 +10,10 @@ import yaml
 from typer.testing import CliRunner
 
 from sandmould import ROOT
+from sandmould.bad_input import BadInputError
 from sandmould.cli.commands import app
-from sandmould.engines.own_deck.scan import findings, to_read
-from sandmould.scenario.bad_input import BadInputError
-from sandmould.study import run_study
+from sandmould.execution import run_study
+from sandmould.kinds.deck.own.scan import findings, to_read
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study

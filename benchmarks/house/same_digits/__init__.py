@@ -1,0 +1,1 @@
+"""Whether two states of the house compute the same digits."""

@@ -1,0 +1,62 @@
+"""What keeps a study from comparing what it asks to compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sandmould.bad_input import Problem
+from sandmould.definition.study import CrossCheck, Study
+from sandmould.definition.sweep import Sweep, points
+from sandmould.statistics.config import Equivalence
+
+ENGINE = "engine.name"
+
+
+def problems(study: Study) -> list[Problem]:
+    """List what is wrong with the comparisons of a study whose sweep has no problems."""
+    misfits = list(_equivalence(study.equivalence, study.sweep))
+    if study.cross_check is not None:
+        misfits += _cross_check(study.cross_check, study)
+    compares = bool(study.equivalence.keys) or study.cross_check is not None
+    if compares and not study.equivalence.margins:
+        valid = "at least one measure with its margin, such as solid_fraction: 0.005"
+        misfits.append(Problem("equivalence.margins", {}, valid))
+    return misfits
+
+
+def _equivalence(equivalence: Equivalence, sweep: Sweep) -> Iterator[Problem]:
+    for name, keys in {"keys": equivalence.keys, "over": equivalence.over}.items():
+        for i, key in enumerate(keys):
+            if key not in sweep.swept:
+                valid = f"a swept key: {', '.join(sweep.swept) or 'none is'}"
+                yield Problem(f"equivalence.{name}.{i}", key, valid)
+            elif key in keys[:i]:
+                yield Problem(f"equivalence.{name}.{i}", key, "each key once")
+
+
+def _cross_check(check: CrossCheck, study: Study) -> Iterator[Problem]:
+    own = study.scenario.engine.name
+    if ENGINE in study.sweep.swept:
+        valid = f"absent where {ENGINE} is swept: equivalence.keys compares the engines"
+        yield Problem("cross_check", check.model_dump(), valid)
+        return
+    if check.engine == own:
+        valid = f"another engine than the study's own, {own}, or cross_check: null"
+        yield Problem("cross_check.engine", check.engine, valid)
+    if check.replicates is not None and check.replicates > study.replicates:
+        valid = f"at most {study.replicates}, the study's own: runs are compared in pairs"
+        yield Problem("cross_check.replicates", check.replicates, valid)
+    if check.vibration_s is not None:
+        yield from _vibration(check.vibration_s, study)
+    swept = points(study.sweep, study.scenario)
+    if check.at not in swept:
+        yield Problem("cross_check.at", check.at, f"a point of the sweep, such as {swept[0]}")
+
+
+def _vibration(vibration_s: float, study: Study) -> Iterator[Problem]:
+    stages = study.scenario.vibrations
+    if not stages:
+        yield Problem("cross_check.vibration_s", vibration_s, "null without a stage of vibration")
+    elif vibration_s > stages[-1].duration_s:
+        valid = f"at most {stages[-1].duration_s:g} s, that of the last vibration"
+        yield Problem("cross_check.vibration_s", vibration_s, valid)

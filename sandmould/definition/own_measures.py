@@ -1,0 +1,253 @@
+"""Measures of the user's own: arithmetic over named measures, as a study's file states it.
+
+A formula is parsed to a tree of the few parts named here and computed from that tree: no text of
+the user's is ever run as a program.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sandmould.bad_input import Problem
+from sandmould.runs.columns import OF_RUN
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+KEY = "own_measures"
+MOST_LETTERS = 400
+"""Of a formula; deeper nesting than so many letters allow would fill the stack."""
+_NAMES_SHOWN = 3
+
+
+class FormulaError(Exception):
+    """A formula that cannot be used; its text says what would be valid."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A constant."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Named:
+    """The value of a measure, or of another own one."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Call:
+    """An operation or a function of some values."""
+
+    of: str
+    values: tuple[Node, ...]
+
+
+Node = Number | Named | Call
+
+_OPERATIONS: dict[type[ast.AST], str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.USub: "minus",
+}  # fmt: skip
+_COMPUTED: dict[str, Callable[..., Array]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power,
+    "minus": np.negative, "min": np.minimum, "max": np.maximum, "abs": np.abs, "sqrt": np.sqrt,
+}  # fmt: skip
+_TAKES_TWO_OR_MORE = ("min", "max")
+_TAKES_ONE = ("abs", "sqrt")
+_VALID = "numbers, names of measures, + - * / **, brackets, min, max, abs and sqrt"
+
+
+def parsed(formula: str) -> Node:
+    """Turn a formula into its tree.
+
+    Parameters
+    ----------
+    formula : str
+
+    Returns
+    -------
+    Node
+
+    Raises
+    ------
+    FormulaError
+        Where it has a part that is not arithmetic, or is none at all.
+    """
+    if len(formula) > MOST_LETTERS:
+        raise FormulaError(f"a formula of at most {MOST_LETTERS} letters, not {len(formula):,}")
+    try:
+        tree = ast.parse(formula.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise FormulaError(f"one line of {_VALID}") from None
+    return _node(tree.body)
+
+
+def _node(part: ast.expr) -> Node:
+    """The tree of a part; only what is listed here is let through."""
+    value = part.value if isinstance(part, ast.Constant) else None
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return Number(_finite(value))
+    if isinstance(part, ast.Name):
+        return Named(part.id)
+    if isinstance(part, ast.BinOp) and type(part.op) in _OPERATIONS:
+        return Call(_OPERATIONS[type(part.op)], (_node(part.left), _node(part.right)))
+    if isinstance(part, ast.UnaryOp) and isinstance(part.op, ast.USub):
+        return Call("minus", (_node(part.operand),))
+    if isinstance(part, ast.Call) and isinstance(part.func, ast.Name):
+        return _call(part, part.func.id)
+    raise FormulaError(f"{_VALID}; {_shown(part)} is none of these")
+
+
+def _call(part: ast.Call, function: str) -> Call:
+    if function not in (*_TAKES_TWO_OR_MORE, *_TAKES_ONE):
+        raise FormulaError(f"{_VALID}; {function} is no function of these")
+    fits = len(part.args) == 1 if function in _TAKES_ONE else len(part.args) >= 2
+    if part.keywords or not fits:
+        takes = "one value" if function in _TAKES_ONE else "two values or more"
+        raise FormulaError(f"{function} of {takes}")
+    return Call(function, tuple(_node(value) for value in part.args))
+
+
+def _finite(value: int | float) -> float:
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise FormulaError("numbers below 1.8e308")
+    return number
+
+
+def _shown(part: ast.expr) -> str:
+    text = ast.unparse(part)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def names_in(node: Node) -> Iterator[str]:
+    """Measures that a formula names."""
+    if isinstance(node, Named):
+        yield node.name
+    elif isinstance(node, Call):
+        for value in node.values:
+            yield from names_in(value)
+
+
+def problems(own: Mapping[str, str], swept: Collection[str]) -> Iterator[Problem]:
+    """List what is wrong with own measures, whatever the scene has.
+
+    Parameters
+    ----------
+    own : mapping of str to str
+        Formula of each, by name.
+    swept : collection of str
+        Swept keys, which are columns too.
+    """
+    trees = {}
+    for name, formula in own.items():
+        try:
+            trees[name] = parsed(formula)
+        except FormulaError as fault:
+            yield Problem(f"{KEY}.{name}", formula, str(fault))
+        if name in OF_RUN or name in swept:
+            yield Problem(KEY, name, "a name that no other column of the tables has")
+    try:
+        _in_order(trees)
+    except CycleError as fault:
+        circle = fault.args[1][::-1]  # each names the next
+        valid = f"a formula that does not lead back to itself ({' over '.join(circle)})"
+        yield Problem(f"{KEY}.{circle[0]}", own[circle[0]], valid)
+
+
+def _in_order(trees: Mapping[str, Node]) -> list[str]:
+    """Names of own measures, each after those that its formula names."""
+    parts = {
+        name: [part for part in names_in(tree) if part in trees] for name, tree in trees.items()
+    }
+    return list(TopologicalSorter(parts).static_order())
+
+
+def problems_in_scene(own: Mapping[str, str], has: Collection[str]) -> Iterator[Problem]:
+    """List the measures that sound formulas name and a scene will not have.
+
+    Parameters
+    ----------
+    own : mapping of str to str
+    has : collection of str
+        Measures of the scene that are numbers.
+    """
+    for name, formula in own.items():
+        if name in has:
+            yield Problem(KEY, name, "a name that no measure of this scene has")
+        for part in dict.fromkeys(names_in(parsed(formula))):
+            if part not in has and part not in own:
+                every = [*has, *own]
+                near = difflib.get_close_matches(part, every, n=_NAMES_SHOWN, cutoff=0.5)
+                hint = (
+                    f"nearest are {', '.join(near)}" if near else f"such as {next(iter(has), '')}"
+                )
+                valid = f"a formula of measures that this scene will have; {part} is none: {hint}"
+                yield Problem(f"{KEY}.{name}", formula, valid)
+
+
+def with_own_measures(table: pd.DataFrame, own: Mapping[str, str]) -> pd.DataFrame:
+    """Add a column for each own measure to a table of measures.
+
+    Parameters
+    ----------
+    table : DataFrame
+        One row a snapshot.
+    own : mapping of str to str
+        Formulas that have no problems.
+
+    Returns
+    -------
+    DataFrame
+        A value that cannot be computed is NaN: of a missing column, a division by zero, the root
+        of a negative number, or one beyond all floating-point numbers.
+    """
+    if not own:
+        return table
+    import pandas as pd  # slow to import, and no plan needs it
+
+    trees = {name: parsed(formula) for name, formula in own.items()}
+    values: dict[str, Array] = {}
+
+    def measured(name: str) -> Array:
+        if name not in table:
+            return np.full(len(table), np.nan)
+        return pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
+
+    def computed(node: Node) -> Array:
+        if isinstance(node, Number):
+            return np.full(len(table), node.value)
+        if isinstance(node, Named):
+            return values[node.name] if node.name in values else measured(node.name)
+        function, (first, *others) = _COMPUTED[node.of], map(computed, node.values)
+        if not others:
+            return _finite_values(function(first))
+        for other in others:
+            first = _finite_values(function(first, other))
+        return first
+
+    with np.errstate(all="ignore"):
+        for name in _in_order(trees):
+            values[name] = computed(trees[name])
+    own_columns = pd.DataFrame({name: values[name] for name in trees}, index=table.index)
+    return pd.concat([table, own_columns], axis=1)
+
+
+def _finite_values(values: Array) -> Array:
+    return np.where(np.isfinite(values), values, np.nan)

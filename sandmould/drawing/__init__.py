@@ -1,0 +1,1 @@
+"""What reports show: charts, figures, films, views of scenes."""

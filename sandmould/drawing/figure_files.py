@@ -1,0 +1,82 @@
+"""Figures of a report as files of their own, for slides, papers and committed records."""
+
+from __future__ import annotations
+
+import base64
+import io
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from jinja2 import Environment
+from matplotlib.figure import Figure
+from PIL import Image
+
+from sandmould.drawing.chart import WIDE, Chart, lay_out
+from sandmould.drawing.figures import png_bytes
+
+_PICTURE_IN = 4.2
+_HEADING_IN = 0.3
+"""Width of a picture in a strip, and room over it, inches."""
+
+
+def strip(panels: Sequence[tuple[str, str]]) -> bytes:
+    """Pictures side by side under their headings, as one PNG.
+
+    Parameters
+    ----------
+    panels : sequence of (str, str)
+        At least one heading and ``data:`` address, all of one size.
+    """
+    images = [
+        (heading, Image.open(io.BytesIO(_image_bytes(address)))) for heading, address in panels
+    ]
+    width, height = images[0][1].size
+    picture_in = _PICTURE_IN * height / width
+    tall_in, share = picture_in + _HEADING_IN, 1.0 / len(images)
+    figure = Figure(figsize=(_PICTURE_IN * len(images), tall_in), dpi=100)
+    for place, (heading, image) in enumerate(images):
+        axes = figure.add_axes((place * share, 0.0, share, picture_in / tall_in))
+        axes.imshow(image.convert("RGB"), interpolation="antialiased")
+        axes.set_title(heading, fontsize=11, parse_math=False)
+        axes.set_axis_off()
+    return png_bytes(figure)
+
+
+def pictures(**addresses: str) -> dict[str, bytes]:
+    """Pictures by name from their ``data:`` addresses, without those that are empty."""
+    return {name: _image_bytes(address) for name, address in addresses.items() if address}
+
+
+def _image_bytes(address: str) -> bytes:
+    """The file that a ``data:`` address holds."""
+    return base64.b64decode(address.partition(",")[2])
+
+
+def numbered(name: str, charts: Iterable[Chart]) -> dict[str, Chart]:
+    """Charts by name: the first has it as it is, others their number too."""
+    return {f"{name}_{n}" if n > 1 else name: chart for n, chart in enumerate(charts, 1)}
+
+
+def write_figures(
+    folder: Path, environment: Environment, files: Mapping[str, Chart | bytes]
+) -> None:
+    """Write a folder of figures anew: charts as SVG in the page's colours, pictures as PNG.
+
+    Parameters
+    ----------
+    folder : Path
+    environment : Environment
+        Of the report's templates.
+    files : mapping of str to Chart or bytes
+        By name without its ending.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    template = environment.get_template("figure.svg")
+    for name, what in files.items():
+        if isinstance(what, bytes):
+            (folder / f"{name}.png").write_bytes(what)
+        else:
+            text = template.render(laid=lay_out(what, WIDE))
+            (folder / f"{name}.svg").write_text(text, encoding="utf-8")

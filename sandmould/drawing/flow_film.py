@@ -1,0 +1,121 @@
+"""Films of metal that flows: particles coloured by pressure or speed, packed into the page.
+
+Packed as the films of sand are; ``templates/report/flow_film.js`` unpacks and draws them.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sandmould.drawing.animation import ABSENT, changes, split_bytes
+
+Array = NDArray[np.float64]
+MOST_FRAMES = 150
+LEVELS = 4095
+"""Quanta across the longest side."""
+SHADES = 255
+
+
+@dataclass(frozen=True)
+class FlowFilm:
+    """Frames of one run as the page reads them."""
+
+    run: str
+    label: str
+    dimension: int
+    particles: int
+    time_s: tuple[float, ...]
+    low_m: tuple[float, ...]
+    high_m: tuple[float, ...]
+    """Corners of what is shown: the mould with its walls."""
+    quantum_m: float
+    particle_m: float
+    wall_m: tuple[tuple[float, float], ...]
+    """Walls across and up."""
+    highest_pa: float
+    """Full shade of the pressure, and below of the speed."""
+    highest_m_s: float
+    data: str
+    """Base64 of deflated bytes: coordinates by axis, frame and particle, then shades of pressure
+    and of speed by frame and particle (uint8)."""
+
+    @property
+    def values(self) -> dict[str, object]:
+        """For JSON."""
+        return asdict(self)
+
+
+def make_flow_film(
+    fields: Mapping[str, Array], run: str, label: str, highest_pa: float, budget_bytes: int
+) -> FlowFilm:
+    """Pack the records of a run; records are left out to keep the budget, particles never.
+
+    Parameters
+    ----------
+    fields : mapping
+        Arrays of ``fields.npz``.
+    run, label : str
+    highest_pa : float, Pa
+        Full shade of the pressure.
+    budget_bytes : int
+        Most that ``data`` may weigh.
+    """
+    count = min(len(fields["time_s"]), MOST_FRAMES)
+    while True:
+        chosen = np.unique(np.linspace(0, len(fields["time_s"]) - 1, count).round().astype(int))
+        film = _pack(fields, chosen, run, label, highest_pa)
+        if len(film.data) <= budget_bytes or count <= 2:
+            return film
+        count = max(2, min(count - 1, int(0.95 * count * budget_bytes / len(film.data))))
+
+
+def _pack(
+    fields: Mapping[str, Array],
+    chosen: NDArray[np.int64],
+    run: str,
+    label: str,
+    highest_pa: float,
+) -> FlowFilm:
+    ends = np.cumsum(fields["count"])
+    most, d = int(fields["count"].max()), fields["position_m"].shape[1]
+    size_m, wall = float(fields["particle_m"]), fields["wall_m"]
+    low_m, high_m = wall.min(axis=0) - 0.5 * size_m, wall.max(axis=0) + 0.5 * size_m
+    quantum_m = float((high_m - low_m).max()) / LEVELS
+    speed = np.linalg.norm(fields["velocity_m_s"], axis=1)
+    # the few that splash may be far faster than the rest
+    highest_m_s = float(np.nanquantile(speed, 0.99)) or 1.0
+    place = np.full((d, len(chosen), most), ABSENT, dtype=np.uint16)
+    shade = np.zeros((2, len(chosen), most), dtype=np.uint8)
+    for number, record in enumerate(chosen):
+        own = slice(int(ends[record] - fields["count"][record]), int(ends[record]))
+        count = int(fields["count"][record])
+        steps = np.rint((fields["position_m"][own] - low_m) / quantum_m)
+        seen = (steps >= 0).all(axis=1) & (steps < ABSENT).all(axis=1)  # not what flew out, or NaN
+        place[:, number, :count] = np.where(seen, steps.T, ABSENT)
+        for k, share in enumerate(
+            (fields["pressure_pa"][own] / highest_pa, speed[own] / highest_m_s)
+        ):
+            shade[k, number, :count] = np.rint(SHADES * np.clip(np.nan_to_num(share), 0.0, 1.0))
+    raw = split_bytes(changes(place)) + shade.tobytes()
+    near = wall if d == 2 else wall[(wall[:, 1] > 0.0) & (wall[:, 1] <= size_m)]
+    return FlowFilm(
+        run=run,
+        label=label,
+        dimension=d,
+        particles=most,
+        time_s=tuple(np.round(fields["time_s"][chosen], 6).tolist()),
+        low_m=tuple(low_m.tolist()),
+        high_m=tuple(high_m.tolist()),
+        quantum_m=quantum_m,
+        particle_m=size_m,
+        wall_m=tuple(map(tuple, np.round(near[:, [0, -1]].astype(float), 6).tolist())),
+        highest_pa=highest_pa,
+        highest_m_s=highest_m_s,
+        data=base64.b64encode(zlib.compress(raw, 6)).decode("ascii"),
+    )

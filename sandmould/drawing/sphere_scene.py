@@ -1,0 +1,149 @@
+"""What stands round the spheres of a 3D view: box, solids, bores of tubes, cavities."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+from numpy.typing import NDArray
+
+from sandmould.analysis.plots import LAYER_COLOURS
+from sandmould.drawing.figures import cut_m
+from sandmould.geometry.geometry import Array, Block, Bore, Solid
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.revolved import Revolved
+from sandmould.scenario.scenario import Scenario
+
+SIDES = 48
+"""Of the polygon that a round solid is drawn as."""
+MOST_TRIANGLES = 40_000
+"""A solid of more is drawn with its vertices joined on a grid, which eyes do not see."""
+_GRIDS = (512, 256, 128, 64)
+"""Cells of such grids across the longest side."""
+_SHARP = np.cos(np.deg2rad(25.0))
+"""An edge is drawn where faces turn by more than this."""
+SHADES = tuple(to_hex(colormaps["viridis"](k / 254)) for k in range(255))
+
+
+def sphere_scene(scenario: Scenario, top_m: float) -> dict[str, object]:
+    """The scene for the page's 3D view, in m.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        In three dimensions.
+    top_m : float, m
+        Height up to which the box is shown.
+    """
+    box, pattern = scenario.box, scenario.pattern
+    gate = scenario.gate.name if scenario.gate else None
+    return {
+        "size_m": [box.width_m, box.depth_m, top_m],
+        "cut_m": cut_m(scenario),
+        "solids": [
+            {
+                "name": solid.name,
+                "opens": solid.name == gate,
+                "bends": pattern is not None and solid.name == pattern.name,
+                **_packed(*_triangles(solid)),
+            }
+            for solid in scenario.scene.solids
+        ],
+        "bores": [np.round(lines_m, 6).ravel().tolist() for lines_m in _cavity_lines(scenario)],
+        "layer_colours": list(LAYER_COLOURS),
+        "shades": list(SHADES),
+        "solid_tint": [0.55, 0.6, 0.66, 0.4],
+    }
+
+
+def _triangles(solid: Solid) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices and triangles of a solid of 3D."""
+    if isinstance(solid, Block):
+        return solid.corners(), solid.facets()
+    mesh = solid.mesh(SIDES) if isinstance(solid, Revolved) else solid
+    assert isinstance(mesh, TriangleMesh)
+    vertices_m, triangles = mesh.vertices_m, mesh.triangles
+    for cells in _GRIDS:
+        if len(triangles) <= MOST_TRIANGLES:
+            break
+        vertices_m, triangles = _joined(mesh.vertices_m, mesh.triangles, cells)
+    return vertices_m, triangles
+
+
+def _joined(
+    vertices_m: Array, triangles: NDArray[np.int64], cells: int
+) -> tuple[Array, NDArray[np.int64]]:
+    """The surface with all vertices of a cell of a grid in one place."""
+    size_m = float(np.ptp(vertices_m, axis=0).max()) / cells
+    cell = np.floor((vertices_m - vertices_m.min(axis=0)) / size_m)
+    _, first, at = np.unique(cell, axis=0, return_index=True, return_inverse=True)
+    joined = at.reshape(-1)[triangles]
+    flat = (joined == np.roll(joined, 1, axis=1)).any(axis=1)
+    return vertices_m[first], joined[~flat].astype(np.int64)
+
+
+def _packed(vertices_m: Array, triangles: NDArray[np.int64]) -> dict[str, object]:
+    """Base64 of deflated vertices (float32), triangles and sharp edges (uint32)."""
+    edges = sharp_edges(vertices_m, triangles)
+    raw = b"".join(
+        part.tobytes()
+        for part in (vertices_m.astype("<f4"), triangles.astype("<u4"), edges.astype("<u4"))
+    )
+    return {
+        "vertices": len(vertices_m),
+        "triangles": len(triangles),
+        "edges": len(edges),
+        "data": base64.b64encode(zlib.compress(raw, 9)).decode("ascii"),
+    }
+
+
+def sharp_edges(vertices_m: Array, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Edges at which a surface turns, or ends.
+
+    Parameters
+    ----------
+    vertices_m : (nv, 3) float64, m
+    triangles : (nt, 3) int64
+
+    Returns
+    -------
+    (k, 2) int64
+        The vertices of each.
+    """
+    a, b, c = vertices_m[triangles].transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    pairs = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    )
+    owner = np.tile(np.arange(len(triangles)), 3)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    pairs, owner = pairs[order], owner[order]
+    same = (pairs[1:] == pairs[:-1]).all(axis=1)
+    smooth = np.zeros(len(pairs), dtype=np.bool_)
+    flat = same & (np.sum(normal[owner[1:]] * normal[owner[:-1]], axis=1) > _SHARP)
+    smooth[1:] |= flat
+    smooth[:-1] |= flat
+    return np.unique(pairs[~smooth], axis=0)
+
+
+def _cavity_lines(scenario: Scenario) -> list[Array]:
+    """Ends of the lines along the edges of each tube's bore and of each cavity."""
+    scene = scenario.scene
+    lines = [_bore_lines(bore) for bore in scene.bores]
+    for cavity in scene.cavities:
+        vertices_m, triangles = _triangles(cavity.space)
+        lines.append(vertices_m[sharp_edges(vertices_m, triangles)])
+    return lines
+
+
+def _bore_lines(bore: Bore) -> Array:
+    """Ends of the lines along the rims of a bore, (k, 2, 3) float64, m."""
+    mouth_m = bore.mouth_m + bore.section_m @ bore.basis
+    foot_m = mouth_m + bore.length_m * bore.axis
+    rims = [np.stack([rim, np.roll(rim, -1, axis=0)], axis=1) for rim in (mouth_m, foot_m)]
+    few = np.arange(0, len(mouth_m), max(1, len(mouth_m) // 8))
+    return np.concatenate([*rims, np.stack([mouth_m[few], foot_m[few]], axis=1)])

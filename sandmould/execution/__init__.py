@@ -1,0 +1,1 @@
+"""How a study is computed: jobs, processes, a cluster, the screen, packs, what ended and how."""

@@ -1,0 +1,97 @@
+"""What a cluster allows: asked of Slurm before any job is submitted."""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.execution.cluster.settings import CLUSTER_FILE, Cluster
+
+_LIMIT_S = 60.0
+_TRIED = 3
+
+
+class Demand(NamedTuple):
+    """What a job asks for."""
+
+    ranks: int
+    cores_a_rank: int
+    memory_mb: int
+
+
+def longest_min(cluster: Cluster) -> tuple[float, str]:
+    """Most minutes of wall time that a job may ask for, and what sets that.
+
+    Raises
+    ------
+    BadInputError
+        Where Slurm does not answer, or a partition is none of its.
+    """
+    limits = _partitions()
+    default = [name for name, (_, is_default) in limits.items() if is_default]
+    names = cluster.partition.split(",") if cluster.partition else default
+    for name in names:
+        if name not in limits:
+            valid = f"a partition of this cluster: {', '.join(limits)}"
+            raise BadInputError([Problem("partition", name, valid, str(CLUSTER_FILE))])
+    allowed = [(limits[name][0], f"the limit of partition {name}") for name in names]
+    if cluster.longest_wall_h is not None:
+        allowed.append((60 * cluster.longest_wall_h, f"longest_wall_h of {CLUSTER_FILE}"))
+    return min(allowed, default=(math.inf, ""))
+
+
+def _partitions() -> dict[str, tuple[float, bool]]:
+    """Longest minutes of each partition, and whether it is the default."""
+    said = _answer(["sinfo", "-h", "-o", "%P %l"])
+    rows = [line.split() for line in said.splitlines() if len(line.split()) == 2]
+    return {name.rstrip("*"): (minutes(limit), name.endswith("*")) for name, limit in rows}
+
+
+def minutes(text: str) -> float:
+    """Minutes of a wall time as Slurm writes it, such as ``1-00:00:00``; infinite without end."""
+    match = re.fullmatch(r"(?:(\d+)-)?(?:(\d+):)?(\d+):(\d+)", text)
+    if match is None:
+        return math.inf
+    days, hours, rest, seconds = (int(part or 0) for part in match.groups())
+    return 1440 * days + 60 * hours + rest + seconds / 60
+
+
+def check_jobs(cluster: Cluster, wall_min: int, demands: Iterable[Demand]) -> None:
+    """Let Slurm judge the largest jobs, without submitting one.
+
+    Raises
+    ------
+    BadInputError
+        With what it says, once.
+    """
+    different = sorted(set(demands))
+    largest = {max(different, key=lambda d: d.memory_mb), max(different)} if different else set()
+    for demand in sorted(largest)[:_TRIED]:
+        command = [
+            "sbatch", "--test-only", *cluster.sbatch(), f"--time={max(1, wall_min)}",
+            f"--ntasks={demand.ranks}", f"--cpus-per-task={demand.cores_a_rank}",
+            f"--mem={demand.memory_mb}", "--wrap=true",
+        ]  # fmt: skip
+        _answer(command, f"{demand.ranks * demand.cores_a_rank} cores, {demand.memory_mb} MB")
+
+
+def _answer(command: Sequence[str], asked: str = "") -> str:
+    """What a program of Slurm says; its refusal becomes one sentence."""
+    try:
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        valid = f"a machine from which Slurm answers, since {command[0]} does not ({error})"
+        raise BadInputError([Problem("--workflow-profile", "slurm", valid)]) from None
+    if ran.returncode == 0:
+        return ran.stdout
+    lines = [line.split("error: ")[-1].strip() for line in ran.stderr.splitlines()]
+    said = next((line for line in lines if line), f"exit status {ran.returncode}")
+    stated = " ".join([option for option in command[2:] if option.startswith("--")][:-1])
+    valid = f"what this cluster takes: {command[0]} says {said!r}"
+    if asked:
+        valid += f" of a job of {asked} ({stated}); batch_cores of the profile sets its cores"
+    raise BadInputError([Problem(str(CLUSTER_FILE), "as it is", valid)])

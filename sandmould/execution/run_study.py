@@ -1,0 +1,147 @@
+"""A study from its file to its report.
+
+Snakemake computes the runs; where the study asks for rounds, its results choose the runs of the
+next one, which are appended until there is reason to end, then those of its controls. Options
+go on to Snakemake.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import sandmould.runs.one_blas_thread  # noqa: F401
+from sandmould import SHIPPED
+from sandmould.bad_input import BAD_INPUT_EXIT
+from sandmould.execution.cluster.settings import may_be_elsewhere
+from sandmould.execution.screen.ending import last_line, trouble
+from sandmould.execution.screen.screen import Screen
+from sandmould.execution.standby import standing_by
+from sandmould.execution.stopping import run_in_group, until_stopped
+from sandmould.study.plan.batches import is_done
+from sandmould.study.plan.build_plan import RESULTS, Plan, starts_jobs, writing
+from sandmould.study.plan.handover import checked_plan, hand_over
+from sandmould.study.plan.plan_files import SUMMARY
+
+
+def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
+    """Compute a study, all its rounds and its robustness checks.
+
+    Parameters
+    ----------
+    path : Path
+        The study's file.
+    options : sequence of str
+        Of Snakemake, such as ``--cores 4`` or ``--workflow-profile profiles/slurm``.
+    opening : str, optional
+        What the last line begins with where all went well.
+
+    Returns
+    -------
+    int
+        Exit status of the last call of Snakemake: not 0 where a run failed, or that of a shell
+        after Ctrl-C or kill.
+
+    Raises
+    ------
+    BadInputError
+        Before anything starts.
+    """
+    return until_stopped(partial(_run_study, path, options, opening), path.stem)
+
+
+def _run_study(path: Path, options: Sequence[str], opening: str) -> int:
+    plan = checked_plan(path)
+    folder, study = RESULTS / plan.study.name, plan.study.study
+    with _standing_by(plan, options):
+        while study.refine.rounds or study.certificate.controls:
+            if _snakemake(plan, options, [str(folder / SUMMARY)]):
+                # Stopped, or broken outside the runs: a run that fails leaves its outcome.
+                return 1
+            from sandmould.study.next_round import decide_next  # statistics: slow to import
+
+            log, decision = decide_next(study, folder)
+            print(f"\n{decision}", file=sys.stderr, flush=True)
+            plan = checked_plan(path)
+            if log.ended:
+                break
+        status = _snakemake(plan, options, [])
+    if starts_jobs(options) and (said := last_line(folder)):
+        print(said if status else f"{opening} {said}".strip())
+    return status
+
+
+def _standing_by(plan: Plan, options: Sequence[str]) -> contextlib.AbstractContextManager[None]:
+    """Have what runs need loaded beforehand, where jobs are on this machine and any is left."""
+    left = any(not is_done(RESULTS / plan.study.name / run.place) for run in plan.runs)
+    if left and starts_jobs(options) and not may_be_elsewhere(options):
+        return standing_by([alike[0] for alike in plan.classes.values()])
+    return contextlib.nullcontext()
+
+
+def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> int:
+    """Have Snakemake compute a study that is shown meanwhile."""
+    stated = stated_cores(options)
+    cores = [] if stated is not None else ["--cores", str(_all_cores())]
+    file = str(plan.study.path.absolute())
+    workflow = ["--snakefile", str(SHIPPED / "Snakefile"), "--configfile", file]
+    arguments = [*cores, *workflow, *options]
+    arguments += ["--", *targets] if targets else []
+    hand_over(plan)
+    work = partial(_be_snakemake, arguments)
+    if not starts_jobs(options):
+        return run_in_group(work)
+    with writing(RESULTS / plan.study.name):
+        screen = Screen(plan, RESULTS, stated or _all_cores())
+        log = screen.log.open("w", encoding="utf-8")
+    with log:
+        with screen:
+            elsewhere = may_be_elsewhere(options)
+            status = run_in_group(work, log, screen.environment(), screen.look, elsewhere)
+        if status == BAD_INPUT_EXIT:
+            return status
+        screen.tell_failures()
+        if status and not screen.is_explained and (found := trouble(screen.log)):
+            for line in (*found, f"All that Snakemake said: {screen.log}"):
+                print(line, file=sys.stderr)
+    return status
+
+
+def _be_snakemake(arguments: Sequence[str]) -> None:
+    """Do what ``python -m snakemake`` does, in this process, which has the plan."""
+    from snakemake.cli import main
+
+    sys.argv = ["snakemake", *arguments]
+    main()
+
+
+def stated_cores(options: Sequence[str]) -> int | None:
+    """Cores, or jobs at a time, as the options of Snakemake state them; None where none does.
+
+    Parameters
+    ----------
+    options : sequence of str
+
+    Returns
+    -------
+    int or None
+        All cores of this machine for words such as ``all``.
+    """
+    for place, option in enumerate(options):
+        found = _CORES.match(option)
+        if found:
+            value = found["value"] or next(iter(options[place + 1 :]), "")
+            return int(value) if value.isdecimal() else _all_cores()
+    return None
+
+
+_CORES = re.compile(r"(?:--cores|--jobs|-c|-j)(?:=?(?P<value>\w+))?$")
+
+
+def _all_cores() -> int:
+    return os.cpu_count() or 1

@@ -1,0 +1,114 @@
+"""One run from its folder: ``python -m sandmould.execution.simulate FOLDER``.
+
+``sandmould.execution.process`` starts and watches it as a process of its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+import sandmould.runs.one_blas_thread  # noqa: F401
+from sandmould.definition.run import Run
+from sandmould.execution.process import RESTARTABLE_EXIT
+from sandmould.kinds.registry import kind_of
+from sandmould.module_main import run_main
+from sandmould.runs.manifest import write_manifest
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import Cost, finish
+from sandmould.runs.provenance import provenance_of
+from sandmould.scenario.quantity import Section
+from sandmould.study.plan.plan_files import read_run
+
+
+def render_run(folder: Path) -> None:
+    """Render the deck of a run into its folder."""
+    render(read_run(folder / "scenario.yaml"), folder)
+
+
+def measure_run(folder: Path) -> None:
+    """Measure what a run left behind."""
+    measure(read_run(folder / "scenario.yaml"), folder)
+
+
+def render(run: Run, folder: Path) -> None:
+    """The same of a run that is read already."""
+    kind_of(run.scenario).execution.render(run, folder)
+
+
+def measure(run: Run, folder: Path) -> None:
+    """The same of a run that is read already; what it writes is written down."""
+    earlier = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    kind_of(run.scenario).execution.measure(run, folder)
+    written = {
+        path.relative_to(folder).as_posix(): path.stat().st_size
+        for path in folder.rglob("*")
+        if path.is_file() and earlier.get(path) != path.stat().st_mtime_ns
+    }
+    write_manifest(folder, "measured", written, code=kind_of(run.scenario).planning.measuring_hash)
+
+
+def provenance(scenario: Any, *arguments: str) -> dict[str, Any]:
+    """Versions, template hash, seed and machine of a run; arguments are those of its command."""
+    command = " ".join(["python", "-m", "sandmould.execution.simulate", *arguments])
+    template_hash = kind_of(scenario).planning.template_hash(scenario)
+    return provenance_of(scenario, scenario.seed, template_hash, command)
+
+
+def simulate(folder: Path, run: Run | None = None) -> int:
+    """Compute a run in this process, or as one rank of several.
+
+    Parameters
+    ----------
+    folder : Path
+    run : Run, optional
+        Read from its folder unless given.
+
+    Returns
+    -------
+    int
+        Exit status: 0 when the outcome is written, ``RESTARTABLE_EXIT`` when the run stopped
+        early with a checkpoint.
+    """
+    run = run or read_run(folder / "scenario.yaml")
+    computed = kind_of(run.scenario).execution.compute(run, folder)
+    if not computed.is_root:
+        return 0
+    outcome = computed.outcome
+    print(f"{run.run}: {outcome.outcome.label}. {outcome.detail}".strip(), file=sys.stderr)
+    if outcome.outcome.restartable:
+        with contextlib.suppress(OSError):  # the disk that refused more may refuse this too
+            outcome.write(folder / "work" / "outcome.json")
+        return RESTARTABLE_EXIT
+    _finish(folder, run.scenario, outcome, computed.cost)
+    return 0
+
+
+def write_crash(folder: Path, detail: str) -> None:
+    """Write the outcome that a crashed process could not."""
+    scenario = read_run(folder / "scenario.yaml").scenario
+    kind = kind_of(scenario)
+    outcome = RunOutcome(Outcome.ENGINE_FAILED, detail, 0.0, kind.planning.planned_s(scenario))
+    _finish(folder, scenario, outcome, kind.execution.no_cost(scenario))
+
+
+def _finish(folder: Path, scenario: Section, outcome: RunOutcome, cost: Cost) -> None:
+    execution = kind_of(scenario).execution
+    execution.complete(scenario, folder / "work")
+    finish(folder, execution.products, outcome, cost, provenance(scenario, str(folder)))
+
+
+def main(folder: str, crash: str | None = None) -> int:
+    """Compute a run, or write down how another process of it crashed."""
+    if crash is None:
+        return simulate(Path(folder))
+    write_crash(Path(folder), crash)
+    return 0
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it as a kill does, silently
+    run_main(main, "python -m sandmould.execution.simulate FOLDER-OF-A-RUN [CRASH]", (1, 2))

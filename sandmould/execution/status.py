@@ -1,0 +1,188 @@
+"""Where a study stands: runs done, running, failed, time left and cost so far."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from sandmould.definition.run import Run
+from sandmould.execution.cluster.queue import jobs_of, live_jobs, queue_lines
+from sandmould.execution.process import is_locked
+from sandmould.execution.tidy import freed_bytes, orphans
+from sandmould.execution.time_left import TimeLeft
+from sandmould.runs.claim import owner_of
+from sandmould.runs.formatting import size_text
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.progress import duration_text
+from sandmould.runs.run_tables import read_costs
+from sandmould.study.plan.build_plan import Plan, stored_speeds
+from sandmould.study.plan.lacking import WHOLE, Lack, Need
+from sandmould.study.rounds.round_log import read_rounds
+
+State = Literal["done", "failed", "running", "stopped", "waiting"]
+STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
+LISTED_RUNS = 12
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
+"""What reading a file may raise that was cut short or overwritten."""
+
+
+@dataclass(frozen=True)
+class RunStatus:
+    """Where one run stands."""
+
+    run: str
+    state: State
+    said: str = ""
+    """How it failed, how far it is, or what of it is lost."""
+    cpu_s: float = 0.0
+    share: float = 0.0
+    """What is done of a run that has begun."""
+    wall_s: float = math.nan
+    """Of a run that is done."""
+
+
+def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) -> RunStatus:
+    """See where a run stands from what it has written.
+
+    Parameters
+    ----------
+    folder : Path
+        ``results/<study>/runs/<run>``.
+    lack : Lack
+        What a start would do for it.
+    live : collection of str, optional
+        Numbers of the jobs of the cluster that have not ended, where that is known.
+    """
+    name = folder.name
+    if lack.need is Need.NOTHING:
+        return _ended(folder)
+    path = folder / "work" / "progress.json"
+    said, share, cpu_s = "", 0.0, 0.0
+    with contextlib.suppress(*_DAMAGED):
+        now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        share = float(now["percent"]) / 100
+        said = f"{now['percent']:.0f} %, {now['stage']}, {now['time_s']:.3g} s simulated"
+        cpu_s = float(now["cpu_s"])
+    owner = owner_of(folder)
+    ended = owner is not None and owner.job and live is not None and owner.job not in live
+    running = is_locked(folder) and not ended
+    if not said:
+        return RunStatus(name, "running" if running else "waiting", "" if running else lack.why)
+    if running:
+        where = f", {owner.text()}" if owner else ""
+        return RunStatus(name, "running", f"{said}{where}", cpu_s, share=share)
+    with contextlib.suppress(*_DAMAGED):
+        said = f"{said}; {_why_stopped(folder / 'work' / 'outcome.json', path)}"
+    return RunStatus(name, "stopped", said, cpu_s, share=share)
+
+
+def _why_stopped(outcome: Path, progress: Path) -> str:
+    """Why a run was stopped, by the outcome of its last start."""
+    stopped = RunOutcome.read(outcome)
+    is_of_before = outcome.stat().st_mtime_ns < progress.stat().st_mtime_ns
+    if is_of_before or stopped.detail.endswith("the system asked"):
+        return "stopped from outside, as by Ctrl-C"
+    return stopped.outcome.label
+
+
+def _ended(folder: Path) -> RunStatus:
+    """A run with all that it leaves behind."""
+    outcome = RunOutcome.read(folder / "outcome.json")
+    cpu_s = wall_s = math.nan
+    with contextlib.suppress(*_DAMAGED):
+        cost = read_costs([folder]).rows.iloc[-1]
+        cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
+    cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
+    if outcome.outcome is Outcome.FINISHED:
+        return RunStatus(folder.name, "done", "", cpu_s, wall_s=wall_s)
+    said = f"{outcome.outcome.label}. {outcome.detail}".strip()
+    return RunStatus(folder.name, "failed", said, cpu_s)
+
+
+def status_text(plan: Plan, results: Path, cores: int) -> str:
+    """Say where a study stands: done, running, failed, time left, cost so far.
+
+    Parameters
+    ----------
+    plan : Plan
+    results : Path
+    cores : int
+        That share what is left.
+    """
+    folder = results / plan.study.name
+    lacks, live = plan.lacks(results), live_jobs()
+    # A fill that no run waits for any more counts where it was computed.
+    fills = [
+        fill
+        for fill in plan.fills
+        if fill.run in lacks or (folder / fill.place / "outcome.json").exists()
+    ]
+    statuses = {
+        run.run: run_status(folder / run.place, lacks.get(run.run, WHOLE), live)
+        for run in (*fills, *plan.runs)
+    }
+    lines = [f"{plan.study.name}: {_count(plan.runs, statuses)} of {len(plan.runs)} runs"]
+    if any(statuses[fill.run].state != "done" for fill in fills):
+        lines.append(f"{_count(fills, statuses)} of {len(fills)} fills that runs share")
+    spent_s = sum(status.cpu_s for status in statuses.values())
+    lines.append(
+        f"processor time so far: {duration_text(spent_s)}; {_left(plan, results, statuses, cores)}"
+    )
+    if live is not None:
+        lines += queue_lines(jobs_of(statuses, Path()))
+    log = read_rounds(folder, plan.study.study)
+    if plan.study.study.refine.rounds:
+        ended = log.ended or f"of at most {plan.study.study.refine.rounds}"
+        lines.append(f"rounds: {len(log.rounds)}, {ended}")
+    for state in ("running", "stopped", "failed", "waiting"):
+        # Of those that wait only what they lack is worth a line.
+        chosen = [
+            s for s in statuses.values() if s.state == state and (s.said or state != "waiting")
+        ]
+        lines += [f"  {state}: {s.run}  {s.said}".rstrip() for s in chosen[:LISTED_RUNS]]
+        if len(chosen) > LISTED_RUNS:
+            lines.append(f"  {state}: and {len(chosen) - LISTED_RUNS} more")
+    if any(status.state == "failed" for status in statuses.values()):
+        lines.append("a failed run is computed once more by: sandmould again RUN")
+    return "\n".join([*lines, *_orphans(plan, results)])
+
+
+def _count(runs: Sequence[Run], statuses: dict[str, RunStatus]) -> str:
+    """How many of some runs are in which state."""
+    count = Counter(statuses[run.run].state for run in runs)
+    return ", ".join(f"{count[state]} {state}" for state in STATES if count[state])
+
+
+def _orphans(plan: Plan, results: Path) -> list[str]:
+    """Runs whose folders are there and that the study does not list."""
+    found = orphans(plan, results)
+    if not found:
+        return []
+    size = size_text(freed_bytes(found))
+    lines = [f"{len(found)} run folders of {size} no longer belong to the study; sandmould tidy "
+        f"{plan.study.name} removes them"]  # fmt: skip
+    lines += [f"  {folder.name}" for folder in found[:LISTED_RUNS]]
+    return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
+
+
+def _left(plan: Plan, results: Path, statuses: Mapping[str, RunStatus], cores: int) -> str:
+    """Wall time until the report is written."""
+    time_left = TimeLeft((*plan.fills, *plan.runs), stored_speeds(plan, results))
+    for status in statuses.values():
+        time_left.learn(status.run, status.wall_s)
+    begun = {s.run: s.share for s in statuses.values() if s.state in ("running", "stopped")}
+    waiting = [s.run for s in statuses.values() if s.state == "waiting"]
+    left_s = time_left.seconds(begun, waiting, cores)
+    if not left_s:
+        return "nothing left"
+    left = [run for run in (*plan.fills, *plan.runs) if run.run in {*begun, *waiting}]
+    return (
+        f"time left, report included: about {duration_text(left_s)} on {cores} cores, "
+        f"{time_left.prices.basis(left)}"
+    )

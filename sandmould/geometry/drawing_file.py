@@ -1,0 +1,36 @@
+"""A file that draws a solid: its hash, and what is wrong with it.
+
+Apart from what reads such a file: that takes longer to import than most studies to plan.
+"""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from sandmould.digest import file_digest
+from sandmould.limits import DRAWING_BYTES
+
+
+class MeshFileError(ValueError):
+    """A file that bounds no solid; its text says what would be valid."""
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file.
+
+    Raises
+    ------
+    MeshFileError
+        When it cannot be read, or is a folder, a device or too large.
+    """
+    try:
+        what = path.stat()
+        if not stat.S_ISREG(what.st_mode):
+            raise MeshFileError("a file; here is a folder or a device")
+        if what.st_size > DRAWING_BYTES.most:
+            raise MeshFileError(f"a file {DRAWING_BYTES.sentence(what.st_size)}")
+        return file_digest(path)
+    except OSError as error:
+        reason = error.strerror or "it cannot be read"
+        raise MeshFileError(f"a readable file ({reason})") from error

@@ -1,0 +1,66 @@
+"""The kind of study that runs a deck of the user's own."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from sandmould.definition.study import Study, kind_key
+from sandmould.kinds.kind import Execution, Kind, Planning
+from sandmould.scenario.own_deck import OwnDeck
+from sandmould.scenario.quantity import quantity
+from sandmould.scenario.sand import ARGUED
+
+
+class DeckStudy(Study):
+    """A study of a deck of the user's own."""
+
+    kind: Literal["deck"] = kind_key("deck")
+    scenario: OwnDeck = Field(
+        ..., description="What the template is given, and what is read from its log."
+    )
+    trust_deck: bool = quantity(
+        False,
+        "true lets the runs execute a deck that is not shipped: it is a program that can read and "
+        "change your files.",
+        source=ARGUED,
+    )
+    allowed_folders: tuple[Annotated[str, Field(min_length=1)], ...] = quantity(
+        (),
+        "Folders, seen from the study's file, that template and files may lie in beside the "
+        "study's own folder.",
+        source="user",
+    )
+
+    @property
+    def trusts_program(self) -> bool:
+        """As the user states it."""
+        return self.trust_deck
+
+    @property
+    def more_folders(self) -> tuple[str, ...]:
+        """As the user states them."""
+        return self.allowed_folders
+
+
+def _planning() -> Planning[OwnDeck]:
+    from sandmould.kinds.deck.planning import PLANNING
+
+    return PLANNING
+
+
+def _execution() -> Execution[OwnDeck]:
+    from sandmould.kinds.deck.execution import EXECUTION
+
+    return EXECUTION
+
+
+DECK = Kind(
+    name="deck",
+    scenario=OwnDeck,
+    study=DeckStudy,
+    open_planning=_planning,
+    open_execution=_execution,
+    draws_by_lot=True,
+)

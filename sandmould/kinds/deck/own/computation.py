@@ -1,0 +1,210 @@
+"""One run of the user's deck: from its newest restart file, or from its beginning, to its end."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import shutil
+import threading
+import time
+from pathlib import Path
+
+import pandas as pd
+
+from sandmould.engines.registry import deck_reader, engine_module
+from sandmould.engines.session import EngineStop
+from sandmould.kinds.deck.own.columns import (
+    deck_key,
+    found_missing,
+    keep_found,
+    missing_columns,
+)
+from sandmould.kinds.deck.own.deck import (
+    RESTART_FILES,
+    check_unchanged,
+    names_used,
+    render,
+)
+from sandmould.kinds.deck.own.thermo import STEP, Thermo, read_thermo
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_bytes
+from sandmould.runs.progress import LINE_EVERY_S, Progress
+from sandmould.scenario.own_deck import CLOCK, OwnDeck
+
+OUTPUT = "output"
+"""Folder that a deck runs in; all that it writes there is kept."""
+FLUSH_EVERY_S = 0.5
+"""What a killed run can lose of its log."""
+_DECK = "deck.in"
+
+
+def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
+    """Have the engine read the deck of a run.
+
+    A restart file that cannot be gone on from is left for the one before it, and that for the
+    beginning.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+    folder : Path
+        The run's; the deck runs in its ``work/output``.
+    run, study : str
+
+    Raises
+    ------
+    BadInputError
+        When template or files are no longer those of the plan.
+    """
+    check_unchanged(scenario)
+    engine = deck_reader(scenario.engine.name)
+    world = engine.communicator()
+    is_root = world is None or world.rank == 0
+    work = folder / "work"
+    output = work / OUTPUT
+    candidates = _restarts(scenario, work) if is_root else []
+    if world is not None:
+        candidates = world.bcast(candidates)
+    begun, cpu_begun = time.monotonic(), cpu_time_s()
+    cost = Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
+    # run folders lie in the folder runs of their study's
+    study_folder, key, known = folder.parent.parent, "", ""
+    if is_root:
+        key = deck_key(scenario, render(scenario, run, study))
+        known = found_missing(study_folder, key, run)
+    if world is not None:
+        known = world.bcast(known)
+    if known:
+        if is_root:
+            output.mkdir(parents=True, exist_ok=True)
+        return Computed(RunOutcome(Outcome.BAD_INPUT, known, 0.0, 0.0), cost, is_root)
+    notes: list[str] = []
+    outcome, detail = Outcome.FINISHED, ""
+    for restart in (*candidates, ""):
+        logs = _logs(work)
+        log = work / f"engine_{len(logs) + 1}.log"
+        if is_root:
+            _lay_out(scenario, output, render(scenario, run, study, restart), bool(restart))
+        if world is not None:
+            world.barrier()
+        watch = _Watch(log, Progress(run, work, scenario.steps, "steps"), is_root)
+        try:
+            with watch:
+                engine.read_deck(output, _DECK, log)
+            break
+        except EngineStop as stop:
+            if restart and read_thermo([log] if log.exists() else []).table.empty:
+                notes.append(f"{Path(restart).name} could not be gone on from: {stop.detail}")
+                continue
+            outcome, detail = stop.outcome, stop.detail
+            break
+    thermo = read_thermo(_logs(work))
+    if outcome is Outcome.FINISHED:
+        missing = missing_columns(scenario, [str(column) for column in thermo.table])
+        if is_root:
+            keep_found(study_folder, key, run, missing)
+        if said := missing or _wrong_end(scenario, thermo, bool(restart)):
+            outcome, detail = Outcome.BAD_INPUT, said
+    cost.version = str(engine_module(scenario.engine.name).installed_version())
+    cost.grains = thermo.grains
+    cost.steps, cost.grain_steps, cost.engine_wall_s = (
+        thermo.steps, thermo.grain_steps, thermo.loop_s
+    )  # fmt: skip
+    cost.wall_s, cost.cpu_s = time.monotonic() - begun, cpu_time_s() - cpu_begun
+    cost.peak_memory_bytes = peak_memory_bytes()
+    cost.largest_overlap_fraction = math.nan
+    last_s = float(thermo.table[CLOCK].iloc[-1]) if CLOCK in thermo.table else 0.0
+    detail = "; ".join([detail, *notes] if detail else notes)
+    return Computed(RunOutcome(outcome, detail, last_s, last_s), cost, is_root)
+
+
+def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
+    """Say that a deck did not end at the step that the study states; empty where it did.
+
+    A deck may count its steps anew on the way: unless it went on from a restart file, those of
+    all its runs together may be the stated ones instead.
+    """
+    if scenario.steps is None or thermo.table.empty:
+        return ""
+    last = int(thermo.table[STEP].iloc[-1])
+    if last == scenario.steps or (not went_on and thermo.steps == scenario.steps):
+        return ""
+    said = f"the deck ended at step {last}, not at steps = {scenario.steps}"
+    if went_on:
+        return f"{said}: after a restart write run {scenario.steps} upto"
+    return f"{said}: state the steps that the deck runs, or none"
+
+
+def write_series(scenario: OwnDeck, work: Path) -> None:
+    """Write ``series.tsv``: time in s, the measures by name, and the whole log beside them."""
+    table = read_thermo(_logs(work)).table
+    named = {
+        "time_s": CLOCK,
+        **{name: column for name, column in scenario.measures.items() if column in table},
+    }
+    if CLOCK not in table:
+        named.pop("time_s")
+    measured = pd.DataFrame({name: table[column] for name, column in named.items()})
+    whole = table.add_prefix("log_")
+    pd.concat([measured, whole], axis=1).to_csv(work / "series.tsv", sep="\t", index=False)
+
+
+def _restarts(scenario: OwnDeck, work: Path) -> list[str]:
+    """Restart files of an earlier attempt as the deck names them, the newest first."""
+    if "restart" not in names_used(scenario):
+        return []
+    files = [work / name for name in RESTART_FILES if (work / name).is_file()]
+    files.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    return [f"../{path.name}" for path in files]
+
+
+def _lay_out(scenario: OwnDeck, output: Path, deck: str, goes_on: bool) -> None:
+    """Make the folder that the deck runs in; one that goes on keeps what it has written."""
+    if not goes_on and output.exists():
+        shutil.rmtree(output)
+    output.mkdir(parents=True, exist_ok=True)
+    for name in scenario.files:
+        shutil.copy(scenario.paths[name], output)
+    (output / _DECK).write_text(deck, encoding="utf-8")
+
+
+def _logs(work: Path) -> list[Path]:
+    """Logs of all attempts in order."""
+    return sorted(work.glob("engine_*.log"), key=lambda path: int(path.stem.split("_")[1]))
+
+
+class _Watch:
+    """Has a log written out while the engine fills it, and shows how far it has come."""
+
+    def __init__(self, log: Path, progress: Progress, is_root: bool) -> None:
+        self._log, self._progress, self._is_root = log, progress, is_root
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+
+    def __enter__(self) -> None:
+        self._begun = time.monotonic()
+        if self._is_root:
+            self._thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        if self._is_root:
+            self._thread.join()
+
+    def _look(self) -> None:
+        first: float | None = None
+        last_line = time.monotonic()
+        libc = ctypes.CDLL(None)
+        while not self._over.wait(FLUSH_EVERY_S):
+            libc.fflush(None)  # LAMMPS keeps some kilobytes of its log to itself
+            if time.monotonic() - last_line < LINE_EVERY_S or not self._log.exists():
+                continue
+            last_line = time.monotonic()
+            table = read_thermo([self._log]).table
+            if table.empty:
+                continue
+            step = float(table[STEP].iloc[-1])
+            first = float(table[STEP].iloc[0]) if first is None else first
+            rate = (step - first) / (time.monotonic() - self._begun)
+            time_s = float(table[CLOCK].iloc[-1]) if CLOCK in table else math.nan
+            self._progress.show("deck", time_s, step, rate)

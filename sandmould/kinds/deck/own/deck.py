@@ -1,0 +1,135 @@
+"""The user's template: what keeps it from being rendered, and its deck."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from sandmould.bad_input import BadInputError, Problem
+from sandmould.digest import file_digest
+from sandmould.engines.ranks import Ranks
+from sandmould.engines.registry import engine_module
+from sandmould.kinds.deck.own.columns import column_problems
+from sandmould.kinds.deck.own.template import MOST_CHARACTERS, names_in, rendered
+from sandmould.scenario.own_deck import RESERVED, OwnDeck
+
+RESTART_FILES = ("restart.a", "restart.b")
+"""Written in turn beside the folder that a deck runs in."""
+
+
+def with_hashes(scenario: OwnDeck) -> OwnDeck:
+    """The same run with the hashes of its files; without those that cannot be read."""
+    if scenario.sha256:
+        return scenario
+    return scenario.model_copy(update={"sha256": dict(_hashes(scenario))})
+
+
+def _hashes(scenario: OwnDeck) -> Iterator[tuple[str, str]]:
+    for name, path in scenario.paths.items():
+        if path.is_file():
+            yield name, file_digest(path)
+
+
+def problems(scenario: OwnDeck) -> list[Problem]:
+    """List what keeps a template from being rendered with its values.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+    """
+    faults = [
+        Problem("template" if n == scenario.template else "files", n, "a file that can be read")
+        for n, path in scenario.paths.items()
+        if not path.is_file()
+    ]
+    names = [Path(n).name for n in scenario.paths]
+    if len(set(names)) < len(names):
+        faults.append(Problem("files", list(scenario.files), "files of different names"))
+    for name in set(RESERVED) & set(scenario.values):
+        faults.append(
+            Problem(f"values.{name}", scenario.values[name], f"another name: {name} is given")
+        )
+    engine = scenario.engine
+    if engine.ranks > 1 and engine_module(engine.name).RANKS is Ranks.ONE:
+        faults.append(Problem("engine.ranks", engine.ranks, f"1 on engine {engine.name}"))
+    return faults or [*_template_problems(scenario)]
+
+
+def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
+    try:
+        used = names_used(scenario)
+        render(scenario, "run", "study", "restart")
+        deck = render(scenario, "run", "study")
+    except ValueError as error:
+        given = ", ".join(sorted({*scenario.values, *RESERVED}))
+        yield Problem(
+            "template", scenario.template, f"a template that renders ({error}); it is given {given}"
+        )
+        return
+    for name in scenario.values:
+        if name not in used:
+            valid = f"a name that the template uses: {', '.join(sorted(used - set(RESERVED)))}"
+            yield Problem(f"values.{name}", scenario.values[name], valid)
+    yield from column_problems(scenario, deck)
+
+
+def names_used(scenario: OwnDeck) -> set[str]:
+    """Names that a template takes from outside.
+
+    Raises
+    ------
+    TemplateError
+    """
+    return names_in(template_text(scenario))
+
+
+def render(scenario: OwnDeck, run: str, study: str, restart: str = "") -> str:
+    """Render the deck of a run.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+    run, study : str
+    restart : str
+        Restart file that the deck is to go on from; empty at the beginning.
+
+    Raises
+    ------
+    TemplateError
+    """
+    given = {
+        "seed": scenario.seed,
+        "run": run,
+        "study": study,
+        "restart": restart,
+        "restart_files": " ".join(f"../{name}" for name in RESTART_FILES),
+    }
+    return rendered(template_text(scenario), scenario.values | given)
+
+
+def template_text(scenario: OwnDeck) -> str:
+    """Text of the template.
+
+    Raises
+    ------
+    ValueError
+        When it is no text, or longer than any template.
+    """
+    path = scenario.paths[scenario.template]
+    if path.stat().st_size > 4 * MOST_CHARACTERS:
+        raise ValueError(f"it is larger than {4 * MOST_CHARACTERS:,} bytes")
+    return path.read_text(encoding="utf-8")
+
+
+def check_unchanged(scenario: OwnDeck) -> None:
+    """See that template and files are those of the plan.
+
+    Raises
+    ------
+    BadInputError
+    """
+    now = dict(_hashes(scenario))
+    changed = [n for n, planned in scenario.sha256.items() if now.get(n) != planned]
+    if changed:
+        valid = "the file as it was planned: plan the study again to run it as it is now"
+        raise BadInputError([Problem("file", name, valid) for name in changed])

@@ -1,0 +1,176 @@
+"""How long a deck of the user's own takes here: a pilot of some seconds, stored."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import textwrap
+import time
+from pathlib import Path
+
+from sandmould.bad_input import BadInputError, Problem, display_path
+from sandmould.digest import SHORT, digest
+from sandmould.engines.registry import engine_module
+from sandmould.kinds.deck.own import computation
+from sandmould.kinds.deck.own import deck as own_deck
+from sandmould.module_main import run_main
+from sandmould.runs.files import write_text
+from sandmould.runs.parent import end_with_parent
+from sandmould.scenario.own_deck import OwnDeck
+
+STORED = "pilots.json"
+FAILED_LOG = "pilot_failed.log"
+"""Log of the last pilot that failed, in the folder of all results."""
+PILOT_S = 12.0
+"""A shorter run is computed whole; of a longer one its steps are counted."""
+_LOOK_EVERY_S = 0.2
+
+
+def stored_rate(scenario: OwnDeck, results: Path) -> float | None:
+    """Expected core-seconds that a second of a core computes, as a pilot found; starts nothing.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+    results : Path
+        Folder of all results.
+    """
+    core_s = _pilots(results).get(_key(scenario))
+    return None if core_s is None else scenario.expected_core_s / core_s
+
+
+def measured_rate(scenario: OwnDeck, results: Path) -> float | None:
+    """The same, by a pilot where there was none yet; parameters as in ``stored_rate``.
+
+    Returns
+    -------
+    float or None
+        None where the deck states no ``steps`` and did not end in time.
+
+    Raises
+    ------
+    BadInputError
+        With what the engine said, where the pilot failed.
+    """
+    if (rate := stored_rate(scenario, results)) is not None:
+        return rate
+    core_s = pilot(scenario, results)
+    if core_s is None:
+        return None
+    results.mkdir(parents=True, exist_ok=True)
+    write_text(results / STORED, json.dumps({**_pilots(results), _key(scenario): core_s}, indent=1))
+    return scenario.expected_core_s / core_s
+
+
+def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float | None:
+    """Compute the deck for some seconds in a folder of its own; processor time of a whole run.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+        One of several ranks has no pilot.
+    results : Path
+        Folder of all results, which keeps the log of a pilot that failed.
+    pilot_s : float, s
+
+    Returns
+    -------
+    float or None
+
+    Raises
+    ------
+    BadInputError
+        Where the deck stopped with an error.
+    """
+    if scenario.engine.ranks > 1:
+        return None
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "runs" / "pilot"
+        folder.mkdir(parents=True)
+        write_text(folder / "scenario.json", scenario.model_dump_json())
+        with (folder / "log").open("w") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-m", __name__, str(folder)],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=end_with_parent,
+            )  # fmt: skip
+        try:
+            core_s = _watched(process, folder, pilot_s)
+            if process.returncode is not None and not (folder / "whole.json").exists():
+                raise BadInputError([_failure(scenario, folder, process.returncode, results)])
+            return core_s
+        finally:
+            process.kill()
+            process.wait()
+
+
+def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Problem:
+    """Say why a pilot failed, and keep its log."""
+    why = folder / "why.txt"
+    said = why.read_text(encoding="utf-8") if why.exists() else f"its process ended with {status}"
+    logs = [path for path in (folder / "work" / "engine_1.log", folder / "log") if path.exists()]
+    kept = results / FAILED_LOG
+    results.mkdir(parents=True, exist_ok=True)
+    shutil.copy(logs[0], kept)
+    values = textwrap.shorten(json.dumps(scenario.values, ensure_ascii=False), 120)
+    return Problem(
+        "scenario.template", scenario.template, "a deck that runs",
+        sentence=f"{Path(scenario.template).name} with the values {values} stopped in a short "
+        f"pilot run. {said.rstrip('. ')}. Its log: {display_path(kept)}",
+    )  # fmt: skip
+
+
+def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> float | None:
+    """What a whole run takes, once the pilot has ended or has gone on for long enough."""
+    whole, progress = folder / "whole.json", folder / "work" / "progress.json"
+    begun_s = None
+    while process.poll() is None:
+        if begun_s is None and (folder / "begun").exists():
+            begun_s = time.monotonic()
+        if begun_s is not None and time.monotonic() - begun_s > pilot_s:
+            break
+        time.sleep(_LOOK_EVERY_S)
+    if whole.exists():
+        return max(float(json.loads(whole.read_text())), 1e-3)
+    if not progress.exists() or begun_s is None:
+        return None
+    now = json.loads(progress.read_text())
+    taken_s = progress.stat().st_mtime - (folder / "begun").stat().st_mtime
+    whole_s = float(now["left_s"]) + taken_s
+    return whole_s if math.isfinite(whole_s) else None
+
+
+def _pilots(results: Path) -> dict[str, float]:
+    """All pilots; none where the file is damaged."""
+    try:
+        return {key: float(s) for key, s in json.loads((results / STORED).read_text()).items()}
+    except (OSError, ValueError, AttributeError):
+        return {}
+
+
+def _key(scenario: OwnDeck) -> str:
+    """Machine, engine and deck: a deck with other values is one of another price."""
+    version = engine_module(scenario.engine.name).installed_version()
+    deck = digest(own_deck.render(scenario.model_copy(update={"seed": 1}), "pilot", "pilot"))
+    return f"{platform.node()} {scenario.engine.name} {version} {deck[:SHORT]}"
+
+
+def main(name: str) -> int:
+    """Compute the pilot of a folder, in a process that may be killed."""
+    folder = Path(name)
+    scenario = OwnDeck.model_validate_json((folder / "scenario.json").read_text())
+    write_text(folder / "begun", "")
+    computed = computation.compute(scenario, folder, "pilot", "pilot")
+    if computed.outcome.outcome == 0:
+        write_text(folder / "whole.json", json.dumps(computed.cost.cpu_s))
+    else:
+        write_text(folder / "why.txt", computed.outcome.detail or computed.outcome.outcome.label)
+    return 0
+
+
+if __name__ == "__main__":
+    run_main(main, "python -m sandmould.kinds.deck.speed FOLDER-OF-A-PILOT", (1,))

@@ -1,0 +1,41 @@
+"""The kind of study in which metal flows."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from sandmould.definition.study import Study, kind_key
+from sandmould.kinds.kind import Execution, Kind, Planning
+from sandmould.scenario.flow import MetalFlow
+
+
+class FlowStudy(Study):
+    """A study of metal that flows."""
+
+    kind: Literal["flow"] = kind_key("flow")
+    scenario: MetalFlow = Field(
+        ..., description="The metal, where it flows, and how that is computed."
+    )
+
+
+def _planning() -> Planning[MetalFlow]:
+    from sandmould.kinds.flow.planning import PLANNING
+
+    return PLANNING
+
+
+def _execution() -> Execution[MetalFlow]:
+    from sandmould.kinds.flow.execution import EXECUTION
+
+    return EXECUTION
+
+
+FLOW = Kind(
+    name="flow",
+    scenario=MetalFlow,
+    study=FlowStudy,
+    open_planning=_planning,
+    open_execution=_execution,
+)

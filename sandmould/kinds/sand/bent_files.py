@@ -1,0 +1,40 @@
+"""The bent pattern of a run in files, as a foundry measures it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sandmould.kinds.sand.bending import BentPattern
+from sandmould.kinds.sand.moments import Moment, list_moments
+from sandmould.pattern_fe.export import write_stl, write_surface
+from sandmould.scenario.scenario import Scenario
+
+
+def shape_moments(moments: tuple[Moment, ...]) -> dict[str, Moment]:
+    """Snapshots after filling and at the end of a run, as far as it came."""
+    shaken = [m for m in moments if m.vibration_time_s >= 0.0]
+    chosen = {"filled": shaken[0]} if shaken else {}
+    return chosen | ({"final": moments[-1]} if moments else {})
+
+
+def write_bent(scenario: Scenario, run_folder: Path, out: Path) -> None:
+    """Write the pattern after filling and at the end: the solid as STL, the surface as VTK.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With a pattern.
+    run_folder : Path
+    out : Path
+        Folder of ``pattern_filled.stl`` and its likes.
+    """
+    bent = BentPattern(scenario)
+    for name, moment in shape_moments(list_moments(run_folder)).items():
+        snapshot = moment.load()
+        if snapshot.pattern_m is None:
+            continue
+        moved_m = snapshot.pattern_m - bent.drawn.vertices_m
+        pattern = bent.pattern
+        stl = out / f"pattern_{name}.stl"
+        write_stl(stl, pattern.space, pattern.surface, pattern.spread(moved_m))
+        write_surface(stl.with_suffix(".vtu"), bent.drawn, moved_m, snapshot.pattern_load_n)

@@ -1,0 +1,240 @@
+"""Measure every snapshot of a run: fill of tubes and cavities, density, contacts, bed, layers."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from sandmould.analysis.cavity_fill import cavity_fill, cavity_voids
+from sandmould.analysis.coordination import contacts
+from sandmould.analysis.deflection import fill_under
+from sandmould.analysis.density import apparent_density
+from sandmould.analysis.export import solids_to_vtk, to_ovito, to_vtk
+from sandmould.analysis.layers import mixing_index
+from sandmould.analysis.loose_zones import LooseSand
+from sandmould.analysis.plots import draw_by_layer, draw_scene
+from sandmould.analysis.solid_fraction import (
+    bed_surface_height_m,
+    mean_solid_fraction,
+    solid_fraction_profile,
+)
+from sandmould.analysis.tube_fill import tube_fill
+from sandmould.definition.run import LAST_MEASURED
+from sandmould.engines.snapshot import Snapshot, scene_at
+from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.geometry.geometry import Cavity, Scene
+from sandmould.kinds.sand.drive import add_drive
+from sandmould.kinds.sand.loose import (
+    LOOSE_ZONES,
+    add_loose_sand,
+    last_loose_sand,
+    write_loose_zones,
+)
+from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
+from sandmould.kinds.sand.outflow import add_outflow, measure_outflow
+from sandmould.runs.columns import OVERLAP_P99_FRACTION
+from sandmould.runs.files import replaced
+from sandmould.scenario.cavity_checks import free_share
+from sandmould.scenario.scenario import Scenario
+
+
+def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
+    """One row of ``measures.tsv``; every column carries its unit.
+
+    The solid fraction is taken from the floor to the mean surface of the bed.
+    """
+    scene, position, radius = (
+        scene_at(scenario, snapshot), snapshot.position_m, snapshot.radius_m
+    )  # fmt: skip
+    row: dict[str, Any] = {
+        "time_s": snapshot.time_s,
+        "vibration_time_s": snapshot.vibration_time_s,
+        "stage": snapshot.stage,
+        "grains": len(radius),
+    }
+    unit = "m2" if scenario.dimension == 2 else "m3"
+    for bore in scene.bores:
+        fill = tube_fill(position, radius, bore)
+        row[f"{bore.name}_fill_fraction"] = fill.fill_fraction
+        row[f"{bore.name}_sand_{unit}"] = fill.sand_measure
+        row[f"{bore.name}_front_depth_m"] = fill.front_depth_m
+        row[f"{bore.name}_grains"] = fill.grains_inside
+    surface = bed_surface_height_m(position, radius, scene)
+    density = apparent_density(position, radius, scenario.sand.density_kg_m3, scene)
+    touching = contacts(position, radius, scene)
+    row |= {
+        "bed_height_m": surface,
+        "solid_fraction": mean_solid_fraction(position, radius, scene, 0.0, surface),
+        "apparent_density_raw_kg_m3": float(np.mean(density.raw_kg_m3)),
+        "apparent_density_corrected_kg_m3": float(np.nanmean(density.corrected_kg_m3)),
+        "coordination": touching.mean_coordination,
+        "coordination_bearing": touching.mean_coordination_bearing,
+        "bearing_fraction": touching.bearing_fraction,
+        "largest_overlap_fraction": touching.largest_overlap_fraction,
+        OVERLAP_P99_FRACTION: touching.overlap_p99_fraction,
+        "layer_mixing_index": mixing_index(position, snapshot.layer),
+    }
+    packed = row["solid_fraction"]
+    for number, cavity in enumerate(scene.cavities):
+        free = free_share(scenario, number)
+        row |= _measure_cavity(scenario, snapshot, scene, cavity, packed, free)
+    for bore in scenario.scene.bores:
+        filled = row[f"{bore.name}_fill_fraction"]
+        row[f"{bore.name}_fill_of_bed_fraction"] = filled / packed if packed else math.nan
+    if snapshot.pattern_m is not None and scenario.dimension == 2:
+        row["pattern_under_fraction"] = fill_under(snapshot.pattern_m, position, radius)
+    return row | measure_outflow(scenario, snapshot)
+
+
+def _measure_cavity(
+    scenario: Scenario,
+    snapshot: Snapshot,
+    scene: Scene,
+    cavity: Cavity,
+    packed: float,
+    free: float,
+) -> dict[str, float]:
+    """Columns of one cavity, beside sand of a bed's solid fraction; a share of it is free."""
+    position, radius, name = snapshot.position_m, snapshot.radius_m, cavity.name
+    grain_m = scenario.sand.mass_median_diameter_m
+    unit = "m2" if scenario.dimension == 2 else "m3"
+    fill = cavity_fill(position, radius, cavity, grain_m, packed)
+    filled = fill.fill_fraction / free
+    voids = cavity_voids(position, radius, cavity, scene, grain_m)
+    return {
+        f"{name}_fill_fraction": filled,
+        f"{name}_fill_of_bed_fraction": filled / packed if packed else math.nan,
+        f"{name}_sand_{unit}": fill.sand_measure,
+        f"{name}_grains": fill.grains_inside,
+        f"{name}_filled_depth_m": fill.filled_depth_m,
+        f"{name}_voids": voids.count,
+        f"{name}_void_fraction": voids.void_fraction / free,
+        f"{name}_largest_void_{unit}": voids.largest_measure,
+    }
+
+
+def measure_sand(scenario: Scenario, folder: Path) -> None:
+    """Write all that is measured on the snapshots of a run's folder."""
+    loose = last_loose_sand(scenario, folder)
+    if loose is not None:
+        write_loose_zones(loose, folder / LOOSE_ZONES)
+    write_measures(scenario, folder, folder / "measures.tsv", loose)
+    write_exports(scenario, folder, folder / "exports")
+    write_profile(scenario, folder, folder / "profile.tsv")
+    write_picture(scenario, folder, folder / LAST_MEASURED)
+
+
+def write_picture(scenario: Scenario, folder: Path, out: Path) -> None:
+    """Draw the last snapshot of a run by layer; the empty scene where there is none."""
+    figure = Figure(figsize=(6, 4.5), dpi=150)
+    ax = figure.add_axes((0.12, 0.12, 0.84, 0.8))  # a layout of its own would draw all twice
+    moments = list_moments(folder)
+    last = moments[-1].load() if moments else None
+    scene = scenario.scene if last is None else scene_at(scenario, last)
+    draw_scene(scene, ax, scenario.box.height_m)
+    if last is not None:
+        draw_by_layer(last, ax)
+    figure.savefig(out)
+
+
+def write_exports(scenario: Scenario, folder: Path, out: Path) -> None:
+    """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks.
+
+    They go into one archive beside the folder, ``exports.zip``: a folder of them would be most of
+    the files of a sweep. A pattern's bent surface is always written, into the folder: it is what
+    the run was made for.
+    """
+    wanted = scenario.record.export
+    moments = list_moments(folder)
+    if scenario.pattern is not None:
+        from sandmould.kinds.sand.bent_files import (
+            write_bent,  # scikit-fem: few studies need it
+        )
+
+        out.mkdir(exist_ok=True)
+        write_bent(scenario, folder, out)
+    if wanted == "none" or not moments:
+        return
+    last_s = moments[-1].vibration_time_s
+    chosen = (
+        moments if wanted == "all" else {nearest(moments, f * last_s) for f in MOMENTS.values()}
+    )
+    with tempfile.TemporaryDirectory() as name, replaced(out.with_suffix(".zip")) as partial:
+        written = Path(name)
+        if scenario.scene.solids:
+            solids_to_vtk(scenario.scene, written / "solids.vtu")
+        _write_moments(chosen, written)
+        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
+            for path in sorted(written.iterdir()):
+                archive.write(path, path.name)
+
+
+def _write_moments(moments: Iterable[Moment], out: Path) -> None:
+    """Write some snapshots for ParaView and OVITO into a folder."""
+    for moment in moments:
+        snapshot = moment.load()
+        to_vtk(snapshot, out / f"{moment.stored.name}.vtu")
+        to_ovito(snapshot, out / f"{moment.stored.name}.dump")
+
+
+def write_profile(scenario: Scenario, folder: Path, out: Path) -> None:
+    """Write the solid fraction against height at the moments of the vibration.
+
+    Slabs are as high as the largest grain; where a slab lies above the bed it holds little.
+    """
+    slab_m = scenario.largest_diameter_m
+    edges_m = np.arange(0.0, scenario.box.height_m + slab_m / 2, slab_m)
+    moments = list_moments(folder)
+    rows = []
+    for heading, share in MOMENTS.items() if moments else ():
+        moment = nearest(moments, share * moments[-1].vibration_time_s)
+        snapshot = moment.load()
+        profile = solid_fraction_profile(
+            snapshot.position_m, snapshot.radius_m, scene_at(scenario, snapshot), edges_m
+        )
+        for height_m, fraction in zip(profile.height_m, profile.solid_fraction, strict=True):
+            rows.append((heading, snapshot.vibration_time_s, height_m, fraction))
+    columns = ["moment", "vibration_time_s", "height_m", "solid_fraction"]
+    pd.DataFrame(rows, columns=columns).to_csv(out, sep="\t", index=False, float_format="%.6g")
+
+
+def write_measures(
+    scenario: Scenario, folder: Path, out: Path, loose: LooseSand | None = None
+) -> None:
+    """Measure all snapshots of a run into a table, and take in what lies loose in the last one.
+
+    A snapshot that cannot be read leaves a row of gaps that names it, not an error: the run's
+    other rows stay good.
+    """
+    bent = None
+    if scenario.pattern is not None:
+        from sandmould.kinds.sand.bending import (  # scikit-fem: few studies need it
+            BentPattern,
+            add_loop,
+        )
+
+        bent = BentPattern(scenario)
+    rows = []
+    for stored in stored_snapshots(folder):
+        try:
+            snapshot = stored.load()
+            row = measure_snapshot(scenario, snapshot)
+            rows.append(row if bent is None else row | bent.row(snapshot))
+        except ValueError as error:
+            rows.append({"stage": f"unreadable: {error}"})
+    columns = ["time_s", "vibration_time_s", "stage", "grains"]
+    table = pd.DataFrame(rows) if rows else pd.DataFrame(columns=columns)
+    table = add_drive(scenario, add_outflow(table, folder), folder)
+    if bent is not None:
+        table = add_loop(table, folder, bent.reach_m)
+    table = add_loose_sand(table, loose)
+    with replaced(out) as partial:
+        table.to_csv(partial, sep="\t", index=False, float_format="%.8g")

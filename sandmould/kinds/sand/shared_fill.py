@@ -1,0 +1,75 @@
+"""A run that goes on from the end of a fill that it shares with others."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from sandmould.definition.run import FILLS, Run
+from sandmould.engines import registry
+from sandmould.engines.cost import cost_before
+from sandmould.engines.durations import run_s
+from sandmould.engines.program import Program
+from sandmould.runs.checkpoint_folders import END_CHECKPOINT
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import SAND_TABLES, Computed
+from sandmould.runs.shared_state import has_begun, lay_checkpoint, lay_tables
+
+
+def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
+    """Lay the end of its fill into the folder of a run that has not begun.
+
+    A fill that cannot be used is told on standard error, and the run fills by itself.
+
+    Parameters
+    ----------
+    run : Run
+    folder : Path
+        ``results/<study>/runs/<run>``; the fills of the study lie beside the runs.
+    program : Program
+        Of the run's scenario.
+
+    Returns
+    -------
+    Computed or None
+        How the run ends where the fill failed: as that did.
+    """
+    if not run.fill:
+        return None
+    world = registry.communicator_of(run.scenario)
+    if world is None:
+        is_root, failed = True, _lay(run, folder, program)
+    else:  # one process lays the files for all
+        is_root = world.rank == 0
+        failed = world.bcast(_lay(run, folder, program) if is_root else None, root=0)
+    if failed is None:
+        return None
+    cost = replace(cost_before(run.scenario), fill=run.fill)
+    return Computed(failed, cost, is_root)
+
+
+def _lay(run: Run, folder: Path, program: Program) -> RunOutcome | None:
+    work, fill, scenario = folder / "work", folder.parent.parent / FILLS / run.fill, run.scenario
+    if has_begun(work):
+        return None
+    try:
+        ended = RunOutcome.read(fill / "outcome.json")
+        lay_tables(fill, work, SAND_TABLES)
+        if ended.outcome is not Outcome.FINISHED:
+            detail = f"in the fill {run.fill}, which it shares: {ended.detail}"
+            return replace(ended, detail=detail, planned_s=run_s(program))
+        lay_checkpoint(
+            fill / END_CHECKPOINT,
+            work,
+            scenario_hash(scenario.before_vibration),
+            scenario_hash(scenario),
+            cost_before(scenario),
+            program.fill_stages,
+            run.fill,
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        why = f"the fill {run.fill} cannot be used ({error}), and the run fills by itself"
+        print(f"{run.run}: {why}", file=sys.stderr)
+    return None

@@ -1,0 +1,97 @@
+"""What an installation has and lacks: the text of ``sandmould doctor``."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from sandmould.engines.registry import engine_module
+from sandmould.execution.cluster.settings import CLUSTER_FILE
+from sandmould.kernel_cache import cache_folder
+from sandmould.runs.formatting import size_text
+from sandmould.runs.provenance import commit, processor
+from sandmould.scenario.engine import ENGINE_NAMES
+
+SMALLEST_DISK_BYTES = 2_000_000_000
+"""A study of some dozen runs takes a tenth of it (docs/running.md)."""
+
+
+@dataclass(frozen=True)
+class InstallationPart:
+    """One thing that was looked at."""
+
+    what: str
+    found: str
+    wrong: str = ""
+    """What to do about it; empty where nothing is wrong."""
+
+
+def findings(folder: Path) -> list[InstallationPart]:
+    """Look at the program, its engines, the machine, the cluster and the disk.
+
+    Parameters
+    ----------
+    folder : Path
+        Where results would go.
+    """
+    return [
+        InstallationPart("sandmould", f"{metadata.version('sandmould')} ({commit()})"),
+        InstallationPart("Python", f"{platform.python_version()}, {platform.platform(terse=True)}"),
+        InstallationPart("processor", f"{processor()}, {os.cpu_count()} cores"),
+        *(_engine(name) for name in ENGINE_NAMES),
+        _kernels(),
+        _slurm(),
+        _disk(folder),
+    ]
+
+
+def _engine(name: str) -> InstallationPart:
+    engine = engine_module(name)
+    problem = engine.installation_problem()
+    version = engine.installed_version()
+    found = f"version {version}" if version else "not installed"
+    wrong = f"studies on this engine need {problem}" if problem else ""
+    return InstallationPart(f"engine {name}", found, wrong)
+
+
+def _kernels() -> InstallationPart:
+    folder = cache_folder()
+    if any(folder.glob("**/*.nbi")):
+        return InstallationPart("compiled loops", f"kept in {folder}")
+    return InstallationPart(
+        "compiled loops", f"none yet; the first study compiles them into {folder}"
+    )
+
+
+def _slurm() -> InstallationPart:
+    if shutil.which("sbatch") is None:
+        return InstallationPart("cluster", "no Slurm on this machine")
+    settings = f"{CLUSTER_FILE} is there" if CLUSTER_FILE.is_file() else f"no {CLUSTER_FILE} here"
+    return InstallationPart("cluster", f"Slurm; {settings} (docs/cluster.md)")
+
+
+def _disk(folder: Path) -> InstallationPart:
+    place = folder if folder.is_dir() else Path.cwd()
+    free = shutil.disk_usage(place).free
+    said = f"{size_text(free)} free in {place.absolute()}"
+    if not os.access(place, os.W_OK):
+        return InstallationPart("disk", said, "work in a folder that you may write to")
+    few = free < SMALLEST_DISK_BYTES
+    return InstallationPart(
+        "disk", said, "free some: a study can take a few hundred MB" if few else ""
+    )
+
+
+def doctor_text(found: list[InstallationPart]) -> str:
+    """One line a finding; what to do stands below it."""
+    width = max(len(finding.what) for finding in found)
+    lines = []
+    for finding in found:
+        lines.append(f"{finding.what.ljust(width)}  {finding.found}")
+        if finding.wrong:
+            lines.append(f"{' ' * width}  -> {finding.wrong}")
+    return "\n".join(lines)

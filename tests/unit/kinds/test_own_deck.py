@@ -1,0 +1,300 @@
+"""Decks of the user's own: what is refused before anything starts, and what their logs say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+import yaml
+
+from sandmould.bad_input import BadInputError
+from sandmould.kinds.deck import execution as deck_execution
+from sandmould.kinds.deck import planning as deck
+from sandmould.kinds.deck.own.deck import check_unchanged, render, with_hashes
+from sandmould.kinds.deck.own.thermo import read_thermo
+from sandmould.report.page import write_report
+from sandmould.runs.outcome import Outcome
+from sandmould.scenario.own_deck import OwnDeck
+from sandmould.study.collect import collect
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.plan.price import Prices
+
+TEMPLATE = """\
+variable a equal {{ angle_deg }}
+{% if restart %}read_restart {{ restart }}{% endif %}
+restart 10 {{ restart_files }}
+run {{ number }}
+"""
+STUDY: dict[str, Any] = {
+    "kind": "deck",
+    "scenario": {
+        "template": "chute.in.j2",
+        "values": {"angle_deg": 20, "number": 100},
+        "measures": {"speed_m_s": "v_speed"},
+        "expected_core_s": 30,
+    },
+    "sweep": {"keys": {"values.angle_deg": [10, 20]}},
+    "replicates": 2,
+    "objective": {"measure": "speed_m_s"},
+}
+LOG = """\
+LAMMPS (22 Jul 2025)
+run 100
+   Step          Time          v_speed
+         0   0              0
+WARNING: something 3 words long
+        50   0.5            1.5
+       100   1              2.5
+Loop time of 4.0 on 1 procs for 100 steps with 10 atoms
+
+Step 7 of a sentence
+"""
+
+
+def opened(folder: Path, text: str = TEMPLATE, /, **scenario: Any) -> Path:
+    """Write a template and a study of it."""
+    (folder / "chute.in.j2").write_text(text)
+    study = {**STUDY, "scenario": {**STUDY["scenario"], **scenario}}
+    path = folder / "trial.yaml"
+    path.write_text(yaml.safe_dump(study))
+    return path
+
+
+def test_every_point_gets_its_deck(tmp_path: Path) -> None:
+    runs = expand(open_study(opened(tmp_path)))
+    assert len(runs) == 4
+    text = render(runs[-1].scenario, "r", "s", "../restart.b")
+    assert "variable a equal 20" in text
+    assert "read_restart ../restart.b" in text
+    assert "restart 10 ../restart.a ../restart.b" in text
+    assert "read_restart" not in render(runs[0].scenario, "r", "s")
+    assert runs[0].run.startswith("angle_deg_10_r1_")
+
+
+@pytest.mark.parametrize(
+    ("template", "scenario", "told"),
+    [
+        (TEMPLATE, {"template": "other.in.j2"}, r"scenario.template = '.*other.in.j2' .* can be r"),
+        (TEMPLATE, {"files": ["grains.data"]}, r"scenario.files = '.*grains.data' .* can be read"),
+        (TEMPLATE + "{{ friction }}", {}, r"'friction' is undefined\); it is given angle_deg, n"),
+        ("{% if %}", {}, r"template that renders \(line 1: "),
+        (TEMPLATE + "{% include 'other' %}", {}, "no loader"),
+        (
+            TEMPLATE,
+            {"values": {"angle_deg": 20, "number": 1, "anlge": 3}},
+            r"scenario.values.anlge = 3 .* uses: angle_deg, number",
+        ),
+        (
+            TEMPLATE,
+            {"values": {"angle_deg": 20, "number": 1, "seed": 3}},
+            "scenario.values.seed = 3 cannot be used: valid is another name",
+        ),
+        (
+            TEMPLATE,
+            {"engine": {"name": "liggghts", "ranks": 2}},
+            r"scenario.engine.ranks = 2 .* 1 on engine liggghts",
+        ),
+        (TEMPLATE, {"engine": {"name": "reference"}}, "one of 'lammps' or 'liggghts'"),
+        (TEMPLATE, {"box": {}}, "one of the keys engine, expected_core_s, files"),
+        (TEMPLATE, {"files": ["sub/chute.in.j2"]}, "files of different names"),
+    ],
+)
+def test_what_cannot_run_is_told_in_one_sentence(
+    tmp_path: Path, template: str, scenario: dict[str, Any], told: str
+) -> None:
+    if scenario.get("files") == ["sub/chute.in.j2"]:
+        (tmp_path / "sub").mkdir()
+        (tmp_path / "sub" / "chute.in.j2").touch()
+    with pytest.raises(BadInputError, match=told):
+        expand(open_study(opened(tmp_path, template, **scenario)))
+
+
+PRINTS = TEMPLATE + "thermo_style custom step time v_speed &\n  v_height # v_width\n"
+
+
+@pytest.mark.parametrize(
+    ("template", "measure", "told"),
+    [
+        (PRINTS, "v_height", ""),
+        (
+            PRINTS,
+            "v_width",
+            "scenario.measures.speed_m_s = 'v_width' cannot be used: valid is a column that the "
+            "deck prints: step, time, v_speed, v_height.",
+        ),
+        (
+            PRINTS.replace(" time", ""),
+            "v_speed",
+            "a deck that prints the time: thermo_style custom step time",
+        ),
+        # What an engine names itself, and what the text of a deck does not show, a run tells.
+        (PRINTS, "KinEng", ""),
+        (PRINTS.replace("v_speed", "${what}"), "v_speed", ""),
+        (PRINTS + "include more.in\n", "v_width", ""),
+        (PRINTS + "thermo_modify colname v_height v_width\n", "v_width", ""),
+    ],
+)
+def test_a_column_that_a_deck_does_not_print_is_told_before_any_run(
+    tmp_path: Path, template: str, measure: str, told: str
+) -> None:
+    path = opened(tmp_path, template, measures={"speed_m_s": measure})
+    if not told:
+        assert len(expand(open_study(path))) == 4
+        return
+    with pytest.raises(BadInputError, match=told.replace("(", r"\(")):
+        expand(open_study(path))
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        {"material": "rojek_2004"},
+        {"certificate": {"controls": ["hold"]}},
+        {"cross_check": {"engine": "liggghts", "at": {"values.angle_deg": 10}}},
+    ],
+)
+def test_sections_of_sand_are_refused(tmp_path: Path, section: dict[str, Any]) -> None:
+    path = opened(tmp_path)
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | section))
+    name = next(iter(section))
+    with pytest.raises(BadInputError, match=f"{name} = .* absent in a study of kind deck"):
+        open_study(path)
+
+
+def test_a_changed_template_is_another_run_and_stops_a_planned_one(tmp_path: Path) -> None:
+    before = expand(open_study(opened(tmp_path)))[0]
+    after = expand(open_study(opened(tmp_path, TEMPLATE + "# changed\n")))[0]
+    assert before.run != after.run
+    check_unchanged(after.scenario)
+    with pytest.raises(BadInputError, match="plan the study again"):
+        check_unchanged(before.scenario)
+    assert deck.computed_hash(before.scenario) == deck.computed_hash(after.scenario)
+    assert with_hashes(before.scenario) == before.scenario
+
+
+def test_the_plan_is_read_back_and_priced(tmp_path: Path) -> None:
+    study = open_study(opened(tmp_path))
+    runs = expand(study)
+    write_plan(runs, tmp_path / "results")
+    back = read_run(tmp_path / "results" / "runs" / runs[0].run / "scenario.yaml")
+    assert back == runs[0]
+    assert isinstance(back.scenario, OwnDeck)
+    lines = plan_table(runs, Prices({("lammps", 0): 3.0}), 2).splitlines()
+    assert lines[1].endswith(" 10 s")
+    # what is used: 30 at three a second, not the 30 that the user expects
+    assert lines[1].split()[-3:] == ["10", "10", "s"]
+    assert lines[-1].startswith("4 runs, 40 core-seconds. Wall time on 2 cores with report: ")
+
+
+def test_a_log_is_read_past_warnings(tmp_path: Path) -> None:
+    (tmp_path / "one.log").write_text(LOG)
+    thermo = read_thermo([tmp_path / "one.log"])
+    assert thermo.table["v_speed"].tolist() == [0.0, 1.5, 2.5]
+    assert (thermo.steps, thermo.grains, thermo.grain_steps, thermo.loop_s) == (100, 10, 1e3, 4.0)
+
+
+def test_a_run_that_went_on_has_each_step_once(tmp_path: Path) -> None:
+    (tmp_path / "one.log").write_text(LOG.split("Loop")[0])
+    (tmp_path / "two.log").write_text(
+        "  Step Time v_speed\n 50 0.5 1.6\n 150 1.5 3\n"
+        "Loop time of 2.0 on 1 procs for 100 steps with 10 atoms\n"
+    )
+    table = read_thermo([tmp_path / "one.log", tmp_path / "two.log"]).table
+    assert table["Step"].tolist() == [0, 50, 150]
+    assert table["v_speed"].tolist() == [0, 1.6, 3]
+
+
+def test_a_log_without_a_table_is_empty(tmp_path: Path) -> None:
+    (tmp_path / "one.log").write_text("ERROR: something\n")
+    assert read_thermo([tmp_path / "one.log"]).table.empty
+
+
+def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
+    study = open_study(opened(tmp_path))
+    runs = expand(study)
+    folder = tmp_path / "results"
+    write_plan(runs, folder)
+    write_study(study.study, folder)
+    for run in runs:
+        angle_deg = run.parameters["values.angle_deg"]
+        speed = angle_deg / 10 + 0.0001 * angle_deg * run.replicate
+        of_run = folder / "runs" / run.run
+        pd.DataFrame({"time_s": [0.0, 1.0], "speed_m_s": [0.0, speed]}).to_csv(
+            of_run / "series.tsv", sep="\t", index=False
+        )
+        (of_run / "outcome.json").write_text(
+            '{"code": 0, "detail": "", "simulated_s": 1.0, "planned_s": 0.0}'
+        )
+        (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
+        deck_execution.measure(run, of_run)
+        assert (of_run / "final.png").stat().st_size > 5000
+    collect(folder)
+    summary = pd.read_csv(folder / "summary.tsv", sep="\t")
+    assert summary["speed_m_s"].tolist() == pytest.approx([1.001, 1.002, 2.002, 2.004])
+    write_report(folder, folder / "report.html")
+    page = (folder / "report.html").read_text()
+    assert "Use 20 °: there the speed is highest." in page
+    assert "speed from v_speed" in page
+    assert (folder / "figures" / "curves.svg").exists()
+    assert "vibration" not in page.split("<style>")[0] + page.split("</style>")[1]
+
+
+def test_at_a_time_of_vibration_nothing_is_measured(tmp_path: Path) -> None:
+    path = opened(tmp_path)
+    tree = yaml.safe_load(path.read_text())
+    tree["objective"]["at_vibration_s"] = 1.0
+    path.write_text(yaml.safe_dump(tree))
+    with pytest.raises(BadInputError, match=r"objective\.at_vibration_s = 1\.0"):
+        expand(open_study(path))
+
+
+ONE_GRAIN = """\
+units si
+{% if restart %}
+read_restart {{ restart }}
+{% else %}
+atom_style sphere
+region box block 0 1 0 1 0 1
+create_box 1 box
+create_atoms 1 single 0.5 0.5 0.5
+{% endif %}
+pair_style zero 0.1
+pair_coeff * *
+variable speed equal vcm(all,x)
+thermo_style custom step time v_speed
+restart 10 {{ restart_files }}
+run {{ number }} {{ 'upto' if angle_deg > 10 else '' }}
+"""
+
+
+def test_a_deck_that_goes_on_too_far_has_failed(tmp_path: Path) -> None:
+    runs = expand(open_study(opened(tmp_path, ONE_GRAIN, steps=100)))
+    for run in (runs[0], runs[-1]):
+        folder = tmp_path / "runs" / run.run
+        ended = deck_execution.compute(run, folder).outcome
+        assert (ended.outcome, ended.detail) == (Outcome.FINISHED, "")
+        # restart.b holds step 100: what is left to do is nothing, or 100 steps for `run 100`
+        ended = deck_execution.compute(run, folder).outcome
+        if run is runs[-1]:
+            assert ended.outcome is Outcome.FINISHED
+        else:
+            assert ended.outcome is Outcome.BAD_INPUT
+            assert ended.detail == (
+                "the deck ended at step 200, not at steps = 100: after a restart write run 100 upto"
+            )
+
+
+def test_a_deck_that_ends_elsewhere_has_failed(tmp_path: Path) -> None:
+    anew = ONE_GRAIN + "reset_timestep 0\nrun 50\n"
+    for text, steps, said in (
+        (ONE_GRAIN, 90, "the deck ended at step 100, not at steps = 90: state the steps that the "
+         "deck runs, or none"),
+        (anew, 150, ""),
+    ):  # fmt: skip
+        run = expand(open_study(opened(tmp_path, text, steps=steps)))[-1]
+        folder = tmp_path / f"of_{steps}" / "runs" / run.run
+        assert deck_execution.compute(run, folder).outcome.detail == said

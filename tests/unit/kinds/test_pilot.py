@@ -1,0 +1,140 @@
+"""A deck of one's own is priced by a pilot, where it may run."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from sandmould.bad_input import BadInputError
+from sandmould.kinds.deck import speed
+from sandmould.study.plan import build_plan
+from sandmould.study.plan.build_plan import (
+    Plan,
+    announce,
+    measure_speeds,
+    open_plan,
+    stored_speeds,
+)
+from sandmould.study.plan.price import Prices
+
+LAMMPS = ("lammps", 0)
+
+
+def short(folder: Path, steps: int) -> Plan:
+    """The shipped deck with so many steps."""
+    path = folder / "trial.yaml"
+    path.write_text(
+        f"based_on: own_deck\nscenario: {{steps: {steps}, values: {{number_of_steps: {steps}}}}}\n"
+        "sweep: {keys: {values.angle_deg: [8, 24]}}\n"
+    )
+    return open_plan(path, folder)
+
+
+def test_a_short_deck_is_computed_whole_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = short(tmp_path, 2000)
+    measure_speeds(plan, tmp_path)
+    # the first and the last point, of which the dearer counts
+    ends_s = list(json.loads((tmp_path / speed.STORED).read_text()).values())
+    assert len(ends_s) == 2
+    assert all(0.0 < core_s < 20.0 for core_s in ends_s)
+    prices = Prices(stored_speeds(plan, tmp_path))
+    assert prices.engine_s(plan.runs[0]) == pytest.approx(max(ends_s))
+    assert prices.basis(plan.runs) == "by a pilot run (results/pilots.json)"
+    monkeypatch.setattr(speed, "pilot", lambda *_: pytest.fail("a second pilot"))
+    measure_speeds(plan, tmp_path)
+
+
+def test_a_long_deck_is_foretold_by_its_steps(tmp_path: Path) -> None:
+    scenario = short(tmp_path, 10**9).runs[0].scenario
+    core_s = speed.pilot(scenario, tmp_path, pilot_s=6.5)
+    assert core_s is not None
+    # The chute takes 20 us to 200 us a step, a thousand million of them hours.
+    assert core_s > 3600.0
+    without = scenario.model_copy(update={"steps": None})
+    assert speed.pilot(without, tmp_path, pilot_s=0.5) is None
+
+
+def test_a_deck_of_several_ranks_has_no_pilot(tmp_path: Path) -> None:
+    scenario = short(tmp_path, 2000).runs[0].scenario
+    engine = scenario.engine.model_copy(update={"ranks": 2})
+    assert speed.pilot(scenario.model_copy(update={"engine": engine}), tmp_path) is None
+
+
+def test_a_deck_that_may_not_run_has_no_pilot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own.in.j2").write_text("run {{ number }}\n")
+    (tmp_path / "own.yaml").write_text(
+        "kind: deck\nscenario: {template: own.in.j2, values: {number: 3}}\n"
+    )
+    monkeypatch.setattr(speed, "pilot", lambda *_: pytest.fail("it ran"))
+    measure_speeds(open_plan(tmp_path / "own.yaml", tmp_path), tmp_path)
+
+
+@pytest.mark.parametrize("trusted", [False, True])
+def test_plan_starts_no_deck(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, trusted: bool
+) -> None:
+    monkeypatch.setattr(speed, "pilot", lambda *_: pytest.fail("it ran"))
+    if trusted:
+        (tmp_path / "own.in.j2").write_text("run {{ number }}\n")
+        (tmp_path / "own.yaml").write_text(
+            "kind: deck\ntrust_deck: true\nscenario: {template: own.in.j2, values: {number: 3}}\n"
+        )
+        plan = open_plan(tmp_path / "own.yaml", tmp_path)
+    else:
+        plan = short(tmp_path, 2000)
+    said = announce(plan, tmp_path, 1, measure="engines")
+    assert ", by expected_core_s, an estimate\n" in said
+    assert not (tmp_path / speed.STORED).exists()
+
+
+def failing(folder: Path, angles_deg: str) -> Plan:
+    """A deck that stops with an error where its angle is above 20."""
+    (folder / "own.in.j2").write_text(
+        "units si\natom_style sphere\nregion box block 0 1 0 1 0 1\ncreate_box 1 box\n"
+        "{{ 'nonsense here' if angle_deg > 20 else '' }}\n"
+        "thermo_style custom step time\npair_style zero 0.1\npair_coeff * *\nrun 1\n"
+    )
+    (folder / "own.yaml").write_text(
+        "kind: deck\ntrust_deck: true\n"
+        "scenario: {template: own.in.j2, values: {angle_deg: 8}}\n"
+        f"sweep: {{keys: {{values.angle_deg: {angles_deg}}}}}\n"
+    )
+    return open_plan(folder / "own.yaml", folder / "results")
+
+
+def test_a_deck_that_fails_is_told_with_the_engines_own_line(tmp_path: Path) -> None:
+    results = tmp_path / "results"
+    with pytest.raises(BadInputError) as told:
+        measure_speeds(failing(tmp_path, "[24, 32]"), results)
+    (said,) = str(told.value).splitlines()
+    assert "Unknown command: nonsense here" in said
+    assert said.endswith(f" Its log: {results / speed.FAILED_LOG}.")
+    assert "nonsense here" in (results / speed.FAILED_LOG).read_text()
+    assert not (results / speed.STORED).exists()
+
+
+def test_a_point_that_fails_alone_is_told_and_keeps_nothing_from_running(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measure_speeds(failing(tmp_path, "[8, 32]"), tmp_path / "results")
+    assert "Unknown command: nonsense here" in capsys.readouterr().err
+
+
+def test_finished_runs_price_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = short(tmp_path, 2000)
+    ended = tmp_path / plan.study.name / plan.runs[0].place
+    monkeypatch.setattr(
+        build_plan, "computed_wall_s", lambda folder: 240.0 if folder == ended else math.nan
+    )
+    prices = build_plan.known_prices(plan, tmp_path)
+    assert prices.basis(plan.runs) == "by finished runs"
+    other = plan.runs[-1]
+    assert prices.engine_s(other) == prices.work(other) == pytest.approx(240.0)
+    assert f"{len(plan.runs) * 240} core-seconds" in announce(plan, tmp_path, 1).replace(",", "")

@@ -1,0 +1,111 @@
+"""Measures of a run with a pattern, from snapshots and a convergence log made up by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pandas as pd
+import pytest
+
+from sandmould.definition.run import Run
+from sandmould.kinds.sand.bending import verdict_of
+from sandmould.kinds.sand.measure import write_exports, write_measures
+from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
+from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.scene import pattern_of
+from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.scenario.scenario import Scenario
+from sandmould.study.plan.plan_files import read_run, write_plan
+from tests.bent_run import SCENE, tip_load, write_bent_run
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    return with_surface(Scenario.model_validate(SCENE))
+
+
+@pytest.fixture(scope="module")
+def body(scenario: Scenario) -> FoamBody:
+    return FoamBody(pattern_of(scenario))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, scenario: Scenario, body: FoamBody) -> Path:
+    write_plan([Run("test", "one", {}, 1, scenario, {})], tmp_path)
+    write_bent_run(tmp_path / "runs" / "one", body)
+    return tmp_path / "runs" / "one"
+
+
+def measured(folder: Path) -> pd.DataFrame:
+    write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")
+    return pd.read_csv(folder / "measures.tsv", sep="\t")
+
+
+def test_shape_and_answer_are_those_of_the_loads(folder: Path, body: FoamBody) -> None:
+    table = measured(folder)
+    _, bent = tip_load(body)
+    tip_m = -bent[np.argmax(body.vertices_m @ [1.0, 1.0]), 1]
+    assert table.pattern_tip_deflection_m.to_list() == pytest.approx(
+        [0.0, tip_m, tip_m, 0.5 * tip_m]
+    )
+    assert table.pattern_tip_answered_m.to_list() == pytest.approx([tip_m] * 4)
+    assert table.pattern_tip_filled_m.to_list() == pytest.approx([tip_m] * 4)
+    assert table.pattern_tip_recovered_m.iloc[-1] == pytest.approx(0.5 * tip_m)
+    largest_m = np.linalg.norm(bent, axis=1).max()
+    assert table.pattern_largest_displacement_m.iloc[1] == pytest.approx(largest_m)
+    # The flange sinks by nearly what its tip does, which a corner's distance cannot exceed.
+    assert 0.8 * tip_m < table.pattern_distance_largest_m.iloc[1] <= largest_m
+    assert 0.0 < table.pattern_distance_rms_m.iloc[1] < table.pattern_distance_largest_m.iloc[1]
+
+
+def test_windows_of_the_log_go_to_the_snapshot_that_ends_them(folder: Path) -> None:
+    table = measured(folder)
+    assert table.pattern_windows.to_list() == [10, 20, 20, 30]
+    assert table.pattern_passes.to_list() == [20, 40, 40, 60]
+    assert table.pattern_residual_fraction.to_list() == pytest.approx([0.2, 0.2, 0.2, 0.1])
+    assert table.pattern_work_j.to_list() == pytest.approx([2e-4, 4e-4, 4e-4, 6e-4])
+    assert table.pattern_stored_fraction.iloc[-1] == pytest.approx(0.5 * 0.051 / 0.06)
+    assert table.pattern_force_left_fraction.iloc[-1] == pytest.approx(1e-11)
+    reach_m = np.hypot(0.05, 0.06)
+    assert table.pattern_moment_left_fraction.iloc[-1] == pytest.approx(5e-12 / reach_m)
+    assert table.pattern_outside_fraction.iloc[0] == pytest.approx(30 * 0.01 / 6.0)
+    assert set(table.pattern_loop) == {"holds"}
+
+
+def test_a_run_stopped_by_its_loop_diverged(folder: Path) -> None:
+    RunOutcome(Outcome.COUPLING_DIVERGED, "", 0.06, 0.1).write(folder / "outcome.json")
+    found, before = verdict_of(folder), verdict_of(folder, 0.04)
+    assert found is not None
+    assert before is not None
+    assert (found.state, before.state) == ("diverged", "lags")
+
+
+def test_a_run_without_a_convergence_log_has_its_shape_alone(folder: Path) -> None:
+    (folder / CONVERGENCE_LOG).unlink()
+    table = measured(folder)
+    assert "pattern_tip_deflection_m" in table
+    assert "pattern_residual_fraction" not in table
+
+
+def test_the_bent_pattern_is_written_for_tools_that_measure_shapes(
+    folder: Path, body: FoamBody, scenario: Scenario
+) -> None:
+    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
+    names = sorted(p.name for p in (folder / "exports").glob("pattern_*"))
+    assert names == ["pattern_filled.stl", "pattern_filled.vtu", "pattern_final.stl",
+                     "pattern_final.vtu"]  # fmt: skip
+    load, bent = tip_load(body)
+    final = meshio.read(folder / "exports" / "pattern_final.vtu")
+    assert final.points[:, :2] == pytest.approx(body.vertices_m + 0.5 * bent)
+    assert final.point_data["load_n"][:, :2] == pytest.approx(load)
+    assert np.abs(final.point_data["distance_m"]).max() == pytest.approx(
+        measured(folder).pattern_distance_largest_m.iloc[-1]
+    )
+    solid = meshio.read(folder / "exports" / "pattern_filled.stl")
+    thickness_m = scenario.sand.thickness_m
+    assert np.ptp(solid.points[:, 2]) == pytest.approx(thickness_m, rel=1e-6)
+    highest_m = (body.vertices_m + bent)[:, 1].max()
+    assert solid.points[:, 1].max() == pytest.approx(highest_m, rel=1e-6)

@@ -1,0 +1,95 @@
+"""The speed of an engine on this machine."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from sandmould import ROOT
+from sandmould.engines.session import Session
+from sandmould.kinds.registry import kind_of
+from sandmould.kinds.sand.speed import _measure_rate, _spent_s, _window_rate
+from sandmould.kinds.stored_speed import STORED, stored_speed
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
+from tests.scenes import tube_scene
+
+
+class OnABusyMachine:
+    """A session whose engine has a core for a small part of the time."""
+
+    steps, grains = 0, 10
+
+    def advance(self) -> None:
+        begun_s = time.process_time()
+        while time.process_time() - begun_s < 2e-3:
+            pass
+        time.sleep(0.01)
+        self.steps += 100
+
+
+def test_time_in_which_others_have_the_cores_does_not_count() -> None:
+    rate = _window_rate(OnABusyMachine())  # type: ignore[arg-type]
+    assert 0.5 < rate / (10 * 100 / 2e-3) <= 1.0  # by the clock it would be below 0.17
+
+
+def test_an_engine_in_a_process_of_its_own_counts() -> None:
+    begun_s = _spent_s()
+    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as engine:
+        while _spent_s() - begun_s < 0.2:
+            time.sleep(0.01)
+            assert engine.poll() is None
+        engine.kill()
+
+
+@pytest.mark.slow
+def test_sand_that_settles_is_timed_while_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each window has work, though a layer ends by itself after 2 s, before the last of them."""
+    windows: list[float] = []
+
+    def noted(session: Session) -> float:
+        windows.append(_window_rate(session))
+        return windows[-1]
+
+    monkeypatch.setattr("sandmould.kinds.sand.speed._window_rate", noted)
+    monkeypatch.setattr("sandmould.kinds.sand.speed.WINDOWS", 16)
+    coarse = {"sand": {"disc_thickness_m": 0.1}, "time_step": {"fraction": 0.8}}
+    scene = tube_scene(engine={"name": "reference"}, vibration=[], **coarse)
+    rate = _measure_rate(scene)
+    assert rate is not None
+    assert 0.0 < min(windows) <= rate <= max(windows)
+
+
+@pytest.mark.parametrize("name", ["plates_small", "bracket_freezes", "tank_small", "shoulder_pour"])
+def test_castings_are_priced_by_a_trial_on_this_machine(name: str, tmp_path: Path) -> None:
+    scenario = expand(open_study(ROOT / "config" / "studies" / f"{name}.yaml"))[0].scenario
+    speed = kind_of(scenario).planning.speed
+    assert speed.stored(scenario, tmp_path) is None
+    rate = speed.measured(scenario, tmp_path)
+    # within a hundred times the speed of a core of 2026
+    assert 1e4 < rate < 5e10
+    assert speed.stored(scenario, tmp_path) == rate
+
+
+def test_a_speed_is_measured_once_and_a_damaged_file_is_written_anew(tmp_path: Path) -> None:
+    trials: list[str] = []
+
+    def trial(scenario: str) -> float | None:
+        trials.append(scenario)
+        return None if scenario == "fails" else 2.0
+
+    speed = stored_speed(lambda scenario: scenario, trial)  # type: ignore[arg-type, type-var]
+    assert speed.measured("fails", tmp_path) is None
+    assert not (tmp_path / STORED).exists()
+    for _ in range(2):
+        assert speed.measured("one", tmp_path) == 2.0
+    assert speed.measured("another", tmp_path) == 2.0
+    assert trials == ["fails", "one", "another"]
+    assert speed.stored("one", tmp_path) == 2.0
+    (tmp_path / STORED).write_text("[1]")
+    assert speed.stored("one", tmp_path) is None
+    assert speed.measured("one", tmp_path) == 2.0
