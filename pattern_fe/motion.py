@@ -11,13 +11,6 @@ from sandmould.pattern_fe.supports import Mask
 Array = NDArray[np.float64]
 
 
-def _check_step(step_s: float, damping_1_s: float) -> None:
-    if not 0.0 < step_s < np.inf:
-        raise ValueError(f"time step of the pattern is {step_s:g} s, valid is above 0")
-    if not 0.0 <= damping_1_s < np.inf:
-        raise ValueError(f"mass damping of the pattern is {damping_1_s:g} 1/s, valid is 0 or above")
-
-
 class CentralDifferences:
     """Motion with lumped masses by central differences, stable below the critical step.
 
@@ -33,7 +26,6 @@ class CentralDifferences:
         step_s: float,
         damping_1_s: float = 0.0,
     ) -> None:
-        _check_step(step_s, damping_1_s)
         self._stiffness = stiffness
         self._mass_kg = mass_kg[:, None]
         self._free = ~fixed

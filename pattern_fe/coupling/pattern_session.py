@@ -131,18 +131,13 @@ class SteppedSession(PatternSession, Generic[Foam]):
 
         Parameters
         ----------
-        sand : SandSession
+        sand, body, surface, load_tolerance
+            See ``PatternSession``; the body is the same pattern at rest.
         foam : ExplicitFoam or InStepFoam
-        body : ElasticBody
-            The same pattern at rest, for where the loads bend it.
-        surface : str
-            Its name in the engine, vertex for vertex that of the foam.
         work : Path
             Folder of the tables.
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
-        load_tolerance : float, optional
-            See ``PatternRest``.
         """
         super().__init__(sand, body, surface, load_tolerance)
         self._foam: Foam = foam

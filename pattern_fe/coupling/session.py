@@ -85,12 +85,8 @@ class CoupledSession(PatternSession):
 
         Parameters
         ----------
-        sand : SandSession
-            Of any engine that can move the surface.
-        body : ElasticBody
-            The pattern.
-        surface : str
-            Its name in the engine, vertex for vertex that of the body.
+        sand, body, surface, load_tolerance
+            See ``PatternSession``; the engine can move the surface.
         loop : Loop
             Of the scenario; one that has windows.
         counts : StepCounts
@@ -99,8 +95,6 @@ class CoupledSession(PatternSession):
             Folder of the tables.
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
-        load_tolerance : float, optional
-            See ``PatternRest``.
         surroundings : Surroundings, optional
             What the surface must not enter, wherever a scheme leads it.
         """
