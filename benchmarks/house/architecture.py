@@ -9,7 +9,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +22,9 @@ PAGE = ROOT / "docs" / "architecture.md"
 PICTURE = "architecture.svg"
 BEFORE = Path(__file__).with_name("rooms_before.json")
 """Rooms at the commit before they were built anew; a shallow clone does not have it."""
-CHANGES = Path(__file__).with_name("changes.json")
-"""Files that a change touched, measured on trial branches."""
 
 
-@dataclass(frozen=True)
-class Change:
-    """What one addition costs in files."""
-
-    change: str
-    """Such as 'a measure in the report'."""
-    before: str
-    """What it took before, in words."""
-    after: tuple[str, ...]
-    """Files written by hand, as a trial had them; none before it was measured."""
-
-
-def page_text(house: House, before: dict[str, Any], changes: Sequence[Change]) -> str:
+def page_text(house: House, before: dict[str, Any]) -> str:
     """Write the page.
 
     Parameters
@@ -46,7 +32,6 @@ def page_text(house: House, before: dict[str, Any], changes: Sequence[Change]) -
     house : House
     before : dict
         The ``commit`` and its ``rooms``, as ``BEFORE`` holds them.
-    changes : sequence of Change
     """
     earlier = {room["name"]: Room(**room) for room in before["rooms"]}
     values = {
@@ -54,22 +39,9 @@ def page_text(house: House, before: dict[str, Any], changes: Sequence[Change]) -
         "names": [name for floor in house.floors for name in floor],
         "earlier": earlier,
         "commit": before["commit"],
-        "changes": changes,
         "picture": PICTURE,
     }
     return render(Path(__file__).with_name("architecture.md.j2"), values)
-
-
-def read_changes(path: Path = CHANGES) -> list[Change]:
-    """Read what changes cost.
-
-    Raises
-    ------
-    OSError, ValueError
-        When the file cannot be read.
-    """
-    trees = json.loads(path.read_text(encoding="utf-8"))
-    return [Change(tree["change"], tree["before"], tuple(tree["after"])) for tree in trees]
 
 
 def write_before(commit: str, path: Path = BEFORE) -> None:
@@ -88,7 +60,7 @@ def main(arguments: Sequence[str] | None = None, page: Path = PAGE) -> int:
         write_before(commit)
     house = read_house(ROOT)
     before = json.loads(BEFORE.read_text(encoding="utf-8"))
-    page.write_text(page_text(house, before, read_changes()), encoding="utf-8")
+    page.write_text(page_text(house, before), encoding="utf-8")
     draw_house(house, page.with_name(PICTURE))
     print(page.relative_to(ROOT) if page.is_relative_to(ROOT) else page)
     for upper, lower in house.upward:

@@ -35,6 +35,8 @@ from sandmould.study.plan.load_study import open_study
 STUDIES = Path(__file__).parent
 APART = {"deck.in", "engine.log", "products.json", "scenario.yaml", "final.png"}
 """Files of a run that hold times, versions and names, or are drawn."""
+TIMED = ["solve_s", "pattern_outside_fraction"]
+"""Columns that hold times of the machine."""
 HEAD = """\
 # Code that was rewritten without a change of digits keeps the identity of the code it replaced:
 # its hash now = the hash before. `python -m benchmarks.house.same_digits COMMIT` compares the
@@ -113,6 +115,9 @@ def _content(path: Path) -> object:
     if path.suffix == ".npz":
         with np.load(path, allow_pickle=False) as arrays:
             return {name: (arrays[name].dtype.str, arrays[name].tobytes()) for name in arrays}
+    if path.suffix == ".tsv":
+        table = pd.read_csv(path, sep="\t", dtype=str)
+        return table.drop(columns=TIMED, errors="ignore").to_csv()
     return path.read_bytes()
 
 
