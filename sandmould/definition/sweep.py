@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from sandmould.bad_input import Problem
 from sandmould.limits import RUNS
+from sandmould.scenario.moved_keys import instead_of
 from sandmould.scenario.quantity import Section, fields_at, quantity
 from sandmould.scenario.reading import Tree
 from sandmould.scenario.sand import ARGUED
@@ -265,7 +266,8 @@ def _paths(sweep: Sweep, scenario: Section) -> Iterator[Problem]:
         except KeyError:
             near = difflib.get_close_matches(key, list(key_paths(base)), n=3, cutoff=0.5)
             keys = f"nearest are {', '.join(near)}" if near else "such as sand.size_scale"
-            yield Problem(where, stated, f"a key of the scenario; {keys}")
+            valid = instead_of(key.split(".")) or f"a key of the scenario; {keys}"
+            yield Problem(where, stated, valid)
         inside = [k for k in sweep.swept if k.startswith(key + ".")]
         if inside:
             yield Problem(where, stated, f"a key that does not hold another swept one, {inside[0]}")

@@ -16,7 +16,7 @@ from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
-from sandmould.engines.session import RefusedError, Session
+from sandmould.engines.session import RefusedError, SandSession
 from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.pattern import PatternDrawing
@@ -83,7 +83,7 @@ class EngineModule(Protocol):
     @staticmethod
     def open_session(
         program: Program, folder: Path, log: Path, checkpoint: Path | None = None
-    ) -> Session:
+    ) -> SandSession:
         """Open a session on a rendered deck, afresh or from a checkpoint."""
 
 

@@ -1,4 +1,4 @@
-"""Keys that stand elsewhere since, and other names of values, so that a file is told."""
+"""Keys that have moved or gone, and other names of values: what to write instead."""
 
 from __future__ import annotations
 
@@ -10,6 +10,12 @@ MOVED = {
     "record.load_every_steps": "rest.load_every_steps",
 }
 
+GONE = {
+    "pattern.loop.exchange": "sand and pattern always exchange loads and displacements in memory",
+    "pattern.loop.predicts": "shorter windows (pattern.loop.window_s) follow a surface that moves",
+}
+"""Keys that are no more, and what holds or serves without them."""
+
 CALLED = {("hold", "stroke"): "displacement", ("hold", "amplitude"): "displacement"}
 """Other names of values, by key."""
 
@@ -19,7 +25,13 @@ def called(key: str, value: str) -> str:
     return CALLED.get((key, value.lower()), "")
 
 
-def moved_to(parts: Sequence[str]) -> str | None:
-    """Where the key of a path stands now; None of one that has not moved."""
-    path = ".".join(parts)
-    return next((new for old, new in MOVED.items() if f".{path}".endswith(f".{old}")), None)
+def instead_of(parts: Sequence[str]) -> str | None:
+    """What is valid instead of a key that has moved or gone; None of any other key's path."""
+    path = "." + ".".join(parts)
+    for old, new in MOVED.items():
+        if path.endswith(f".{old}"):
+            return f"the key {new}, where this one has moved"
+    for old, why in GONE.items():
+        if path.endswith(f".{old}"):
+            return f"nothing in its place, for the key is no more: {why}"
+    return None

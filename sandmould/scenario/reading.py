@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.limits import YAML_BYTES
-from sandmould.scenario.moved_keys import called, moved_to
+from sandmould.scenario.moved_keys import called, instead_of
 from sandmould.scenario.quantity import units_at
 from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
 from sandmould.scenario.units import number_of
@@ -226,9 +226,9 @@ def _valid(model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: l
         if lengths:  # nothing where another branch of a union takes as many
             several = f"a list of {' or '.join(map(str, lengths))} entries"
             return "" if len(item["input"]) in lengths else several
-    if kind == "extra_forbidden" and (new := moved_to(parts)):
-        return f"the key {new}, where this one has moved"
     if kind == "extra_forbidden":
+        if instead := instead_of(parts):
+            return instead
         keys = standing_keys(model, tree, parts[:-1])
         near = difflib.get_close_matches(parts[-1], keys, n=1, cutoff=0.5)
         hint = f" (did you mean {near[0]}?)" if near else ""

@@ -39,7 +39,6 @@ NOT_TYPED = {
     "sand/bin/": "the environment that was installed",
     "~/sandmould-env/": "the environment that was installed",
     "scp": "needs another machine",
-    "until": "a pattern that another program bends; test_column_on_foam.py has the loop",
 }
 """How commands begin that are left out, and why."""
 

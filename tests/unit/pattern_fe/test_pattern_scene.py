@@ -19,12 +19,12 @@ from sandmould.kinds.sand import planning as sand
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.session import window_ends
-from sandmould.pattern_fe.mesh_file import write_mesh
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.pattern_fe.shapes import bar, mesh_of, with_sides
 from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
+from tests.patterns import write_mesh
 
 L_SCENE: dict[str, Any] = {
     "box": {"width_m": 0.2, "height_m": 0.2},
@@ -216,7 +216,6 @@ def test_a_mesh_file_of_tetrahedra_meets_the_sand(tmp_path: Path) -> None:
             {"loop": {"scheme": "per_layer"}, "young_modulus_pa": 1e3},
             r"scheme = 'per_layer' .* for so soft a foam",
         ),
-        ({}, {"loop": {"exchange": "files"}}, r"loop.exchange = 'files' .* memory in 3D"),
         ({"engine": {"name": "liggghts"}, "frame": "box"}, {}, r"engine.name = 'liggghts' .* lamm"),
         ({"dimension": 2}, {"depth_m": 0.1, "position_m": [0.06, 0.0]}, r"depth_m = 0.1 .* null"),
     ],
@@ -284,7 +283,6 @@ def test_windows_fill_a_record_with_whole_samples() -> None:
             "scheme = 'measured' .* valid is one_way, per_layer, fixed, ait",
         ),
         ("liggghts", {}, "pattern.loop.repeats = 12 cannot be used: valid is 0 on eng"),
-        ("lammps", {"scheme": "in_step", "exchange": "files"}, "exchange = 'files' .* no windows"),
     ],
 )
 def test_what_an_engine_cannot_couple_is_told(engine: str, loop: dict[str, Any], says: str) -> None:
