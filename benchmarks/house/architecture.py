@@ -1,27 +1,22 @@
-"""Write ``docs/developers/architecture.md`` and its picture: ``make architecture``.
-
-With ``--before COMMIT``, the rooms of an earlier commit are counted and kept for the page.
-"""
+"""Write ``docs/developers/architecture.md`` and its picture: ``make architecture``."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
-from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from benchmarks.frame.page import render
 from benchmarks.house.picture import draw_house
-from benchmarks.house.rooms import House, Room, read_house, rooms_at
+from benchmarks.house.rooms import House, Room, read_house
 from sandmould import ROOT
+from sandmould.module_main import run_main
 
 PAGE = ROOT / "docs" / "developers" / "architecture.md"
 PICTURE = "architecture.svg"
 BEFORE = Path(__file__).with_name("rooms_before.json")
-"""Rooms at the commit before they were built anew; a shallow clone does not have it."""
+"""Rooms at the commit before they were built anew, counted in the same way."""
 
 
 def page_text(house: House, before: dict[str, Any]) -> str:
@@ -44,20 +39,8 @@ def page_text(house: House, before: dict[str, Any]) -> str:
     return render(Path(__file__).with_name("architecture.md.j2"), values)
 
 
-def write_before(commit: str, path: Path = BEFORE) -> None:
-    """Count the rooms at a commit of this clone and keep them."""
-    rooms = [asdict(room) for room in rooms_at(ROOT, commit).values()]
-    text = json.dumps({"commit": commit, "rooms": rooms}, indent=1)
-    path.write_text(text + "\n", encoding="utf-8")
-
-
-def main(arguments: Sequence[str] | None = None, page: Path = PAGE) -> int:
+def main(page: Path = PAGE) -> int:
     """Write the page and its picture; status 1 where an import runs up."""
-    parser = argparse.ArgumentParser(description="Write architecture.md and its picture.")
-    parser.add_argument("--before", metavar="COMMIT", help="count the rooms at COMMIT for the page")
-    commit = parser.parse_args(arguments).before
-    if commit:
-        write_before(commit)
     house = read_house(ROOT)
     before = json.loads(BEFORE.read_text(encoding="utf-8"))
     page.write_text(page_text(house, before), encoding="utf-8")
@@ -69,4 +52,4 @@ def main(arguments: Sequence[str] | None = None, page: Path = PAGE) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_main(main, "python -m benchmarks.house.architecture")

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from benchmarks.frame.source_tree import unpack
 from sandmould import ROOT, geometry, pattern_fe
 from sandmould.casting import arpm, mps
 from sandmould.definition.run import Run
@@ -139,12 +140,7 @@ def main(commit: str) -> int:
         print(json.dumps(identities(), indent=1))
         return 0
     with tempfile.TemporaryDirectory() as name:
-        tree = Path(name, commit)
-        tree.mkdir()
-        archive = subprocess.run(
-            ["git", "archive", commit], cwd=ROOT, check=True, capture_output=True
-        ).stdout
-        subprocess.run(["tar", "-x"], cwd=tree, input=archive, check=True)
+        tree = unpack(commit, Path(name))
         compute(tree, Path(name, "before"))
         compute(ROOT, Path(name, "now"))
         found = list(differences(Path(name, "before"), Path(name, "now")))

@@ -96,7 +96,7 @@ def test_rooms_of_before_and_now_are_listed(tree: Path) -> None:
 
 
 def test_page_of_this_house(tmp_path: Path) -> None:
-    assert architecture.main([], tmp_path / "architecture.md") == 0
+    assert architecture.main(tmp_path / "architecture.md") == 0
     page = (tmp_path / "architecture.md").read_text(encoding="utf-8")
     assert "Every import runs down" in page
     assert (tmp_path / architecture.PICTURE).stat().st_size > 1e4
