@@ -14,7 +14,7 @@ from sandmould.execution.cluster.settings import CLUSTER_FILE
 from sandmould.kernel_cache import cache_folder
 from sandmould.runs.formatting import size_text
 from sandmould.runs.provenance import commit, processor
-from sandmould.scenario.engine import ENGINE_NAMES
+from sandmould.scenario.engine import ENGINE_NAMES, EngineName
 
 SMALLEST_DISK_BYTES = 2_000_000_000
 """A study of some dozen runs takes a tenth of it (docs/running.md)."""
@@ -49,7 +49,7 @@ def findings(folder: Path) -> list[InstallationPart]:
     ]
 
 
-def _engine(name: str) -> InstallationPart:
+def _engine(name: EngineName) -> InstallationPart:
     engine = engine_module(name)
     problem = engine.installation_problem()
     version = engine.installed_version()
