@@ -211,9 +211,7 @@ class Execution(ABC, Generic[ScenarioT]):
         write_text(folder / "deck.in", "\n".join(lines) + "\n")
 
     def complete(self, scenario: ScenarioT, work: Path) -> None:
-        """Make the products in a work folder that a broken run never wrote: empty files."""
-        for name in self.products:
-            (work / name).touch()
+        """Make the products in a work folder that a broken run never wrote, if others read them."""
 
     def load_computing(self, scenario: ScenarioT) -> None:
         """Import what computing needs, for a worker that forks for each run.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,12 +27,12 @@ from sandmould.study.collect import Collected
 class KindPages:
     """The part of a report that depends on what is simulated."""
 
-    template: str
+    template: str = "shell.html"
     """File of ``templates/report``."""
-    method: tuple[Row, ...]
-    ends: str
+    method: tuple[Row, ...] = ()
+    ends: str = "the end of the run"
     """When measures are taken, where the objective names no time."""
-    context: Mapping[str, Any]
+    context: Mapping[str, Any] = field(default_factory=dict)
     """What the template is given beside what all are given."""
     figures: Mapping[str, Chart | bytes] = field(default_factory=dict)
     """What is written as files too, by name."""
@@ -72,10 +71,9 @@ class Findings(Generic[ScenarioT]):
         return {label: scenario for label, (scenario, _) in self.by_setting.items()}
 
 
-class KindReport(ABC, Generic[ScenarioT]):
-    """What reports of one kind of study say and show of their own; only pages are asked for."""
+class KindReport(Generic[ScenarioT]):
+    """What reports of one kind of study say and show of their own: nothing, unless it says so."""
 
-    @abstractmethod
     def pages(self, findings: Findings[ScenarioT], film_budget_bytes: int) -> KindPages:
         """What it draws.
 
@@ -85,6 +83,7 @@ class KindReport(ABC, Generic[ScenarioT]):
         film_budget_bytes : int
             Most that the film of one run may weigh.
         """
+        return KindPages()
 
     def notes(
         self, scenario: ScenarioT, collected: Collected, seeks_best: bool, is_controlled: bool
