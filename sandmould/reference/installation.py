@@ -16,7 +16,7 @@ from sandmould.execution.cluster.settings import CLUSTER_FILE
 from sandmould.kernel_cache import cache_folder
 from sandmould.runs.formatting import size_text
 from sandmould.runs.provenance import commit, processor
-from sandmould.scenario.engine import ENGINE_NAMES
+from sandmould.scenario.engine import ENGINE_NAMES, EngineName
 
 LOCK = SHIPPED / "requirements.lock"
 """The versions that the tests run with; a package may have one for older Pythons too."""
@@ -76,7 +76,7 @@ def _installed(name: str) -> str | None:
         return None
 
 
-def _engine(name: str) -> InstallationPart:
+def _engine(name: EngineName) -> InstallationPart:
     engine = engine_module(name)
     problem = engine.installation_problem()
     version = engine.installed_version()

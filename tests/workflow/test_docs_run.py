@@ -17,8 +17,7 @@ from pathlib import Path
 import pytest
 
 from sandmould.cli.study_file import study_file
-from sandmould.kinds.sand import speed
-from sandmould.kinds.sand.speed import SPEED
+from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.study.plan.build_plan import open_plan
 from tests.workflow.pages import PAGES, blocks
 
@@ -149,9 +148,9 @@ class Reader:
 @pytest.fixture
 def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
     """A reader whose plans know how fast the machine is: measuring it takes 10 s each."""
-    monkeypatch.setattr(speed, "_measure_rate", lambda _: 2e7)
+    monkeypatch.setattr(SandSpeed, "trial", lambda *_: 2e7)
     for study in ("tube_quick", "tube_3d_small"):
-        SPEED.measured(open_plan(study_file(study)).runs[0].scenario, tmp_path / "results")
+        SandSpeed().measured(open_plan(study_file(study)).runs[0].scenario, tmp_path / "results")
     return Reader(tmp_path)
 
 

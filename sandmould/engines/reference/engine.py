@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,13 +15,11 @@ from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
 from sandmould.engines.ranks import Ranks
+from sandmould.engines.session import SandSession
 from sandmould.scenario.contact import SYMBOLS
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
-
-if TYPE_CHECKING:
-    from sandmould.engines.reference.session import ReferenceSession
 
 GRAIN_STEPS_PER_S = 1.5e7
 RANKS = Ranks.THREADS
@@ -49,6 +46,10 @@ def installed_version() -> str:
 
 def installation_problem() -> None:
     """Find nothing missing: the solver comes with the house."""
+
+
+def communicator() -> None:
+    """There is none: ranks are threads of one process."""
 
 
 def refuse(scenario: Scenario) -> None:
@@ -129,7 +130,7 @@ def load_session(scenario: Scenario) -> None:
 
 def open_session(
     program: Program, folder: Path, log: Path, checkpoint: Path | None = None
-) -> ReferenceSession:
+) -> SandSession:
     """Open a session, afresh or from a checkpoint; the deck is for people alone."""
     from sandmould.engines.reference.session import ReferenceSession
 

@@ -44,23 +44,23 @@ class DeckStudy(Study):
         return self.allowed_folders
 
 
-def _planning() -> Planning[OwnDeck]:
-    from sandmould.kinds.deck.planning import PLANNING
+def _open_planning() -> Planning[OwnDeck]:
+    from sandmould.kinds.deck.planning import DeckPlanning
 
-    return PLANNING
+    return DeckPlanning()
 
 
-def _execution() -> Execution[OwnDeck]:
-    from sandmould.kinds.deck.execution import EXECUTION
+def _open_execution() -> Execution[OwnDeck]:
+    from sandmould.kinds.deck.execution import DeckExecution
 
-    return EXECUTION
+    return DeckExecution()
 
 
 DECK = Kind(
     name="deck",
     scenario=OwnDeck,
     study=DeckStudy,
-    open_planning=_planning,
-    open_execution=_execution,
+    open_planning=_open_planning,
+    open_execution=_open_execution,
     draws_by_lot=True,
 )

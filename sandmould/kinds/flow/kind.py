@@ -20,22 +20,22 @@ class FlowStudy(Study):
     )
 
 
-def _planning() -> Planning[MetalFlow]:
-    from sandmould.kinds.flow.planning import PLANNING
+def _open_planning() -> Planning[MetalFlow]:
+    from sandmould.kinds.flow.planning import FlowPlanning
 
-    return PLANNING
+    return FlowPlanning()
 
 
-def _execution() -> Execution[MetalFlow]:
-    from sandmould.kinds.flow.execution import EXECUTION
+def _open_execution() -> Execution[MetalFlow]:
+    from sandmould.kinds.flow.execution import FlowExecution
 
-    return EXECUTION
+    return FlowExecution()
 
 
 FLOW = Kind(
     name="flow",
     scenario=MetalFlow,
     study=FlowStudy,
-    open_planning=_planning,
-    open_execution=_execution,
+    open_planning=_open_planning,
+    open_execution=_open_execution,
 )

@@ -34,23 +34,23 @@ class SolidificationStudy(Study):
             yield Problem("reference", self.reference, f"a point of the sweep, such as {swept[0]}")
 
 
-def _planning() -> Planning[Solidification]:
-    from sandmould.kinds.solidification.planning import PLANNING
+def _open_planning() -> Planning[Solidification]:
+    from sandmould.kinds.solidification.planning import SolidificationPlanning
 
-    return PLANNING
+    return SolidificationPlanning()
 
 
-def _execution() -> Execution[Solidification]:
-    from sandmould.kinds.solidification.execution import EXECUTION
+def _open_execution() -> Execution[Solidification]:
+    from sandmould.kinds.solidification.execution import SolidificationExecution
 
-    return EXECUTION
+    return SolidificationExecution()
 
 
 SOLIDIFICATION = Kind(
     name="solidification",
     scenario=Solidification,
     study=SolidificationStudy,
-    open_planning=_planning,
-    open_execution=_execution,
+    open_planning=_open_planning,
+    open_execution=_open_execution,
     material=MetalAndMould,
 )

@@ -15,7 +15,7 @@ from skfem import MeshTet
 from sandmould.bad_input import BadInputError
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.step_counts import StepCounts
-from sandmould.kinds.sand import planning as sand
+from sandmould.kinds.sand.kind import SAND
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.session import window_ends
@@ -253,9 +253,11 @@ def test_foam_that_keeps_its_volume_is_told(ratio: float) -> None:
 
 
 def test_another_foam_is_another_result() -> None:
-    one, other = (sand.resolved(l_scene(young_modulus_pa=e)) for e in (1e6, 2e6))
-    assert sand.computed_hash(one) != sand.computed_hash(other)
-    assert sand.template_hash(one) != sand.template_hash(one.model_copy(update={"pattern": None}))
+    one, other = (SAND.planning.resolved(l_scene(young_modulus_pa=e)) for e in (1e6, 2e6))
+    assert SAND.planning.computed_hash(one) != SAND.planning.computed_hash(other)
+    assert SAND.planning.template_hash(one) != SAND.planning.template_hash(
+        one.model_copy(update={"pattern": None})
+    )
 
 
 def test_windows_fill_a_record_with_whole_samples() -> None:
@@ -290,10 +292,10 @@ def test_what_an_engine_cannot_couple_is_told(engine: str, loop: dict[str, Any],
     tree = {**L_SCENE, "engine": {"name": engine}, "frame": frame}
     tree["pattern"] = {**L_SCENE["pattern"], "loop": loop}
     with pytest.raises(BadInputError, match=says):
-        sand.resolved(Scenario.model_validate(tree))
+        SAND.planning.resolved(Scenario.model_validate(tree))
 
 
 def test_a_gate_beside_a_pattern_is_told() -> None:
     scenario = Scenario.model_validate({**L_SCENE, "discharge": {"gate": "gate"}})
     with pytest.raises(BadInputError, match=r"discharge.gate = 'gate' .* absent in a scene with"):
-        sand.resolved(scenario)
+        SAND.planning.resolved(scenario)
