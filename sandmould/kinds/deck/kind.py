@@ -56,7 +56,7 @@ def _execution() -> Execution[OwnDeck]:
     return EXECUTION
 
 
-DECK = Kind(
+DECK: Kind[OwnDeck] = Kind(
     name="deck",
     scenario=OwnDeck,
     study=DeckStudy,

@@ -32,7 +32,7 @@ def _execution() -> Execution[MetalFlow]:
     return EXECUTION
 
 
-FLOW = Kind(
+FLOW: Kind[MetalFlow] = Kind(
     name="flow",
     scenario=MetalFlow,
     study=FlowStudy,

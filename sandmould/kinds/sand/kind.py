@@ -49,7 +49,7 @@ def _execution() -> Execution[Scenario]:
     return EXECUTION
 
 
-SAND = Kind(
+SAND: Kind[Scenario] = Kind(
     name="sand",
     scenario=Scenario,
     study=SandStudy,

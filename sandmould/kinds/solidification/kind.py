@@ -46,7 +46,7 @@ def _execution() -> Execution[Solidification]:
     return EXECUTION
 
 
-SOLIDIFICATION = Kind(
+SOLIDIFICATION: Kind[Solidification] = Kind(
     name="solidification",
     scenario=Solidification,
     study=SolidificationStudy,
