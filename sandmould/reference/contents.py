@@ -1,4 +1,4 @@
-"""What files a study and its runs leave, and what stands in them: ``files.yaml``, and its page."""
+"""What files a study and its runs leave, and what stands in them, as ``files.yaml`` has it."""
 
 from __future__ import annotations
 
@@ -72,25 +72,3 @@ OF_STUDY = _files("study")
 """Files of ``results/<study>``."""
 OF_RUN = _files("run")
 """Files of ``results/<study>/runs/<run>``."""
-
-
-def files_lines() -> Iterator[str]:
-    """The page: lists of files, each table of columns once."""
-    for title, where, files in (
-        ("All studies", "results/", OF_ALL),
-        ("A study", "results/<study>/", OF_STUDY),
-        ("A run", "results/<study>/runs/<run>/", OF_RUN),
-    ):
-        yield from ("", f"## {title}", "")
-        yield from (f"In `{where}`; each where the kind of study has it:", "")
-        yield from ("| file | what it is |", "| --- | --- |")
-        yield from (f"| `{file.name}` | {file.meaning} |" for file in files)
-    for file in (*OF_STUDY, *OF_RUN):
-        if not file.columns:
-            continue
-        yield from ("", f"### `{file.name}`", "")
-        if file.columns_of:
-            yield f"As `{file.columns_of}`."
-            continue
-        yield from ("| name | unit | meaning |", "| --- | --- | --- |")
-        yield from (f"| `{c.name}` | {c.unit} | {c.meaning} |" for c in file.columns)
