@@ -18,7 +18,7 @@ from benchmarks.arpm.space import REFERENCE_MM, space_rows
 from benchmarks.arpm.ways import way_rows
 from benchmarks.frame import Benchmark, BenchmarkRun
 from sandmould.casting.arpm import source_hash
-from sandmould.casting.arpm.plates_case import read_plates
+from tests.verification.castings.plates import read_plates
 
 
 class ElementSizes(NamedTuple):

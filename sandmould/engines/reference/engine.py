@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sandmould.dem import source_files, source_hash
+from sandmould.digest import SHORT
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
@@ -16,6 +17,7 @@ from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import SandSession
+from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.contact import SYMBOLS
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
@@ -80,6 +82,8 @@ def render_deck(program: Program, sources: Mapping[str, str], run: str, study: s
     context |= {
         "kernels": source_hash(),
         "keys": keys,
+        "scenario_hash": scenario_hash(scenario)[:SHORT],
+        "slip_normal": scenario.contact.slip_normal or "half_step",
         "inertia_factor": inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d),
         "surfaces": surfaces_of(scenario).names,
         "planned_step_s": scenario.planned_step_s,

@@ -56,7 +56,7 @@ def _open_execution() -> Execution[OwnDeck]:
     return DeckExecution()
 
 
-DECK = Kind(
+DECK: Kind[OwnDeck] = Kind(
     name="deck",
     scenario=OwnDeck,
     study=DeckStudy,

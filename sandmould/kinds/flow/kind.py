@@ -32,7 +32,7 @@ def _open_execution() -> Execution[MetalFlow]:
     return FlowExecution()
 
 
-FLOW = Kind(
+FLOW: Kind[MetalFlow] = Kind(
     name="flow",
     scenario=MetalFlow,
     study=FlowStudy,

@@ -45,7 +45,7 @@ def _open_execution() -> Execution[Scenario]:
     return SandExecution()
 
 
-SAND = Kind(
+SAND: Kind[Scenario] = Kind(
     name="sand",
     scenario=Scenario,
     study=SandStudy,

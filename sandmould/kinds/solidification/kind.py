@@ -46,7 +46,7 @@ def _open_execution() -> Execution[Solidification]:
     return SolidificationExecution()
 
 
-SOLIDIFICATION = Kind(
+SOLIDIFICATION: Kind[Solidification] = Kind(
     name="solidification",
     scenario=Solidification,
     study=SolidificationStudy,

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sandmould.casting.arpm.elements import Elements, placed
-from sandmould.casting.arpm.exact import contact_temperature_k
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster
+from tests.verification.castings.exact import contact_temperature_k
 
 SMALL_M = 0.005
 HALF_LENGTH_M, WIDTH_M = 0.5, 0.08
