@@ -21,7 +21,6 @@ from pydantic import Field, ValidationError
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILLS, RUN_NAME
-from sandmould.digest import digest
 from sandmould.runs.manifest import DECK_FILE, MANIFEST_FILE, read_origin
 from sandmould.runs.outcome import RunOutcome
 from sandmould.scenario.quantity import NAME, Section
@@ -68,13 +67,7 @@ class PackList(Section):
     """Of runs at their end, by their place in it; see ``identity_of``."""
 
     def runs(self) -> dict[str, dict[str, PackedFile]]:
-        """Files of each run, and of each fill that runs share, by its place.
-
-        Raises
-        ------
-        ValueError
-            Where a file belongs into no folder of a run.
-        """
+        """Files of each run or fill by its place; ``ValueError`` for a file that is of none."""
         runs: dict[str, dict[str, PackedFile]] = {}
         for name, file in self.files.items():
             if found := _PLACE.fullmatch(name):
@@ -119,16 +112,11 @@ def is_at_end(folder: Path) -> bool:
 
 
 def identity_of(folder: Path) -> str:
-    """What tells runs of one name apart; empty where it cannot be read."""
+    """Hashes of a run's scenario and of what turns it into a computation; empty where untold."""
     with contextlib.suppress(*UNREADABLE):
         origin = read_origin(folder)
-        return identity(origin["scenario_sha256"], origin["template_sha256"])
+        return f"{origin['scenario_sha256']} {origin['template_sha256']}"
     return ""
-
-
-def identity(scenario_sha256: str, template_sha256: str) -> str:
-    """The same from hashes of the scenario, and of what turns it into a computation."""
-    return digest(f"{scenario_sha256} {template_sha256}")
 
 
 def reasons_lines(reasons: Mapping[str, str], head: str) -> Iterator[str]:
@@ -173,13 +161,7 @@ class Pack:
     """A pack that is read: its list is sound, and the zip holds what that names and no more."""
 
     def __init__(self, file: io.BufferedReader) -> None:
-        """Judge all heads and the list.
-
-        Raises
-        ------
-        ValueError
-            With what is wrong, in a few words.
-        """
+        """Judge all heads and the list; ``ValueError`` says what is wrong, in a few words."""
         size = file.seek(0, io.SEEK_END)
         with _reading("it is no zip, cut short or damaged"):
             self._archive = zipfile.ZipFile(file)
@@ -194,20 +176,18 @@ class Pack:
             raise ValueError("files in it lie over each other")
         if sizes.pop(LIST_FILE, _MOST_BYTES) > _MOST_TEXT_BYTES:
             raise ValueError(f"it has no {LIST_FILE}")
-        self.listed = _list_of(b"".join(self._chunks(LIST_FILE)))
+        try:
+            self.listed = PackList.model_validate_json(b"".join(self._chunks(LIST_FILE)))
+        except ValidationError as error:
+            wrong = error.errors(include_url=False)[0]["msg"]
+            raise ValueError(f"its {LIST_FILE} is none of ours ({wrong})") from None
         self.study, self.runs = self.listed.study, self.listed.runs()
         named = {f"{self.study}/{name}": file.size for name, file in self.listed.files.items()}
-        if wrong := sorted(sizes.items() ^ named.items()):
-            raise ValueError(f"{wrong[0][0][:_NAME_BYTES]!r} is not as its {LIST_FILE} says")
+        if odd := [name for name, _ in sorted(sizes.items() ^ named.items())]:
+            raise ValueError(f"{odd[0][:_NAME_BYTES]!r} is not as its {LIST_FILE} says")
 
     def extract(self, names: Iterable[str], folder: Path) -> None:
-        """Write files of the list below a folder.
-
-        Raises
-        ------
-        ValueError
-            Where one is damaged: what was written is not what was packed.
-        """
+        """Write files below a folder; ``ValueError`` where one is damaged."""
         for name in names:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             hashed = hashlib.sha256()
@@ -228,15 +208,6 @@ def _is_plain(head: zipfile.ZipInfo) -> bool:
     """Whether a member is a plain file, in a form that takes little memory to unpack."""
     is_file = head.external_attr >> 28 in (0, 8) and not head.flag_bits & 1
     return is_file and head.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-
-
-def _list_of(text: bytes) -> PackList:
-    try:
-        return PackList.model_validate_json(text)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        place = ".".join(str(part) for part in first["loc"])[:_NAME_BYTES]
-        raise ValueError(f"its {LIST_FILE} is none of ours ({place!r}: {first['msg']})") from None
 
 
 @contextlib.contextmanager
@@ -260,12 +231,7 @@ class _Bounded(io.BufferedReader):
 
 @contextlib.contextmanager
 def open_pack(path: Path) -> Iterator[Pack]:
-    """Open a pack; what is wrong with it becomes one sentence.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """Open a pack; what is wrong with it becomes one ``BadInputError``."""
     try:
         if path.exists() and not path.is_file():
             raise ValueError("it is no file")

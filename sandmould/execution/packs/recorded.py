@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sandmould import ROOT, SHIPPED
 from sandmould.definition.run import Run
-from sandmould.execution.packs.archive import SUFFIX, identity, open_pack
+from sandmould.execution.packs.archive import SUFFIX, open_pack
 from sandmould.execution.packs.pack import Packed
 from sandmould.execution.packs.pack import pack as pack_study
 from sandmould.execution.packs.unpack import Unpacked, take, unusable, wants_fill
@@ -20,13 +20,7 @@ RECORDS = ROOT / "docs" / "results"
 
 
 def record_part(plan: Plan, results: Path) -> Packed:
-    """Add a pack of the runs at their end to the record of a study.
-
-    Raises
-    ------
-    BadInputError
-        Where no run is at its end that is not in the record yet.
-    """
+    """Add a pack of the runs at their end that it lacks to the record of a study."""
     folder = RECORDS / plan.study.name
     folder.mkdir(parents=True, exist_ok=True)
     return pack_study(plan, results, folder, last_state=True)
@@ -68,7 +62,7 @@ def take_up(plan: Plan, results: Path) -> tuple[Plan, str]:
                 run.place: run
                 for run in _missing(plan, results)
                 if pack.listed.identities.get(run.place)
-                == identity(scenario_hash(run.scenario), template_hash(run))
+                == f"{scenario_hash(run.scenario)} {template_hash(run)}"
             }
 
             def judge(place: str, part: Path, runs: dict[str, Run] = missing) -> str:

@@ -40,6 +40,7 @@ from sandmould.study.rounds.round_log import ROUNDS_FILE
 
 _COMPARED = ("series.tsv", "measures.tsv")
 _BUSY = "being computed here"
+_REMOVE = "remove its folder to take the packed one"
 
 
 @dataclass
@@ -108,15 +109,13 @@ def take(
     *,
     states: bool = False,
 ) -> None:
-    """Put runs into the results of a study, once the files of all are whole.
+    """Put runs and fills into ``results/<study>``, once the files of all are whole.
 
     Parameters
     ----------
     pack : Pack
     folder : Path
-        ``results/<study>``.
     places : iterable of str
-        Of runs and fills.
     judge : callable
         Why a run at its end that lies in a folder is not taken; empty where it is.
     unpacked : Unpacked
@@ -126,10 +125,8 @@ def take(
 
     Raises
     ------
-    ValueError
-        Where the pack is damaged.
-    BadInputError
-        Where it does not fit on the disk.
+    ValueError, BadInputError
+        Where the pack is damaged, or does not fit on the disk.
     """
     part = folder / "unpacking.partial"
     files = {
@@ -172,9 +169,8 @@ def unusable(run: Run, folder: Path, template_hash: Callable[[Run], str]) -> str
         lack = lack_of(run, folder, template_hash)
         return f"a start would compute it: {lack.why}" if lack.need is Need.COMPUTE else ""
     with contextlib.suppress(*UNREADABLE):
-        if is_at_end(folder) and read_origin(folder)["scenario_sha256"] == scenario_hash(
-            run.scenario
-        ):
+        of = read_origin(folder)["scenario_sha256"]
+        if is_at_end(folder) and of == scenario_hash(run.scenario):
             return ""
     return "it is not told what it cost"
 
@@ -199,12 +195,12 @@ def _judged(study: str, place: str, part: Path, template_hash: Callable[[Run], s
         return f"its {SCENARIO_FILE} cannot be read by this version"
     if (run.study, run.place) != (study, place):
         return f"its {SCENARIO_FILE} is that of another run"
+
+    def stated(_: Run) -> str:
+        return str(read_origin(part)["template_sha256"])
+
     own = kind_of(run.scenario).planning.program is not None
-    return unusable(run, part, (lambda _: _stated_hash(part)) if own else template_hash)
-
-
-def _stated_hash(folder: Path) -> str:
-    return str(read_origin(folder)["template_sha256"])
+    return unusable(run, part, stated if own else template_hash)
 
 
 def _fill(place: str) -> bool:
@@ -238,28 +234,24 @@ def _is_wanted(pack: Pack, place: str, folder: Path, checkpoints: bool, unpacked
     at_end, is_begun = OUTCOME_FILE in files, (here / WORK).exists()
     if _fill(place):
         return at_end and wants_fill(here)
+    same = pack.listed.identities.get(place) == identity_of(here)
+    if is_at_end(here) and (same or not at_end):
+        unpacked.there.append(here.name)
+        if any(_differs(here / table, files) for table in _COMPARED):
+            unpacked.other_digits.append(here.name)
+        return False
     why = ""
     if is_at_end(here):
-        if at_end and pack.listed.identities.get(place) != identity_of(here):
-            why = (
-                "at its end here with another scenario, deck or solver: remove its folder to take "
-                "the packed one"
-            )
-        else:
-            unpacked.there.append(here.name)
-            if any(_differs(here / table, files) for table in _COMPARED):
-                unpacked.other_digits.append(here.name)
-            return False
+        why = f"at its end here with another scenario, deck or solver: {_REMOVE}"
     elif is_locked(here):
         why = _BUSY
     elif at_end and is_begun and _differs(here / DECK_FILE, files):
-        why = "begun here with another deck: remove its folder to take the packed one"
+        why = f"begun here with another deck: {_REMOVE}"
     elif not at_end and not checkpoints:
         why = "not at its end: --checkpoints takes its checkpoint (docs/trust.md)"
     elif not at_end and is_begun:
         why = "begun here as well"
-    if why:
-        unpacked.left[here.name] = why
+    unpacked.left |= {here.name: why} if why else {}
     return not why
 
 

@@ -17,16 +17,20 @@ from types import SimpleNamespace
 import pytest
 
 from sandmould.bad_input import BadInputError
+from sandmould.definition.run import Run
 from sandmould.digest import digest
 from sandmould.execution.packs import archive, recorded
 from sandmould.execution.packs.pack import pack
 from sandmould.execution.packs.rounds import merge_rounds
 from sandmould.execution.packs.unpack import unpack
+from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import MANIFEST_FILE
+from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import collect
 from sandmould.study.plan.batches import mark_done
 from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan
 from sandmould.study.plan.lacking import Need
+from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.rounds.round_log import ROUNDS_FILE
 from tests.finished_study import finished_study, study_text
 
@@ -395,6 +399,25 @@ def test_a_run_that_a_start_would_compute_is_left_and_the_others_are_taken(
     assert unpacked.taken == [Path(other).parent.name]
     assert [p.name for p in (RESULTS / "two" / "runs").iterdir()] == unpacked.taken
     assert not list(RESULTS.rglob("*.partial"))
+
+
+def test_files_that_a_scenario_names_are_not_opened(packed: Path) -> None:
+    """A deck of the user's own names its template, which may be any file of this machine."""
+    scenario = OwnDeck(template="nowhere/deck.in.j2")
+    run = Run("two", "own_r1_0a1b2c", {}, 1, scenario, {})
+    write_plan([run], Path("plan"))
+    origin = {"scenario_sha256": scenario_hash(scenario), "template_sha256": "as it was there"}
+    texts = {
+        "scenario.yaml": (Path("plan") / run.place / "scenario.yaml").read_bytes(),
+        "deck.in": b"run 0",
+        "products.json": json.dumps({"origin": origin, "computed": {}, "measured": {}}).encode(),
+        "outcome.json": members_of(packed)[
+            series_in(members_of(packed)).replace("series.tsv", "outcome.json")
+        ],
+    }
+    listed = {"manifest.json": members_of(packed)["manifest.json"]}
+    written({f"two/{run.place}/{name}": text for name, text in texts.items()} | listed, packed)
+    assert unpack(packed, RESULTS).taken == [run.run]
 
 
 def test_what_is_begun_here_with_another_deck_stays(packed: Path) -> None:
