@@ -1,6 +1,8 @@
 # `make` alone lists the targets: a line of two hashes above a target is its help.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
+OTHER_PYTHON ?= $(shell for python in python3.13 python3.12 "$$HOME"/.pyenv/versions/3.1[32]*/bin/python; do \
+  "$$python" -c '' 2> /dev/null && echo "$$python" && break; done)
 CORES ?= $(shell nproc)
 STUDY ?= config/studies/tube_demo.yaml
 MINUTES ?= 60
@@ -12,7 +14,7 @@ TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo study plan status report quick fast-tests test lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
+.PHONY: help install demo study plan status report quick fast-tests test other-python lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
 .PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop size reliability fuzz benchmarks peers scaling solidification flow \
   reproduction
 
@@ -58,6 +60,17 @@ test: lint
 fast-tests: $(INSTALLED)
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and not browser"
 
+## the fast half of the tests on another supported Python, where there is one
+other-python:
+ifeq ($(OTHER_PYTHON),)
+	@echo 'No other Python from 3.12 on is found: the tests ran on one alone.'
+else
+	$(OTHER_PYTHON) -m venv .venv-other
+	.venv-other/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	.venv-other/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	.venv-other/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and not browser"
+endif
+
 ## lint, types and import contract alone
 lint: $(LINT)
 
@@ -94,23 +107,23 @@ verification: $(INSTALLED)
 stability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.stability
 
-## what LAMMPS decks cost with near grains and sorting: docs/lammps_speed.md
+## what LAMMPS decks cost with near grains and sorting: docs/developers/lammps_speed.md
 lammps-decks: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.lammps_decks $(QUICK)
 
-## impacts on all engines and beds with both dashpots: docs/rebound.md
+## impacts on all engines and beds with both dashpots: docs/developers/rebound.md
 rebound: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.rebound $(QUICK)
 
-## small grains between large ones: docs/size_ratio.md
+## small grains between large ones: docs/developers/size_ratio.md
 size-ratio: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.size_ratio $(QUICK)
 
-## packing measured at speed and at rest: docs/measured_at_rest.md
+## packing measured at speed and at rest: docs/developers/measured_at_rest.md
 at-rest: $(INSTALLED)
 	@NUMBA_NUM_THREADS=1 $(BIN)/python -m benchmarks.at_rest $(QUICK)
 
-## studies killed, disks that fail: docs/reliability.md, 50 minutes
+## studies killed, disks that fail: docs/developers/reliability.md, 50 minutes
 reliability: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.reliability $(QUICK)
 
@@ -118,24 +131,24 @@ reliability: $(INSTALLED)
 fuzz: $(INSTALLED)
 	@$(BIN)/python -m tests.fuzz.campaign --minutes $(MINUTES)
 
-## how fast the engines are: docs/speed.md
+## how fast the engines are: docs/developers/speed.md
 benchmarks: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.engines $(QUICK)
 
-## the solver's step loop beside an earlier commit: docs/core_loop.md
+## the solver's step loop beside an earlier commit: docs/developers/core_loop.md
 core-loop: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.core_loop $(QUICK)
 
-## memory, listings, meshes and large beds beside an earlier commit: docs/size.md
+## memory, listings, meshes and large beds beside an earlier commit: docs/developers/size.md
 size: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.size $(QUICK)
 
 # The peers need an older numpy, so they have an environment of their own.
-## calibration beside other tools: docs/calibration_peers.md
+## calibration beside other tools: docs/developers/calibration_peers.md
 peers: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.calibration $(QUICK)
 
-## what the workflow costs up to 10 000 runs: docs/workflow_cost.md
+## what the workflow costs up to 10 000 runs: docs/developers/workflow_cost.md
 scaling: $(INSTALLED) .venv-peers/installed
 	@$(BIN)/python -m benchmarks.scaling $(QUICK)
 
@@ -162,7 +175,7 @@ solidification: $(INSTALLED)
 docs: $(INSTALLED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-## draw the rooms and write docs/architecture.md
+## draw the rooms and write docs/developers/architecture.md
 architecture: $(INSTALLED)
 	@$(BIN)/python -m benchmarks.house.architecture
 

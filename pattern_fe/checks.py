@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -72,12 +73,13 @@ def check_inside(place_m: Array, low_m: Array, high_m: Array, hint: str = "") ->
     near_m = 1e-6 * float((most - least).max())
     if (least < low_m - near_m).any() or (most > high_m + near_m).any():
         raise ValueError(
-            f"pattern reaches from {_place(least)} to {_place(most)} m, valid is inside the box "
-            f"from {_place(low_m)} to {_place(high_m)} m{hint}"
+            f"pattern reaches from {place(least)} to {place(most)} m, valid is inside the box "
+            f"from {place(low_m)} to {place(high_m)} m{hint}"
         )
 
 
-def _place(point_m: Array) -> str:
+def place(point_m: Iterable[float]) -> str:
+    """Coordinates in a message."""
     return "({})".format(", ".join(f"{x:.4g}" for x in point_m))
 
 

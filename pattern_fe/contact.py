@@ -5,7 +5,7 @@ gap there is no reaction. With the gaps linearised these are a linear complement
 reactions, whose matrix is the compliance of the surface between the places of contact; a
 primal-dual active set solves it exactly (Hintermüller, Ito and Kunisch, SIAM Journal on
 Optimization 13, 2003), so there is no stiffness of contact to choose. What is solved for are the
-loads of the surroundings on the vertices: how the pattern answers them is the caller's.
+loads of the surroundings on the vertices: how the pattern moves under them is the caller's.
 """
 
 from __future__ import annotations
@@ -100,18 +100,18 @@ class _Bound:
         self._rows = gaps.rows(len(free_m))
         self._free_response = response
         self._open_m = gaps.gap_m + gaps.opening_m(free_m - at_m)
-        self._answers = response(self._rows.T) if len(self._rows) else self._rows.T
-        compliance = self._rows @ self._answers
+        self._moves = response(self._rows.T) if len(self._rows) else self._rows.T
+        compliance = self._rows @ self._moves
         self._compliance = compliance + _SHARES * np.diag(np.abs(compliance.diagonal()))
-        away_m = self._answers @ np.linalg.solve(self._compliance, self._open_m)
+        away_m = self._moves @ np.linalg.solve(self._compliance, self._open_m)
         self.moved_m = free_m - away_m.reshape(free_m.shape)
         """(nv, d) float64, m: where the free motion leads with these gaps closed."""
 
     def response(self, load_n: Array) -> Array:
         """Displacements under loads, as those of the free pattern."""
-        answer = self._free_response(load_n)
-        kept = np.linalg.solve(self._compliance, self._rows @ answer)
-        return np.asarray(answer - self._answers @ kept)
+        free = self._free_response(load_n)
+        kept = np.linalg.solve(self._compliance, self._rows @ free)
+        return np.asarray(free - self._moves @ kept)
 
     def reactions_n(self, load_n: Array) -> Array:
         """What keeps the gaps closed under loads (nv, d) beside the free motion, N."""
@@ -132,14 +132,14 @@ def _pushed(
     load_n, moved_m = np.zeros_like(free_m), free_m
     open_m = gaps.gap_m + gaps.opening_m(free_m - at_m)
     use = np.zeros(0, dtype=np.int64)
-    rows, answers = np.zeros((0, free_m.size)), np.zeros((free_m.size, 0))
+    rows, moves = np.zeros((0, free_m.size)), np.zeros((free_m.size, 0))
     fresh = _deepest(gaps, open_m, least_m)
     while len(fresh):
         new = gaps.only(fresh).rows(len(free_m))
         use, rows = np.concatenate([use, fresh]), np.concatenate([rows, new])
-        answers = np.concatenate([answers, response(new.T)], axis=1)
-        reaction = reactions_n(rows @ answers, open_m[use])
-        moved_m = free_m + (answers @ reaction).reshape(free_m.shape)
+        moves = np.concatenate([moves, response(new.T)], axis=1)
+        reaction = reactions_n(rows @ moves, open_m[use])
+        moved_m = free_m + (moves @ reaction).reshape(free_m.shape)
         load_n = (rows.T @ reaction).reshape(free_m.shape)
         left_m = gaps.gap_m + gaps.opening_m(moved_m - at_m)
         left_m[use] = 0.0

@@ -17,14 +17,6 @@ from sandmould.pattern_fe.weak_forms import element_mass_kg, element_stiffness_n
 Array = NDArray[np.float64]
 
 
-def consistent_mass_kg(space: Space, foam: Foam) -> csc_array:
-    """Mass matrix of the shape functions, (n d, n d) sparse float64, kg."""
-    products = element_mass_kg(space, foam)
-    d, k = space.dimension, products.shape[1]
-    blocks = products[:, :, None, :, None] * np.eye(d)[None, None, :, None, :]
-    return space.assembled(blocks.reshape(-1, k * d, k * d))
-
-
 def element_lumped_mass_kg(space: Space, foam: Foam) -> Array:
     """Mass of each element shared among its nodes, (ne, k) float64, kg.
 

@@ -1,4 +1,4 @@
-"""Forces of elements in large displacements, compiled: explicit motion asks for them every step."""
+"""Forces of elements in large displacements, compiled: Newton's method needs many."""
 
 from __future__ import annotations
 

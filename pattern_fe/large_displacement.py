@@ -90,12 +90,12 @@ class _Equilibrium:
         tangent.setdiag(tangent.diagonal() + np.repeat(self.bedding, self.space.dimension))
         factor = factorised(tangent[self.free][:, self.free])
 
-        def answer(load_n: Array) -> Array:
+        def solved(load_n: Array) -> Array:
             step = np.zeros_like(load_n)
             step[self.free] = factor.solve(load_n[self.free])
             return step
 
-        step = answer(residual_n.ravel())
+        step = solved(residual_n.ravel())
         if self.obstructed is not None:
             nodes, shape = self.obstructed.nodes, displacement_m.shape
             entries = (nodes[:, None] * shape[1] + np.arange(shape[1])).ravel()
@@ -103,7 +103,7 @@ class _Equilibrium:
             def response(load_n: Array) -> Array:
                 whole = np.zeros((displacement_m.size, load_n.shape[1]))
                 whole[entries] = load_n
-                return answer(whole)[entries]
+                return solved(whole)[entries]
 
             at = displacement_m[nodes]
             led = at + step.reshape(shape)[nodes]
@@ -112,7 +112,7 @@ class _Equilibrium:
             self.contact_n = np.zeros_like(displacement_m)
             if touched is not None:
                 self.contact_n[nodes] = touched.load_n
-                step = answer((residual_n + self.contact_n).ravel())
+                step = solved((residual_n + self.contact_n).ravel())
         return step.reshape(displacement_m.shape)
 
     def residual_n(self, displacement_m: Array, load_n: Array) -> tuple[Array, float]:

@@ -1,4 +1,4 @@
-"""Meshes of patterns from files of any format that meshio reads, and back."""
+"""Meshes of patterns from files of any format that meshio reads."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshHex1, MeshQuad1, MeshTet1, MeshTri1
-from skfem.io.meshio import from_meshio, to_meshio
+from skfem.io.meshio import from_meshio
 
 from sandmould.pattern_fe.checks import check_mesh
 from sandmould.pattern_fe.shapes import with_sides
@@ -133,14 +133,3 @@ def _straight(mesh: Any, unit_m: float) -> Any:
         if len(own):
             groups[name] = own
     return straight.with_boundaries(groups)
-
-
-def write_mesh(path: Path, mesh: Any) -> None:
-    """Write a mesh with its named boundaries in a format that the file's name asks for.
-
-    The names go along as cell data of scikit-fem, which ``read_mesh`` understands; formats
-    without cell data lose them. Points of 2D lie at z = 0.
-    """
-    written = to_meshio(mesh)
-    written.points = np.pad(written.points, ((0, 0), (0, 3 - written.points.shape[1])))
-    meshio.write(path, written)

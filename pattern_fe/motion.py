@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from sandmould.pattern_fe.supports import Mask
 
 Array = NDArray[np.float64]
-
-
-def _check_step(step_s: float, damping_1_s: float) -> None:
-    if not 0.0 < step_s < np.inf:
-        raise ValueError(f"time step of the pattern is {step_s:g} s, valid is above 0")
-    if not 0.0 <= damping_1_s < np.inf:
-        raise ValueError(f"mass damping of the pattern is {damping_1_s:g} 1/s, valid is 0 or above")
 
 
 class CentralDifferences:
@@ -28,20 +20,18 @@ class CentralDifferences:
 
     def __init__(
         self,
-        internal_force_n: Callable[[Array], Array],
+        stiffness: csr_array,
         mass_kg: Array,
         fixed: Mask,
         step_s: float,
         damping_1_s: float = 0.0,
     ) -> None:
-        _check_step(step_s, damping_1_s)
-        self._force_n = internal_force_n
+        self._stiffness = stiffness
         self._mass_kg = mass_kg[:, None]
         self._free = ~fixed
         self._keeps = (1.0 - 0.5 * step_s * damping_1_s) / (1.0 + 0.5 * step_s * damping_1_s)
         self._gains = self._free * step_s / (1.0 + 0.5 * step_s * damping_1_s) / self._mass_kg
         self.step_s = step_s
-        self.time_s = 0.0
         self.displacement_m = np.zeros(fixed.shape)
         """(n, d) float64, m; may be set before the first step, zero where fixed."""
         self.velocity_m_s = np.zeros(fixed.shape)
@@ -55,10 +45,15 @@ class CentralDifferences:
         load_n : (n, d) float64, N
             At the start of the step, on nodes displaced as now.
         """
-        force = load_n - self._force_n(self.displacement_m)
+        force = load_n - self.internal_force_n
         self.velocity_m_s = self._keeps * self.velocity_m_s + self._gains * force
         self.displacement_m = self.displacement_m + self.step_s * self.velocity_m_s
-        self.time_s += self.step_s
+
+    @property
+    def internal_force_n(self) -> Array:
+        """Elastic forces of the displacement, (n, d) float64, N."""
+        moved_m = self.displacement_m
+        return np.asarray((self._stiffness @ moved_m.ravel()).reshape(moved_m.shape))
 
     @property
     def mobility_m_n(self) -> Array:

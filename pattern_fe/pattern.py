@@ -15,11 +15,9 @@ from sandmould.geometry.geometry import Scene
 from sandmould.pattern_fe import dynamics
 from sandmould.pattern_fe.checks import check_mesh
 from sandmould.pattern_fe.condensation import CondensedSurface, condensed_surface
-from sandmould.pattern_fe.distance import Distance, distance_from_drawing
 from sandmould.pattern_fe.elasticity import (
     displacement_gradient,
     green_strain,
-    internal_force_n,
     small_strain,
     von_mises_pa,
 )
@@ -148,20 +146,13 @@ class Pattern:
         displacement[self._free] = self._factor.solve(load_n.ravel()[self._free])
         return displacement.reshape(load_n.shape)
 
-    def solve_nonlinear(self, load_n: Array, settings: NewtonSettings = _NEWTON) -> Array:
-        """Large displacements under dead loads; arguments and errors as ``solve_linear``.
-
-        Raises
-        ------
-        LoadNotReachedError
-            When no equilibrium is found; it knows the share of the load reached.
-        """
-        return self.solve_obstructed(load_n, None, settings)[0]
-
-    def solve_obstructed(
-        self, load_n: Array, obstructed: Obstructed | None, settings: NewtonSettings = _NEWTON
+    def solve_large(
+        self,
+        load_n: Array,
+        obstructed: Obstructed | None = None,
+        settings: NewtonSettings = _NEWTON,
     ) -> tuple[Array, Array]:
-        """Large displacements under dead loads among obstacles; see ``solve_large``."""
+        """Large displacements under dead loads, and reactions of obstacles; see ``solve_large``."""
         self._check_load(load_n)
         check_held(self.space.node_m, self.fixed, self.supports)
         return solve_large(
@@ -242,27 +233,12 @@ class Pattern:
         equivalent = von_mises_pa(self.foam, self.stress_pa(displacement_m, large))
         return np.asarray(np.average(equivalent, axis=1, weights=self.space.weight))
 
-    def distance(self, displacement_m: Array) -> Distance:
-        """Distance of the deformed surface from the drawing."""
-        return distance_from_drawing(
-            self.surface, self.surface.moved(self.on_surface(displacement_m))
-        )
-
-    def natural_frequencies_hz(self, count: int = 1, lumped: bool = False) -> Array:
+    def natural_frequencies_hz(self, count: int = 1) -> Array:
         """Lowest natural frequencies, ascending, (count,) float64; rigid motions are near 0."""
+        mass = dynamics.as_diagonal(self.mass_kg, self.space.dimension)
         return dynamics.natural_frequencies_hz(
-            self.space, self.foam, self.stiffness, self.mass_matrix(lumped), self.fixed, count
+            self.space, self.foam, self.stiffness, mass, self.fixed, count
         )
-
-    def mass_matrix(self, lumped: bool) -> csc_array:
-        """Consistent or lumped mass of all components, (n d, n d) sparse float64, kg."""
-        if lumped:
-            return dynamics.as_diagonal(self.mass_kg, self.space.dimension)
-        return dynamics.consistent_mass_kg(self.space, self.foam)
-
-    def mass_damping_1_s(self, damping_ratio: float) -> float:
-        """Rayleigh's mass damping that gives the first natural frequency a damping ratio."""
-        return 4.0 * math.pi * float(self.natural_frequencies_hz(1)[0]) * damping_ratio
 
     @cached_property
     def condensed(self) -> CondensedSurface:
@@ -277,30 +253,15 @@ class Pattern:
             self.stiffness, mass, self.surface.nodes, self.fixed, self._loose_motions
         )
 
-    def critical_step_s(self, mass_scale: float = 1.0) -> float:
+    def critical_step_s(self) -> float:
         """Largest stable step of ``central_differences``, of the stiffest element and bedding."""
         elements2 = (2.0 / dynamics.critical_step_s(self.space, self.foam)) ** 2
         bedding2 = float((self._bedding_n_m / self.mass_kg).max())
-        return 2.0 * math.sqrt(mass_scale / (elements2 + bedding2))
+        return 2.0 * math.sqrt(1.0 / (elements2 + bedding2))
 
     def central_differences(
-        self,
-        step_s: float,
-        damping_1_s: float = 0.0,
-        mass_scale: float = 1.0,
-        large: bool = False,
+        self, step_s: float, damping_1_s: float = 0.0, mass_scale: float = 1.0
     ) -> CentralDifferences:
-        """Explicit motion, at rest on the drawing, with small or large displacements."""
-        if large:
-            bedding = self._bedding_n_m[:, None]
-
-            def force_n(moved_m: Array) -> Array:
-                return internal_force_n(self.space, self.foam, moved_m) + bedding * moved_m
-        else:
-            rows = self.stiffness.tocsr()
-
-            def force_n(moved_m: Array) -> Array:
-                return np.asarray((rows @ moved_m.ravel()).reshape(moved_m.shape))
-
+        """Explicit motion in small displacements, at rest on the drawing."""
         mass = mass_scale * self.mass_kg
-        return CentralDifferences(force_n, mass, self.fixed, step_s, damping_1_s)
+        return CentralDifferences(self.stiffness.tocsr(), mass, self.fixed, step_s, damping_1_s)

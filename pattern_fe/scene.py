@@ -126,13 +126,13 @@ def _supports(config: PatternConfig) -> Supports:
     ValueError
         When a free pattern is held by something else too.
     """
-    told = config.supports
-    held = told.clamped or told.resting or told.hung or told.bedding_n_m3
-    if told.free and held:
+    given = config.supports
+    held = given.clamped or given.resting or given.hung or given.bedding_n_m3
+    if given.free and held:
         others = "clamped, resting, hung and bedding_n_m3"
         raise ValueError(f"a free pattern is held by sand alone, valid is without {others}")
-    hung = tuple((box.low_m, box.high_m) for box in told.hung or ())
-    return Supports(told.clamped, told.resting, told.bedding_n_m3 or 0.0, hung)
+    hung = tuple((box.low_m, box.high_m) for box in given.hung or ())
+    return Supports(given.clamped, given.resting, given.bedding_n_m3 or 0.0, hung)
 
 
 def _mesh(config: PatternConfig, size_m: tuple[float, ...]) -> Any:

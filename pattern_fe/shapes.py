@@ -53,17 +53,6 @@ def t_shape(thickness_m: float, height_m: float, width_m: float) -> list[Rectang
     ]
 
 
-def frame(thickness_m: float, width_m: float, height_m: float) -> list[Rectangle]:
-    """Hollow box: four walls of one thickness around a cavity."""
-    inner_m, roof_m = width_m - thickness_m, height_m - thickness_m
-    return [
-        (0.0, 0.0, width_m, thickness_m),
-        (0.0, roof_m, width_m, height_m),
-        (0.0, 0.0, thickness_m, height_m),
-        (inner_m, 0.0, width_m, height_m),
-    ]
-
-
 def mesh_of(rectangles: Sequence[Rectangle], element_m: float, depth_m: float | None = None) -> Any:
     """Mesh a union of rectangles that overlap or share sides.
 

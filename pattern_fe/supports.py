@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.pattern_fe.checks import place
 from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
@@ -74,17 +74,13 @@ def _nodes_in(space: Space, low_m: tuple[float, ...], high_m: tuple[float, ...])
     inside = (place_m >= np.array(low_m) - near_m) & (place_m <= np.array(high_m) + near_m)
     found = inside.all(axis=1)
     if not found.any():
-        reach = " to ".join(_place(corner) for corner in (low_m, high_m))
-        own = " to ".join(_place(end(place_m, axis=0)) for end in (np.min, np.max))
+        reach = " to ".join(place(corner) for corner in (low_m, high_m))
+        own = " to ".join(place(end(place_m, axis=0)) for end in (np.min, np.max))
         raise ValueError(
             f"the box that hangs the pattern, {reach} m, holds no node of it; the pattern reaches "
             f"from {own} m, and a box thinner than an element may miss its nodes"
         )
     return np.asarray(found)
-
-
-def _place(corner: Any) -> str:
-    return "({})".format(", ".join(f"{x:.4g}" for x in corner))
 
 
 def _flat_axis(name: str, place_m: Array) -> int:

@@ -99,7 +99,6 @@ class Surroundings:
         """Vertices as drawn, (nv, d) float64, m."""
         self._facets = outer.facets
         self._held = held.all(axis=1)
-        self.walls = scene.walls
         none = np.zeros((0, self.dimension))
         self._wall_normal = np.vstack([none, *(wall.normal for wall in scene.walls)])
         self._wall_at_m = np.array([wall.normal @ wall.point_m for wall in scene.walls])
@@ -117,9 +116,10 @@ class Surroundings:
         self._apart_m = float(sides_m.min())
         points = [self.drawn_m[:0]]
         for solid in self.solids:
-            # In 2D one of two outlines that overlap has a corner in the other.
-            of_solid = _corners if self.dimension == 2 else points_on
-            points.append(of_solid(solid, self._apart_m, low_m, high_m))
+            if self.dimension == 2:  # one of two outlines that overlap has a corner in the other
+                points.append(_within(solid.corners(), low_m, high_m))
+            else:
+                points.append(points_on(solid, self._apart_m, low_m, high_m))
         self._points_m = np.concatenate(points)
 
     @property
@@ -333,10 +333,6 @@ def points_on(solid: Solid, apart_m: float, low_m: Array, high_m: Array) -> Arra
         count = 2 + int(np.linalg.norm(end - start) / apart_m)
         parts.append(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start))
     return _within(np.concatenate(parts), low_m, high_m)
-
-
-def _corners(solid: Solid, apart_m: float, low_m: Array, high_m: Array) -> Array:
-    return _within(solid.corners(), low_m, high_m)
 
 
 def _within(points: Array, low_m: Array, high_m: Array) -> Array:

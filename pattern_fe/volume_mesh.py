@@ -45,7 +45,7 @@ def drawing_mesh(shape: PatternDrawing, drawn: TriangleMesh, size_m: float) -> A
     ValueError
         When it cannot be meshed, or the mesh is another part than the drawing.
     """
-    SOLID_ELEMENTS.check("pattern.element_m", expected_elements(drawn.measure, size_m), size_m)
+    SOLID_ELEMENTS.check("pattern.element_m", _FILL * drawn.measure / size_m**3, size_m)
     if is_step(shape.path):
         nodes_m, tetrahedra = step_tetrahedra(shape.path, size_m)
         nodes_m = nodes_m @ turn_about_vertical(shape).T
@@ -61,8 +61,3 @@ def drawing_mesh(shape: PatternDrawing, drawn: TriangleMesh, size_m: float) -> A
             f"90 to 110 %: a smaller pattern.element_m than {size_m:g} m follows round parts closer"
         )
     return with_sides(mesh)
-
-
-def expected_elements(volume_m3: float, size_m: float) -> float:
-    """Least number of tetrahedra of an edge that fill a volume, about."""
-    return _FILL * volume_m3 / size_m**3

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from skfem import MeshQuad, MeshTet
+from skfem.io.meshio import to_meshio
 from threadpoolctl import threadpool_limits
 
+from sandmould.pattern_fe.large_displacement import NewtonSettings
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.pattern import Pattern
-from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, with_sides
+from sandmould.pattern_fe.shapes import Rectangle, bar, l_shape, mesh_of, with_sides
 from sandmould.pattern_fe.supports import Supports
 
 Array = NDArray[np.float64]
@@ -87,3 +91,38 @@ def end_load(pattern: Pattern, force_n: float) -> Array:
     loads = np.zeros_like(surface.vertices_m)
     loads[:, 1] = force_n * area / area.sum()
     return pattern.on_nodes(loads)
+
+
+def frame(thickness_m: float, width_m: float, height_m: float) -> list[Rectangle]:
+    """Hollow box: four walls of one thickness around a cavity."""
+    inner_m, roof_m = width_m - thickness_m, height_m - thickness_m
+    return [
+        (0.0, 0.0, width_m, thickness_m),
+        (0.0, roof_m, width_m, height_m),
+        (0.0, 0.0, thickness_m, height_m),
+        (inner_m, 0.0, width_m, height_m),
+    ]
+
+
+def write_mesh(path: Path, mesh: Any) -> None:
+    """Write a mesh with its named boundaries in a format that the file's name asks for.
+
+    The names go along as cell data of scikit-fem, which ``read_mesh`` understands; formats
+    without cell data lose them. Points of 2D lie at z = 0.
+    """
+    written = to_meshio(mesh)
+    written.points = np.pad(written.points, ((0, 0), (0, 3 - written.points.shape[1])))
+    meshio.write(path, written)
+
+
+def read_shapes(path: Path, vertices: int, dimension: int) -> tuple[Array, Array]:
+    """Times (k,) in s and displacements (k, nv, d) in m of all whole rows of a file."""
+    width = 1 + vertices * dimension
+    flat = np.fromfile(path, dtype="<f8")
+    table = flat[: len(flat) // width * width].reshape(-1, width)
+    return table[:, 0], table[:, 1:].reshape(-1, vertices, dimension)
+
+
+def bent_far(pattern: Pattern, load_n: Array, **settings: Any) -> Array:
+    """Large displacements under dead loads, (n, d) float64, m."""
+    return pattern.solve_large(load_n, settings=NewtonSettings(**settings))[0]

@@ -1,1 +1,1 @@
-"""Pages on studies whose settings should agree: docs/engine_twins.md, docs/repose_settings.md."""
+"""Pages on studies whose settings should agree."""

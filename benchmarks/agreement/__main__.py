@@ -1,6 +1,7 @@
 """The pages on studies whose settings should agree, from the committed results.
 
-``python -m benchmarks.agreement`` writes docs/engine_twins.md and docs/repose_settings.md;
+``python -m benchmarks.agreement`` writes docs/engine_twins.md and
+docs/developers/repose_settings.md;
 ``make twins`` computes and records the studies of the first before.
 """
 
@@ -14,7 +15,8 @@ BENCHMARK = Benchmark(
     __doc__,
     pages={
         "engine_twins.md": lambda results: engine_twins.page(),
-        "repose_settings.md": lambda results: repose_settings.page(),
+        "one_difference.md": lambda results: engine_twins.one_difference(),
+        "developers/repose_settings.md": lambda results: repose_settings.page(),
     },
 )
 

@@ -1,4 +1,4 @@
-"""The page on how far the engines agree, from the committed results: ``docs/engine_twins.md``."""
+"""The pages on how far engines and choices of the model agree, from the committed results."""
 
 from __future__ import annotations
 
@@ -16,15 +16,30 @@ EFFECTS = ("damping_forms", "contact_readings", "rolling_axes", "frames")
 
 
 def page(records: Path = RECORDS) -> str:
-    """Write the page from the committed results.
+    """Write the page on the engines from the committed results.
 
     Raises
     ------
     SystemExit
         Naming the studies that have no record yet.
     """
-    twins, *effects = read_all(records, (TWINS, *EFFECTS))
-    return render(Path(__file__).with_name("engine_twins.md.j2"), {
-        "twins": twins, "effects": effects, "number": number, "seconds": seconds,
-        "name_of": name_of, "interval_text": interval_text,
+    (twins,) = read_all(records, (TWINS,))
+    return _render("engine_twins.md.j2", twins=twins)
+
+
+def one_difference(records: Path = RECORDS) -> str:
+    """Write the page on what a choice of the model does.
+
+    Raises
+    ------
+    SystemExit
+        Naming the studies that have no record yet.
+    """
+    return _render("one_difference.md.j2", effects=read_all(records, EFFECTS))
+
+
+def _render(template: str, **values: object) -> str:
+    return render(Path(__file__).with_name(template), {
+        **values, "number": number, "seconds": seconds, "name_of": name_of,
+        "interval_text": interval_text,
     })  # fmt: skip

@@ -1,4 +1,4 @@
-"""The page on the cheapest settings that change no angle: ``docs/repose_settings.md``."""
+"""The page on the cheapest settings that change no angle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pandas as pd
 from benchmarks.agreement.recorded import Recorded, read_all
 from benchmarks.frame import render
 from sandmould.execution.records import RECORDS
-from sandmould.runs.formatting import name_of, number, seconds
+from sandmould.runs.formatting import name_of, number
 from sandmould.runs.outcome import Outcome
 from sandmould.statistics.agreement import Compared, value_label
 from sandmould.study.collect import read_summary
@@ -50,7 +50,6 @@ class Factor:
     levels: tuple[Level, ...]
     failed: int
     commit: str
-    processor: str
 
     @property
     def dearest(self) -> Level:
@@ -108,7 +107,6 @@ def factors_of(recorded: Recorded, summary: pd.DataFrame, keys: tuple[str, ...])
                 tuple(levels),
                 len(summary) - len(finished),
                 record["commit"],
-                record["machine"]["processor"],
             )
         )
     return factors
@@ -142,5 +140,5 @@ def page(records: Path = RECORDS) -> str:
     (margin,) = margins  # one sentence holds for all
     return render(Path(__file__).with_name("repose_settings.md.j2"), {
         "factors": factors, "margin": margin,
-        "number": number, "seconds": seconds, "name_of": name_of,
+        "number": number, "name_of": name_of,
     })  # fmt: skip

@@ -13,12 +13,12 @@ from benchmarks.arpm.charts import draw
 from benchmarks.arpm.contact import contact_rows
 from benchmarks.arpm.fields import draw_fields
 from benchmarks.arpm.limits import jump_rows, scatter_rows, step_rows
-from benchmarks.arpm.page import page
+from benchmarks.arpm.page import all_ways, failures, page
 from benchmarks.arpm.space import REFERENCE_MM, space_rows
 from benchmarks.arpm.ways import way_rows
 from benchmarks.frame import Benchmark, BenchmarkRun
 from sandmould.casting.arpm import source_hash
-from sandmould.casting.arpm.plates_case import read_plates
+from tests.verification.castings.plates import read_plates
 
 
 class ElementSizes(NamedTuple):
@@ -71,7 +71,11 @@ BENCHMARK = Benchmark(
         "space": space,
         "fields": fields,
     },
-    pages={"solidification.md": page},
+    pages={
+        "solidification.md": page,
+        "developers/solidification_ways.md": all_ways,
+        "developers/solidification_limits.md": failures,
+    },
     draw=draw,
     extent=ElementSizes(1.0, REFERENCE_MM),
     quick=ElementSizes(5.0, 2.0),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from sandmould.casting.arpm.contact_case import LAYERS, run_contact
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.plates_case import read_aluminium
+from tests.verification.castings.contact import LAYERS, run_contact
+from tests.verification.castings.plates import read_aluminium
 
 KERNEL_SIZES = (1.4, 1.8, 2.1, 2.4, 2.8, 3.2, 3.6, 4.2)
 RESISTANCES_M2K_W = (0.0, 0.001)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.frame import thousands
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.plates_case import Plates, PlatesRun, run_plates
+from tests.verification.castings.plates import Plates, PlatesRun, run_plates
 
 matplotlib.use("Agg")
 AT_S = 1000.0

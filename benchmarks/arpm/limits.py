@@ -7,19 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.casting.arpm.contact_case import (
+from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.filling import Filling
+from sandmould.casting.arpm.marching import Substance
+from sandmould.casting.arpm.method import HeatMethod
+from tests.verification.castings.contact import (
     COLD_K,
     DURATION_S,
     HOT_K,
     compare_contact,
     contact_elements,
 )
-from sandmould.casting.arpm.elements import Elements
-from sandmould.casting.arpm.exact import contact_temperature_k
-from sandmould.casting.arpm.filling import Filling
-from sandmould.casting.arpm.marching import Substance
-from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.plates_case import read_aluminium
+from tests.verification.castings.exact import contact_temperature_k
+from tests.verification.castings.growth import grows_beyond_s
+from tests.verification.castings.plates import read_aluminium
 
 Array = NDArray[np.float64]
 FORMS = ("printed", "corrected", "symmetric", "faces")
@@ -81,7 +82,7 @@ def step_rows() -> list[dict[str, Any]]:
         planned_s = float(exchange.limit_s(capacity).min())
         rows.append({
             "exchange": form, "planned_s": planned_s,
-            "grows_beyond": exchange.instability_s(capacity) / planned_s,
+            "grows_beyond": grows_beyond_s(exchange, capacity) / planned_s,
             "largest_k": {str(share): _disturbed_k(elements, _method(form, share=share))
                           for share in STEP_SHARES},
         })  # fmt: skip

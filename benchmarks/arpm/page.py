@@ -1,4 +1,4 @@
-"""The page on solidification."""
+"""The pages on solidification."""
 
 from __future__ import annotations
 
@@ -15,6 +15,10 @@ UNIFORM = (PAPERS[0], 2.0)
 """The paper's standard of accuracy, and what is to beat it."""
 ADAPTIVE = ("2-3B, faces, local steps", 2.0)
 KERNELS, LOCAL = (PAPERS[0], 1.0), ("uniform, faces, local steps", 1.0)
+KERNEL_SIZES = (1.4, 2.4, 3.2, 4.2)
+"""Of the contact cases in tables; the picture has all."""
+JUMP_SIZES = (1.4, 2.1, 4.2)
+"""Kernels of the jumps of sizes in the table."""
 LIMITS_PERCENT = (2.0, 1.0, 0.5, 0.2, 0.1)
 Row = Mapping[str, Any]
 
@@ -27,20 +31,14 @@ class Pivot(NamedTuple):
 
 
 def page(results: Mapping[str, Any]) -> str:
-    """Write the page.
+    """Write the page on which way to take.
 
     Parameters
     ----------
     results : mapping
         What ``benchmarks.arpm`` measured.
     """
-    contact, ways, space = (results[part]["rows"] for part in ("contact", "ways", "space"))
-    limits = results["limits"]
-    faces = [r for r in contact if r["exchange"] == "faces"]
-    of_one_side = [
-        r for r in contact
-        if (r["exchange"], r["case"], r["resistance_m2k_w"]) == ("corrected", "1-3A", 0.0)
-    ]  # fmt: skip
+    ways, space = (results[part]["rows"] for part in ("ways", "space"))
     rows = {(r["way"], r["size_mm"]): r for r in reversed(ways)}
     return render(Path(__file__).with_name("page.md.j2"), {
         "papers": PAPERS,
@@ -53,15 +51,46 @@ def page(results: Mapping[str, Any]) -> str:
         "papers_rows": [
             r for r in ways if r["way"] in PAPERS and r["size_mm"] in PAPERS_SIZES_MM
         ],
+        "origins": {name: part for name, part in results.items() if "solver" in part},
+    })  # fmt: skip
+
+
+def all_ways(results: Mapping[str, Any]) -> str:
+    """Write the tables of all ways.
+
+    Parameters
+    ----------
+    results : mapping
+    """
+    tables = {part: results[part]["rows"] for part in ("ways", "space")}
+    return render(Path(__file__).with_name("ways.md.j2"), tables)
+
+
+def failures(results: Mapping[str, Any]) -> str:
+    """Write the page on where the ways fail.
+
+    Parameters
+    ----------
+    results : mapping
+    """
+    contact, limits = results["contact"]["rows"], results["limits"]
+    faces = [r for r in contact if r["exchange"] == "faces"]
+    of_one_side = [
+        r for r in contact
+        if (r["exchange"], r["case"], r["resistance_m2k_w"]) == ("corrected", "1-3A", 0.0)
+    ]  # fmt: skip
+    return render(Path(__file__).with_name("limits.md.j2"), {
         "contact_errors": {form: _contact_errors(contact, form)
                            for form in ("corrected", "printed")},
         "least_of_one_side": min(of_one_side, key=lambda r: abs(r["error_percent"])),
         "faces_most_percent": max(abs(r["error_percent"]) for r in faces),
         "faces_largest_k": max(r["largest_k"] for r in faces),
         "limits": limits,
-        "jumps": pivot(limits["jumps"], ("exchange", "kernel_size"), "ratio", "largest_k"),
+        "jumps": pivot(
+            [r for r in limits["jumps"] if r["kernel_size"] in (None, *JUMP_SIZES)],
+            ("exchange", "kernel_size"), "ratio", "largest_k",
+        ),
         "scatter": pivot(limits["scatter"], ("exchange",), "scatter", "largest_k"),
-        "origins": results,
     })  # fmt: skip
 
 
@@ -116,7 +145,7 @@ def pivot(rows: Sequence[Row], by: Sequence[str], over: str, value: str) -> Pivo
 def _contact_errors(rows: Sequence[Row], form: str) -> Pivot:
     """Error (6) of each case over the size of the kernel, in the paper's order."""
     own = sorted(
-        (r for r in rows if r["exchange"] == form),
+        (r for r in rows if r["exchange"] == form and r["kernel_size"] in KERNEL_SIZES),
         key=lambda r: (r["resistance_m2k_w"], CASES.index(r["case"])),
     )
     return pivot(own, ("resistance_m2k_w", "case"), "kernel_size", "error_percent")

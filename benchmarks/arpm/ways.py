@@ -9,13 +9,13 @@ from benchmarks.arpm.fem import fem_exchange
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.marching import Marching, Substance
 from sandmould.casting.arpm.method import STEPS, HeatMethod
-from sandmould.casting.arpm.plates_case import (
+from sandmould.casting.arpm.solidification import SolidificationResult, solidify
+from tests.verification.castings.plates import (
     Plates,
     PlatesRun,
     curve_error_percent,
     plates_layout,
 )
-from sandmould.casting.arpm.solidification import SolidificationResult, solidify
 
 ADAPTIVE = "2-3B"
 WARMING_S = 10.0

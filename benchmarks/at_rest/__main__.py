@@ -1,6 +1,7 @@
 """What it changes to measure a packing at rest after vibration, and not at full speed.
 
-``make at-rest`` runs ``python -m benchmarks.at_rest``, which writes docs/measured_at_rest.md.
+``make at-rest`` runs ``python -m benchmarks.at_rest``, which writes
+docs/developers/measured_at_rest.md.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ BENCHMARK = Benchmark(
     __file__,
     __doc__,
     parts={"drives": drives},
-    pages={"measured_at_rest.md": page},
+    pages={"developers/measured_at_rest.md": page},
     extent=WHOLE,
     quick=LITTLE,
 )

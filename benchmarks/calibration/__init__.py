@@ -1,1 +1,1 @@
-"""Calibration beside its peers: docs/calibration_peers.md."""
+"""Calibration beside its peers: docs/developers/calibration_peers.md."""

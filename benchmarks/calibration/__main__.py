@@ -1,6 +1,7 @@
 """Calibration against its peers: the noise of one heap, runs needed, and coverage.
 
-``make peers`` runs ``python -m benchmarks.calibration``, which writes docs/calibration_peers.md.
+``make peers`` runs ``python -m benchmarks.calibration``, which writes
+docs/developers/calibration_peers.md.
 Runs of the part ``emulator`` come from the emulator of the study repose_map; those of the part
 ``dem`` are computed, and truths are planted by DEM too, in two measures of the same runs. Runs by
 DEM are kept in results/benchmarks/calibration/runs: what was killed goes on from there.
@@ -57,7 +58,7 @@ BENCHMARK = Benchmark(
         "emulator": lambda run: by_oracle(run, "emulator"),
         "dem": lambda run: by_oracle(run, "dem"),
     },
-    pages={"calibration_peers.md": page},
+    pages={"developers/calibration_peers.md": page},
     extent=WHOLE,
     quick=QUICK,
     by_default=("emulator",),

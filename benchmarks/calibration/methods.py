@@ -20,8 +20,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from benchmarks.calibration.refine import best_guess, design, next_point
 from sandmould.statistics.calibration.config import Target
-from sandmould.statistics.calibration.refine import best_guess, design, next_point
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
 
 Messages = Generator[dict[str, Any], float | None, None]
@@ -75,7 +75,7 @@ def problem_of(
 
 
 class Ours:
-    """``sandmould.statistics.calibration.refine``, one run after the other."""
+    """``benchmarks.calibration.refine``, one run after the other."""
 
     name = "sandmould"
 

@@ -1,4 +1,4 @@
-"""The page docs/calibration_peers.md, written from what was measured."""
+"""The page docs/developers/calibration_peers.md, written from what was measured."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """The step loop of the solver beside that of an earlier commit, on the same beds in turns.
 
 ``python -m benchmarks.core_loop`` unpacks that commit from the repository, settles the beds and
-writes docs/core_loop.md. Times are processor times of one thread, so that a busy machine does not
+writes docs/developers/core_loop.md. Times are processor times of one thread, so that a busy machine
+does not
 spoil them.
 """
 
@@ -24,6 +25,7 @@ from benchmarks.core_loop import turns
 from benchmarks.engines.beds import Bed, settled, tiled
 from benchmarks.engines.timing import ratio, spread
 from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, render
+from benchmarks.frame.source_tree import unpack
 from sandmould import ROOT
 
 BEFORE = "274675f"
@@ -44,19 +46,9 @@ class LoopExtent:
     """Simulated time of a bed at rest, and how many discs it has."""
 
 
+TREES = SCRATCH / "core_loop"
+"""Where the source trees of earlier commits are unpacked."""
 QUICK = LoopExtent(2, 0.05, (300,), 300, 600, 100, 0.05)
-
-
-def tree_of(commit: str) -> Path:
-    """Source tree of a commit, unpacked once."""
-    tree = SCRATCH / "core_loop" / commit
-    if not tree.exists():
-        tree.mkdir(parents=True)
-        packed = subprocess.run(
-            ["git", "archive", commit], cwd=ROOT, check=True, capture_output=True
-        )
-        subprocess.run(["tar", "-x", "-C", tree], input=packed.stdout, check=True)
-    return tree
 
 
 @contextmanager
@@ -91,7 +83,7 @@ def turn(process: Any, steps: int) -> dict[str, Any]:
 
 def compare(bed: Bed, motion: str, extent: LoopExtent) -> dict[str, Any]:
     """Cost per grain-step before and now in turns, and whether all digits are the same."""
-    with started({"before": tree_of(BEFORE), "now": ROOT}, bed, motion) as both:
+    with started({"before": unpack(BEFORE, TREES), "now": ROOT}, bed, motion) as both:
         for process in both.values():
             turn(process, 4)
         first = [turn(process, 40)["took_s"] for process in both.values()]
@@ -130,7 +122,7 @@ def measure_rest(run: BenchmarkRun) -> dict[str, Any]:
     """Drift of a small bed at rest over a long time, before and now."""
     extent: LoopExtent = run.extent
     bed = settled(2, extent.rest_discs)
-    with started({"before": tree_of(BEFORE), "now": ROOT}, bed, "rest") as both:
+    with started({"before": unpack(BEFORE, TREES), "now": ROOT}, bed, "rest") as both:
         step_s = {name: turn(process, 4)["step_s"] for name, process in both.items()}["now"]
         tenth = max(1, round(0.1 * extent.rest_s / step_s))
         marks = {name: [turn(p, tenth) for _ in range(10)] for name, p in both.items()}
@@ -156,7 +148,7 @@ BENCHMARK = Benchmark(
     __file__,
     __doc__,
     parts={"beds": measure_beds, "rest": measure_rest},
-    pages={"core_loop.md": page},
+    pages={"developers/core_loop.md": page},
     extent=LoopExtent(),
     quick=QUICK,
     arrange=lambda measured, run: {**measured, "origin": run.origin, "turns": run.extent.turns},

@@ -1,1 +1,1 @@
-"""Speed of the engines: docs/speed.md."""
+"""Speed of the engines: docs/developers/speed.md."""

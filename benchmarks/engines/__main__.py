@@ -1,7 +1,7 @@
 """Speed of the engines side by side, and of the reference engine against its targets.
 
-``make benchmarks`` runs ``python -m benchmarks.engines``, which writes docs/speed.md and
-docs/speed.png. Nothing else should run on the machine meanwhile.
+``make benchmarks`` runs ``python -m benchmarks.engines``, which writes docs/developers/speed.md and
+docs/developers/speed.png. Nothing else should run on the machine meanwhile.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ BENCHMARK = Benchmark(
         "roofline": lambda run: measure_roofline(run.extent),
         "accuracy": lambda run: measure_accuracy(run.results["rates"][0], run.extent),
     },
-    pages={"speed.md": page},
-    draw=lambda results, folder: draw(results, folder / "speed.png"),
+    pages={"developers/speed.md": page},
+    draw=lambda results, folder: draw(results, folder / "developers" / "speed.png"),
     extent=Extent(),
     quick=QUICK,
     arrange=arrange,

@@ -1,4 +1,4 @@
-"""The picture of docs/speed.md."""
+"""The picture of docs/developers/speed.md."""
 
 from __future__ import annotations
 

@@ -14,11 +14,22 @@ from typing import Any
 
 from benchmarks.frame.parts import Parts
 from sandmould import ROOT
+from sandmould.digest import code_digest
 from sandmould.execution.simulate import provenance
 from sandmould.scenario.scenario import Scenario
 
 SCRATCH = ROOT / "results" / "benchmarks"
+PRODUCT = ("analysis", "pattern_fe", "sandmould")
+ORIGINS = ("origin", "provenance", "fresh_origin")
+"""Where results have the commit that measured them, beside their parts."""
+CODE = "code_of_parts"
+"""In the results: hash of the product's code as each part was measured."""
 Results = dict[str, Any]
+
+
+def product_code() -> str:
+    """Hash of what the product computes today."""
+    return code_digest(path for room in PRODUCT for path in (ROOT / room).rglob("*.py"))
 
 
 @dataclass
@@ -104,11 +115,39 @@ class Benchmark:
 
     def write(self, results: Results, folder: Path) -> None:
         """Write pages and pictures of some results into a folder."""
-        folder.mkdir(parents=True, exist_ok=True)
+        for name in self.pages:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
         self.draw(results, folder)
-        for name, text in self.pages.items():
-            (folder / name).write_text(text(results), encoding="utf-8")
+        for name in self.pages:
+            (folder / name).write_text(self.text(name, results), encoding="utf-8")
             print(folder / name)
+
+    def text(self, page: str, results: Results) -> str:
+        """Text of a page; below its title stands what wrote it, and of which code its figures are.
+
+        Parameters
+        ----------
+        page : str
+            Its name in docs.
+        results : dict
+        """
+        title, _, rest = self.pages[page](results).partition("\n")
+        origin = f"Written by `python -m benchmarks.{self.theme}`; do not edit."
+        if self.parts:
+            origin += " " + self._measured_by(results)
+        return f"{title}\n\n{origin}\n{rest}"
+
+    def _measured_by(self, results: Results) -> str:
+        """Sentence on the commits that measured, and whether the code has changed since."""
+        named = [results.get(key) for key in (*ORIGINS, *self.parts)]
+        origins = [results, *(part for part in named if isinstance(part, dict))]
+        commits = sorted({origin["commit"] for origin in origins if "commit" in origin})
+        at = f"at commit {', '.join(commits)}" if commits else "at a commit that was not kept"
+        parts = [part for part in self.parts if part in results]
+        codes = {results.get(CODE, {}).get(part) for part in parts}
+        today = None not in codes and codes == {product_code()}
+        since = "" if today else " with older code than that of today"
+        return f"Measured {at}{since}."
 
     def _options(self, arguments: Sequence[str] | None) -> argparse.Namespace:
         parser = argparse.ArgumentParser(
@@ -140,4 +179,5 @@ class Benchmark:
             measured[name] = run.results[name] = parts.get(name, partial(self.parts[name], run))
         arranged = self.arrange(measured, run)
         parts.remove()
-        return results | arranged
+        codes = results.get(CODE, {}) | dict.fromkeys(measured, product_code())
+        return results | arranged | {CODE: codes}

@@ -14,7 +14,8 @@ BENCHMARK = Benchmark(
     __file__,
     __doc__,
     pages={
-        "frequency_law.md": lambda results: page.page(picture=ROOT / "docs" / "frequency_law.png")
+        "frequency_law.md": lambda results: page.page(picture=ROOT / "docs" / "frequency_law.png"),
+        "frequency_law_evidence.md": lambda results: page.evidence(),
     },
 )
 

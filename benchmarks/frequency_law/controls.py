@@ -34,7 +34,8 @@ class RecordedCurves:
         record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
         study = open_study(ROOT / record["study"])
         self.name = folder.name
-        self._scenarios = {run.run: run.scenario for run in runs_in(study, folder)}
+        # Records may name their runs as an earlier version did.
+        self._scenarios = {run.part: run.scenario for run in runs_in(study, folder)}
         runs = read_summary(folder)
         is_curve = (runs[PART] == SWEEP) | runs[PART].str.startswith(OF_SPRINGS)
         self._runs = runs[is_curve]
@@ -67,5 +68,4 @@ class RecordedCurves:
         for part, mine in runs.groupby(PART, sort=False):
             if mine[FREQUENCY].nunique() >= FEWEST:
                 label = "" if part == SWEEP else str(part).removeprefix(CONTROL)
-                scenario = self._scenarios[mine[RUN].iloc[0]]
-                yield fill_curve(self.name, label, mine, scenario)
+                yield fill_curve(self.name, label, mine, self._scenarios[str(part)])

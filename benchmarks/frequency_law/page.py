@@ -1,9 +1,10 @@
-"""The page on the law of the best frequency: ``docs/frequency_law.md``."""
+"""The pages on the law of the best frequency."""
 
 from __future__ import annotations
 
+import functools
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,10 @@ import pandas as pd
 from benchmarks.frame import render
 from benchmarks.frequency_law import chart, groups, groups_chart
 from benchmarks.frequency_law.controls import RecordedCurves
-from benchmarks.frequency_law.series import FREQUENCY, Power, Series, power_of, series_of
+from benchmarks.frequency_law.series import FREQUENCY, series_of
 from sandmould import ROOT
 from sandmould.execution.records import RECORDS
-from sandmould.runs.formatting import number, seconds
+from sandmould.runs.formatting import number
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.expand import expand
@@ -41,31 +42,12 @@ FEWEST_CURVES = 3
 PREDICTED_M_S = (0.02, 0.04, 0.08)
 PREDICTED_IN_MODES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 """Where the page tabulates the law."""
-POWERS: dict[str, tuple[str, str, Callable[[Series], float]]] = {
-    "tube_law_springs": ("wave speed c", "1", lambda series: series.wave_speed_m_s),
-    "tube_law_depth": ("depth H of the bed", "-1", lambda series: series.depth_m),
-    "tube_law_width": (
-        "width of the tube",
-        "0",
-        lambda s: s.scenario.scene.bores[0].section_measure,
-    ),
-}
-"""What changes between the curves of a study, and its exponent were f in proportion to c/(4 H)."""
 
 
 def page(records: Path = RECORDS, picture: Path | None = None) -> str:
-    """Write the page from the records that are there, and its picture where it is given a place."""
-    there = {
-        name: _study(records / name)
-        for name in STUDIES
-        if (records / name / "record.json").is_file()
-    }
-    others = [
-        RecordedCurves(records / name)
-        for name in HELD_OUT
-        if (records / name / "record.json").is_file()
-    ]
-    law = _law(there, others) if all(name in there for name in COLLAPSED) else None
+    """Write the law from the records that are there, and its picture where it is given a place."""
+    there = _recorded(records)
+    law = _law_of(records)
     studies = list(there.values())
     if picture is not None:
         if studies:
@@ -80,9 +62,36 @@ def page(records: Path = RECORDS, picture: Path | None = None) -> str:
         "missing": [name for name in STUDIES if name not in there],
         "law": law,
         "number": number,
-        "seconds": seconds,
     }
     return render(Path(__file__).with_name("page.md.j2"), values)
+
+
+def evidence(records: Path = RECORDS) -> str:
+    """Write why these two numbers decide, and how well they predict."""
+    values = {"law": _law_of(records), "number": number}
+    return render(Path(__file__).with_name("evidence.md.j2"), values)
+
+
+@functools.cache
+def _recorded(records: Path) -> dict[str, dict[str, Any]]:
+    """Studies of the law that are there."""
+    return {
+        name: _study(records / name)
+        for name in STUDIES
+        if (records / name / "record.json").is_file()
+    }
+
+
+@functools.cache
+def _law_of(records: Path) -> dict[str, Any] | None:
+    """The law and what it is asked for; none before all studies that it is fitted to are there."""
+    there = _recorded(records)
+    others = [
+        RecordedCurves(records / name)
+        for name in HELD_OUT
+        if (records / name / "record.json").is_file()
+    ]
+    return _law(there, others) if all(name in there for name in COLLAPSED) else None
 
 
 def _study(folder: Path) -> dict[str, Any]:
@@ -101,7 +110,6 @@ def _study(folder: Path) -> dict[str, Any]:
         "series": series,
         "record": record,
         "runs": len(summary),
-        "power": _power(folder.name, series),
     }
 
 
@@ -145,10 +153,3 @@ def _law(there: Mapping[str, dict[str, Any]], others: Sequence[RecordedCurves]) 
             if study.moments and len(study.curves) >= FEWEST_CURVES
         ],
     }
-
-
-def _power(study: str, series: list[Series]) -> tuple[str, str, Power | None] | None:
-    if study not in POWERS:
-        return None
-    what, expected, changed = POWERS[study]
-    return what, expected, power_of(series, [changed(s) for s in series])

@@ -8,19 +8,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sandmould.runs.formatting import setting_text
 from sandmould.scenario.hardness import bed_hardness, column_mode_hz
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import usable_values
-from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.settings import number_blocks
 from sandmould.statistics.spring_dependence import CurveLimbs, find_limbs
 
-Array = NDArray[np.float64]
 FREQUENCY = "vibration.0.frequency_hz"
 MEASURE = "tube_fill_fraction"
 BED_HEIGHT = "bed_height_m"
@@ -30,17 +26,6 @@ DRIVE = {
     "drive_displacement_m": "displacement_m",
 }
 """Columns of a summary with the box's motion, and their names in a ``Series``."""
-
-
-@dataclass(frozen=True)
-class Rise:
-    """What the mean fill gains between two frequencies."""
-
-    from_hz: float
-    to_hz: float
-    gain: float
-    half_width: float
-    """Of its 95 % interval, in pairs. The two were picked after seeing, so it is too narrow."""
 
 
 @dataclass(frozen=True)
@@ -58,23 +43,6 @@ class FillCurve:
     """A row a filling, a column a frequency in rising order; NaN where a run failed."""
     drives: pd.DataFrame
     """A row a frequency in the same order: ``DRIVE``, peaks of the box's motion."""
-
-    @property
-    def largest_rise(self) -> Rise:
-        """Where the mean fill gains most towards higher frequencies.
-
-        Beside a curve that falls from its lowest frequency it shows a second top.
-        """
-        means = self.fills.mean().to_numpy(dtype=np.float64)
-        gains = np.array([means[j] - means[:j].min() for j in range(1, len(means))])
-        top = 1 + int(gains.argmax())
-        valley = int(means[:top].argmin())
-        pairs = (self.fills.iloc[:, top] - self.fills.iloc[:, valley]).dropna().to_numpy()
-        half = float(stdtrit(len(pairs) - 1, 0.5 + CONFIDENCE / 2)) * float(pairs.std(ddof=1))
-        hz = self.fills.columns
-        return Rise(
-            float(hz[valley]), float(hz[top]), float(pairs.mean()), half / len(pairs) ** 0.5
-        )
 
     @property
     def wave_speed_m_s(self) -> float:
@@ -105,16 +73,6 @@ class Series(FillCurve):
     def interval_hz(self) -> tuple[float, float]:
         """Where the optimum lies with 95 % probability."""
         return self.optimum.interval(FREQUENCY)
-
-    @property
-    def is_inner(self) -> bool:
-        """Whether a frequency inside the range beats both of its ends at 95 %."""
-        return self.limbs.shape == "inner"
-
-    @property
-    def drawn_hz(self) -> Array:
-        """Where surfaces drawn from all that the runs leave possible are best, (n,) float64."""
-        return self.optimum.points[self.optimum.picks, 0]
 
 
 def series_of(
@@ -177,36 +135,3 @@ def fill_curve(study: str, label: str, summary: pd.DataFrame, scenario: Scenario
 
 def _usable(summary: pd.DataFrame) -> pd.DataFrame:
     return summary.loc[usable_values(summary, MEASURE).dropna().index]
-
-
-@dataclass(frozen=True)
-class Power:
-    """f in proportion to a power of what changes between curves."""
-
-    exponent: float
-    ci: tuple[float, float]
-    """95 % interval."""
-
-
-def power_of(series: Sequence[Series], changed: Sequence[float]) -> Power | None:
-    """Fit log f over the logarithm of what changes, over all drawn optima.
-
-    Parameters
-    ----------
-    series : sequence of Series
-    changed : sequence of float
-        As many, such as wave speeds.
-
-    Returns
-    -------
-    Power or None
-        None of fewer than two curves with an inner optimum.
-    """
-    inner = [(s, x) for s, x in zip(series, changed, strict=True) if s.is_inner]
-    if len(inner) < 2:
-        return None
-    x = np.log([value for _, value in inner])
-    y = np.log(np.array([s.drawn_hz for s, _ in inner]))
-    slopes = (x - x.mean()) @ (y - y.mean(axis=0)) / ((x - x.mean()) ** 2).sum()
-    low, high = np.quantile(slopes, (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
-    return Power(float(np.median(slopes)), (float(low), float(high)))

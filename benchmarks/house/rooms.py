@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import ast
 import re
-import subprocess
-import tarfile
-import tempfile
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
 PACKAGE = "sandmould"
@@ -104,21 +100,6 @@ def room_files(root: Path) -> dict[str, list[Path]]:
     if "workflow" in files and (root / "Snakefile").is_file():
         files["workflow"].append(root / "Snakefile")
     return {name: paths for name, paths in files.items() if paths}
-
-
-def rooms_at(root: Path, commit: str) -> dict[str, Room]:
-    """Count files and lines of each room at a commit.
-
-    Raises
-    ------
-    subprocess.CalledProcessError
-        When the clone does not have the commit.
-    """
-    command = ["git", "archive", "--format=tar", commit]
-    archive = subprocess.run(command, cwd=root, capture_output=True, check=True).stdout
-    with tempfile.TemporaryDirectory() as folder, tarfile.open(fileobj=BytesIO(archive)) as tar:
-        tar.extractall(folder, filter="data")
-        return rooms_of(Path(folder))
 
 
 def _code(folder: Path) -> list[Path]:

@@ -1,6 +1,7 @@
 """What grains near walls and sorted grains make of the speed of LAMMPS decks.
 
-``make lammps-decks`` runs ``python -m benchmarks.lammps_decks``, which writes docs/lammps_speed.md.
+``make lammps-decks`` runs ``python -m benchmarks.lammps_decks``, which writes
+docs/developers/lammps_speed.md.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ BENCHMARK = Benchmark(
     __file__,
     __doc__,
     parts=PARTS,
-    pages={"lammps_speed.md": page},
+    pages={"developers/lammps_speed.md": page},
     extent=WHOLE,
     quick=LITTLE,
 )

@@ -35,7 +35,7 @@ def page(results: Mapping[str, Any]) -> str:
         "costs_s": sorted(schemes["duration_s"] * row["cpu_s_per_simulated_s"] for row in runs),
         "shares": [row["pressure_share"] for row in schemes["rows"] if not row["stopped"]],
         "casting": results["large"]["row"],
-        "origins": results,
+        "origins": {name: part for name, part in results.items() if "solver" in part},
     })  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sandmould import ROOT
-from sandmould.casting.mps.stability import ideal_pa
+from tests.verification.castings.still_fluid import ideal_pa
 
 PYTHON = ROOT / ".venv-peers-flow" / "bin" / "python"
 PROGRAM = Path(__file__).parents[1] / "peers" / "run_pysph.py"

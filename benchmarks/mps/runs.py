@@ -8,8 +8,8 @@ from typing import Any
 
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.shoulder import open_shoulder
-from sandmould.casting.mps.stability import ideal_pa, run_still
 from sandmould.runs.products import peak_memory_bytes
+from tests.verification.castings.still_fluid import ideal_pa, run_still
 
 EXACT = 0.59
 """c_poi that undoes a long wave of compression at once: one over ``compression_gain``."""

@@ -3,7 +3,8 @@
 ``python -m benchmarks.prices`` compares all records whose scenarios are those of today with what
 their plans foretell, and computes nothing: a minute of a core. ``--part fresh`` runs the studies
 that are planned with less than ten minutes of one core: an hour and a half on a free one;
-``--studies NAME ...`` chooses some, and keeps the rows of the others. Both write docs/prices.md.
+``--studies NAME ...`` chooses some, and keeps the rows of the others. Both write
+docs/developers/prices.md.
 """
 
 from __future__ import annotations
@@ -189,7 +190,7 @@ BENCHMARK = Benchmark(
     __doc__,
     parts={"records": records, "fresh": fresh},
     by_default=("records",),
-    pages={"prices.md": page},
+    pages={"developers/prices.md": page},
     extent=Studies(),
     quick=Studies(("tank_small",), ("tube_law_hold",)),
     arrange=_arranged,

@@ -1,6 +1,6 @@
 """Rebound over damping ratio and step on all engines, and beds with both kinds of dashpot.
 
-``make rebound`` runs ``python -m benchmarks.rebound``, which writes docs/rebound.md.
+``make rebound`` runs ``python -m benchmarks.rebound``, which writes docs/developers/rebound.md.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ BENCHMARK = Benchmark(
     __file__,
     __doc__,
     parts={"impacts": impacts, "walls": walls, "beds": beds},
-    pages={"rebound.md": page},
+    pages={"developers/rebound.md": page},
     extent=WHOLE,
     quick=LITTLE,
 )

@@ -2,7 +2,8 @@
 
 ``python -m benchmarks.reliability`` kills small studies of all kinds at random moments, cuts their
 checkpoints short, fills their disk, makes it read-only and starts them twice at once, and writes
-docs/reliability.md. Each study is then called again by the same command and compared with one that
+docs/developers/reliability.md. Each study is then called again by the same command and compared
+with one that
 nothing happened to.
 """
 
@@ -78,7 +79,7 @@ BENCHMARK = Benchmark(
     __file__,
     __doc__,
     parts={"kills": kills, "torn": torn, "disks": disks, "twice": twice},
-    pages={"reliability.md": page},
+    pages={"developers/reliability.md": page},
     extent=WHOLE,
     quick=A_LITTLE,
     arrange=lambda measured, run: {

@@ -153,8 +153,6 @@ class MeasuredElsewhere(Section):
     found: str
     by: str = Field(..., description="Source, and how much of it was seen.")
     lacks: str = Field(..., description="What a computation of it would take.")
-    price_like: str = Field("", description="Shipped study that would cost about as much.")
-    price: str = Field("", description="An estimate where no study is like it.")
 
 
 class Elsewhere(Section):

@@ -35,6 +35,8 @@ from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed, number, seconds
 
 PAPERS = ("rojek_2004", "hirata_2019", "hirata_2017")
+FIRST = "reproduction.md"
+PAGES = {name: f"reproduction_{name}.md" for name in PAPERS}
 VERIFICATION = ROOT / "docs" / "verification.md"
 COMMANDS = {"arpm": "make solidification", "mps": "make flow"}
 HEAD = ("where", "what", "theirs", "ours", "ours less theirs", "why", "command", "cost", "state")
@@ -65,21 +67,27 @@ class LedgerPage:
     old: int = 0
     """Rows whose record is no longer what the code would compute."""
 
-    def text(self) -> str:
-        """Write the page.
+    def texts(self) -> dict[str, str]:
+        """Write the pages, by their names in docs: one a paper, and the one that leads to them.
 
         Raises
         ------
         BadInputError
             Where a row refers to what no record has, or is wrong in itself.
         """
-        papers = [self.paper(self.claims / f"{name}.yaml") for name in PAPERS]
+        here = Path(__file__)
+        papers = {PAGES[name]: self.paper(self.claims / f"{name}.yaml") for name in PAPERS}
         elsewhere = self.measured_elsewhere()
-        return render(Path(__file__).with_name("page.md.j2"), {
+        first = render(here.with_name("page.md.j2"), {
             "papers": papers, "elsewhere": elsewhere, "records": self.sources(),
             "states": self.states, "on_stand_ins": self.on_stand_ins,
             "meanings": judge.STATES, "old": self.old, "rows": self.states.total(),
         })  # fmt: skip
+        of_papers = {
+            page: render(here.with_name("paper.md.j2"), {"paper": paper})
+            for page, paper in papers.items()
+        }
+        return {FIRST: first} | of_papers
 
     def paper(self, path: Path) -> dict[str, object]:
         """Tables of one paper."""
@@ -179,35 +187,21 @@ class LedgerPage:
 
     def measured_elsewhere(self) -> str:
         """Table of what others measured."""
-        path = self.claims / "measured_elsewhere.yaml"
-        rows = []
-        for i, row in enumerate(read_elsewhere(path).rows):
-            price = row.price or "not known"
-            if row.price_like:
-                price = f"like {self._like(row.price_like, path, f'rows.{i}.price_like')}"
-            rows.append([row.what, row.found, row.by, row.lacks, price])
-        return table(("what", "they found", "source", "what ours would take", "price"), rows)
-
-    def _like(self, study: str, path: Path, key: str) -> str:
-        """What a shipped study took, or what it is planned to take."""
-        file = display_path(path)
-        command, price = _planned(study, file, key)
-        if self._has_record(study):
-            price = f"{seconds(self.numbers.record_of(study, file, key).took_s)} of all runs"
-        return f"{command}: {price}"
+        rows = read_elsewhere(self.claims / "measured_elsewhere.yaml").rows
+        cells = [[row.what, row.found, row.by, row.lacks] for row in rows]
+        return table(("what", "they found", "source", "what ours would take"), cells)
 
     def sources(self) -> str:
         """Table of the records that rows refer to."""
         rows = []
         for name, record in sorted(self.numbers.read.items()):
             failed = int((~finished(record.summary)).sum())
-            machine = record.record["machine"]["processor"]
             rows.append([
-                f"[{name}](results/{name}/README.md)", record.record["commit"], machine,
+                f"[{name}](results/{name}/README.md)", record.record["commit"],
                 str(len(record.summary)), str(failed or ""), seconds(record.took_s),
                 record.stale or "stands",
             ])  # fmt: skip
-        head = ("record", "commit", "machine", "runs", "failed", "wall time of all", "stands")
+        head = ("record", "commit", "runs", "failed", "wall time of all", "stands")
         return table(head, rows)
 
 
@@ -252,7 +246,7 @@ def _checked(equation: Equation, cases: pd.DataFrame, file: str, key: str) -> tu
         if title not in cases.index:
             raise _bad(file, f"{key}.cases", title, "the title of a case in docs/verification.md")
         case = cases.loc[title]
-        checks.append(str(case["case"]).replace("(#", "(verification.md#"))
+        checks.append(str(case["case"]))
         for cell in case.drop(["case", "equations"]):
             count, _, error = str(cell).partition(", ")
             worst = max(worst, float(error)) if count.isdigit() and error else worst

@@ -1,1 +1,1 @@
-"""Thousands of runs: docs/workflow_cost.md."""
+"""Thousands of runs: docs/developers/workflow_cost.md."""

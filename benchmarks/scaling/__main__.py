@@ -1,6 +1,7 @@
 """How the workflow bears thousands of runs.
 
-``make scaling`` runs ``python -m benchmarks.scaling``, which writes docs/workflow_cost.md with its
+``make scaling`` runs ``python -m benchmarks.scaling``, which writes
+docs/developers/workflow_cost.md with its
 picture. It takes 46 minutes of two cores that have nothing else to do; the same command goes on
 from where it was stopped.
 """
@@ -99,8 +100,8 @@ BENCHMARK = Benchmark(
         "parts": lambda run: parts(Place(SCRATCH / "scaling"), run.extent.executed[0]),
         "peers": lambda run: peers(SCRATCH / "peers", run.extent.peers, CORES),
     },
-    pages={"workflow_cost.md": page},
-    draw=lambda results, folder: draw(results, folder / "workflow_cost.png"),
+    pages={"developers/workflow_cost.md": page},
+    draw=lambda results, folder: draw(results, folder / "developers" / "workflow_cost.png"),
     extent=StudySizes((10, 100, 1_000), (10_000,), 100),
     quick=StudySizes((3, 10), (30,), 10),
     arrange=arrange,

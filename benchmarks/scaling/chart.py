@@ -1,4 +1,4 @@
-"""The picture of docs/workflow_cost.md."""
+"""The picture of docs/developers/workflow_cost.md."""
 
 from __future__ import annotations
 

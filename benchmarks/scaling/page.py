@@ -1,4 +1,4 @@
-"""The page docs/workflow_cost.md, written from what was measured."""
+"""The page docs/developers/workflow_cost.md, written from what was measured."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks.frame import render
 from benchmarks.scaling.model import Assumed, WorkflowCosts, drain
 
-SWEEPS = ((1_000, 60), (10_000, 10), (10_000, 60), (10_000, 600))
+SWEEPS = ((10_000, 60),)
 SETTINGS = (
     ("a job a run", 0.0, 1),
     ("jobs of one core", 300.0, 1),
@@ -16,12 +16,10 @@ SETTINGS = (
     ("whole nodes, half an hour", 1800.0, 32),
 )
 WHEN_FAILING = {
-    "sandmould": "the run's outcome says why; the others end; the report is written and the last "
-    "rule fails",
-    "Snakemake with Paramspace": "with `--keep-going` the others end; no table; the reason is in "
-    "what the job printed",
-    "signac with signac-flow": "the first that fails ends all; the runs' folders tell what is done",
-    "yade-batch": "the others end; a line with the exit status and a log a run; no table by itself",
+    "sandmould": "the outcome says why; the others end; the report is written",
+    "Snakemake with Paramspace": "with `--keep-going` the others end; no table",
+    "signac with signac-flow": "the first that fails ends all",
+    "yade-batch": "the others end; a log a run; no table by itself",
 }
 TO_GO_ON = {
     "sandmould": "the same command",
@@ -29,8 +27,6 @@ TO_GO_ON = {
     "signac with signac-flow": "the same command",
     "yade-batch": "it runs all again; lines can be chosen by hand",
 }
-GENERAL = "Snakemake with Paramspace", "signac with signac-flow"
-"""Tools that run any job."""
 Rows = dict[int, dict[str, Any]]
 
 
@@ -46,8 +42,6 @@ def page(results: dict[str, Any]) -> str:
     costs, assumed = WorkflowCosts.of(results), Assumed()
     parts = _run_parts(results["parts"])
     whole = drain(10_000, 10, 300.0, assumed.cores, costs, assumed)
-    tools = results["peers"]["tools"]
-    general_s = [tool["whole"]["cpu_s"] for name, tool in tools.items() if name in GENERAL]
     return render(Path(__file__).with_name("page.md.j2"), {
         **results,
         "rows": rows,
@@ -55,8 +49,6 @@ def page(results: dict[str, Any]) -> str:
         "files": rows[max(runs for runs, row in rows.items() if "files" in row)]["files"],
         "run_parts": parts,
         "parts_s": sum(parts.values()),
-        "imports_s": 2 * results["parts"]["imports of a run"]
-        + results["parts"]["imports of measuring"],
         "overhead_s": {name: _overhead_s(rows, name) for name in ("run_alone", "run_shared")},
         "graph_job": {of: _of_a_job(rows, of) for of in ("cpu_s", "peak_memory_bytes")},
         "costs": costs,
@@ -65,7 +57,6 @@ def page(results: dict[str, Any]) -> str:
         "runs_per_s": 10_000 / whole.wall_s,
         "when_failing": WHEN_FAILING,
         "to_go_on": TO_GO_ON,
-        "others_s": max(general_s, default=None),
     })  # fmt: skip
 
 

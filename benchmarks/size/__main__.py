@@ -1,7 +1,7 @@
 """Memory, listings, threads, meshes and cost over size of the solver, beside an earlier commit.
 
 ``python -m benchmarks.size`` unpacks that commit from the repository, settles the beds and writes
-docs/size.md. Beds of all sizes are copies of one, side by side in both directions.
+docs/developers/size.md. Beds of all sizes are copies of one, side by side in both directions.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.core_loop.__main__ import tree_of
+from benchmarks.core_loop.__main__ import TREES
 from benchmarks.engines.beds import Bed, settled, tiled
 from benchmarks.engines.timing import median_interval, ratio, spread
 from benchmarks.frame import Benchmark, BenchmarkRun, render
+from benchmarks.frame.source_tree import unpack
 from benchmarks.size import worker
 from benchmarks.size.mesh import Mesh, rested, round_pattern
 from sandmould import ROOT
@@ -117,7 +118,7 @@ def ask(process: Any, what: str, number: int = 0) -> dict[str, Any]:
 
 
 def _both() -> dict[str, Path]:
-    return {"before": tree_of(BEFORE), "now": ROOT}
+    return {"before": unpack(BEFORE, TREES), "now": ROOT}
 
 
 def _steps(extent: SizeExtent, bed: Bed) -> int:
@@ -310,7 +311,7 @@ BENCHMARK = Benchmark(
         "scale": measure_scale,
         "threads": measure_threads,
     },
-    pages={"size.md": page},
+    pages={"developers/size.md": page},
     by_default=("memory", "listing", "mesh", "scale"),
     extent=SizeExtent(),
     quick=QUICK,

@@ -1,6 +1,7 @@
 """Whether small grains are trapped between large ones, and what that does to a filled box.
 
-``make size-ratio`` runs ``python -m benchmarks.size_ratio``, which writes docs/size_ratio.md.
+``make size-ratio`` runs ``python -m benchmarks.size_ratio``, which writes
+docs/developers/size_ratio.md.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ BENCHMARK = Benchmark(
     __file__,
     __doc__,
     parts={"grooves": grooves, "boxes": boxes, "costs": costs},
-    pages={"size_ratio.md": page},
+    pages={"developers/size_ratio.md": page},
     extent=WHOLE,
     quick=LITTLE,
 )

@@ -20,7 +20,7 @@ from benchmarks.stability.limits import (
     one_contact_s,
     rotation,
 )
-from benchmarks.stability.page import draw, page
+from benchmarks.stability.page import draw, longer_steps, page
 from benchmarks.stability.scenes import SCENES, limits_of, start_of
 
 
@@ -60,7 +60,7 @@ BENCHMARK = Benchmark(
         "bed_followed": lambda run: followed_beds(engines_here(), run.extent),
         "rotation": lambda run: rotation(run.extent),
     },
-    pages={"stability.md": page},
+    pages={"stability.md": page, "developers/longer_steps.md": longer_steps},
     draw=draw,
     extent=WHOLE,
     quick=COARSE,

@@ -16,7 +16,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from benchmarks.frame import render
-from benchmarks.stability.phases import errors
 from benchmarks.stability.runs import BLOWS_UP, DRIFTS, STABLE
 
 OUTCOMES = (STABLE, DRIFTS, BLOWS_UP)
@@ -163,7 +162,12 @@ def page(results: dict[str, Any]) -> str:
         "of_one_mode": of_one_mode,
         "largest_error": _largest_error(results),
         "agreement": _agreement(results),
-        "impacts": errors(),
+        "known_within": max(
+            row["known_within"]
+            for scene in scenes.values()
+            for rows in scene["maps"].values()
+            for row in rows
+        ),
         "blow_up": {scene: _first_blow_up(results, scene) for scene in scenes},
         "one_contact": [
             step_s / row["whole_s"]
@@ -172,3 +176,14 @@ def page(results: dict[str, Any]) -> str:
         "planned": [row["planned_s"] / row["whole_s"] for row in limits],
         "grain": [row["grain_s"] / row["whole_s"] for row in limits],
     })  # fmt: skip
+
+
+def longer_steps(results: dict[str, Any]) -> str:
+    """Write the page on what makes a step longer.
+
+    Parameters
+    ----------
+    results : dict
+        What ``benchmarks.stability`` measured.
+    """
+    return render(Path(__file__).with_name("longer_steps.md.j2"), results)

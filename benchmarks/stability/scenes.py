@@ -11,19 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.dem.critical_step import (
-    StableStep,
-    active_contacts,
-    grain_step,
-    simplified_step,
-    whole_step,
-)
+from sandmould.dem.critical_step import StableStep, active_contacts, whole_step
 from sandmould.engines.guard import grain_masses_kg
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
+from tests.verification.grain_limits import grain_step, simplified_step
 
 Array = NDArray[np.float64]
 RADIUS_M = 0.002

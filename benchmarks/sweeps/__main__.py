@@ -1,6 +1,7 @@
 """What whole sweeps cost with an older version and with this one, in turns on one machine.
 
-``python -m benchmarks.sweeps --old FOLDER`` writes docs/scaling.md. FOLDER is a checkout of the
+``python -m benchmarks.sweeps --old FOLDER`` writes docs/developers/scaling.md. FOLDER is a checkout
+of the
 older version with its own ``.venv``, such as one that ``git worktree add`` makes and
 ``make quick`` sets up. ``--part thousand_runs`` runs a thousand short runs with both, once:
 some 1 700 s of a core with a version that starts a process for each run, 200 s with a worker.
@@ -53,7 +54,7 @@ def _study(scenario: Mapping[str, Any], hz: list[float], **top: Any) -> dict[str
 
 
 def _stand_in(runs: int, replicates: int = 5) -> dict[str, Any]:
-    """Short runs: those of docs/workflow_cost.md."""
+    """Short runs: those of docs/developers/workflow_cost.md."""
     scenario = {
         "sand": {"size_scale": 12, "size_classes": 3, "disc_thickness_m": 0.1},
         "fill": {"layers": [{"count": 20}]},
@@ -353,8 +354,6 @@ def page(results: dict[str, Any]) -> str:
     medians = {version: median(rows) for version, rows in one_run["core_s"].items()}
     values["one_run"] = {**one_run, "median": medians}
     values["thousand"] = _compared(results["thousand_runs"])
-    if "report" in results:
-        values["report"] = results["report"]
     values["remark"] = results.get("remark", "")
     return render(Path(__file__).with_name("page.md.j2"), values)
 
@@ -378,7 +377,7 @@ BENCHMARK = Benchmark(
         "report": _report,
         "origin": lambda run: run.origin,
     },
-    pages={"scaling.md": page},
+    pages={"developers/scaling.md": page},
     extent=WHOLE,
     quick=LITTLE,
     add_options=_add_options,

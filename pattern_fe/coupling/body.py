@@ -1,4 +1,4 @@
-"""What a coupled session asks of the pattern's participant."""
+"""What a coupled session needs of the pattern: where loads bend it."""
 
 from __future__ import annotations
 

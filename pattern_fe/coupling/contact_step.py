@@ -257,21 +257,21 @@ def hold_out(
     count = of_walls
     if obstacles:
         count = _obstacle_rows(c, pressed, before, moved, at, share, gap, count)
-    answers, matrix = np.zeros((count, n)), np.zeros((count, count))
+    moves, matrix = np.zeros((count, n)), np.zeros((count, count))
     for r in range(count):
         for k in range(4):
             if share[r, k] != 0.0:
-                answers[r] += share[r, k] * inverse[at[r, k]]
+                moves[r] += share[r, k] * inverse[at[r, k]]
     for r in range(count):
         for q in range(count):
             for k in range(4):
-                matrix[q, r] += share[q, k] * answers[r, at[q, k]]
+                matrix[q, r] += share[q, k] * moves[r, at[q, k]]
     _sweep(matrix, gap, reaction, count)
     impulse[:] = 0.0
     c.wall[:] = 0.0
     for r in range(count):
         if reaction[r] > 0.0:
-            moved += reaction[r] * answers[r]
+            moved += reaction[r] * moves[r]
             for k in range(4):
                 impulse[at[r, k]] += reaction[r] * share[r, k]
             if r < of_walls:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.engines.program import Stage
-from sandmould.engines.session import Session, Shared
+from sandmould.engines.session import SandSession, Shared
 from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_periods import TablePeriod
 
 Array = NDArray[np.float64]
@@ -21,7 +19,7 @@ Array = NDArray[np.float64]
 class DelegatingSession:
     """The sand's participant behind the interface of a session; see ``Session`` for all members."""
 
-    def __init__(self, sand: Session) -> None:
+    def __init__(self, sand: SandSession) -> None:
         self.sand = sand
         """Session of the engine that computes the grains."""
 
@@ -54,15 +52,6 @@ class DelegatingSession:
     def at_rest(self) -> bool:
         """Whether the sand has come to rest in a stage of settling."""
         return self.sand.at_rest
-
-    @property
-    def sand_rests(self) -> bool:
-        """Whether the checks of this stage find the sand at rest, held or not."""
-        return self.sand.sand_rests
-
-    def hold_rest(self, why: str) -> None:
-        """Let the stage go on while something else than the sand still moves."""
-        self.sand.hold_rest(why)
 
     @property
     def rest_sentence(self) -> str:
@@ -121,29 +110,9 @@ class DelegatingSession:
         """Give the periods of a vibration on mounts that have ended since the last asking."""
         return self.sand.table_periods()
 
-    def vertex_loads(self, name: str) -> Array | None:
-        """Mean force of the sand on each vertex of a surface since the last call, N."""
-        return self.sand.vertex_loads(name)
-
-    def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
-        """Move a surface to new vertices over the next window."""
-        self.sand.move_surface(name, vertices_m, window_s)
-
-    def save_checkpoint(self) -> Any:
-        """Give all that is needed to compute on from here, in memory."""
-        return self.sand.save_checkpoint()
-
-    def restore_checkpoint(self, checkpoint: Any) -> None:
-        """Compute on from what ``save_checkpoint`` gave."""
-        self.sand.restore_checkpoint(checkpoint)
-
     def exact_limit_s(self) -> float:
         """Limit of the sand's contacts."""
         return self.sand.exact_limit_s()
-
-    def attach_mover(self, name: str, mover: StepMover) -> None:
-        """Let a surface be moved in every step."""
-        self.sand.attach_mover(name, mover)
 
     def write_checkpoint(self, folder: Path) -> None:
         """Write all that a continued run needs."""

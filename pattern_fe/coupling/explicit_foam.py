@@ -107,9 +107,8 @@ class ExplicitFoam:
         self.mass_scale = mass_scale
         self.sub_steps = math.ceil(math.sqrt(inner / (STABLE_SHARE * mass_scale - pressed)) - 1e-9)
         """Steps of the pattern in one of the grains, under a load that stays."""
-        self.first_hz = float(pattern.natural_frequencies_hz(1, True)[0]) / math.sqrt(mass_scale)
+        self.first_hz = float(pattern.natural_frequencies_hz()[0]) / math.sqrt(mass_scale)
         """Lowest natural frequency with the masses scaled."""
-        self._stiffness = pattern.stiffness.tocsr()
         self._mass_kg = mass_scale * pattern.mass_kg[:, None]
         self._damping_1_s = 4.0 * math.pi * self.first_hz * damping_ratio
         self._motion = pattern.central_differences(
@@ -189,8 +188,7 @@ class ExplicitFoam:
     @property
     def elastic_j(self) -> float:
         """Elastic energy half a step ago, that of a bedding included."""
-        force = self._stiffness @ self._motion.displacement_m.ravel()
-        return 0.5 * float(self._before.ravel() @ force)
+        return 0.5 * float(self._before.ravel() @ self._motion.internal_force_n.ravel())
 
     def state(self) -> dict[str, Array]:
         """All that moves, by name."""

@@ -50,7 +50,8 @@ class FoamBody:
         self._nodes = pattern.surface.nodes[self._line]
         self._surroundings = surroundings
         self._obstructed = None if surroundings is None else Obstructed(surroundings, self._nodes)
-        self._answers: dict[int, Array] = {}
+        self._compliance: dict[int, Array] = {}
+        """Displacements of the surface under 1 N on a component of it, by its number."""
 
     @property
     def vertices_m(self) -> Array:
@@ -62,7 +63,7 @@ class FoamBody:
         pattern = self._pattern
         load = self._on_nodes(load_n)
         if self._large:
-            moved, touched = pattern.solve_obstructed(load, self._obstructed)
+            moved, touched = pattern.solve_large(load, self._obstructed)
         else:
             moved, touched = self._linear(load)
         reaction = self._inner_force_n(moved) - load
@@ -109,15 +110,15 @@ class FoamBody:
     def _response(self, load_n: Array) -> Array:
         """Displacements of the surface under loads on it, (nv d, m); those of one load are kept."""
         for entry in np.flatnonzero(load_n.any(axis=1)):
-            if entry not in self._answers:
+            if entry not in self._compliance:
                 unit = np.zeros_like(self.vertices_m)
                 unit.ravel()[entry] = 1.0
-                answer = self._pattern.solve_linear(self._on_nodes(unit))
-                self._answers[int(entry)] = answer[self._nodes].ravel()
+                moved = self._pattern.solve_linear(self._on_nodes(unit))
+                self._compliance[int(entry)] = moved[self._nodes].ravel()
         used = np.flatnonzero(load_n.any(axis=1))
         if not len(used):
             return np.zeros_like(load_n)
-        return np.column_stack([self._answers[int(e)] for e in used]) @ load_n[used]
+        return np.column_stack([self._compliance[int(e)] for e in used]) @ load_n[used]
 
     def _on_nodes(self, load_n: Array) -> Array:
         on_surface = np.zeros_like(self._pattern.surface.vertices_m)

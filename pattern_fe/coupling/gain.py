@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.session import Session
+from sandmould.engines.session import SandSession
 from sandmould.pattern_fe.coupling.body import ElasticBody
 from sandmould.pattern_fe.coupling.convergence_log import rms_m
 
 Array = NDArray[np.float64]
 MOVED_M = 1e-6
-"""Size of the perturbation: grains overlap a surface by some hundred times as much."""
+"""Perturbation, root of the mean square over the vertices: grains overlap a surface by some hundred
+times as much."""
 
 
 @dataclass(frozen=True)
@@ -34,18 +35,17 @@ class Gain:
 
 
 def measure_gain(
-    session: Session,
+    session: SandSession,
     body: ElasticBody,
     surface: str,
     displacement_m: Array,
     window_s: float,
-    moved_m: float = MOVED_M,
 ) -> Gain | None:
     """Compute a window twice, once led a little farther along the solution; the session stays.
 
     Parameters
     ----------
-    session : Session
+    session : SandSession
         Of an engine that repeats windows.
     body : ElasticBody
     surface : str
@@ -53,8 +53,6 @@ def measure_gain(
     displacement_m : (nv, d) float64, m
         Displacement at the interface that the window leads to.
     window_s : float
-    moved_m : float
-        Perturbation, root of the mean square over the vertices.
 
     Returns
     -------
@@ -78,7 +76,7 @@ def measure_gain(
     plain = solved(displacement_m)
     if plain is None or not plain.any():
         return None
-    way = plain * (moved_m / rms_m(plain))
+    way = plain * (MOVED_M / rms_m(plain))
     led = solved(displacement_m + way)
     assert led is not None
     # the surface moves evenly: in the mean over the window the sand sees half of the way

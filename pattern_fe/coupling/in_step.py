@@ -3,32 +3,16 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sandmould.engines.session import EngineStop, Session
-from sandmould.engines.snapshot import Snapshot
-from sandmould.pattern_fe.coupling.body import ElasticBody
-from sandmould.pattern_fe.coupling.convergence_log import (
-    CONVERGENCE_LOG,
-    ConvergenceLog,
-    WindowEntry,
-    force_n,
-    imbalance_n,
-    rms_m,
-)
-from sandmould.pattern_fe.coupling.delegating_session import DelegatingSession
+from sandmould.engines.session import EngineStop
+from sandmould.pattern_fe.coupling.convergence_log import WindowEntry, force_n, imbalance_n, rms_m
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
-from sandmould.pattern_fe.coupling.pattern_rest import PatternRest
-from sandmould.pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
+from sandmould.pattern_fe.coupling.pattern_session import SteppedSession
 from sandmould.runs.outcome import Outcome
-
-Array = NDArray[np.float64]
-CHECKPOINT = "pattern.npz"
 
 
 @dataclass(frozen=True)
@@ -47,55 +31,14 @@ class InStepEntry(WindowEntry):
     """Work less all four energies, that which contact took among them: round-off."""
 
 
-class InStepSession(DelegatingSession):
-    """A session whose pattern gives way in every step; else the engine's own."""
+class InStepSession(SteppedSession[InStepFoam]):
+    """A session of an engine that calls the pattern's step in its own."""
 
-    def __init__(
-        self,
-        sand: Session,
-        foam: InStepFoam,
-        body: ElasticBody,
-        surface: str,
-        work: Path,
-        checkpoint: Path | None = None,
-        load_tolerance: float | None = None,
-    ) -> None:
-        """Start with the pattern at rest, or where a checkpoint left it.
+    entry, load_name = InStepEntry, "mean_load"
 
-        Parameters
-        ----------
-        sand : Session
-            Of any engine that calls a mover in its steps.
-        foam : InStepFoam
-        body : ElasticBody
-            The same pattern at rest, for the residual.
-        surface : str
-            Its name in the engine, vertex for vertex that of the foam.
-        work : Path
-            Folder of the tables.
-        checkpoint : Path, optional
-            Folder that ``write_checkpoint`` wrote.
-        load_tolerance : float, optional
-            See ``PatternRest``.
-        """
-        super().__init__(sand)
-        self._rest = PatternRest(sand, load_tolerance)
-        self._foam, self._body = foam, body
-        self._load = np.zeros_like(foam.vertices_m)
-        log_bytes, rows = None, 0
-        if checkpoint is not None:
-            with np.load(checkpoint / CHECKPOINT, allow_pickle=False) as saved:
-                foam.restore({name: saved[name] for name in saved.files})
-                self._load = saved["mean_load"]
-                log_bytes, rows = (int(number) for number in saved["trusted"])
-        sand.attach_mover(surface, foam.mover)
-        self._log = ConvergenceLog(work / CONVERGENCE_LOG, log_bytes, InStepEntry)
-        self._shapes = ShapesFile(work / SHAPES, rows, *foam.vertices_m.shape)
-
-    @property
-    def displacement_m(self) -> Array:
-        """Displacement of the surface, (nv, d) float64, m."""
-        return self._foam.displacement_m
+    def _begin(self, work: Path, checkpoint: Path | None) -> None:
+        super()._begin(work, checkpoint)
+        self.sand.attach_mover(self._surface, self._foam.mover)
 
     def advance(self, duration_s: float | None = None) -> None:
         """Compute for a duration, or up to the next check; see ``Session``.
@@ -147,36 +90,3 @@ class InStepSession(DelegatingSession):
             )
         )
         self._shapes.write(self.sand.time_s, moved_m)
-
-    def snapshot(self) -> Snapshot:
-        """State of all grains relative to the box, and the pattern among them."""
-        moved = self._foam.vertices_m + self.displacement_m
-        return replace(self.sand.snapshot(), pattern_m=moved, pattern_load_n=self._load)
-
-    def save_checkpoint(self) -> Any:
-        """Copies of what grains and pattern are; the tables go on."""
-        return self.sand.save_checkpoint(), self._foam.state()
-
-    def restore_checkpoint(self, checkpoint: Any) -> None:
-        """Compute on from what ``save_checkpoint`` gave."""
-        grains, foam = checkpoint
-        self.sand.restore_checkpoint(grains)
-        self._foam.restore(foam)
-
-    def write_checkpoint(self, folder: Path) -> None:
-        """Write the engine's state and the pattern's."""
-        self.sand.write_checkpoint(folder)
-        self._shapes.flush()
-        trusted = np.array([self._log.size(), self._shapes.rows])
-        np.savez(
-            folder / CHECKPOINT,
-            trusted=trusted,
-            mean_load=self._load,
-            **self._foam.state(),  # type: ignore[arg-type]
-        )
-
-    def close(self) -> None:
-        """Close the tables and free the engine."""
-        self._log.close()
-        self._shapes.close()
-        self.sand.close()

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from sandmould.dem.addresses import table_of
 from sandmould.engines.step_mover import StepMover
 from sandmould.pattern_fe.condensation import CondensedSurface
-from sandmould.pattern_fe.coupling.contact_arrays import contact_arrays
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows
+from sandmould.pattern_fe.coupling.contact_step import ContactArrays
 from sandmould.pattern_fe.coupling.foam_step import (
     CONTACT,
     DAMPED,
@@ -28,6 +28,7 @@ from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.surroundings import Surroundings
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 class InStepFoam:
@@ -160,7 +161,7 @@ def _at_rest(
     surface: CondensedSurface,
     mass: SelectiveMass,
     vertices_m: Array,
-    pressed: NDArray[np.int64],
+    pressed: Indices,
     surroundings: Surroundings | None,
 ) -> FoamArrays:
     """A surface at rest, its numbers not set."""
@@ -189,5 +190,32 @@ def _at_rest(
         mean_momentum=none(),
         sums=np.zeros(5),
         impulse=none(),
-        **contact_arrays(surroundings, vertices_m, pressed, n + more)._asdict(),
+        **_contact_arrays(surroundings, vertices_m, pressed, n + more)._asdict(),
+    )
+
+
+def _contact_arrays(
+    surroundings: Surroundings | None, drawn_m: Array, pressed: Indices, size: int
+) -> ContactArrays:
+    """What a pattern of some components may touch, in 3D floor and walls alone; nothing as yet."""
+    low, high = np.full(size, -np.inf), np.full(size, np.inf)
+    sides: list[Array] = []
+    if surroundings is not None:
+        least_m, most_m = surroundings.bounds_m()
+        low[pressed], high[pressed] = least_m.ravel(), most_m.ravel()
+        sides = surroundings.outlines_m() if surroundings.dimension == 2 else []
+    ends = [np.hstack([line, np.roll(line, -1, axis=0)]) for line in sides]
+    vertices = len(drawn_m)
+    return ContactArrays(
+        low,
+        high,
+        np.concatenate([np.zeros((0, 4)), *ends]),
+        np.cumsum([0, *map(len, ends)]).astype(np.int64),
+        np.concatenate([np.zeros((0, 2)), *sides]),
+        np.ascontiguousarray(drawn_m),
+        np.zeros(vertices + 1),
+        np.zeros((vertices, 2)),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
     )

@@ -12,9 +12,7 @@ from sandmould.engines.program import Program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
 from sandmould.engines.step_counts import StepCounts
-from sandmould.pattern_fe.coupling.body import ElasticBody
 from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam
-from sandmould.pattern_fe.coupling.files_body import EXCHANGE, FilesBody
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.free_body import FreeBody
 from sandmould.pattern_fe.coupling.in_step import InStepSession
@@ -60,7 +58,7 @@ def open_coupled(
         (work / MASSES_LOG).write_text(_selective_masses(foam.mass), encoding="utf-8")
         held = FreeBody(pattern, foam) if pattern.is_free else FoamBody(pattern, False, around)
         return InStepSession(sand, foam, held, name, work, checkpoint, tolerance)
-    body: ElasticBody = FoamBody(pattern, large, around)
+    body = FoamBody(pattern, large, around)
     if loop.scheme == "monolithic":
         explicit = explicit_foam(scenario, pattern)
         sand = open_session(program, folder, log, checkpoint)
@@ -71,8 +69,6 @@ def open_coupled(
             sand, explicit, body, name, limit_m, counts, work, checkpoint, tolerance
         )
     sand = open_session(program, folder, log, checkpoint)
-    if loop.exchange == "files":
-        body = FilesBody(pattern, large, folder / EXCHANGE, sand, around)
     return CoupledSession(sand, body, name, loop, counts, work, checkpoint, tolerance, around)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.session import Session
+from sandmould.engines.session import SandSession
 from sandmould.pattern_fe.coupling.convergence_log import rms_m
 
 Array = NDArray[np.float64]
@@ -20,12 +20,12 @@ class PatternRest:
     it is left to the way.
     """
 
-    def __init__(self, sand: Session, load_tolerance: float | None) -> None:
+    def __init__(self, sand: SandSession, load_tolerance: float | None) -> None:
         """Watch a pattern.
 
         Parameters
         ----------
-        sand : Session
+        sand : SandSession
         load_tolerance : float or None
             ``rest.load_tolerance``; None holds no stage.
         """

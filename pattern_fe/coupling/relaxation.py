@@ -9,8 +9,8 @@ G(x) about -g x: the plain loop x <- G(x) diverges for g > 1, a fixed relaxation
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,58 +23,47 @@ Change = tuple[Array, Array]
 _COLUMNS = 10
 """Changes that the quasi-Newton scheme remembers."""
 STRUCK = 2.0
-"""Ratio of residuals from which on an iteration is gone back on. Below it secants may lead on: they
-are fast just because their residuals need not fall at every step. A surface that creeps to its
-place in sand at rest has larger residuals than one that stands still, too: dashpots resist it."""
+"""Ratio of residuals from which on an iteration is rejected. Below it secants may lead on: they are
+fast just because their residuals need not fall at every step. A surface that creeps to its place in
+sand at rest has larger residuals than one that stands still, too: dashpots resist it."""
 _PARTS = (0.1, 0.5)
 """Least and greatest part of a way that led farther off, as line searches have them."""
 _FILTER = 1e-2
 """Part of a change that must be new: below it is noise of the sand."""
 
 
-class Relaxation(Protocol):
+class Relaxation(ABC):
     """Chooses the next displacement at the interface; arrays are (k,) float64, m."""
 
-    factor: float
-    """Relaxation factor of the last call: part of the residual that was gone, along it."""
-    keeps_nearest: bool
+    keeps_nearest = False
     """Whether a window that ends far off is the iteration of it with the least residual. Shares
-    that are laid down keep the last one, so that a share too large is seen to diverge."""
+    that are prescribed keep the last one, so that a share too large is seen to diverge."""
 
-    def begin_window(self, is_iterated: bool) -> None:
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+        """Relaxation factor of the last call: part of the residual that was gone, along it."""
+
+    def begin_window(self, is_iterated: bool) -> None:  # noqa: B027
         """Hear that a new window begins, and whether it may be computed more than once."""
 
+    @abstractmethod
     def next(self, displacement: Array, solution: Array) -> Array:
         """Next displacement, from that of an iteration, x, and the one its loads give, G(x)."""
 
     def state(self) -> dict[str, Array]:
         """Memory, for a checkpoint."""
+        return {}
 
-    def restore(self, arrays: dict[str, Array]) -> None:
+    def restore(self, arrays: dict[str, Array]) -> None:  # noqa: B027
         """Take up a memory."""
 
 
-class FixedRelaxation:
+class FixedRelaxation(Relaxation):
     """The same factor for every residual."""
-
-    keeps_nearest = False
-
-    def __init__(self, factor: float) -> None:
-        self.factor = factor
-
-    def begin_window(self, is_iterated: bool) -> None:
-        """Nothing changes."""
 
     def next(self, displacement: Array, solution: Array) -> Array:
         """Go the factor times the residual."""
         return np.asarray(displacement + self.factor * (solution - displacement))
-
-    def state(self) -> dict[str, Array]:
-        """Nothing is remembered."""
-        return {}
-
-    def restore(self, arrays: dict[str, Array]) -> None:
-        """Nothing is remembered."""
 
 
 class MeasuredRelaxation(FixedRelaxation):
@@ -97,19 +86,20 @@ class MeasuredRelaxation(FixedRelaxation):
         self.factor = float(arrays["factor"][0])
 
 
-class AitkenRelaxation:
+class AitkenRelaxation(Relaxation):
     """One factor for all, from how the last two residuals differ (Küttler and Wall 2008, (44)).
 
     Its sign and size are kept within bounds: noise of the sand in the residuals would throw it.
     Where sand lets go of a surface and strikes it, secants lead to and fro between the two. So an
-    iteration that is much farther off than the one before it in its window is gone back on: the
-    next starts from that one again and goes a part of the way.
+    iteration that is much farther off than the one before it in its window is rejected: the next
+    starts from that one again and goes a part of the way.
     """
 
     keeps_nearest = True
 
     def __init__(self, first: float, least: float, most: float) -> None:
-        self.factor = self._first = first
+        super().__init__(first)
+        self._first = first
         self._least, self._most = least, most
         self._last: Array | None = None
         self._is_iterated = False
@@ -118,9 +108,9 @@ class AitkenRelaxation:
         self._from: Change | None = None
         """Displacement and residual that the last step of this window went from, if iterated."""
         self._too_far: Array | None = None
-        """Displacement of the last iteration that was gone back on in this window."""
+        """Displacement of the last iteration that was rejected in this window."""
         self._led = first
-        """Factor of the last step that was not gone back on."""
+        """Factor of the last step that was not rejected."""
         self.is_calm = False
         """Whether the factor is the first one: where sand rests, and no window is computed again,
         residuals differ by noise alone, which tells no factor."""
@@ -178,12 +168,10 @@ class AitkenRelaxation:
         """Take up the last residual and factors."""
         self._last = arrays["last"] if len(arrays["last"]) else None
         self.factor = float(arrays["factor"][0])
-        # a run that an earlier version paused has one factor
-        self._led = float(arrays["led"][0]) if "led" in arrays else self.factor
-        self._iterations = int(arrays["iterations"][0]) if "iterations" in arrays else 0
+        self._led, self._iterations = float(arrays["led"][0]), int(arrays["iterations"][0])
 
 
-class QuasiNewtonRelaxation:
+class QuasiNewtonRelaxation(Relaxation):
     """IQN-ILS: the inverse Jacobian of the residual by least squares over the last windows.
 
     Changes that say hardly anything beside newer ones are left out (QR filter), and what the
@@ -193,15 +181,12 @@ class QuasiNewtonRelaxation:
     keeps_nearest = True
 
     def __init__(self, first: float, columns: int, filter_fraction: float) -> None:
-        self.factor = first
+        super().__init__(first)
         self._first = first
         self._filter = filter_fraction
         # newest first: the filter drops the oldest of columns that say the same
         self._changes: deque[Change] = deque(maxlen=columns)
         self._last: Change | None = None
-
-    def begin_window(self, is_iterated: bool) -> None:
-        """Nothing changes: windows are alike."""
 
     def next(self, displacement: Array, solution: Array) -> Array:
         """Go where the residual would vanish if it changed as it did before."""

@@ -75,10 +75,6 @@ def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
             "window that is computed again; another scheme for windows that are computed once"
         )
         raise _bad("repeats", loop.repeats, valid)
-    if loop.exchange == "files" and not loop.has_windows:
-        raise _bad(
-            "exchange", loop.exchange, f"memory in the scheme {scheme}, which has no windows"
-        )
     if scheme == "per_layer":
         _refuse_foam_by_layers(scenario, pattern, loop)
     if scheme == "monolithic":
@@ -118,8 +114,6 @@ def _refuse_in_space(scenario: Scenario, pattern: Pattern, loop: Loop) -> None:
                 "pattern may reach"
             )
             raise _bad("scheme", loop.scheme, valid)
-    if loop.exchange == "files":
-        raise _bad("exchange", loop.exchange, "memory in 3D")
 
 
 def _refuse_foam_by_layers(scenario: Scenario, pattern: Pattern, loop: Loop) -> None:

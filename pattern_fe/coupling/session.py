@@ -3,43 +3,37 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.session import EngineStop, RefusedError, Session
-from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.session import EngineStop, SandSession
 from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.body import ElasticBody, StaticSolution
 from sandmould.pattern_fe.coupling.convergence_log import (
-    CONVERGENCE_LOG,
-    ConvergenceLog,
     WindowEntry,
     force_n,
     imbalance_n,
     rms_m,
     work_of,
 )
-from sandmould.pattern_fe.coupling.delegating_session import DelegatingSession
 from sandmould.pattern_fe.coupling.gain import measure_gain
-from sandmould.pattern_fe.coupling.pattern_rest import PatternRest
+from sandmould.pattern_fe.coupling.pattern_session import PatternSession
 from sandmould.pattern_fe.coupling.relaxation import (
     STRUCK,
     AitkenRelaxation,
     MeasuredRelaxation,
     relaxation_of,
 )
-from sandmould.pattern_fe.coupling.shapes_file import SHAPES, ShapesFile
 from sandmould.pattern_fe.large_displacement import LoadNotReachedError
 from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
 
 Array = NDArray[np.float64]
-CHECKPOINT = "pattern.npz"
 GAIN_EVERY_S = 0.02
 """About how often the gain is measured, at checks: it costs two windows."""
 
@@ -62,7 +56,7 @@ class _Iteration:
         return rms_m(self.solution.displacement_m - self.displacement_m)
 
 
-class CoupledSession(DelegatingSession):
+class CoupledSession(PatternSession):
     """A session whose sand presses on a pattern that gives way; else the engine's own.
 
     Two participants, sand and pattern, are coupled in windows. In a window the surface between
@@ -77,7 +71,7 @@ class CoupledSession(DelegatingSession):
 
     def __init__(
         self,
-        sand: Session,
+        sand: SandSession,
         body: ElasticBody,
         surface: str,
         loop: Loop,
@@ -91,12 +85,8 @@ class CoupledSession(DelegatingSession):
 
         Parameters
         ----------
-        sand : Session
-            Of any engine that can move the surface.
-        body : ElasticBody
-            The pattern.
-        surface : str
-            Its name in the engine, vertex for vertex that of the body.
+        sand, body, surface, load_tolerance
+            See ``PatternSession``; the engine can move the surface.
         loop : Loop
             Of the scenario; one that has windows.
         counts : StepCounts
@@ -105,38 +95,29 @@ class CoupledSession(DelegatingSession):
             Folder of the tables.
         checkpoint : Path, optional
             Folder that ``write_checkpoint`` wrote.
-        load_tolerance : float, optional
-            See ``PatternRest``.
         surroundings : Surroundings, optional
             What the surface must not enter, wherever a scheme leads it.
         """
-        super().__init__(sand)
+        tolerance = load_tolerance if loop.scheme != "one_way" else None
+        super().__init__(sand, body, surface, tolerance)
         self._surroundings = surroundings
-        self._body = body
-        self._rest = PatternRest(sand, load_tolerance if loop.scheme != "one_way" else None)
-        self._surface = surface
         self._loop = loop
         self._counts = counts
         self._ends = window_ends(loop.window_s, counts)
         checks = round(GAIN_EVERY_S / (counts.check * counts.step_s))
         self._gain_steps = counts.check * max(1, checks)
         self._relaxation = relaxation_of(loop)
-        rest = body.vertices_m
-        self._interface = np.zeros_like(rest)
+        rest = np.zeros_like(body.vertices_m)
+        self._interface = rest
         """Displacement at the interface, which the sand meets, m."""
-        self._next = np.zeros_like(rest)
+        self._next = rest
         """Displacement to which the next window leads, m."""
-        self._solved = np.zeros_like(rest)
+        self._solved = rest
         """Displacement of the pattern's last solution that counts, m."""
-        self._load = np.zeros_like(rest)
-        self._load_sum, self._load_steps = np.zeros_like(rest), 0
+        self._load_sum, self._load_steps = rest, 0
         self._work_j = self._contact_j = self._solve_s = 0.0
         self._gain = np.nan
-        log_bytes, rows = None, 0
-        if checkpoint is not None:
-            log_bytes, rows = self._take_up(checkpoint)
-        self._log = ConvergenceLog(work / CONVERGENCE_LOG, log_bytes)
-        self._shapes = ShapesFile(work / SHAPES, rows, *rest.shape)
+        self._begin(work, checkpoint)
 
     @property
     def displacement_m(self) -> Array:
@@ -221,7 +202,7 @@ class CoupledSession(DelegatingSession):
             self.sand.restore_checkpoint(checkpoint)
             displacement = ahead
         self._take(start, steps, iteration)
-        self._next = self._predicted(start, self._interface, ahead)
+        self._next = ahead
         self._write(steps, iterations, iteration)
         self._check()
 
@@ -259,12 +240,6 @@ class CoupledSession(DelegatingSession):
         """A displacement that enters nothing: steps beyond the solution may lead into a wall."""
         around = self._surroundings
         return displacement if around is None else around.pushed_out(displacement)
-
-    def _predicted(self, start: Array, displacement: Array, relaxed: Array) -> Array:
-        """Where the next window leads: part of the way to the solution, or on as in this one."""
-        if self._loop.predicts:
-            return self._outside(relaxed + (displacement - start))
-        return relaxed
 
     def _write(self, steps: int, iterations: int, iteration: _Iteration) -> None:
         displacement, load, solution = self._interface, iteration.load_n, iteration.solution
@@ -305,61 +280,24 @@ class CoupledSession(DelegatingSession):
                 f"{self.sand.time_s:.4g} s: a smaller factor or another scheme may hold",
             )
 
-    def snapshot(self) -> Snapshot:
-        """State of all grains relative to the box, and the pattern among them."""
-        moved_m = self._body.vertices_m + self.displacement_m
-        return replace(self.sand.snapshot(), pattern_m=moved_m, pattern_load_n=self._load)
-
-    def save_checkpoint(self) -> Any:
-        """Refuse: the loop repeats its windows itself.
-
-        Raises
-        ------
-        RefusedError
-        """
-        valid = "a scheme without windows, where windows are repeated from outside"
-        raise RefusedError("pattern.loop.scheme", self._loop.scheme, valid)
-
-    def restore_checkpoint(self, checkpoint: Any) -> None:
-        """Refuse as ``save_checkpoint`` does."""
-        self.save_checkpoint()
-
-    def write_checkpoint(self, folder: Path) -> None:
-        """Write the engine's state and the loop's."""
-        self.sand.write_checkpoint(folder)
-        log_bytes = self._log.size()
-        self._shapes.flush()
-        arrays: dict[str, Any] = {  # names on disk: paused runs of an earlier version go on
+    def _state(self) -> dict[str, Array]:
+        memory = {f"relaxation_{name}": a for name, a in self._relaxation.state().items()}
+        return memory | {  # names on disk: paused runs of an earlier version go on
             "shown": self._interface,
             "next": self._next,
             "answered": self._solved,
-            "load": self._load,
-            "work_j": self._work_j,
-            "contact_j": self._contact_j,
-            "gain": self._gain,
-            "ledger_bytes": log_bytes,
-            "rows": self._shapes.rows,
+            "work_j": np.array(self._work_j),
+            "contact_j": np.array(self._contact_j),
+            "gain": np.array(self._gain),
         }
-        arrays |= {f"relaxation_{name}": a for name, a in self._relaxation.state().items()}
-        np.savez(folder / CHECKPOINT, **arrays)
 
-    def _take_up(self, folder: Path) -> tuple[int, int]:
-        """Read what ``write_checkpoint`` wrote; give the trusted parts of the tables."""
-        with np.load(folder / CHECKPOINT, allow_pickle=False) as saved:
-            self._interface, self._next, self._load = saved["shown"], saved["next"], saved["load"]
-            self._solved = saved["answered"]
-            self._work_j, self._contact_j = float(saved["work_j"]), float(saved["contact_j"])
-            self._gain = float(saved["gain"])
-            start = "relaxation_"
-            memory = {k.removeprefix(start): saved[k] for k in saved.files if k.startswith(start)}
-            self._relaxation.restore(memory)
-            return int(saved["ledger_bytes"]), int(saved["rows"])
-
-    def close(self) -> None:
-        """Close the tables and free the engine."""
-        self._log.close()
-        self._shapes.close()
-        self.sand.close()
+    def _take_up(self, state: dict[str, Array]) -> None:
+        self._interface, self._next, self._solved = state["shown"], state["next"], state["answered"]
+        self._work_j, self._contact_j = float(state["work_j"]), float(state["contact_j"])
+        self._gain = float(state["gain"])
+        start = "relaxation_"
+        memory = {k.removeprefix(start): a for k, a in state.items() if k.startswith(start)}
+        self._relaxation.restore(memory)
 
 
 def window_ends(window_s: float, counts: StepCounts) -> NDArray[np.int64]:

@@ -44,11 +44,3 @@ class ShapesFile:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-
-def read_shapes(path: Path, vertices: int, dimension: int) -> tuple[Array, Array]:
-    """Times (k,) in s and displacements (k, nv, d) in m of all whole rows of a file."""
-    width = 1 + vertices * dimension
-    flat = np.fromfile(path, dtype="<f8")
-    table = flat[: len(flat) // width * width].reshape(-1, width)
-    return table[:, 0], table[:, 1:].reshape(-1, vertices, dimension)

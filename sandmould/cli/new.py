@@ -74,7 +74,7 @@ def new(
     wave_speed_m_s: Annotated[
         float | None, typer.Option(help="Wave speed of the sand, in m/s.")
     ] = None,
-    engine: Annotated[Literal["reference", "lammps"] | None, typer.Option(help="Engine.")] = None,
+    engine: Annotated[str | None, typer.Option(help="Engine, a name of sandmould doctor.")] = None,
     replicates: Annotated[int | None, typer.Option(help="Repeats of each setting.")] = None,
 ) -> None:
     """Write a study: it asks for drive, box, hole and sand."""

@@ -15,6 +15,7 @@ from sandmould.reference.new_answers import (
     WHY_HELD,
     NewStudy,
     applies,
+    engines,
     fault,
     finer_scale,
     number_in,
@@ -71,7 +72,8 @@ def _asked(name: str, known: Mapping[str, Any]) -> Any:
     for choice, meaning in _MEANINGS.get(name, {}).items():
         typer.echo(f"  {choice:12}  {meaning}")
     field, before = NewStudy.model_fields[name], plain(known)
-    among = sands() if name == "material" else _choices(name)
+    of_house = {"material": sands, "engine": engines}.get(name)
+    among = of_house() if of_house else _choices(name)
     unit = "" if _unit(name) == "1" else f", {_unit(name)}"
     listed = f" ({', '.join(among)})" if among else ""
     if name == "size_scale" and (finer := finer_scale(before)):

@@ -2,41 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 from typer.main import get_command
 
-from sandmould import ROOT
 from sandmould.cli.commands import app
 from sandmould.module_main import run_main
+from sandmould.reference.reference import DOCS, page
 
-COMMANDS = ROOT / "docs" / "commands.md"
+COMMANDS = DOCS / "commands.md"
 _WIDTH = 100
 
 
 def commands_page() -> str:
     """Each command with its options, as ``--help`` prints them."""
-    return "\n".join(_lines()) + "\n"
-
-
-def _lines() -> Iterator[str]:
     group: Any = get_command(app)
-    yield from (
-        "# Commands", "",
-        "Written by `make schema` from the code; nothing here is edited by hand.", "",
-        "`sandmould COMMAND --help` prints the same. `sandmould --install-completion` lets the "
-        "shell complete commands, options, names of shipped studies and paths of keys.", "",
-        "| command | does |", "| --- | --- |",
-    )  # fmt: skip
-    for name, command in group.commands.items():
-        yield f"| [`{name}`](#{name}) | {command.help.splitlines()[0]} |"
+    commands = {}
     for name, command in group.commands.items():
         context = command.make_context(
             f"sandmould {name}", ["--"], resilient_parsing=True, terminal_width=_WIDTH
         )
         text = "\n".join(line.rstrip() for line in command.get_help(context).splitlines())
-        yield from ("", f"## {name}", "", "```text", text, "```")
+        commands[name] = (command.help.splitlines()[0], text)
+    return page("commands", commands=commands)
 
 
 def main() -> None:

@@ -154,7 +154,7 @@ def contact(
     Velocities are those of half a step ago, when the normal was n - turn v_t to first order. The
     slip in that plane is v_t (1 + turn v_n) - (w + turn w_n v) x n with w = arm_1 w_1 + arm_2 w_2.
     Taken in the plane of n instead, a grain that rolls and twists, as in the groove between two
-    others, slips a little in every step, always the same way (docs/size_ratio.md).
+    others, slips a little in every step, always the same way (docs/developers/size_ratio.md).
     """
     approach = dot(v, n)
     normal = law.k_n * overlap - sizes.damping * approach

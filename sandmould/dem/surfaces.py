@@ -242,18 +242,6 @@ class Surfaces:
         self.arrays.vertex_velocity[rows] = (target - now) / (steps * step_s)
         self.arrays.steps_left[rows] = steps
 
-    def set_belt(self, name: str, velocity_m_s: ArrayLike) -> None:
-        """Let a surface run in itself: friction feels the velocity, the surface stays.
-
-        Parameters
-        ----------
-        name : str
-        velocity_m_s : (d,) or (nv, d) float64, m/s
-        """
-        rows = self._range[name]
-        self.arrays.vertex_velocity[rows] = np.asarray(velocity_m_s, dtype=np.float64)
-        self.arrays.steps_left[rows] = STAYS
-
     def forces(self, loads: Floats) -> dict[str, Floats]:
         """Sum the loads on the vertices of each surface.
 

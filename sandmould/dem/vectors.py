@@ -200,16 +200,6 @@ rolling_part = _by_length(
     two=lambda n, w, torsion: w,
     three=lambda n, w, torsion: w if torsion else without(n, w),
 )
-spin_cross = _by_length(
-    "spin_cross",
-    "w x arm as a vector: spin_cross(arm, w).",
-    two=lambda arm, w: (-w[0] * arm[1], w[0] * arm[0]),
-    three=lambda arm, w: (
-        w[1] * arm[2] - w[2] * arm[1],
-        w[2] * arm[0] - w[0] * arm[2],
-        w[0] * arm[1] - w[1] * arm[0],
-    ),
-)
 
 
 @register_jitable

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, assert_never
 
 from sandmould import ROOT, geometry
 from sandmould.bad_input import Problem
@@ -16,8 +15,8 @@ from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
-from sandmould.engines.session import RefusedError, Session
-from sandmould.scenario.engine import ENGINE_NAMES
+from sandmould.engines.session import RefusedError, SandSession
+from sandmould.scenario.engine import ENGINE_NAMES, DeckReader, EngineName
 from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
@@ -37,60 +36,20 @@ class EngineModule(Protocol):
 
     CAPABILITIES: Capabilities
     GRAIN_STEPS_PER_S: float
-    """Speed of one core in 2D that batches are filled by (docs/speed.md); fixed, so that a study
+    """Speed of one core in 2D that batches are filled by (docs/developers/speed.md); fixed, so
+    that a study
     has the same batches on every machine."""
     RANKS: Ranks
     RUNS_ITS_DECK: bool
     """Whether what a deck commands is what is computed; else it only lists the numbers."""
 
-    @staticmethod
-    def installed_version() -> int | str:
+    def installed_version(self) -> int | str:
         """Version of the engine on this machine, 0 where there is none."""
 
-    @staticmethod
-    def installation_problem() -> str | None:
+    def installation_problem(self) -> str | None:
         """Say what would be a valid installation where the engine is missing or too old."""
 
-    @staticmethod
-    def refuse(scenario: Scenario) -> None:
-        """Raise RefusedError for what the engine lacks."""
-
-    @staticmethod
-    def render_deck(program: Program, sources: Mapping[str, str], run: str, study: str) -> Deck:
-        """Render the deck."""
-
-    @staticmethod
-    def write_deck(
-        program: Program, sources: Mapping[str, str], folder: Path, run: str, study: str
-    ) -> None:
-        """Write ``deck.in`` and ``layers/``; the deck last."""
-
-    @staticmethod
-    def session_sources(scenario: Scenario) -> list[list[Path]]:
-        """Files of ours that compute beside what the deck commands: its session, our kernels.
-
-        Files that are used together make one group.
-        """
-
-    @staticmethod
-    def load_session(scenario: Scenario) -> None:
-        """Import what a session needs and no plan does.
-
-        What starts threads, MPI or the engine is left to the run's own process.
-        """
-
-    @staticmethod
-    def open_session(
-        program: Program, folder: Path, log: Path, checkpoint: Path | None = None
-    ) -> Session:
-        """Open a session on a rendered deck, afresh or from a checkpoint."""
-
-
-class DeckReaderModule(Protocol):
-    """What ``sandmould.engines.<name>.own_deck`` offers, of engines that read decks of users."""
-
-    @staticmethod
-    def communicator() -> Any:
+    def communicator(self) -> Any:
         """Give the MPI communicator of this process, or None where the engine has one process.
 
         Raises
@@ -99,8 +58,41 @@ class DeckReaderModule(Protocol):
             When the engine cannot be loaded.
         """
 
-    @staticmethod
-    def read_deck(folder: Path, deck: str, log: Path) -> None:
+    def refuse(self, scenario: Scenario) -> None:
+        """Raise RefusedError for what the engine lacks."""
+
+    def render_deck(
+        self, program: Program, sources: Mapping[str, str], run: str, study: str
+    ) -> Deck:
+        """Render the deck."""
+
+    def write_deck(
+        self, program: Program, sources: Mapping[str, str], folder: Path, run: str, study: str
+    ) -> None:
+        """Write ``deck.in`` and ``layers/``; the deck last."""
+
+    def session_sources(self, scenario: Scenario) -> list[list[Path]]:
+        """Files of ours that compute beside what the deck commands: its session, our kernels.
+
+        Files that are used together make one group.
+        """
+
+    def load_session(self, scenario: Scenario) -> None:
+        """Import what a session needs and no plan does.
+
+        What starts threads, MPI or the engine is left to the run's own process.
+        """
+
+    def open_session(
+        self, program: Program, folder: Path, log: Path, checkpoint: Path | None = None
+    ) -> SandSession:
+        """Open a session on a rendered deck, afresh or from a checkpoint."""
+
+
+class DeckReaderModule(Protocol):
+    """What ``sandmould.engines.<name>.own_deck`` offers, of engines that read decks of users."""
+
+    def read_deck(self, folder: Path, deck: str, log: Path) -> None:
         """Have the engine read a deck from its first line to its last; every rank calls this.
 
         Parameters
@@ -124,9 +116,26 @@ def engine_of(scenario: Scenario) -> EngineModule:
     return engine_module(scenario.engine.name)
 
 
-def engine_module(name: str) -> EngineModule:
-    """Import the module of an engine by its name, one of ``ENGINE_NAMES``."""
-    return cast(EngineModule, importlib.import_module(f"sandmould.engines.{name}.engine"))
+def engine_module(name: EngineName) -> EngineModule:
+    """Import the module of an engine by its name, and only that one.
+
+    The type checker compares each module with what is asked of it.
+    """
+    match name:
+        case "lammps":
+            from sandmould.engines.lammps import engine as lammps
+
+            return lammps
+        case "liggghts":
+            from sandmould.engines.liggghts import engine as liggghts
+
+            return liggghts
+        case "reference":
+            from sandmould.engines.reference import engine as reference
+
+            return reference
+        case _:
+            assert_never(name)
 
 
 def engines_that(can: Callable[[Capabilities], bool]) -> list[str]:
@@ -140,9 +149,19 @@ def engines_that(can: Callable[[Capabilities], bool]) -> list[str]:
     return [name for name in ENGINE_NAMES if can(engine_module(name).CAPABILITIES)]
 
 
-def deck_reader(name: str) -> DeckReaderModule:
+def deck_reader(name: DeckReader) -> DeckReaderModule:
     """Import how an engine reads decks of users, by its name."""
-    return cast(DeckReaderModule, importlib.import_module(f"sandmould.engines.{name}.own_deck"))
+    match name:
+        case "lammps":
+            from sandmould.engines.lammps import own_deck as lammps
+
+            return lammps
+        case "liggghts":
+            from sandmould.engines.liggghts import own_deck as liggghts
+
+            return liggghts
+        case _:
+            assert_never(name)
 
 
 def mpi_ranks(scenario: Scenario) -> int:
@@ -158,9 +177,7 @@ def calls_our_kernels(scenario: Scenario) -> bool:
 
 def communicator_of(scenario: Scenario) -> Any:
     """The MPI communicator of the processes that compute a run; None where there is one."""
-    if mpi_ranks(scenario) == 1:
-        return None
-    return deck_reader(scenario.engine.name).communicator()
+    return None if mpi_ranks(scenario) == 1 else engine_of(scenario).communicator()
 
 
 def deck_hash(scenario: Scenario) -> str:

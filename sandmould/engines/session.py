@@ -65,7 +65,7 @@ class RefusedError(Exception):
 
 
 class Session(Protocol):
-    """One scenario being computed by one engine."""
+    """One scenario being computed, as the driver sees it."""
 
     @property
     def version(self) -> str:
@@ -90,19 +90,6 @@ class Session(Protocol):
     @property
     def at_rest(self) -> bool:
         """Whether the sand has come to rest in a stage of settling."""
-
-    @property
-    def sand_rests(self) -> bool:
-        """Whether the checks of this stage find the sand at rest, held or not."""
-
-    def hold_rest(self, why: str) -> None:
-        """Let the stage go on while something else than the sand still moves.
-
-        Parameters
-        ----------
-        why : str
-            What has moved since the last check.
-        """
 
     @property
     def rest_sentence(self) -> str:
@@ -166,6 +153,50 @@ class Session(Protocol):
     def table_periods(self) -> list[TablePeriod]:
         """Give the periods of a vibration on mounts that have ended since the last asking."""
 
+    def exact_limit_s(self) -> float:
+        """Find the step up to which the contacts of this moment stay bounded.
+
+        Returns
+        -------
+        float, s
+            Limit of the whole system with its dashpots, eq. (42); infinite where nothing touches.
+            All contacts count as sticking, and none opens: the stiffest case.
+        """
+
+    def write_checkpoint(self, folder: Path) -> None:
+        """Write all that a continued run needs; only after a full check."""
+
+    @property
+    def can_checkpoint(self) -> bool:
+        """Whether the last advance ended a check, so that no mean is cut."""
+
+    def share(self, value: Shared) -> Shared:
+        """Give the first rank's value to all ranks."""
+
+    @property
+    def is_root(self) -> bool:
+        """Whether this process writes the files."""
+
+    def close(self) -> None:
+        """Free the engine."""
+
+
+class SandSession(Session, Protocol):
+    """The same of an engine alone, with what a coupling asks of its sand."""
+
+    @property
+    def sand_rests(self) -> bool:
+        """Whether the checks of this stage find the sand at rest, held or not."""
+
+    def hold_rest(self, why: str) -> None:
+        """Let the stage go on while something else than the sand still moves.
+
+        Parameters
+        ----------
+        why : str
+            What has moved since the last check.
+        """
+
     def vertex_loads(self, name: str) -> Array | None:
         """Give the mean force of the sand on each vertex of a surface since the last asking.
 
@@ -217,30 +248,3 @@ class Session(Protocol):
         ------
         RefusedError
         """
-
-    def exact_limit_s(self) -> float:
-        """Find the step up to which the contacts of this moment stay bounded.
-
-        Returns
-        -------
-        float, s
-            Limit of the whole system with its dashpots, eq. (42); infinite where nothing touches.
-            All contacts count as sticking, and none opens: the stiffest case.
-        """
-
-    def write_checkpoint(self, folder: Path) -> None:
-        """Write all that a continued run needs; only after a full check."""
-
-    @property
-    def can_checkpoint(self) -> bool:
-        """Whether the last advance ended a check, so that no mean is cut."""
-
-    def share(self, value: Shared) -> Shared:
-        """Give the first rank's value to all ranks."""
-
-    @property
-    def is_root(self) -> bool:
-        """Whether this process writes the files."""
-
-    def close(self) -> None:
-        """Free the engine."""

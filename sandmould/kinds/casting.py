@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from sandmould.bad_input import Problem
 from sandmould.definition.run import LAST_MEASURED, Run
-from sandmould.kinds.kind import (
-    Execution,
-    MachineSpeed,
-    Note,
-    Planning,
-    ScenarioT,
-    SpeedClass,
-    nothing_beside,
-)
-from sandmould.runs.files import replaced, write_text
-from sandmould.runs.measures import MeasureGroup
+from sandmould.kinds.kind import Execution, Planning, ScenarioT
+from sandmould.runs.files import replaced
 from sandmould.runs.products import Computed, Cost
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-SLOWER = 10.0
-"""Than predicted a machine may be, and a run longer than expected."""
 
 
 class CastingSolver(Protocol):
@@ -40,9 +28,6 @@ class CastingSolver(Protocol):
     def source_hash(self) -> str:
         """State of the solver."""
 
-    def computed_hash(self, scenario: Any) -> str:
-        """Hash of scenario and solver."""
-
     def no_cost(self, scenario: Any) -> Cost:
         """Cost of a run that has not begun."""
 
@@ -53,67 +38,44 @@ class CastingSolver(Protocol):
         """Make the products that a broken run never wrote."""
 
 
-def casting_planning(
-    solver: CastingSolver,
-    *,
-    work_unit: str,
-    resolved: Callable[[ScenarioT], ScenarioT],
-    problems: Callable[[ScenarioT], list[Problem]],
-    measures: tuple[MeasureGroup[ScenarioT], ...],
-    threads: Callable[[ScenarioT], int],
-    memory_mb: Callable[[ScenarioT], int],
-    planned_work: Callable[[ScenarioT], float],
-    predicted_s: Callable[[ScenarioT], float],
-    planned_s: Callable[[ScenarioT], float],
-    speed_class: Callable[[ScenarioT], SpeedClass],
-    plan_cells: Callable[[ScenarioT], Mapping[str, str]],
-    notes: Callable[[ScenarioT], Sequence[Note]],
-    measuring: tuple[str, ...],
-    speed: MachineSpeed[ScenarioT],
-    beside_s: Callable[[ScenarioT], float] = nothing_beside,
-) -> Planning[ScenarioT]:
-    """Plan runs whose solver is our own: no engine can be missing, nothing runs under MPI.
+class CastingPlanning(Planning[ScenarioT]):
+    """How runs are planned whose solver is our own; their measures are those of the end."""
 
-    Measures are those of the end, and a slow machine is given ``SLOWER`` times the predicted time.
-    Parameters are those of ``Planning``.
-    """
-    return Planning(
-        work_unit=work_unit,
-        resolved=resolved,
-        problems=problems,
-        engine_problem=lambda scenario: None,
-        measures=measures,
-        sources=lambda scenario: solver.source_files(),
-        template_hash=lambda scenario: solver.source_hash(),
-        computed_hash=solver.computed_hash,
-        threads=threads,
-        ranks=lambda scenario: 1,
-        memory_mb=memory_mb,
-        allowed_s=lambda scenario: SLOWER * predicted_s(scenario),
-        planned_work=planned_work,
-        predicted_s=predicted_s,
-        planned_s=planned_s,
-        speed_class=speed_class,
-        plan_cells=plan_cells,
-        notes=notes,
-        measuring=("sandmould/kinds/casting.py", *measuring),
-        speed=speed,
-        beside_s=beside_s,
-    )
+    measuring: tuple[str, ...] = ("sandmould/kinds/casting.py",)
+
+    @property
+    @abstractmethod
+    def solver(self) -> CastingSolver:
+        """The module that computes them."""
+
+    def sources(self, scenario: ScenarioT) -> list[Path]:
+        """Files of the solver."""
+        return self.solver.source_files()
+
+    def template_hash(self, scenario: ScenarioT) -> str:
+        """State of the solver."""
+        return self.solver.source_hash()
 
 
-def casting_execution(
-    solver: CastingSolver, products: tuple[str, ...], measure: Callable[[Run, Path], None]
-) -> Execution[Any]:
-    """Compute runs with a solver of our own; its deck lists all values with their sources."""
-    return Execution(
-        products=products,
-        render=lambda run, folder: _write_values(run, folder, solver.source_hash()),
-        compute=lambda run, folder: solver.compute(run.scenario, folder, run.run),
-        complete=solver.complete,
-        no_cost=solver.no_cost,
-        measure=measure,
-    )
+class CastingExecution(Execution[ScenarioT]):
+    """How a solver of our own computes runs."""
+
+    @property
+    @abstractmethod
+    def solver(self) -> CastingSolver:
+        """The module that computes them."""
+
+    def compute(self, run: Run, folder: Path) -> Computed:
+        """Have the solver compute a run."""
+        return self.solver.compute(run.scenario, folder, run.run)
+
+    def complete(self, scenario: ScenarioT, work: Path) -> None:
+        """Have the solver make what is missing."""
+        self.solver.complete(scenario, work)
+
+    def no_cost(self, scenario: ScenarioT) -> Cost:
+        """As the solver states it."""
+        return self.solver.no_cost(scenario)
 
 
 def read_fields(folder: Path) -> dict[str, Any] | None:
@@ -143,20 +105,3 @@ def write_picture(
     else:
         figure.text(0.5, 0.5, "No fields: the run broke off.", ha="center")
     figure.savefig(folder / LAST_MEASURED)
-
-
-def _write_values(run: Run, folder: Path, solver: str) -> None:
-    """Write every value of a run's scenario with its source to ``deck.in``."""
-    lines = [
-        f"# Study {run.study}, run {run.run}: what the solver {solver} is given",
-        *_lines(run.scenario.model_dump(mode="json"), run.sources),
-    ]
-    write_text(folder / "deck.in", "\n".join(lines) + "\n")
-
-
-def _lines(tree: Any, sources: Mapping[str, str], key: str = "") -> list[str]:
-    """One line a value; a list with one source stays together."""
-    if key in sources or not isinstance(tree, dict | list):
-        return [f"{key} = {tree}".ljust(60) + f" # {sources.get(key, 'not stated')}"]
-    each = tree.items() if isinstance(tree, dict) else enumerate(tree)
-    return [line for n, v in each for line in _lines(v, sources, f"{key}.{n}" if key else str(n))]

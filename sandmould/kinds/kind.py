@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -13,6 +14,9 @@ from sandmould.bad_input import Problem
 from sandmould.definition.run import Run
 from sandmould.definition.study import Study
 from sandmould.digest import code_identity
+from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.runs.files import write_text
+from sandmould.runs.hashing import solution_hash
 from sandmould.runs.measures import MeasureGroup
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.quantity import Section
@@ -22,6 +26,9 @@ AnyScenario = Section
 ScenarioT = TypeVar("ScenarioT", bound=Section)
 SpeedClass = tuple[str, int]
 """Engine and dimension: what the speed of a core depends on most."""
+CORE_SECONDS = "core-seconds"
+BASE_MEMORY_MB = 600
+"""Python and its libraries."""
 
 
 class Note(NamedTuple):
@@ -35,116 +42,39 @@ class Note(NamedTuple):
     """What the line begins with."""
 
 
-def nothing_beside(scenario: Any) -> float:
-    """No time beside the work."""
-    return 0.0
-
-
-def no_notes(scenario: Any) -> Sequence[Note]:
-    """Nothing to tell."""
-    return ()
-
-
-def no_lines(scenarios: Any) -> Sequence[str]:
-    """Nothing to list."""
-    return ()
-
-
-def no_state(scenario: Any) -> int:
-    """Nothing on the disk."""
-    return 0
-
-
-def no_fill(scenario: Any) -> None:
-    """Nothing that runs could share."""
-
-
-CORE_SECONDS = "core-seconds"
-
-
-@dataclass(frozen=True)
-class MachineSpeed(Generic[ScenarioT]):
-    """How fast a core of this machine is; of kinds whose engines differ from machine to machine.
-
-    Both functions take a scenario and the folder of all results, and give work a second.
-    """
-
-    stored: Callable[[ScenarioT, Path], float | None]
-    """As measured before; None where it was not. Starts nothing."""
-    measured: Callable[[ScenarioT, Path], float | None]
-    """As measured before, or measured now and stored; None where nothing could be measured.
-
-    A program of the user's that stops with an error is a BadInputError.
-    """
-    basis: str = "at the speed measured on this machine"
-    """What a price rests on that was reckoned with it."""
-
-
-@dataclass(frozen=True)
-class UserProgram(Generic[ScenarioT]):
+class UserProgram(ABC, Generic[ScenarioT]):
     """What a kind says of programs of the user's that its runs execute."""
 
     shipped: Path
     """Folder of those that come with us."""
-    files: Callable[[ScenarioT], Mapping[str, Path]]
-    """Its files by key: they must lie in folders that the study allows."""
-    foreign: Callable[[ScenarioT], str]
-    """Why it is not one of those shipped, in a few words; empty where it is."""
-    to_read: Callable[[Sequence[ScenarioT]], list[str]]
-    """Lines of it that a person should read before running it."""
+
+    @abstractmethod
+    def files(self, scenario: ScenarioT) -> Mapping[str, Path]:
+        """Its files by key: they must lie in folders that the study allows."""
+
+    @abstractmethod
+    def foreign(self, scenario: ScenarioT) -> str:
+        """Why it is not one of those shipped, in a few words; empty where it is."""
+
+    @abstractmethod
+    def to_read(self, scenarios: Sequence[ScenarioT]) -> list[str]:
+        """Lines of it that a person should read before running it."""
 
 
-@dataclass(frozen=True)
-class Planning(Generic[ScenarioT]):
-    """What a kind says of a run before it starts. Functions take its scenario."""
+class Planning(ABC, Generic[ScenarioT]):
+    """What a kind says of a run before it starts.
 
-    work_unit: str
+    A kind states its measures, the files that compute its runs, and how long they take. The rest
+    is as here: runs of one process, whose work is time, computed by our own code.
+    """
+
+    work_unit = CORE_SECONDS
     """Unit of ``planned_work``; ``CORE_SECONDS`` where work is time and is priced as such."""
-    resolved: Callable[[ScenarioT], ScenarioT]
-    """The scenario with the hashes of the files that it names."""
-    problems: Callable[[ScenarioT], list[Problem]]
-    """What keeps a well-typed scenario from being run."""
-    engine_problem: Callable[[ScenarioT], Problem | None]
-    """Why this machine cannot compute it."""
-    measures: tuple[MeasureGroup[ScenarioT], ...]
-    """All that its runs can be measured by: the one list of names, units and meanings."""
-    sources: Callable[[ScenarioT], list[Path]]
-    """Files that its runs are computed again for when they change."""
-    template_hash: Callable[[ScenarioT], str]
-    """Hash of all that turns a scenario into a deck, and of our solver where it takes part."""
-    computed_hash: Callable[[ScenarioT], str]
-    """Hash of what is computed, whatever it is called."""
-    threads: Callable[[ScenarioT], int]
-    """Cores that a run keeps busy, as MPI ranks or as threads."""
-    ranks: Callable[[ScenarioT], int]
-    """MPI ranks of a run."""
-    memory_mb: Callable[[ScenarioT], int]
-    """Memory to ask for."""
-    allowed_s: Callable[[ScenarioT], float]
-    """Wall time to ask for, less what any job takes."""
-    planned_work: Callable[[ScenarioT], float]
-    """What a run costs, before it starts."""
-    predicted_s: Callable[[ScenarioT], float]
-    """Wall time of a run at speeds that are the same on every machine."""
-    planned_s: Callable[[ScenarioT], float]
-    """Simulated time of a whole run."""
-    speed_class: Callable[[ScenarioT], SpeedClass]
-    """Scenarios of one class are computed at one speed."""
-    plan_cells: Callable[[ScenarioT], Mapping[str, str]]
-    """What the plan says of a run, by heading."""
-    fill: Callable[[ScenarioT], ScenarioT | None] = no_fill
-    """The part that comes first, as a scene of its own: runs with equal ones share it."""
-    state_bytes: Callable[[ScenarioT], int] = no_state
-    """Disk that the state at the end of a scene takes."""
-    beside_s: Callable[[ScenarioT], float] = nothing_beside
-    """Wall time of a run that does not grow with its work."""
-    notes: Callable[[ScenarioT], Sequence[Note]] = no_notes
-    """What a user should know of a run before it starts, though it can be run."""
-    settings_lines: Callable[[Iterable[ScenarioT]], Sequence[str]] = no_lines
-    """What the settings of a study ask of a machine, as lines; of one scenario a setting."""
-    guess: str = "an estimate"
+    slower = 10.0
+    """Than predicted a machine may be, and a run longer than expected."""
+    guess = "an estimate"
     """What a price by ``predicted_s`` rests on."""
-    speed: MachineSpeed[ScenarioT] | None = None
+    speed: StoredSpeed[ScenarioT] | None = None
     """None where ``predicted_s`` is all that is known."""
     program: UserProgram[ScenarioT] | None = None
     """None where all that a run executes is shipped."""
@@ -152,40 +82,149 @@ class Planning(Generic[ScenarioT]):
     """Files, from the root of the house, whose code takes the measures; what draws is left out."""
 
     @property
+    @abstractmethod
+    def measures(self) -> tuple[MeasureGroup[ScenarioT], ...]:
+        """All that its runs can be measured by: the one list of names, units and meanings."""
+
+    @abstractmethod
+    def sources(self, scenario: ScenarioT) -> list[Path]:
+        """Files that its runs are computed again for when they change."""
+
+    @abstractmethod
+    def predicted_s(self, scenario: ScenarioT) -> float:
+        """Wall time of a run at speeds that are the same on every machine."""
+
+    @cached_property
     def measuring_hash(self) -> str:
         """State of the code that takes the measures: runs measured by another one are so again."""
-        return _hash_of(self.measuring)
+        return code_identity([[ROOT / file for file in self.measuring]])
+
+    def resolved(self, scenario: ScenarioT) -> ScenarioT:
+        """The scenario with the hashes of the files that it names."""
+        return scenario
+
+    def problems(self, scenario: ScenarioT) -> list[Problem]:
+        """What keeps a well-typed scenario from being run."""
+        return []
+
+    def engine_problem(self, scenario: ScenarioT) -> Problem | None:
+        """Why this machine cannot compute it."""
+        return None
+
+    def template_hash(self, scenario: ScenarioT) -> str:
+        """Hash of all that turns a scenario into a deck, and of our solver where it takes part."""
+        return code_identity([self.sources(scenario)])
+
+    def computed_hash(self, scenario: ScenarioT) -> str:
+        """Hash of what is computed, whatever it is called."""
+        return solution_hash(scenario, self.template_hash(scenario))
+
+    def threads(self, scenario: ScenarioT) -> int:
+        """Cores that a run keeps busy, as MPI ranks or as threads."""
+        return 1
+
+    def ranks(self, scenario: ScenarioT) -> int:
+        """MPI ranks of a run."""
+        return 1
+
+    def memory_mb(self, scenario: ScenarioT) -> int:
+        """Memory to ask for."""
+        return BASE_MEMORY_MB
+
+    def allowed_s(self, scenario: ScenarioT) -> float:
+        """Wall time to ask for, less what any job takes."""
+        return self.slower * self.predicted_s(scenario)
+
+    def planned_work(self, scenario: ScenarioT) -> float:
+        """What a run costs, before it starts."""
+        return self.threads(scenario) * self.predicted_s(scenario)
+
+    def planned_s(self, scenario: ScenarioT) -> float:
+        """Simulated time of a whole run; 0 where nobody knows it before."""
+        return 0.0
+
+    def speed_class(self, scenario: ScenarioT) -> SpeedClass:
+        """Scenarios of one class are computed at one speed."""
+        return type(scenario).__name__.lower(), 0
+
+    def plan_cells(self, scenario: ScenarioT) -> Mapping[str, str]:
+        """What the plan says of a run, by heading."""
+        return {}
+
+    def fill(self, scenario: ScenarioT) -> ScenarioT | None:
+        """The part that comes first, as a scene of its own: runs with equal ones share it."""
+        return None
+
+    def state_bytes(self, scenario: ScenarioT) -> int:
+        """Disk that the state at the end of a scene takes."""
+        return 0
+
+    def beside_s(self, scenario: ScenarioT) -> float:
+        """Wall time of a run that does not grow with its work."""
+        return 0.0
+
+    def notes(self, scenario: ScenarioT) -> Sequence[Note]:
+        """What a user should know of a run before it starts, though it can be run."""
+        return ()
+
+    def settings_lines(self, scenarios: Iterable[ScenarioT]) -> Sequence[str]:
+        """What the settings of a study ask of a machine, as lines; of one scenario a setting."""
+        return ()
 
 
-@cache
-def _hash_of(files: tuple[str, ...]) -> str:
-    return code_identity([[ROOT / file for file in files]])
+class Execution(ABC, Generic[ScenarioT]):
+    """How a kind computes a run.
+
+    A kind states what its runs leave and cost, computes them and measures what they left.
+    """
+
+    @property
+    @abstractmethod
+    def products(self) -> tuple[str, ...]:
+        """What a run leaves beside outcome, cost and provenance."""
+
+    @abstractmethod
+    def compute(self, run: Run, folder: Path) -> Computed:
+        """Compute a run from its newest checkpoint, or from its beginning."""
+
+    @abstractmethod
+    def no_cost(self, scenario: ScenarioT) -> Cost:
+        """Cost of a run that has not begun."""
+
+    @abstractmethod
+    def measure(self, run: Run, folder: Path) -> None:
+        """Measure what a run left behind; the picture last."""
+
+    def render(self, run: Run, folder: Path) -> None:
+        """Write the deck of a run into its folder: every value of its scenario, with its source."""
+        solver = self.no_cost(run.scenario).version
+        lines = [
+            f"# Study {run.study}, run {run.run}: what the solver {solver} is given",
+            *_value_lines(run.scenario.model_dump(mode="json"), run.sources),
+        ]
+        write_text(folder / "deck.in", "\n".join(lines) + "\n")
+
+    def complete(self, scenario: ScenarioT, work: Path) -> None:
+        """Make the products in a work folder that a broken run never wrote, if others read them."""
+
+    def load_computing(self, scenario: ScenarioT) -> None:
+        """Import what computing needs, for a worker that forks for each run.
+
+        What starts threads, MPI or an engine must stay for the run's own process.
+        """
+
+    def load_measuring(self, scenario: ScenarioT) -> None:
+        """Import what measuring needs, as ``load_computing`` does."""
 
 
-@dataclass(frozen=True)
-class Execution(Generic[ScenarioT]):
-    """How a kind computes a run. Functions of a run take its folder too."""
-
-    products: tuple[str, ...]
-    """What a run leaves beside outcome, cost and provenance."""
-    render: Callable[[Run, Path], None]
-    """Write the deck of a run into its folder."""
-    compute: Callable[[Run, Path], Computed]
-    """Compute a run from its newest checkpoint, or from its beginning."""
-    complete: Callable[[ScenarioT, Path], None]
-    """Make the products in a work folder that a broken run never wrote."""
-    no_cost: Callable[[ScenarioT], Cost]
-    """Cost of a run that has not begun."""
-    measure: Callable[[Run, Path], None]
-    """Measure what a run left behind; the picture last."""
-    load_computing: Callable[[ScenarioT], None] = lambda scenario: None
-    load_measuring: Callable[[ScenarioT], None] = lambda scenario: None
-    """Import what computing or measuring needs, for a worker that forks for each run: what starts
-    threads, MPI or an engine must stay for the run's own process."""
-
-
-def _nothing() -> dict[str, Any]:
-    return {}
+def _value_lines(tree: Any, sources: Mapping[str, str], key: str = "") -> list[str]:
+    """One line a value; a list with one source stays together."""
+    if key in sources or not isinstance(tree, dict | list):
+        return [f"{key} = {tree}".ljust(60) + f" # {sources.get(key, 'not stated')}"]
+    each = tree.items() if isinstance(tree, dict) else enumerate(tree)
+    return [
+        line for n, v in each for line in _value_lines(v, sources, f"{key}.{n}" if key else str(n))
+    ]
 
 
 @dataclass(frozen=True)
@@ -208,8 +247,12 @@ class Kind(Generic[ScenarioT]):
     """Whether runs of other seeds differ, so that replicates tell something."""
     labels_have_units: bool = True
     """Whether the unit in a swept key's name stands in names of runs: those of sand have none."""
-    defaults: Callable[[], dict[str, Any]] = _nothing
-    """Scenario of a study that states nothing."""
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """Scenario of a study that states nothing."""
+        field = self.study.model_fields["scenario"]
+        return {} if field.is_required() else field.default.model_dump(mode="json")
 
     @cached_property
     def planning(self) -> Planning[ScenarioT]:

@@ -4,52 +4,82 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from pathlib import Path
+from typing import Generic, TypeVar
 
-from sandmould.kinds.kind import MachineSpeed, ScenarioT
 from sandmould.runs.files import write_text
+from sandmould.scenario.quantity import Section
 
 STORED = "calibration.json"
+SceneT = TypeVar("SceneT", bound=Section)
 
 
-def stored_speed(
-    computed_by: Callable[[ScenarioT], str], trial: Callable[[ScenarioT], float | None]
-) -> MachineSpeed[ScenarioT]:
-    """Measure a speed once on a machine for all scenarios that are computed alike.
+class StoredSpeed(ABC, Generic[SceneT]):
+    """How fast a core of this machine is: measured once for all scenarios that run at one speed.
 
-    Parameters
-    ----------
-    computed_by : callable
-        Takes a scenario; a text that is the same for all that run at one speed: engine, version,
-        dimension.
-    trial : callable
-        Takes a scenario; work a second of one core, or None where nothing could be measured: the
-        study's own runs will say why.
+    A kind says what they have in common, and how the speed is measured.
     """
 
-    def name_of(scenario: ScenarioT) -> str:
-        return f"{platform.node()} {computed_by(scenario)}"
+    basis = "at the speed measured on this machine"
+    """What a price rests on that was reckoned with it."""
+    file = STORED
+    """In the folder of all results."""
 
-    def stored(scenario: ScenarioT, results: Path) -> float | None:
-        rates = _rates(results)
-        return rates.get(name_of(scenario)) if rates else None
+    @abstractmethod
+    def computed_by(self, scenario: SceneT) -> str:
+        """Name what is the same for all that run at one speed: engine, version, dimension."""
 
-    def measured(scenario: ScenarioT, results: Path) -> float | None:
-        rate, name = stored(scenario, results), name_of(scenario)
-        if rate is None and (rate := trial(scenario)) is not None:
+    @abstractmethod
+    def trial(self, scenario: SceneT, results: Path) -> float | None:
+        """Measure what is stored: work a second of one core; None where that failed."""
+
+    def rate(self, scenario: SceneT, stored: float) -> float:
+        """Work a second of one core by what is stored."""
+        return stored
+
+    def stored(self, scenario: SceneT, results: Path) -> float | None:
+        """Work a second of one core as measured before; None where it was not. Starts nothing.
+
+        Parameters
+        ----------
+        scenario : scenario of the kind
+        results : Path
+            Folder of all results.
+        """
+        every = self._stored(results)
+        found = every.get(self._name_of(scenario)) if every else None
+        return None if found is None else self.rate(scenario, found)
+
+    def measured(self, scenario: SceneT, results: Path) -> float | None:
+        """The same, measured now and stored where it was not before; parameters as of ``stored``.
+
+        Returns
+        -------
+        float or None
+            None where nothing could be measured: the study's own runs will say why.
+
+        Raises
+        ------
+        BadInputError
+            Where a program of the user's stops with an error.
+        """
+        rate = self.stored(scenario, results)
+        if rate is None and (found := self.trial(scenario, results)) is not None:
             results.mkdir(parents=True, exist_ok=True)
             # another start may have measured meanwhile
-            write_text(results / STORED, json.dumps({**_rates(results), name: rate}, indent=1))
+            every = {**self._stored(results), self._name_of(scenario): found}
+            write_text(results / self.file, json.dumps(every, indent=1))
+            rate = self.rate(scenario, found)
         return rate
 
-    return MachineSpeed(stored, measured)
+    def _name_of(self, scenario: SceneT) -> str:
+        return f"{platform.node()} {self.computed_by(scenario)}"
 
-
-def _rates(results: Path) -> dict[str, float]:
-    """All that was measured; nothing where the file is damaged."""
-    try:
-        tree = json.loads((results / STORED).read_text(encoding="utf-8"))
-        return {machine: float(rate) for machine, rate in tree.items()}
-    except (OSError, ValueError, TypeError, AttributeError):
-        return {}
+    def _stored(self, results: Path) -> dict[str, float]:
+        """All that was measured; nothing where the file is damaged."""
+        try:
+            tree = json.loads((results / self.file).read_text(encoding="utf-8"))
+            return {machine: float(number) for machine, number in tree.items()}
+        except (OSError, ValueError, TypeError, AttributeError):
+            return {}

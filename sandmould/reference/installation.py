@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import shutil
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from sandmould import SHIPPED
 from sandmould.engines.registry import engine_module
 from sandmould.execution.cluster.settings import CLUSTER_FILE
 from sandmould.kernel_cache import cache_folder
 from sandmould.runs.formatting import size_text
 from sandmould.runs.provenance import commit, processor
-from sandmould.scenario.engine import ENGINE_NAMES
+from sandmould.scenario.engine import ENGINE_NAMES, EngineName
 
+LOCK = SHIPPED / "requirements.lock"
+"""The versions that the tests run with; a package may have one for older Pythons too."""
+_PINNED = re.compile(r"^([\w.-]+)==(\S+)", re.M)
 SMALLEST_DISK_BYTES = 2_000_000_000
 """A study of some dozen runs takes a tenth of it (docs/running.md)."""
 
@@ -42,6 +47,7 @@ def findings(folder: Path) -> list[InstallationPart]:
         InstallationPart("sandmould", f"{metadata.version('sandmould')} ({commit()})"),
         InstallationPart("Python", f"{platform.python_version()}, {platform.platform(terse=True)}"),
         InstallationPart("processor", f"{processor()}, {os.cpu_count()} cores"),
+        _packages(),
         *(_engine(name) for name in ENGINE_NAMES),
         _kernels(),
         _slurm(),
@@ -49,7 +55,28 @@ def findings(folder: Path) -> list[InstallationPart]:
     ]
 
 
-def _engine(name: str) -> InstallationPart:
+def _packages() -> InstallationPart:
+    """Packages whose versions are others than those that the tests run with."""
+    tested: dict[str, list[str]] = {}
+    for name, version in _PINNED.findall(LOCK.read_text(encoding="utf-8")):
+        tested.setdefault(name, []).append(version)
+    differ = [
+        f"{name} {installed} (tested: {' or '.join(versions)})"
+        for name, versions in tested.items()
+        if (installed := _installed(name)) not in (None, *versions)
+    ]
+    text = f"not the versions that were tested: {', '.join(differ)}" if differ else "as tested"
+    return InstallationPart("packages", text)
+
+
+def _installed(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _engine(name: EngineName) -> InstallationPart:
     engine = engine_module(name)
     problem = engine.installation_problem()
     version = engine.installed_version()

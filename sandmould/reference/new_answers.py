@@ -6,10 +6,13 @@ import re
 from collections.abc import Mapping
 from typing import Any, Literal
 
+from sandmould.engines.registry import engine_problem
 from sandmould.kinds.registry import DEFAULT_KIND
+from sandmould.scenario.engine import ENGINE_NAMES, Engine, EngineName
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.reading import Origin, merge, read_yaml, validated
 from sandmould.scenario.sand import Sand
+from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.unbalance import Unbalance
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.study.plan.load_study import MATERIALS, materials
@@ -131,9 +134,7 @@ class NewStudy(Section):
         source="docs/hard_sand.md",
         gt=0,
     )
-    engine: Literal["reference", "lammps"] = quantity(
-        "reference", "Engine: reference is the faster one", source=_DEMO
-    )
+    engine: EngineName = quantity("reference", "Engine: reference is the faster one", source=_DEMO)
     replicates: int = quantity(
         4,
         "How often each setting is computed, each time with other grains. More repeats show "
@@ -316,6 +317,9 @@ def fault(name: str, a: NewStudy) -> str:
     if name == "material":
         names = sands()
         return "" if a.material in names else f"one of {', '.join(names)}"
+    if name == "engine":
+        names = engines()
+        return "" if a.engine in names else f"one of {', '.join(names)}"
     if name == "size_scale" and a.cavity != "none":
         largest_mm = largest_grain_mm(a.material)
         if largest_mm * a.size_scale >= a.opening_mm:
@@ -328,6 +332,11 @@ def sands() -> list[str]:
     """Names of the sands that a study can use."""
     assert DEFAULT_KIND.material is not None
     return materials(DEFAULT_KIND.material)
+
+
+def engines() -> list[str]:
+    """Names of the engines that compute discs on this machine as a study states them by default."""
+    return [n for n in ENGINE_NAMES if engine_problem(Scenario(engine=Engine(name=n))) is None]
 
 
 def largest_grain_mm(material: str) -> float:

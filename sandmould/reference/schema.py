@@ -8,18 +8,17 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Iterator
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
 from sandmould import ROOT
 from sandmould.definition.study import Study
 from sandmould.kinds.registry import DEFAULT_KIND, KINDS
 from sandmould.module_main import run_main
+from sandmould.reference.keys import Key, keys_of
 from sandmould.scenario.pattern import PatternConfig
-from sandmould.scenario.quantity import Section, models_in
+from sandmould.scenario.quantity import Section
 
 SCHEMA = ROOT / "config" / "schema.json"
 DEFAULT = ROOT / "config" / "default.yaml"
@@ -94,41 +93,39 @@ def default_text() -> str:
 
 
 def _lines(section: Section, indent: str = "") -> Iterator[str]:
-    for name, field in type(section).model_fields.items():
-        value = getattr(section, name)
-        yield from _comment(_meaning(field), indent)
+    for key in keys_of(type(section)):
+        value = getattr(section, key.name)
+        yield from _comment(_meaning(key), indent)
         if isinstance(value, Section):
-            yield f"{indent}{name}:"
+            yield f"{indent}{key.name}:"
             yield from _lines(value, indent + "  ")
             continue
-        for entry in models_in(field.annotation):
+        for entry in key.below:
             yield from _entry_keys(entry, indent)
-        dump = section.model_dump(mode="json", include={name})[name]
+        dump = section.model_dump(mode="json", include={key.name})[key.name]
         if isinstance(value, tuple) and value:
-            yield f"{indent}{name}:"
+            yield f"{indent}{key.name}:"
             yield from (f"{indent}- {json.dumps(item)}" for item in dump)
         else:
-            yield f"{indent}{name}: {json.dumps(dump)}"
+            yield f"{indent}{key.name}: {json.dumps(dump)}"
 
 
 def _entry_keys(entry: type[BaseModel], indent: str, called: str = "") -> Iterator[str]:
     """Keys of a section that the defaults do not show, as comments."""
     yield from _comment(f"Keys of {called or f'a {entry.__name__}'}:", indent)
-    for name, field in entry.model_fields.items():
-        only = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
-        default_value = only[0] if field.is_required() and len(only) == 1 else field.default
-        if isinstance(default_value, BaseModel):
-            default_value = default_value.model_dump(mode="json")
-        default = "" if default_value is PydanticUndefined else f" {json.dumps(default_value)}"
-        yield from _comment(f"{name}:{default}  {_meaning(field)}".rstrip(), indent, "  ")
+    for key in keys_of(entry):
+        known = [
+            json.dumps(key.schema[name]) for name in ("default", "const") if name in key.schema
+        ]
+        text = f"{' '.join([f'{key.name}:', *known[:1]])}  {_meaning(key)}"
+        yield from _comment(text.rstrip(), indent, "  ")
 
 
-def _meaning(field: FieldInfo) -> str:
-    extra = field.json_schema_extra
-    if not isinstance(extra, dict):
-        return field.description or ""
-    unit = "" if extra["unit"] == "1" else f" [{extra['unit']}]"
-    return f"{field.description}{unit} Source: {extra['source']}."
+def _meaning(key: Key) -> str:
+    meaning, unit, source = map(key.about, ("description", "unit", "source"))
+    return (
+        f"{meaning}{f' [{unit}]' if unit != '1' else ''} Source: {source}." if source else meaning
+    )
 
 
 def _comment(text: str, indent: str, inner: str = "") -> list[str]:

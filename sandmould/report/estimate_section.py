@@ -15,7 +15,7 @@ from sandmould.definition.study import Study
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.kinds.kind import AnyScenario
 from sandmould.report.heaps import Heap
-from sandmould.report.kinds.registry import heaps_of
+from sandmould.report.kinds.registry import report_of
 from sandmould.report.repose_figures import draw_map, draw_posterior, plotted
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN, total_s
@@ -95,7 +95,7 @@ def estimate_pages(
         headline=_headline(settings, sands, verdict.measure, keys),
         sentences=tuple(sentences) or (f"No run has a usable value: {what}.",),
         sound=bool(settings) and all(sand.posterior for sand in sands),
-        heaps=heaps_of(study_folder, summary, verdict, scenario),
+        heaps=report_of(scenario).heaps(study_folder, summary, verdict, scenario),
         map=_map_table(settings, (keys[0], keys[1])) if is_map and settings else None,
         map_picture=_map_picture(summary, keys, verdict.measure, calibrated) if is_map else "",
         sands=sands,

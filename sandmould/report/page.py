@@ -6,7 +6,7 @@ import contextlib
 import os
 import shutil
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -38,14 +38,8 @@ from sandmould.report.bed_mode import BedMode
 from sandmould.report.curves import objective_charts
 from sandmould.report.drive import with_amplitudes
 from sandmould.report.estimate_section import EstimatePages, estimate_figures, estimate_pages
-from sandmould.report.kinds.kind import KindPages
-from sandmould.report.kinds.registry import (
-    drives_of,
-    kind_pages,
-    mode_of,
-    notes_of,
-    robustness_of,
-)
+from sandmould.report.kinds.kind import Findings, KindPages
+from sandmould.report.kinds.registry import report_of
 from sandmould.report.method import (
     Row,
     own_measures_method,
@@ -78,8 +72,9 @@ from sandmould.report.tables import (
 from sandmould.runs.columns import RUN
 from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, setting_text
+from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.settings import setting_rows
-from sandmould.statistics.verdict import Verdict, compare_settings
+from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
@@ -122,29 +117,14 @@ def write_report(study_folder: Path, out: Path) -> None:
     write_text(study_folder / VERDICT_FILE, f"{first}\n")
 
 
-@dataclass(frozen=True)
-class _Page:
-    """What the report is made from."""
-
-    study_folder: Path
-    href: str
-    study: Study
-    collected: Collected
-    verdict: Verdict
-    scenario: AnyScenario
-    """Of the run that is shown."""
-    by_setting: dict[str, tuple[AnyScenario, pd.DataFrame]]
-    """Scenario and rows of the summary of the settings that are listed, by label."""
-
-
-def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> _Page:
+def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> Findings[Any]:
     objective, keys, summary = study.objective, collected.keys, collected.of_sweep.summary
     seeks_best = study.seeks_best
     any_scenario = _scenario_of(study_folder, summary[RUN])
     if any_scenario is None:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
     is_controlled = bool(read_rounds(study_folder, study).certified_hz)
-    notes = notes_of(any_scenario, collected, seeks_best, is_controlled)
+    notes = report_of(any_scenario).notes(any_scenario, collected, seeks_best, is_controlled)
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
     verdict = compare_settings(
@@ -165,14 +145,23 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
             if own is not None:
                 by_setting[label] = own, summary.iloc[rows]
     if seeks_best:
-        verdict = with_amplitudes(verdict, drives_of(by_setting))
+        verdict = with_amplitudes(verdict, _drives(by_setting))
     if study.adds_replicates:
         effort = effort_sentence(read_rounds(study_folder, study), study, summary)
         verdict = replace(verdict, sentences=(*verdict.sentences, effort))
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario
-    return _Page(study_folder, href, study, collected, verdict, scenario, by_setting)
+    return Findings(study_folder, href, study, collected, verdict, scenario, by_setting)
+
+
+def _drives(by_setting: Mapping[str, tuple[AnyScenario, pd.DataFrame]]) -> dict[str, BoxDrive]:
+    """Drives of the settings that have a vibrating table, by label."""
+    every = {
+        label: report_of(scenario).drive(scenario, runs)
+        for label, (scenario, runs) in by_setting.items()
+    }
+    return {label: drive for label, drive in every.items() if drive is not None}
 
 
 def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
@@ -184,7 +173,7 @@ def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
 
 
 def _render(
-    page: _Page, environment: Environment, film_budget_bytes: int
+    page: Findings[Any], environment: Environment, film_budget_bytes: int
 ) -> tuple[str, dict[str, Chart | bytes], Mapping[str, str], str]:
     """The page, its figures for files, scripts beside it, and the sentence that answers."""
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
@@ -192,24 +181,16 @@ def _render(
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
     estimate = estimate_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
-    robustness = robustness_of(page.study_folder, page.study, page.collected, page.scenario)
-    mode = robustness.mode if robustness else mode_of(page.scenario, of_sweep.summary)
+    kind = report_of(page.scenario)
+    robustness = kind.robustness(page)
+    mode = robustness.mode if robustness else kind.mode(page)
     optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, robustness, mode)
     drawn, drawn_verdict = drawn_part(of_sweep, verdict)
     charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
         charts = tuple(with_surface(c, optimum.optimum, page.study) for c in charts)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary[RUN]]
-    of_kind = kind_pages(
-        page.study_folder,
-        page.study,
-        page.scenario,
-        page.collected,
-        verdict,
-        film_budget_bytes,
-        page.href,
-        {label: scenario for label, (scenario, _) in page.by_setting.items()},
-    )
+    of_kind = kind.pages(page, film_budget_bytes)
     method: tuple[Row, ...] = (
         *of_kind.method,
         *own_measures_method(page.study.own_measures),
@@ -236,7 +217,7 @@ def _render(
         key_numbers=key_numbers(summary),
         objective_charts=[_both_sizes(c) for c in charts],
         drawn_note=drawn_note(of_sweep, verdict),
-        settings=settings_table(verdict, drives_of(page.by_setting)),
+        settings=settings_table(verdict, _drives(page.by_setting)),
         runs=runs_table(summary, keys, verdict, f"{page.href}runs"),
         method=method,
         provenance=provenance_rows(provenance),
@@ -255,7 +236,7 @@ def _render(
 
 
 def _answer(
-    page: _Page,
+    page: Findings[Any],
     optimum: OptimumPages | None,
     agreement: AgreementPages | None,
     estimate: EstimatePages | None,
@@ -265,7 +246,7 @@ def _answer(
     """The first screen."""
     study, collected, verdict = page.study, page.collected, page.verdict
     summary = collected.of_sweep.summary
-    drives = drives_of(page.by_setting)
+    drives = _drives(page.by_setting)
     figures: tuple[KeyNumber, ...] = ()
     table = None
     if optimum is not None:
@@ -305,7 +286,7 @@ def _write_beside(folder: Path, scripts: Mapping[str, str]) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def _beside_mode(page: _Page, mode: BedMode | None) -> list[str]:
+def _beside_mode(page: Findings[Any], mode: BedMode | None) -> list[str]:
     """The best of swept frequencies over the first mode of the bed."""
     key, best = frequency_among(page.collected.keys), page.verdict.best
     if mode is None or best is None or not key or not page.study.seeks_best:

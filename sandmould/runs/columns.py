@@ -1,7 +1,6 @@
-"""Columns of the tables that runs and studies leave, and what their cells mean.
+"""Names of the columns of the tables that runs and studies leave; swept keys are columns too.
 
-``runs.tsv`` has a row a planned run, ``summary.tsv`` the same with outcome, measures and cost,
-``curves.tsv`` and ``measures.tsv`` one a snapshot. Swept keys are columns too, by their key path.
+``reference/files.yaml`` says what each means, and the lists of measures where it is one.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ RUN: Final = "run"
 REPLICATE: Final = "replicate"
 SEED: Final = "seed"
 PART: Final = "part"
-"""Which part of a study a run belongs to; only studies of several parts have it."""
 
 SWEEP: Final = "sweep"
 CROSS_CHECK: Final = "cross_check"
@@ -31,9 +29,7 @@ control's case."""
 
 OUTCOME_CODE: Final = "outcome_code"
 OUTCOME: Final = "outcome"
-"""Label of the code."""
 DETAIL: Final = "detail"
-"""What the engine, a guard or the collection said of the run."""
 SIMULATED_S: Final = "simulated_s"
 PLANNED_S: Final = "planned_s"
 
@@ -43,38 +39,27 @@ RANKS: Final = "ranks"
 WALL_S: Final = "wall_s"
 CPU_S: Final = "cpu_s"
 FILL: Final = "fill"
-"""Fill that a run shares; only studies that have such runs."""
 FILL_WALL_S: Final = "fill_wall_s"
 FILL_CPU_S: Final = "fill_cpu_s"
-"""What the fill took, over the runs that share it: their sum counts each fill once."""
 GRAIN_STEPS_PER_S: Final = "grain_steps_per_s"
 PEAK_MEMORY_BYTES: Final = "peak_memory_bytes"
 TIME_STEP_S: Final = "time_step_s"
 TIME_STEP_FRACTION: Final = "time_step_fraction"
-"""Of the critical one."""
 BED_LIMIT_S: Final = "bed_limit_s"
 LEAST_LIMIT_S: Final = "least_limit_s"
 LIMIT_MOMENTS: Final = "limit_moments"
-"""Exact critical step of the filled bed, the least one of the shaken bed, and at how many moments
-that was found; only runs that take their step from the bed have them."""
 LARGEST_OVERLAP_FRACTION: Final = "largest_overlap_fraction"
-"""Of a radius; of the whole run in ``summary.tsv``, of one moment in the other tables."""
 OVERLAP_P99_FRACTION: Final = "overlap_p99_fraction"
-"""Of a radius: what 99 of 100 contacts do not exceed, at one moment."""
 
 TIME_S: Final = "time_s"
 VIBRATION_TIME_S: Final = "vibration_time_s"
-"""Absent before the vibration begins, and where nothing vibrates; older tables have -1 there."""
 STAGE: Final = "stage"
 GRAINS: Final = "grains"
 SOLID_FRACTION: Final = "solid_fraction"
 BED_HEIGHT_M: Final = "bed_height_m"
 CLASSIFICATION: Final = "classification"
-"""Of a run of flow: excellent, good or failed."""
 LOOP: Final = "pattern_loop"
-"""State of the loop between sand and pattern at the end of a run: holds, lags, one way, ..."""
 LOOP_ERROR: Final = "pattern_loop_error_fraction"
-"""How far the shape may be off by that loop, over its displacement."""
 HOPS: Final = "hops"
 SOLIDIFICATION_TIME_S: Final = "solidification_time_s"
 
@@ -85,9 +70,9 @@ OF_RUN: Final = frozenset({
     FILL_WALL_S, FILL_CPU_S, GRAIN_STEPS_PER_S, PEAK_MEMORY_BYTES, TIME_STEP_S, TIME_STEP_FRACTION,
     BED_LIMIT_S, LEAST_LIMIT_S, LIMIT_MOMENTS, LARGEST_OVERLAP_FRACTION, *CLOCK, GRAINS,
     "steps", "grain_steps", "engine_wall_s", "elements", "element_steps", "particles",
-    "particle_solves", "poisson_iterations", "solver_fraction", "measured_time_s",
-    "measured_vibration_time_s", "measured_stage", "measured_grains",
-    "measured_largest_overlap_fraction",
+    "particle_solves", "element_steps_per_s", "particle_solves_per_s", "poisson_iterations",
+    "solver_fraction", "measured_time_s", "measured_vibration_time_s", "measured_stage",
+    "measured_grains", "measured_largest_overlap_fraction",
 })  # fmt: skip
 """Columns that runs of some kind have whatever is measured: no measure of a user's has their
 names."""

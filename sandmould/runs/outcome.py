@@ -28,7 +28,6 @@ class Outcome(IntEnum):
     ENGINE_FAILED = 320
     OUT_OF_WALL_TIME = 400
     DISK_REFUSED = 401
-    AWAITS_PATTERN = 402
 
     @property
     def label(self) -> str:
@@ -62,7 +61,6 @@ _MEANING = {
     Outcome.ENGINE_FAILED: "The engine stopped with an error of its own.",
     Outcome.OUT_OF_WALL_TIME: "The wall-time limit came first; the same command continues.",
     Outcome.DISK_REFUSED: "The disk took no more; with room on it the same command continues.",
-    Outcome.AWAITS_PATTERN: "The pattern has not answered yet; then the same command continues.",
 }
 
 

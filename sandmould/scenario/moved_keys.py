@@ -45,6 +45,14 @@ REMOVED: dict[str, tuple[Any, str]] = {
         0.0,
         "absent: a cavity that leans is of kind polygon in 2D and of kind mesh in 3D",
     ),
+    "scenario.pattern.loop.exchange": (
+        "memory",
+        "absent: sand and pattern always exchange loads and displacements in memory",
+    ),
+    "scenario.pattern.loop.predicts": (
+        False,
+        "absent: shorter windows (pattern.loop.window_s) follow a surface that moves",
+    ),
     "scenario.pattern.shape.t_shape": (None, "kind: file, with a T of a mesh file"),
     "scenario.discharge.settling": (
         {"shortest_s": 0.2, "longest_s": 20.0},

@@ -168,12 +168,6 @@ class Loop(Section):
     limit_share: float = quantity(
         0.5, "Share in the measured scheme of the limit 2 / (1 + gain).", source=ARGUED, gt=0, le=1
     )
-    exchange: Literal["memory", "files"] = quantity(
-        "memory",
-        "How sand and pattern exchange loads and displacements. memory: at once. files: by files "
-        "in the run's folder exchange; the run stops until another program has answered.",
-        source=ARGUED,
-    )
     repeats: int = quantity(
         12, "Times that a window is computed again at most; 0 on LIGGGHTS.", source=ARGUED,
         ge=0, le=100,
@@ -182,9 +176,6 @@ class Loop(Section):
         0.03, "Residual over displacement below which no window is repeated.", source=ARGUED,
         gt=0, lt=1,
     )  # fmt: skip
-    predicts: bool = quantity(
-        False, "Whether a window goes on as the last one went.", source=ARGUED
-    )
     mass_scale: float | None = quantity(
         None,
         "Factor of the pattern's masses in the schemes monolithic and in_step. Unless given, it "

@@ -31,7 +31,8 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 TUBE_PAPER = "Rojek 2004, section 4.2"
 STOP_PERIODS = 1.0
 """Periods in which the box stops: in a half one it would be accelerated 1.4 times as hard as by the
-vibration, in one 1.05 times; a longer stop goes on shaking the sand (docs/measured_at_rest.md)."""
+vibration, in one 1.05 times; a longer stop goes on shaking the sand
+(docs/developers/measured_at_rest.md)."""
 
 
 class Shaking(Section):

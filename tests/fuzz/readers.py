@@ -6,7 +6,6 @@ Anything else is a finding.
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,23 +84,6 @@ def _snapshot(path: Path) -> object:
     return Snapshot.load(path)
 
 
-def _exchange_pattern(path: Path) -> object:
-    from sandmould.pattern_fe.coupling.exchange import MESH, PATTERN, read_pattern
-
-    path.replace(path.parent / PATTERN)
-    shutil.copyfile(CORPUS / "pattern_mesh" / "square.vtu", path.parent / MESH)
-    return read_pattern(path.parent)
-
-
-def _exchange_loads(path: Path) -> object:
-    from sandmould.pattern_fe.coupling.exchange import read_loads
-    from sandmould.pattern_fe.scene import pattern_of
-    from sandmould.scenario.scenario import Scenario
-    from tests.bent_run import SCENE
-
-    return read_loads(path, pattern_of(Scenario.model_validate(SCENE)).surface.outer)
-
-
 def _grains(path: Path) -> object:
     from sandmould.engines.liggghts.grains_file import read_grains
 
@@ -145,8 +127,6 @@ READERS: dict[str, Reader] = {
     "casting_checkpoint": Reader(_casting_checkpoint),
     "checkpoint_mark": Reader(_checkpoint_mark),
     "snapshot": Reader(_snapshot, (ValueError,)),
-    "exchange_pattern": Reader(_exchange_pattern, (ValueError,)),
-    "exchange_loads": Reader(_exchange_loads, (ValueError,)),
     "grains": Reader(_grains, (ValueError,)),
     "stress": Reader(_stress, (ValueError,)),
     "log": Reader(_log),

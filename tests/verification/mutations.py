@@ -1,8 +1,8 @@
 """Break each law of the reference solver by 5 % and see which case notices.
 
-Run as ``python -m tests.verification.mutations`` from the root; it writes its section of
-docs/verification.md. The exact values are those of the laws as they should be. Numbers of a law
-are changed on their way into the solver; its structure in a copy of the sources.
+Run as ``python -m tests.verification.mutations`` from the root; it writes
+docs/developers/mutations.md. The exact values are those of the laws as they should be. Numbers of
+a law are changed on their way into the solver; its structure in a copy of the sources.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ from sandmould import ROOT
 from sandmould.dem import source_hash
 from sandmould.dem.motion import COMPONENTWISE, ISOTROPIC
 from sandmould.engines.reference import session as session_module
+from sandmould.runs.files import write_text
 from tests.verification.cases.catalogue import CASES
-from tests.verification.table import BEGIN, END, PAGE, between, write
 
+PAGE = ROOT / "docs" / "developers" / "mutations.md"
 FACTOR = 1.05
 SHOWN = 4
 """Cases named in the table; how many more notice is said."""
@@ -217,8 +218,8 @@ def run(index: int) -> list[str]:
     return found
 
 
-def section(found: list[list[str]]) -> str:
-    """The section of the page."""
+def page(found: list[list[str]]) -> str:
+    """The page."""
     rows = []
     for mutation, names in zip(MUTATIONS, found, strict=True):
         words = ", ".join(names[:SHOWN]) or "**nobody**"
@@ -229,12 +230,13 @@ def section(found: list[list[str]]) -> str:
     quiet = {case.family: 0 for case in CASES if "reference" in case.engines}
     idle = ", ".join(name for name in quiet if name not in noticed) or "none"
     return (
+        "# Would a wrong law be noticed?\n\n"
         f"`python -m tests.verification.mutations`, reference solver {source_hash()}. Each law is "
         "made wrong by 5 %, or in its structure where that is said. The exact values stay right. "
         "A good set of cases notices every wrong law. "
         f"{sum(map(bool, found))} of {len(found)} mutations are noticed.\n\n"
         f"{table(['broken', 'equation', 'noticed by'], rows)}\n"
-        f"These cases hold under any law, so they notice no wrong one: {idle}."
+        f"These cases hold under any law, so they notice no wrong one: {idle}.\n"
     )
 
 
@@ -249,11 +251,7 @@ def main() -> int:
         raise SystemExit(f"cases fail already on the sound solver: {', '.join(sound)}")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         found = list(pool.map(run, range(len(MUTATIONS))))
-    page = PAGE.read_text(encoding="utf-8")
-    old = between(page, BEGIN, END)
-    if old is None:
-        raise SystemExit(f"{PAGE} has no section of mutations: make verification first")
-    write(page.replace(old, section(found)))
+    write_text(PAGE, page(found))
     return 0 if all(found) else 1
 
 

@@ -1,4 +1,4 @@
-"""Write docs/verification.md: every case on every engine, measured against exact.
+"""Write the pages of the verification: every case on every engine, measured against exact.
 
 Run as ``python -m tests.verification.table`` from the root, or ``make verification``.
 """
@@ -23,17 +23,14 @@ from tests.verification.cases.bench import scene
 from tests.verification.cases.case import Case, RefusedCase, Result
 from tests.verification.cases.catalogue import CASES
 
-PAGE = ROOT / "docs" / "verification.md"
-BEGIN, END = "<!-- mutations begin -->", "<!-- mutations end -->"
-NO_MUTATIONS = "Not run yet: `python -m tests.verification.mutations`."
-ELSEWHERE = Path(__file__).with_name("elsewhere.md")
-
-
-def between(text: str, begin: str, end: str) -> str | None:
-    """What stands between two marks, or None without them."""
-    if begin not in text or end not in text:
-        return None
-    return text.split(begin, 1)[1].split(end, 1)[0].strip("\n")
+DOCS = ROOT / "docs"
+CASE_PAGES = {
+    "verification_cases.md": "Verification cases: motion, damping, impacts",
+    "verification_rolling.md": "Verification cases: rolling, bars, frames",
+}
+"""Pages of the cases and their titles."""
+SECOND = "Rolling to a stop"
+"""The first case of the second page, in the order of the catalogue."""
 
 
 def number(value: float) -> str:
@@ -154,31 +151,40 @@ def provenance() -> str:
     )
 
 
-def page(made: list[Family], mutations: str) -> str:
-    """The whole page."""
-    return render(Path(__file__).with_name("page.md.j2"), {
+def pages(made: list[Family]) -> dict[str, str]:
+    """Text of each page by its name in docs."""
+    titles = [family.title for family in made]
+    split = titles.index(SECOND)
+    of_page = dict(zip(CASE_PAGES, (made[:split], made[split:]), strict=True))
+    values = {
         "provenance": provenance(),
         "engines": ENGINE_NAMES,
-        "families": made,
-        "elsewhere": ELSEWHERE.read_text(encoding="utf-8"),
-        "begin": BEGIN, "end": END,
-        "mutations": mutations,
-    })  # fmt: skip
-
-
-def write(text: str) -> None:
-    """Write the page, last of all."""
-    write_text(PAGE, text)
+        "page_of": {f.title: page for page, families in of_page.items() for f in families},
+    }
+    here = Path(__file__)
+    return {
+        "verification.md": render(here.with_name("page.md.j2"), {**values, "families": made}),
+        "verification_figures.md": render(
+            here.with_name("figures.md.j2"), {**values, "families": made}
+        ),
+        **{
+            page: render(
+                here.with_name("cases.md.j2"), {"title": CASE_PAGES[page], "families": families}
+            ).rstrip()
+            + "\n"
+            for page, families in of_page.items()
+        },
+    }
 
 
 def main() -> int:
-    old = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
     made = families(CASES)
-    write(page(made, between(old, BEGIN, END) or NO_MUTATIONS))
+    for page, text in pages(made).items():
+        write_text(DOCS / page, text)
     failed = [r for f in made for r in f.results if not r.holds]
     for r in failed:
         print(textwrap.shorten(f"FAIL {r}", 300))
-    print(f"{sum(len(f.results) for f in made)} numbers, {len(failed)} fail: {PAGE}")
+    print(f"{sum(len(f.results) for f in made)} numbers, {len(failed)} fail: {DOCS}")
     return 1 if failed else 0
 
 

@@ -14,7 +14,6 @@ from sandmould.arrays import Floats
 from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.cut_volume import LEAST_SHARE, held_of
 from sandmould.casting.arpm.elements import placed
-from sandmould.casting.arpm.exact import stefan_front
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.front import middle_frozen_s
 from sandmould.casting.arpm.material import ThermalMaterial
@@ -26,6 +25,7 @@ from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
 from sandmould.scenario.casting_shapes import Body, Pixels
 from tests.radial_casting import lumped_s, radial_frozen_s
+from tests.verification.castings.exact import stefan_front
 
 STEEL = ThermalMaterial("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
 SAND = ThermalMaterial("sand", 1600.0, 1130.0, 1.255)

@@ -7,15 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from sandmould.casting.arpm.contact_case import compare_contact, contact_elements, run_contact
 from sandmould.casting.arpm.elements import Elements, placed
-from sandmould.casting.arpm.exact import contact_temperature_k, stefan_front, stefan_temperature_k
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.plates_case import read_aluminium
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
+from tests.verification.castings.contact import compare_contact, contact_elements, run_contact
+from tests.verification.castings.exact import (
+    contact_temperature_k,
+    stefan_front,
+    stefan_temperature_k,
+)
+from tests.verification.castings.plates import read_aluminium
 
 ALUMINIUM = read_aluminium()
 SAND = ThermalMaterial("sand", 1600.0, 1130.0, 1.255)

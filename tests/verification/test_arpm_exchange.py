@@ -16,6 +16,7 @@ from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.power_diagram import power_exchange
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.super_steps import SuperSteps
+from tests.verification.castings.growth import grows_beyond_s
 
 CONDUCTIVITY = np.array([1.255, 29.3])
 STEEL = ThermalMaterial("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
@@ -128,7 +129,7 @@ def test_steps_just_below_the_limit_are_stable_and_just_above_not(exchange: str)
         else kernel_exchange(elements, alike.conductivity_w_m_k, 0.0, refuse_ratio=False)
     )
     substance = Substance(elements.material, alike.table)
-    limit_s = rates.instability_s(substance.capacity_j_m3_k)
+    limit_s = grows_beyond_s(rates, substance.capacity_j_m3_k)
     assert rates.limit_s(substance.capacity_j_m3_k).min() <= limit_s
     largest = []
     for share in (0.99, 1.01):

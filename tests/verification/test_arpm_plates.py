@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.plates_case import (
+from sandmould.casting.arpm.solidification import CoolingProgress
+from tests.verification.castings.plates import (
     PlatesRun,
     curve_error_percent,
     plates_layout,
     read_plates,
     run_plates,
 )
-from sandmould.casting.arpm.solidification import CoolingProgress
 
 PLATES = read_plates()
 

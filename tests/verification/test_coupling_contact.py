@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, get_args
 
@@ -11,19 +12,19 @@ import pytest
 from numpy.typing import NDArray
 
 from sandmould.engines.driver import Driver
+from sandmould.kinds.sand.bending import verdict_of
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
-from sandmould.pattern_fe.coupling.from_files import solve_all
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.loop_verdict import classify_loop
 from sandmould.pattern_fe.coupling.opening import open_coupled
-from sandmould.pattern_fe.coupling.shapes_file import SHAPES, read_shapes
+from sandmould.pattern_fe.coupling.shapes_file import SHAPES
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Scheme
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
-from tests.patterns import _one_thread  # noqa: F401
+from tests.patterns import _one_thread, read_shapes  # noqa: F401
 from tests.workflow.runs import drive
 
 Array = NDArray[np.float64]
@@ -144,18 +145,14 @@ def test_a_plank_that_bends_far_lies_on_the_floor(tmp_path: Path) -> None:
     assert deepest_m(told, moved_m) < 1e-6 * 0.04
 
 
-def test_files_carry_what_the_pattern_must_not_enter(tmp_path: Path) -> None:
-    loop = {"scheme": "aitken", "exchange": "files", "repeats": 0}
-    told = scene(pattern={"loop": loop}, fill={"settling": {"shortest_s": 0.03}})
-    for _ in range(40):
-        outcome = drive(told, tmp_path, lambda *given: Driver(*given, open_coupled))
-        if outcome.outcome is not Outcome.AWAITS_PATTERN:
-            break
-        solve_all(tmp_path / "exchange")
-    moved_m, log = shapes_of(told, tmp_path)
-    assert outcome.outcome is Outcome.FINISHED
-    assert (log["contact_n"] > 0.0).any()
-    assert deepest_m(told, moved_m) < 1e-9
+def test_foam_too_soft_for_its_load_ends_the_run_in_a_sentence(tmp_path: Path) -> None:
+    foam = {"statics": "large", "young_modulus_pa": 30.0, "position_m": [0.01, 0.01]}
+    told = scene(pattern=foam, fill={"settling": {"shortest_s": 0.012}})
+    outcome = drive(told, tmp_path, lambda *given: Driver(*given, open_coupled))
+    assert outcome.outcome is Outcome.NO_EQUILIBRIUM
+    assert re.match(r"after .* s the pattern finds no equilibrium beyond", outcome.detail)
+    found = verdict_of(tmp_path)
+    assert found is None or found.state == "diverged"
 
 
 def test_in_space_a_soft_plank_lies_on_the_floor(tmp_path: Path) -> None:

@@ -210,20 +210,6 @@ def test_threads_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     np.testing.assert_array_equal(*found)
 
 
-def test_it_goes_back_to_what_it_kept(tmp_path: Path) -> None:
-    pattern = wedge_pattern(2e5)
-    session = in_step(pattern, wedge_scene(pattern), tmp_path)
-    put_disc(session)
-    session.advance(5e-4)
-    checkpoint, found = session.save_checkpoint(), []
-    for _ in range(2):
-        session.advance(5e-4)
-        found.append(session.displacement_m)
-        session.restore_checkpoint(checkpoint)
-    session.close()
-    np.testing.assert_array_equal(*found)
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_bar_that_runs_away_stops_the_run(engine: str, tmp_path: Path) -> None:
     pattern = wedge_pattern(100.0)

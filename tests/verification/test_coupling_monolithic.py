@@ -152,20 +152,6 @@ def test_a_stopped_monolithic_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     assert (tmp_path / CONVERGENCE_LOG).read_bytes() == table
 
 
-def test_the_monolithic_scheme_goes_back_to_its_checkpoint(tmp_path: Path) -> None:
-    pattern = wedge_pattern(2e5)
-    session = monolithic(pattern, wedge_scene(pattern), tmp_path)
-    put_disc(session)
-    session.advance(5e-4)
-    checkpoint, found = session.save_checkpoint(), []
-    for _ in range(2):
-        session.advance(5e-4)
-        found.append(session.displacement_m)
-        session.restore_checkpoint(checkpoint)
-    session.close()
-    np.testing.assert_array_equal(*found)
-
-
 def test_a_bar_that_runs_away_stops_the_run(tmp_path: Path) -> None:
     pattern = wedge_pattern(100.0)
     session = monolithic(pattern, wedge_scene(pattern), tmp_path)

@@ -10,10 +10,10 @@ import pytest
 from sandmould.casting.mps.flow import Flow, FlowGuard
 from sandmould.casting.mps.probes import Watch, pressure_at
 from sandmould.casting.mps.scheme import Scheme
-from sandmould.casting.mps.shoulder import Ladle, open_shoulder, pressure_pa_m, run_shoulder
-from sandmould.casting.mps.stability import ideal_pa, run_still
+from sandmould.casting.mps.shoulder import HOP_SPEED_M_S, PAPERS, Ladle, open_shoulder, ring_m
 from sandmould.casting.mps.tank import still_tank
 from sandmould.casting.mps.weight import make_kernel
+from tests.verification.castings.still_fluid import ideal_pa, run_still
 
 SIZE_M = 2e-3
 MR5 = Scheme(1e-3, 5, 0.5)
@@ -86,14 +86,26 @@ def test_the_papers_tank_at_its_recommended_setting():
 
 def test_a_full_casting_with_a_shoulder_rests():
     """Particles of 5 mm: the smallest casting that shows the shoulder."""
-    flow = open_shoulder(5e-3, MR5, full=True)
-    seen = run_shoulder(flow, 0.01, 0.015)
-    assert not seen.stopped
-    assert not seen.hops
-    assert 0.18 * pressure_pa_m(flow.metal) == pytest.approx(4410.0)
+    size_m = 5e-3
+    flow = open_shoulder(size_m, MR5, full=True)
+    across_m, under_m = 0.25 * (PAPERS.lower_m + PAPERS.upper_m), 0.5 * PAPERS.height_m - size_m
+    place = np.vstack(([[0.0, 0.0, 0.5 * size_m]], ring_m(across_m, under_m)))
+    pressures_pa, rises_m_s = [], []
+
+    def each(now: Flow) -> None:
+        if now.time_s > 0.01:
+            pressures_pa.append(pressure_at(now, place))
+            rises_m_s.append(now.particles.velocity_m_s[now.fluid, 2].max())
+
+    flow.advance(0.025, each)
+    assert max(rises_m_s) < HOP_SPEED_M_S
+    pa_m = flow.metal.density_kg_m3 * 9.8
+    assert 0.18 * pa_m == pytest.approx(4410.0)
+    bottom_pa, *under_pa = np.mean(pressures_pa, axis=0)
+    top_m = PAPERS.level_m(size_m, int(flow.fluid.sum()))
     # half a particle at the top carries no pressure: 61 Pa, and the bore is only five across
-    assert seen.bottom_pa == pytest.approx(seen.ideal_bottom_pa, rel=0.1)
-    assert seen.under_shoulder_pa == pytest.approx(seen.ideal_shoulder_pa, rel=0.15)
+    assert bottom_pa == pytest.approx(pa_m * (top_m - 0.5 * size_m), rel=0.1)
+    assert np.mean(under_pa) == pytest.approx(pa_m * (top_m - under_m), rel=0.15)
 
 
 def test_a_ladle_pours_at_its_rate():

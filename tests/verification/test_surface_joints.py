@@ -204,7 +204,7 @@ def test_moving_floor_drags_a_grain_to_its_speed_at_mu_g(d: int, moved_by: str) 
     belt = np.zeros(d)
     belt[0] = 0.02
     if moved_by == "belt":
-        surfaces.set_belt("floor", belt)
+        surfaces.arrays.vertex_velocity[:] = belt
     elif moved_by == "vertices":
         target = surfaces.arrays.vertices + belt * 1.0
         surfaces.set_motion("floor", target, 1.0, STEP_S)

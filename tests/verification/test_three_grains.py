@@ -1,7 +1,8 @@
 """A small grain in the groove between two large ones: where each engine takes the slip, it leaves.
 
 In the plane of the normal of a whole step it is held below the large grains at a ratio of five.
-LAMMPS with ``synchronized_verlet`` is the control of our solver's mend (docs/size_ratio.md).
+LAMMPS with ``synchronized_verlet`` is the control of our solver's mend
+(docs/developers/size_ratio.md).
 """
 
 from __future__ import annotations

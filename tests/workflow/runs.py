@@ -20,7 +20,7 @@ from sandmould.engines.registry import engine_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution.simulate import render_run
-from sandmould.kinds.sand.execution import EXECUTION
+from sandmould.kinds.sand.execution import SandExecution
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import RunOutcome
 from sandmould.runs.products import finish
@@ -108,8 +108,9 @@ def drive(
     driver = driver_of(program, folder, "test", scenario_hash(scenario))
     outcome = driver.run()
     if not outcome.outcome.restartable:
-        EXECUTION.complete(scenario, folder / "work")
-        finish(folder, EXECUTION.products, outcome, driver.cost, {})
+        execution = SandExecution()
+        execution.complete(scenario, folder / "work")
+        finish(folder, execution.products, outcome, driver.cost, {})
     return outcome
 
 

@@ -12,7 +12,7 @@ import pytest
 from sandmould.definition.run import Run
 from sandmould.engines.registry import engine_problem
 from sandmould.engines.step_counts import StepCounts
-from sandmould.kinds.sand.planning import PLANNING
+from sandmould.kinds.sand.kind import SAND
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.run_tables import read_costs
@@ -35,7 +35,7 @@ def beside_the_sweep(scene: Scenario, folder: Path) -> tuple[Path, Path, Path]:
         update={"rest": scene.rest.model_copy(update={"shaken_check_every_s": None})}
     )
     runs = [Run("test", f"run_{i}", {"of": i}, 1, s, {}) for i, s in enumerate((plain, scene))]
-    shared, (fill,) = share_fills(runs, PLANNING)
+    shared, (fill,) = share_fills(runs, SAND.planning)
     write_plan([*shared, fill], folder)
     one, other = (folder / run.place for run in shared)
     return one, other, folder / fill.place

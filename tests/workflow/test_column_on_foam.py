@@ -12,7 +12,7 @@ from sandmould.bad_input import BadInputError
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
-from sandmould.kinds.sand import planning
+from sandmould.kinds.sand.kind import SAND
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.opening import open_coupled
 from sandmould.runs.outcome import Outcome
@@ -110,7 +110,7 @@ def test_secants_of_the_sands_noise_are_refused(engine: str, says: str) -> None:
         tree |= {"background_damping": {"form": "none"}}
         tree["sand"]["disc_inertia"] = "sphere"
     with pytest.raises(BadInputError, match=says):
-        planning.resolved(Scenario.model_validate(tree))
+        SAND.planning.resolved(Scenario.model_validate(tree))
 
 
 def test_layers_are_refused_on_a_foam_too_soft_for_their_share() -> None:
@@ -118,4 +118,4 @@ def test_layers_are_refused_on_a_foam_too_soft_for_their_share() -> None:
     assert scene.pattern is not None
     pattern = scene.pattern.model_copy(update={"young_modulus_pa": 1e3})
     with pytest.raises(BadInputError, match=r"scheme = 'per_layer' .* for so soft a foam"):
-        planning.resolved(scene.model_copy(update={"pattern": pattern, "obstacles": ()}))
+        SAND.planning.resolved(scene.model_copy(update={"pattern": pattern, "obstacles": ()}))

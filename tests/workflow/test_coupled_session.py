@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.session import EngineStop, RefusedError, Session
+from sandmould.engines.session import EngineStop, Session
 from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.body import StaticSolution
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.session import CoupledSession
-from sandmould.pattern_fe.coupling.shapes_file import SHAPES, read_shapes
+from sandmould.pattern_fe.coupling.shapes_file import SHAPES
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
 from sandmould.scenario.scenario import Scenario
+from tests.patterns import read_shapes
 from tests.scenes import open_lammps, tube_scene
 
 Array = NDArray[np.float64]
@@ -56,7 +57,7 @@ class Plate:
 def settings(**changes: Any) -> Loop:
     values: dict[str, Any] = {
         "window_s": 0.002, "scheme": "fixed", "factor": 0.02, "least_factor": 0.005,
-        "most_factor": 1.0, "limit_share": 0.5, "repeats": 0, "tolerance": 0.01, "predicts": False,
+        "most_factor": 1.0, "limit_share": 0.5, "repeats": 0, "tolerance": 0.01,
         "largest_displacement_m": 0.02,
     }  # fmt: skip
     return Loop(**(values | changes))
@@ -119,15 +120,6 @@ def after(session: CoupledSession, folder: Path) -> tuple[pd.DataFrame, Any]:
     session._shapes.flush()
     log = read_convergence_log(folder / CONVERGENCE_LOG)
     return log, log.iloc[-1]
-
-
-def test_windows_are_not_repeated_from_outside(tmp_path: Path) -> None:
-    session = coupled(tmp_path)
-    with pytest.raises(
-        RefusedError, match=r"pattern.loop.scheme = 'fixed' .* a scheme without win"
-    ):
-        session.save_checkpoint()
-    session.close()
 
 
 def test_shapes_and_loads_are_those_of_every_record(tmp_path: Path) -> None:
@@ -243,7 +235,7 @@ def test_by_layers_the_plate_stands_still_until_the_sand_rests(tmp_path: Path) -
         before, rested = session.displacement_m.copy(), False
         while not session.stage_over:
             session.advance()
-            rested = rested or session.sand_rests
+            rested = rested or session.sand.sand_rests
             if not ended and not rested:
                 np.testing.assert_array_equal(session.displacement_m, before)
         ended.append(session.displacement_m[0, 1])

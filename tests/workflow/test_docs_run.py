@@ -17,8 +17,7 @@ from pathlib import Path
 import pytest
 
 from sandmould.cli.study_file import study_file
-from sandmould.kinds.sand import speed
-from sandmould.kinds.sand.speed import SPEED
+from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.study.plan.build_plan import open_plan
 from tests.workflow.pages import PAGES, blocks
 
@@ -39,7 +38,6 @@ NOT_TYPED = {
     "sand/bin/": "the environment that was installed",
     "~/sandmould-env/": "the environment that was installed",
     "scp": "needs another machine",
-    "until": "a pattern that another program bends; test_column_on_foam.py has the loop",
 }
 """How commands begin that are left out, and why."""
 
@@ -73,8 +71,8 @@ SMALLER = {
 """What is written in the place of what stands on the page, so that a study takes seconds."""
 
 ONE_STUDY = (
-    "README.md", "docs/how-to/write_a_study.md", "docs/running.md", "docs/cluster.md",
-    "docs/tutorials/cluster.md",
+    "README.md", "docs/how-to/write_a_study.md", "docs/running.md", "docs/how-to/packs.md",
+    "docs/cluster.md", "docs/tutorials/cluster.md",
 )  # fmt: skip
 """They speak of the study of the README: one person reads them in one folder."""
 
@@ -150,9 +148,9 @@ class Reader:
 @pytest.fixture
 def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
     """A reader whose plans know how fast the machine is: measuring it takes 10 s each."""
-    monkeypatch.setattr(speed, "_measure_rate", lambda _: 2e7)
+    monkeypatch.setattr(SandSpeed, "trial", lambda *_: 2e7)
     for study in ("tube_quick", "tube_3d_small"):
-        SPEED.measured(open_plan(study_file(study)).runs[0].scenario, tmp_path / "results")
+        SandSpeed().measured(open_plan(study_file(study)).runs[0].scenario, tmp_path / "results")
     return Reader(tmp_path)
 
 

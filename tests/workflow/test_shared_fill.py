@@ -27,7 +27,7 @@ from sandmould.execution.packs.unpack import unpack
 from sandmould.execution.process import launch
 from sandmould.execution.simulate import render_run, simulate
 from sandmould.execution.status import status_text
-from sandmould.kinds.sand.planning import PLANNING
+from sandmould.kinds.sand.kind import SAND
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT, read_mark, seal
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -59,7 +59,7 @@ def pair(scene: Scenario, folder: Path) -> tuple[list[Path], Path]:
     longer = stage.model_copy(update={"duration_s": 2 * stage.duration_s})
     scenes = [scene, scene.model_copy(update={"vibration": (longer, *scene.vibration[1:])})]
     runs = [Run("test", f"run_{i}", {"of": i}, 1, each, {}) for i, each in enumerate(scenes)]
-    shared, (fill,) = share_fills(runs, PLANNING)
+    shared, (fill,) = share_fills(runs, SAND.planning)
     write_plan([*shared, fill], folder)
     return [folder / run.place for run in shared], folder / fill.place
 
@@ -115,7 +115,7 @@ def test_a_branch_is_bit_for_bit_the_run_that_fills_by_itself(
     # what the plan says of the disk
     ends = [*(fill / END_CHECKPOINT).iterdir(), fill / "snapshots.npz"]
     taken = sum(path.stat().st_size for path in ends)
-    assert 0.5 < taken / PLANNING.state_bytes(read_run(fill / "scenario.yaml").scenario) < 2.0
+    assert 0.5 < taken / SAND.planning.state_bytes(read_run(fill / "scenario.yaml").scenario) < 2.0
     # the longer one knows nothing of the shorter
     assert RunOutcome.read(longer / "outcome.json").simulated_s > costs[straight].steps * (
         costs[straight].time_step_s
@@ -312,7 +312,7 @@ def test_packed_runs_need_no_fill_and_its_cost_travels(
     summary = (folder / "summary.tsv").read_bytes()
     assert b"\tfill_cpu_s" in summary
     end = [*(folder / fill.place / END_CHECKPOINT).iterdir()]
-    small, whole = (pack(plan, RESULTS, Path(f"{name}.tar.xz"), checkpoints=name == "whole").path
+    small, whole = (pack(plan, RESULTS, Path(f"{name}.zip"), checkpoints=name == "whole").path
                     for name in ("small", "whole"))  # fmt: skip
     for path, checkpoints in ((small, False), (whole, False), (whole, True)):
         shutil.rmtree(RESULTS)

@@ -12,7 +12,7 @@ import pytest
 
 from sandmould import ROOT
 
-SHIPPED = ("Snakefile", "config", "profiles", "templates", "workflow")
+SHIPPED = ("Snakefile", "config", "profiles", "requirements.lock", "templates", "workflow")
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +36,22 @@ def test_it_holds_every_file_that_a_clone_has_in_git(site: Path) -> None:
     assert missing == []
     assert not (site / "tests").exists()
     assert (site / "sandmould" / "py.typed").is_file()
+
+
+def test_it_takes_one_name_from_its_user(site: Path, tmp_path: Path) -> None:
+    assert [path.name for path in site.iterdir() if path.suffix != ".dist-info"] == ["sandmould"]
+    for name in ("analysis", "pattern_fe"):
+        (tmp_path / f"{name}.py").write_text(
+            "raise SystemExit('a file of the user was executed')\n"
+        )
+    script = (
+        "import sandmould.pattern_fe, sandmould.analysis.density, sandmould.kinds.sand.planning"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(site)}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert (ran.returncode, ran.stderr) == (0, "")
 
 
 @pytest.mark.slow

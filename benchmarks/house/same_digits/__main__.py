@@ -21,12 +21,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from benchmarks.frame.source_tree import unpack
 from sandmould import ROOT, geometry, pattern_fe
 from sandmould.casting import arpm, mps
 from sandmould.definition.run import Run
 from sandmould.digest import EQUAL_CODE, SHORT, code_digest, equal_code
 from sandmould.engines.registry import code_groups
 from sandmould.kinds.registry import KINDS
+from sandmould.module_main import run_main
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.expand import expand
@@ -35,6 +37,8 @@ from sandmould.study.plan.load_study import open_study
 STUDIES = Path(__file__).parent
 APART = {"deck.in", "engine.log", "products.json", "scenario.yaml", "final.png"}
 """Files of a run that hold times, versions and names, or are drawn."""
+TIMED = ["solve_s", "pattern_outside_fraction"]
+"""Columns that hold times of the machine."""
 HEAD = """\
 # Code that was rewritten without a change of digits keeps the identity of the code it replaced:
 # its hash now = the hash before. `python -m benchmarks.house.same_digits COMMIT` compares the
@@ -113,6 +117,9 @@ def _content(path: Path) -> object:
     if path.suffix == ".npz":
         with np.load(path, allow_pickle=False) as arrays:
             return {name: (arrays[name].dtype.str, arrays[name].tobytes()) for name in arrays}
+    if path.suffix == ".tsv":
+        table = pd.read_csv(path, sep="\t", dtype=str)
+        return table.drop(columns=TIMED, errors="ignore").to_csv()
     return path.read_bytes()
 
 
@@ -127,19 +134,13 @@ def write_equal(before: dict[str, str], now: dict[str, str]) -> None:
     EQUAL_CODE.write_text("\n".join([HEAD, *lines]), encoding="utf-8")
 
 
-def main(arguments: list[str]) -> int:
+def main(commit: str) -> int:
     """Compare with a commit, or print the identities."""
-    if arguments == ["identities"]:
+    if commit == "identities":
         print(json.dumps(identities(), indent=1))
         return 0
-    (commit,) = arguments
     with tempfile.TemporaryDirectory() as name:
-        tree = Path(name, commit)
-        tree.mkdir()
-        archive = subprocess.run(
-            ["git", "archive", commit], cwd=ROOT, check=True, capture_output=True
-        ).stdout
-        subprocess.run(["tar", "-x"], cwd=tree, input=archive, check=True)
+        tree = unpack(commit, Path(name))
         compute(tree, Path(name, "before"))
         compute(ROOT, Path(name, "now"))
         found = list(differences(Path(name, "before"), Path(name, "now")))
@@ -155,4 +156,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+    run_main(main, "python -m benchmarks.house.same_digits COMMIT | identities", (1,))

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, diags_array
-from scipy.sparse.linalg import eigsh
+from scipy.sparse import coo_array
 
 from sandmould.arrays import Floats, Ints
 
@@ -47,26 +46,6 @@ class Exchange:
     def _padded(self) -> Floats:
         """Rates with one more: reduceat takes no start behind the last entry."""
         return np.append(self.rate_w_m3_k, 0.0)
-
-    def instability_s(self, capacity_j_m3_k: Floats) -> float:
-        """Explicit step beyond which the fastest mode grows: 2 over the largest eigenvalue.
-
-        Rates are symmetric up to a factor for each row and column in every form of exchange here,
-        so that the eigenvalues are those of a symmetric matrix.
-
-        Parameters
-        ----------
-        capacity_j_m3_k : (n,) float64, J/m3/K
-        """
-        n = len(self.volume_m3)
-        row = np.repeat(np.arange(n), np.diff(self.start))
-        scaled = self.rate_w_m3_k / capacity_j_m3_k[row]
-        apart = csr_array((scaled, self.neighbour, self.start), (n, n))
-        # entries that mirror each other have one sign
-        off = apart.sign().multiply(abs(apart.multiply(apart.T)).sqrt())
-        diagonal = diags_array(np.bincount(row, scaled, n).astype(np.float64))
-        largest = eigsh((diagonal - off).tocsr(), k=1, which="LA", return_eigenvectors=False)
-        return 2.0 / float(largest[0])
 
 
 def from_rows(row: Ints, column: Ints, rate_w_m3_k: Floats, volume_m3: Floats) -> Exchange:

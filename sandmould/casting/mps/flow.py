@@ -141,10 +141,6 @@ class Flow:
         """Speeds of the fluid, (m,) float64, m/s."""
         return np.sqrt((self.particles.velocity_m_s[self.fluid] ** 2).sum(axis=1))
 
-    def kinetic_energy_per_mass(self) -> float:
-        """Mean over the fluid, J/kg."""
-        return 0.5 * float((self.speed() ** 2).mean())
-
     def next_dt_s(self) -> float:
         """Longest step that eq. (8), the viscosity and the scheme allow."""
         size_m, nu = self.kernel.spacing_m, self.metal.viscosity_m2_s

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sandmould.arrays import Flags, Floats
-from sandmould.casting.mps.flow import Flow, FlowGuard, FlowProgress, RunningCost
+from sandmould.casting.mps.flow import Flow, FlowGuard
 from sandmould.casting.mps.particles import (
     FLUID,
     WALL_LAYERS,
@@ -17,13 +16,10 @@ from sandmould.casting.mps.particles import (
     lattice,
     mould_around,
 )
-from sandmould.casting.mps.probes import pressure_at
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.weight import make_kernel
 
 RATE_KG_S = 0.1
-SEEN_S = 4.5
-"""When figure 8 is drawn."""
 FREEBOARD = 10
 """Particles that the bore reaches above the casting."""
 POUR_HEIGHT = 5
@@ -72,11 +68,6 @@ class Casting:
 
 
 PAPERS = Casting()
-
-
-def pressure_pa_m(metal: LiquidMetal) -> float:
-    """Hydrostatic pressure by depth, Pa/m: 4410 Pa at the bottom of 180 mm of aluminium."""
-    return metal.density_kg_m3 * float(np.linalg.norm(metal.gravity_m_s2))
 
 
 def open_shoulder(
@@ -184,91 +175,9 @@ class Ladle:
         self.poured += count
 
 
-@dataclass(frozen=True)
-class Poured:
-    """What figure 8 shows, as numbers."""
-
-    particles: int
-    """Of fluid."""
-    bottom_pa: float
-    """Mean in time, after the casting settled, round the middle of the bottom."""
-    under_shoulder_pa: float
-    """The same under the shoulder's ring, at half height."""
-    ideal_bottom_pa: float
-    """Of the depth that the metal really has."""
-    ideal_shoulder_pa: float
-    largest_rise_m_s: float
-    """Fastest upward particle in the same time."""
-    hops: bool
-    """Whether that is faster than ``HOP_SPEED_M_S``."""
-    stopped: str
-    """Why a guard stopped the run, or nothing."""
-    cost: RunningCost
-
-
 def ring_m(radius_m: float, height_m: float) -> Floats:
     """Places round the axis, (8, 3) float64, m."""
     turn = np.arange(8) * math.pi / 4
     return np.stack(
         (radius_m * np.cos(turn), radius_m * np.sin(turn), np.full(8, height_m)), axis=1
-    )
-
-
-def run_shoulder(
-    flow: Flow,
-    settle_s: float,
-    watch_s: float,
-    pour: bool = False,
-    progress: Callable[[FlowProgress], None] | None = None,
-) -> Poured:
-    """Run a casting with a shoulder and measure its pressure at the end.
-
-    Parameters
-    ----------
-    flow : Flow
-        From ``open_shoulder``.
-    settle_s : float, s
-        Before measuring; with pouring ``SEEN_S`` less ``watch_s`` is the paper's.
-    watch_s : float, s
-        Over which pressures are averaged.
-    pour : bool
-        Whether metal is poured, or what is there is watched at rest.
-    progress : function of a ``FlowProgress``, optional
-    """
-    size_m = flow.kernel.spacing_m
-    radius_m = 0.25 * (PAPERS.lower_m + PAPERS.upper_m)
-    ring = ring_m(radius_m, 0.5 * PAPERS.height_m - size_m)
-    place = np.vstack(([[0.0, 0.0, 0.5 * size_m]], ring))
-    ladle = Ladle(flow) if pour else None
-    rows: list[tuple[float, float, float]] = []
-
-    def each(now: Flow) -> None:
-        if ladle:
-            ladle(now)
-        if now.time_s > settle_s:
-            around = pressure_at(now, place)
-            rise = float(now.particles.velocity_m_s[now.fluid, 2].max())
-            rows.append((around[0], float(around[1:].mean()), rise))
-
-    stopped = ""
-    try:
-        flow.advance(settle_s + watch_s, each, progress)
-    except ArithmeticError as error:
-        stopped = str(error)
-    seen = np.array(rows).reshape(-1, 3)
-    nothing = not len(seen)
-    bottom, ring_pa = (math.nan, math.nan) if nothing else seen[:, :2].mean(axis=0).tolist()
-    rise = math.nan if nothing else float(seen[:, 2].max())
-    count = int(flow.fluid.sum())
-    top_m, weight_pa_m = PAPERS.level_m(size_m, count), pressure_pa_m(flow.metal)
-    return Poured(
-        count,
-        bottom,
-        ring_pa,
-        weight_pa_m * (top_m - float(place[0, 2])),
-        weight_pa_m * max(0.0, top_m - float(place[1, 2])),
-        rise,
-        rise > HOP_SPEED_M_S,
-        stopped,
-        flow.cost,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from sandmould.dem import source_files
 from sandmould.engines.bed_deck import sources_of_step
@@ -15,9 +16,10 @@ from sandmould.engines.lammps.refusals import refuse as refuse
 from sandmould.engines.lammps.render import needs_callback
 from sandmould.engines.lammps.render import render_deck as render_deck
 from sandmould.engines.lammps.render import write_deck as write_deck
-from sandmould.engines.lammps.session import LammpsSession
+from sandmould.engines.lammps.session import LammpsSession, load_library
 from sandmould.engines.program import Program
 from sandmould.engines.ranks import Ranks
+from sandmould.engines.session import SandSession
 from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 2.5e6
@@ -55,6 +57,17 @@ def installation_problem() -> str | None:
     return None
 
 
+def communicator() -> Any:
+    """Give the MPI communicator of LAMMPS.
+
+    Raises
+    ------
+    EngineStop
+        When LAMMPS cannot be loaded.
+    """
+    return load_library()[1]
+
+
 def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The session, and our solver where LAMMPS is given forces of surfaces and damping by it."""
     here = Path(__file__).parent
@@ -73,7 +86,7 @@ def load_session(scenario: Scenario) -> None:
 
 def open_session(
     program: Program, folder: Path, log: Path, checkpoint: Path | None = None
-) -> LammpsSession:
+) -> SandSession:
     """Open a session on a rendered deck.
 
     Raises

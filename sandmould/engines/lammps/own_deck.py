@@ -12,17 +12,6 @@ from sandmould.engines.lammps.session import load_library
 from sandmould.engines.session import engine_stop
 
 
-def communicator() -> Any:
-    """Give the MPI communicator of LAMMPS.
-
-    Raises
-    ------
-    EngineStop
-        When LAMMPS cannot be loaded.
-    """
-    return load_library()[1]
-
-
 def read_deck(folder: Path, deck: str, log: Path) -> None:
     """Have LAMMPS read a deck; see ``sandmould.engines.registry.DeckReaderModule``."""
     lammps, _ = load_library()

@@ -15,6 +15,7 @@ from sandmould.engines.liggghts.render import write_deck as write_deck
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.program import Program
 from sandmould.engines.ranks import Ranks
+from sandmould.engines.session import SandSession
 from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 3e6
@@ -53,6 +54,10 @@ def _numbers(version: str) -> list[int]:
     return [int(part) for part in version.split(".")]
 
 
+def communicator() -> None:
+    """There is none: LIGGGHTS runs in one process."""
+
+
 def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The session and the files that pass between it and the engine."""
     names = ("session.py", "process.py", "grains_file.py", "mesh_files.py", "bending_mesh.py",
@@ -67,7 +72,7 @@ def load_session(scenario: Scenario) -> None:
 
 def open_session(
     program: Program, folder: Path, log: Path, checkpoint: Path | None = None
-) -> LiggghtsSession:
+) -> SandSession:
     """Open a session on a rendered deck.
 
     Raises

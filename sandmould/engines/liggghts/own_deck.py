@@ -9,10 +9,6 @@ from sandmould.engines.session import EngineStop, engine_stop
 from sandmould.runs.outcome import Outcome
 
 
-def communicator() -> None:
-    """There is none: LIGGGHTS runs in one process."""
-
-
 def read_deck(folder: Path, deck: str, log: Path) -> None:
     """Have LIGGGHTS read a deck; see ``sandmould.engines.registry.DeckReaderModule``."""
     path = executable()

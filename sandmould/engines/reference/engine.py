@@ -5,24 +5,23 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sandmould.dem import source_files, source_hash
+from sandmould.digest import SHORT
 from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
 from sandmould.engines.ranks import Ranks
+from sandmould.engines.session import SandSession
+from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.contact import SYMBOLS
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import inertia_factor
-
-if TYPE_CHECKING:
-    from sandmould.engines.reference.session import ReferenceSession
 
 GRAIN_STEPS_PER_S = 1.5e7
 RANKS = Ranks.THREADS
@@ -49,6 +48,10 @@ def installed_version() -> str:
 
 def installation_problem() -> None:
     """Find nothing missing: the solver comes with the house."""
+
+
+def communicator() -> None:
+    """There is none: ranks are threads of one process."""
 
 
 def refuse(scenario: Scenario) -> None:
@@ -79,6 +82,8 @@ def render_deck(program: Program, sources: Mapping[str, str], run: str, study: s
     context |= {
         "kernels": source_hash(),
         "keys": keys,
+        "scenario_hash": scenario_hash(scenario)[:SHORT],
+        "slip_normal": scenario.contact.slip_normal or "half_step",
         "inertia_factor": inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d),
         "surfaces": surfaces_of(scenario).names,
         "planned_step_s": scenario.planned_step_s,
@@ -129,7 +134,7 @@ def load_session(scenario: Scenario) -> None:
 
 def open_session(
     program: Program, folder: Path, log: Path, checkpoint: Path | None = None
-) -> ReferenceSession:
+) -> SandSession:
     """Open a session, afresh or from a checkpoint; the deck is for people alone."""
     from sandmould.engines.reference.session import ReferenceSession
 

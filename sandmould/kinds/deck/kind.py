@@ -45,23 +45,23 @@ class DeckStudy(StudyBesideSand):
         return self.allowed_folders
 
 
-def _planning() -> Planning[OwnDeck]:
-    from sandmould.kinds.deck.planning import PLANNING
+def _open_planning() -> Planning[OwnDeck]:
+    from sandmould.kinds.deck.planning import DeckPlanning
 
-    return PLANNING
-
-
-def _execution() -> Execution[OwnDeck]:
-    from sandmould.kinds.deck.execution import EXECUTION
-
-    return EXECUTION
+    return DeckPlanning()
 
 
-DECK = Kind(
+def _open_execution() -> Execution[OwnDeck]:
+    from sandmould.kinds.deck.execution import DeckExecution
+
+    return DeckExecution()
+
+
+DECK: Kind[OwnDeck] = Kind(
     name="deck",
     scenario=OwnDeck,
     study=DeckStudy,
-    open_planning=_planning,
-    open_execution=_execution,
+    open_planning=_open_planning,
+    open_execution=_open_execution,
     draws_by_lot=True,
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import platform
 import shutil
 import subprocess
 import sys
@@ -18,6 +17,7 @@ from sandmould.digest import SHORT, digest
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
+from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.module_main import run_main
 from sandmould.runs.files import write_text
 from sandmould.runs.parent import end_with_parent
@@ -31,40 +31,25 @@ PILOT_S = 12.0
 _LOOK_EVERY_S = 0.2
 
 
-def stored_rate(scenario: OwnDeck, results: Path) -> float | None:
-    """Expected core-seconds that a second of a core computes, as a pilot found; starts nothing.
+class DeckSpeed(StoredSpeed[OwnDeck]):
+    """See ``StoredSpeed``; what is stored is the processor time of a whole run."""
 
-    Parameters
-    ----------
-    scenario : OwnDeck
-    results : Path
-        Folder of all results.
-    """
-    core_s = _pilots(results).get(_key(scenario))
-    return None if core_s is None else scenario.expected_core_s / core_s
+    file = STORED
+    basis = f"by a pilot run (results/{STORED})"
 
+    def computed_by(self, scenario: OwnDeck) -> str:
+        """Engine and deck: a deck with other values is one of another price."""
+        version = engine_module(scenario.engine.name).installed_version()
+        deck = digest(own_deck.render(scenario.model_copy(update={"seed": 1}), "pilot", "pilot"))
+        return f"{scenario.engine.name} {version} {deck[:SHORT]}"
 
-def measured_rate(scenario: OwnDeck, results: Path) -> float | None:
-    """The same, by a pilot where there was none yet; parameters as in ``stored_rate``.
+    def trial(self, scenario: OwnDeck, results: Path) -> float | None:
+        """Processor time of a whole run, by a pilot."""
+        return pilot(scenario, results)
 
-    Returns
-    -------
-    float or None
-        None where the deck states no ``steps`` and did not end in time.
-
-    Raises
-    ------
-    BadInputError
-        With what the engine said, where the pilot failed.
-    """
-    if (rate := stored_rate(scenario, results)) is not None:
-        return rate
-    core_s = pilot(scenario, results)
-    if core_s is None:
-        return None
-    results.mkdir(parents=True, exist_ok=True)
-    write_text(results / STORED, json.dumps({**_pilots(results), _key(scenario): core_s}, indent=1))
-    return scenario.expected_core_s / core_s
+    def rate(self, scenario: OwnDeck, stored: float) -> float:
+        """Expected core-seconds that a second of a core computes."""
+        return scenario.expected_core_s / stored
 
 
 def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float | None:
@@ -81,11 +66,12 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float |
     Returns
     -------
     float or None
+        None where the deck states no ``steps`` and did not end in time.
 
     Raises
     ------
     BadInputError
-        Where the deck stopped with an error.
+        With what the engine said, where the deck stopped with an error.
     """
     if scenario.engine.ranks > 1:
         return None
@@ -142,21 +128,6 @@ def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> 
     taken_s = progress.stat().st_mtime - (folder / "begun").stat().st_mtime
     whole_s = float(now["left_s"]) + taken_s
     return whole_s if math.isfinite(whole_s) else None
-
-
-def _pilots(results: Path) -> dict[str, float]:
-    """All pilots; none where the file is damaged."""
-    try:
-        return {key: float(s) for key, s in json.loads((results / STORED).read_text()).items()}
-    except (OSError, ValueError, AttributeError):
-        return {}
-
-
-def _key(scenario: OwnDeck) -> str:
-    """Machine, engine and deck: a deck with other values is one of another price."""
-    version = engine_module(scenario.engine.name).installed_version()
-    deck = digest(own_deck.render(scenario.model_copy(update={"seed": 1}), "pilot", "pilot"))
-    return f"{platform.node()} {scenario.engine.name} {version} {deck[:SHORT]}"
 
 
 def main(name: str) -> int:

@@ -21,22 +21,22 @@ class FlowStudy(CastingStudy):
     )
 
 
-def _planning() -> Planning[MetalFlow]:
-    from sandmould.kinds.flow.planning import PLANNING
+def _open_planning() -> Planning[MetalFlow]:
+    from sandmould.kinds.flow.planning import FlowPlanning
 
-    return PLANNING
-
-
-def _execution() -> Execution[MetalFlow]:
-    from sandmould.kinds.flow.execution import EXECUTION
-
-    return EXECUTION
+    return FlowPlanning()
 
 
-FLOW = Kind(
+def _open_execution() -> Execution[MetalFlow]:
+    from sandmould.kinds.flow.execution import FlowExecution
+
+    return FlowExecution()
+
+
+FLOW: Kind[MetalFlow] = Kind(
     name="flow",
     scenario=MetalFlow,
     study=FlowStudy,
-    open_planning=_planning,
-    open_execution=_execution,
+    open_planning=_open_planning,
+    open_execution=_open_execution,
 )

@@ -16,90 +16,82 @@ from sandmould.kinds.kind import Execution
 from sandmould.kinds.sand.fill_apart import fill_apart
 from sandmould.kinds.sand.shared_fill import lay_fill
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.products import SAND_PRODUCTS, Computed
+from sandmould.runs.products import SAND_PRODUCTS, Computed, Cost
 from sandmould.scenario.scenario import Scenario
 
 
-def render(run: Run, folder: Path) -> None:
-    """Write the deck and the layers."""
-    _write_deck(build_program(run.scenario), run, folder)
+class SandExecution(Execution[Scenario]):
+    """See ``Execution``."""
+
+    products = SAND_PRODUCTS
+
+    def render(self, run: Run, folder: Path) -> None:
+        """Write the deck and the layers."""
+        _write_deck(build_program(run.scenario), run, folder)
+
+    def compute(self, run: Run, folder: Path) -> Computed:
+        """Take the scenario through its program, or through what its shared fill leaves of it."""
+        program = build_program(run.scenario)
+        failed = lay_fill(run, folder, program)
+        if failed is not None:
+            return failed
+        opening: Opening = registry.engine_of(run.scenario).open_session
+        if run.scenario.pattern is not None:
+            from sandmould.pattern_fe.coupling.opening import open_coupled
+
+            opening = open_coupled
+        if run.scenario.rest.shaken_check_every_s is not None:
+            stopped = fill_apart(run, folder, program, opening)
+            if stopped is not None:
+                return stopped
+            program = build_program(run.scenario.from_vibration)
+        run_hash, is_fill = scenario_hash(run.scenario), run.part == FILL
+
+        def write_deck(program: Program) -> None:
+            world = registry.communicator_of(run.scenario)
+            if world is None or world.rank == 0:  # one process writes for all
+                _write_deck(program, run, folder)
+            if world is not None:
+                world.barrier()
+
+        driver = Driver(program, folder, run.run, run_hash, opening, is_fill, write_deck)
+        outcome = driver.run()
+        return Computed(outcome, driver.cost, driver.is_root)
+
+    def no_cost(self, scenario: Scenario) -> Cost:
+        """Its engine and its time step."""
+        return cost_before(scenario)
+
+    def complete(self, scenario: Scenario, work: Path) -> None:
+        """Make empty tables, so that collection finds them, and end the file of snapshots."""
+        recording.create_tables(work, scenario.dimension)
+        close_torn(work)
+
+    def measure(self, run: Run, folder: Path) -> None:
+        """Measure every snapshot."""
+        from sandmould.kinds.sand.measure import measure_sand  # draws: not every job needs that
+
+        measure_sand(run.scenario, folder)
+
+    def load_computing(self, scenario: Scenario) -> None:
+        """Import the engine's side of the house, and the pattern's where there is one."""
+        registry.engine_of(scenario).load_session(scenario)
+        if scenario.time_step.bed_fraction is not None:
+            importlib.import_module("sandmould.engines.bed_limit")
+        if scenario.pattern is not None:
+            importlib.import_module("sandmould.pattern_fe.coupling.opening")
+
+    def load_measuring(self, scenario: Scenario) -> None:
+        """Import what measures and draws."""
+        from sandmould.kinds.sand.measure import write_picture
+
+        # The first picture loads fonts, which every forked process would do again.
+        with tempfile.TemporaryDirectory() as name:
+            write_picture(scenario, Path(name), Path(name) / "first.png")
+        if scenario.pattern is not None:
+            importlib.import_module("sandmould.kinds.sand.bent_files")
 
 
 def _write_deck(program: Program, run: Run, folder: Path) -> None:
     engine = registry.engine_of(run.scenario)
     engine.write_deck(program, run.sources, folder, run.run, run.study)
-
-
-def compute(run: Run, folder: Path) -> Computed:
-    """Take the scenario through its program, or through what its shared fill leaves of it."""
-    program = build_program(run.scenario)
-    failed = lay_fill(run, folder, program)
-    if failed is not None:
-        return failed
-    opening: Opening = registry.engine_of(run.scenario).open_session
-    if run.scenario.pattern is not None:
-        from sandmould.pattern_fe.coupling.opening import open_coupled
-
-        opening = open_coupled
-    if run.scenario.rest.shaken_check_every_s is not None:
-        stopped = fill_apart(run, folder, program, opening)
-        if stopped is not None:
-            return stopped
-        program = build_program(run.scenario.from_vibration)
-    run_hash, is_fill = scenario_hash(run.scenario), run.part == FILL
-
-    def write_deck(program: Program) -> None:
-        world = registry.communicator_of(run.scenario)
-        if world is None or world.rank == 0:  # one process writes for all
-            _write_deck(program, run, folder)
-        if world is not None:
-            world.barrier()
-
-    driver = Driver(program, folder, run.run, run_hash, opening, is_fill, write_deck)
-    outcome = driver.run()
-    return Computed(outcome, driver.cost, driver.is_root)
-
-
-def complete(scenario: Scenario, work: Path) -> None:
-    """Make empty tables, so that collection finds them, and end the file of snapshots."""
-    recording.create_tables(work, scenario.dimension)
-    close_torn(work)
-
-
-def measure(run: Run, folder: Path) -> None:
-    """Measure every snapshot."""
-    from sandmould.kinds.sand.measure import measure_sand  # draws: not every job needs that
-
-    measure_sand(run.scenario, folder)
-
-
-def load_computing(scenario: Scenario) -> None:
-    """Import the engine's side of the house, and the pattern's where there is one."""
-    registry.engine_of(scenario).load_session(scenario)
-    if scenario.time_step.bed_fraction is not None:
-        importlib.import_module("sandmould.engines.bed_limit")
-    if scenario.pattern is not None:
-        importlib.import_module("sandmould.pattern_fe.coupling.opening")
-
-
-def load_measuring(scenario: Scenario) -> None:
-    """Import what measures and draws."""
-    from sandmould.kinds.sand.measure import write_picture
-
-    # The first picture loads fonts, which every forked process would do again.
-    with tempfile.TemporaryDirectory() as name:
-        write_picture(scenario, Path(name), Path(name) / "first.png")
-    if scenario.pattern is not None:
-        importlib.import_module("sandmould.kinds.sand.bent_files")
-
-
-EXECUTION = Execution[Scenario](
-    products=SAND_PRODUCTS,
-    render=render,
-    compute=compute,
-    complete=complete,
-    no_cost=cost_before,
-    measure=measure,
-    load_computing=load_computing,
-    load_measuring=load_measuring,
-)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -33,30 +33,25 @@ class Material(Section):
     )
 
 
-def _default_scene() -> dict[str, Any]:
-    return Scenario().model_dump(mode="json")
+def _open_planning() -> Planning[Scenario]:
+    from sandmould.kinds.sand.planning import SandPlanning
+
+    return SandPlanning()
 
 
-def _planning() -> Planning[Scenario]:
-    from sandmould.kinds.sand.planning import PLANNING
+def _open_execution() -> Execution[Scenario]:
+    from sandmould.kinds.sand.execution import SandExecution
 
-    return PLANNING
-
-
-def _execution() -> Execution[Scenario]:
-    from sandmould.kinds.sand.execution import EXECUTION
-
-    return EXECUTION
+    return SandExecution()
 
 
-SAND = Kind(
+SAND: Kind[Scenario] = Kind(
     name="sand",
     scenario=Scenario,
     study=SandStudy,
-    open_planning=_planning,
-    open_execution=_execution,
+    open_planning=_open_planning,
+    open_execution=_open_execution,
     material=Material,
     draws_by_lot=True,
     labels_have_units=False,
-    defaults=_default_scene,
 )

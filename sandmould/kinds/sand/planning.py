@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from sandmould import pattern_fe
@@ -13,25 +12,18 @@ from sandmould.digest import digest
 from sandmould.engines import registry
 from sandmould.engines.durations import grain_steps, run_s, stage_s
 from sandmould.engines.program import build_program
-from sandmould.geometry.mesh import TriangleMesh
-from sandmould.geometry.outline import Outline
-from sandmould.kernel_cache import are_compiled, cache_folder
-from sandmould.kinds.kind import Note, Planning, SpeedClass
-from sandmould.kinds.sand.hardness_text import hardness_lines
+from sandmould.kinds.kind import BASE_MEMORY_MB, Note, Planning, SpeedClass
 from sandmould.kinds.sand.measures import MEASURES
-from sandmould.kinds.sand.narrow import narrow_spaces
-from sandmould.kinds.sand.speed import SPEED
-from sandmould.kinds.sand.table_motion import frequency_rule, table_lines
+from sandmould.kinds.sand.notes import notes
+from sandmould.kinds.sand.speed import SandSpeed
+from sandmould.kinds.sand.table_motion import table_lines
 from sandmould.limits import FRAMES, RECORDS
-from sandmould.runs.formatting import number
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario import checks
-from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawing_notes, with_hash
-from sandmould.scenario.wall_thickness import thinnest_wall
+from sandmould.scenario.solids import READ_BYTES, SolidMesh, with_hash
 
 MEASURING = (
     *(f"sandmould/analysis/{name}.py" for name in (
@@ -42,7 +34,6 @@ MEASURING = (
         "bending", "drive", "loose", "measure", "moments", "outflow",
     )),
 )  # fmt: skip
-BASE_MEMORY_MB = 600
 STEPPED_COPIES = 8
 """Matrices of a surface held together while the masses of the in-step scheme are found."""
 GRAINS_PER_MB = 50
@@ -59,13 +50,8 @@ bracket of foam (study bracket_foam_small), 3.6 to 3.8 on the L that is filled a
 (l_deflection) and 5.0 to 5.8 where it is shaken deep in sand (l_depth): within 1.4 of each."""
 MEASURING_3D_S = 1.3
 """Processor time for measures and pictures in 3D beside what any job takes: 1.4 to 4.0 s a run in
-four shipped studies, nothing in a fifth (docs/prices.md); in 2D it is lost in the rest."""
-HIGH_ACCELERATION_G = 20.0
-"""Peak acceleration above which a plan asks whether the amplitude is meant so."""
-COMPILE_S = 25.0
-"""Processor time for what a first run compiles: 24 s measured in 2D, 26 s in 3D, 24 s with a
-pattern (fe_column)."""
-_kernel_folder = functools.cache(cache_folder)
+four shipped studies, nothing in a fifth (docs/developers/prices.md); in 2D it is lost in the
+rest."""
 STEPPED_ENTRY_S, STEPPED_CACHED_S = 0.2e-9, 0.06e-9
 """Processor time of a step for an entry of the matrix of a pattern stepped in step, where memory
 decides (1 820 to 4 400 components) and where it fits the cache of 32 MB (1 290 components)."""
@@ -75,97 +61,155 @@ PASS_S = 2e-3
 """Processor time of a pass of a window beside its grain-steps: loads, solution, new surface."""
 
 
-def resolved(scenario: Scenario) -> Scenario:
-    """The scenario with its pattern's outline and the hashes of its meshes.
+class SandPlanning(Planning[Scenario]):
+    """See ``Planning``."""
 
-    So a changed mesh makes another run.
-    """
-    pattern = scenario.pattern
-    if pattern is not None:
-        from sandmould.pattern_fe.coupling.interface import (
-            with_surface,  # scikit-fem: few studies need it
-        )
+    work_unit = "grain-steps"
+    speed = SandSpeed()
+    measures = MEASURES
+    measuring = MEASURING
 
-        if isinstance(pattern.shape, PatternDrawing):
-            shape = with_hash(pattern.shape)
-            pattern = pattern.model_copy(update={"shape": shape})
-            scenario = scenario.model_copy(update={"pattern": pattern})
-        scenario = with_surface(scenario)
-    solids = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
-    hashed = {
-        key: tuple(with_hash(s) if isinstance(s, SolidMesh) else s for s in every)
-        for key, every in solids.items()
-    }
-    return scenario.model_copy(update=hashed)
+    def resolved(self, scenario: Scenario) -> Scenario:
+        """The scenario with its pattern's outline and the hashes of its meshes.
 
+        So a changed mesh makes another run.
+        """
+        pattern = scenario.pattern
+        if pattern is not None:
+            # scikit-fem: few studies need it
+            from sandmould.pattern_fe.coupling.interface import with_surface
 
-def problems(scenario: Scenario) -> list[Problem]:
-    """What keeps a scene from being computed, and more records of it than anyone can use."""
-    return checks.problems(scenario) or [*_records(scenario)]
+            if isinstance(pattern.shape, PatternDrawing):
+                shape = with_hash(pattern.shape)
+                pattern = pattern.model_copy(update={"shape": shape})
+                scenario = scenario.model_copy(update={"pattern": pattern})
+            scenario = with_surface(scenario)
+        solids = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
+        hashed = {
+            key: tuple(with_hash(s) if isinstance(s, SolidMesh) else s for s in every)
+            for key, every in solids.items()
+        }
+        return scenario.model_copy(update=hashed)
 
+    def problems(self, scenario: Scenario) -> list[Problem]:
+        """What keeps a scene from being computed, and more records of it than anyone can use."""
+        return checks.problems(scenario) or [*self._records(scenario)]
 
-def _records(scenario: Scenario) -> Iterator[Problem]:
-    lasts_s, record = planned_s(scenario), scenario.record
-    for key, limit in (
-        ("series_every_s", RECORDS), ("checkpoint_every_s", RECORDS), ("snapshot_every_s", FRAMES),
-    ):  # fmt: skip
-        every_s = getattr(record, key)
-        yield from limit.problems(f"record.{key}", lasts_s / every_s, every_s)
+    def _records(self, scenario: Scenario) -> Iterator[Problem]:
+        lasts_s, record = self.planned_s(scenario), scenario.record
+        for key, limit in (
+            ("series_every_s", RECORDS),
+            ("checkpoint_every_s", RECORDS),
+            ("snapshot_every_s", FRAMES),
+        ):
+            every_s = getattr(record, key)
+            yield from limit.problems(f"record.{key}", lasts_s / every_s, every_s)
 
+    def engine_problem(self, scenario: Scenario) -> Problem | None:
+        """Why the engine of a scene cannot compute it."""
+        return registry.engine_problem(scenario)
 
-def sources(scenario: Scenario) -> list[Path]:
-    """Templates, and our own code where it computes."""
-    ours = pattern_fe.source_files() if scenario.pattern else []
-    return registry.deck_sources(scenario) + ours
+    def sources(self, scenario: Scenario) -> list[Path]:
+        """Templates, and our own code where it computes."""
+        ours = pattern_fe.source_files() if scenario.pattern else []
+        return registry.deck_sources(scenario) + ours
 
+    def template_hash(self, scenario: Scenario) -> str:
+        """Hash of all that turns a scenario into a deck, and of our code where it computes."""
+        return registry.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
 
-def template_hash(scenario: Scenario) -> str:
-    """Hash of all that turns a scenario into a deck, and of our code where it computes."""
-    return registry.deck_hash(scenario) + (pattern_fe.source_hash() if scenario.pattern else "")
+    def fill(self, scenario: Scenario) -> Scenario | None:
+        """The scene up to its first vibration; None where there is none."""
+        return scenario.before_vibration if scenario.vibrations else None
 
+    def state_bytes(self, scenario: Scenario) -> int:
+        """Disk for the end of a scene and for the snapshots up to there."""
+        every_s, d = scenario.record.snapshot_every_s, scenario.dimension
+        snapshots = self.planned_s(scenario) / every_s
+        return round(sum(plan_counts(scenario)) * (STATE_BYTES[d] + snapshots * SNAPSHOT_BYTES[d]))
 
-def fill(scenario: Scenario) -> Scenario | None:
-    """The scene up to its first vibration; None where there is none.
+    def computed_hash(self, scenario: Scenario) -> str:
+        """Hash of what the engine is told to compute, and of the pattern beside it."""
+        of_engine = registry.computed_hash(scenario)
+        if scenario.pattern is None:
+            return of_engine
+        return digest(of_engine, scenario_hash(scenario.pattern), pattern_fe.source_hash())
 
-    Another program that bends a pattern answers every run for itself.
-    """
-    pattern = scenario.pattern
-    if not scenario.vibrations or (pattern is not None and pattern.loop.exchange == "files"):
-        return None
-    return scenario.before_vibration
+    def threads(self, scenario: Scenario) -> int:
+        """Ranks of MPI, or threads."""
+        return scenario.engine.ranks
 
+    def ranks(self, scenario: Scenario) -> int:
+        """MPI ranks; the ranks of some engines are threads of one process."""
+        return registry.mpi_ranks(scenario)
 
-def state_bytes(scenario: Scenario) -> int:
-    """Disk for the end of a scene and for the snapshots up to there."""
-    snapshots, d = planned_s(scenario) / scenario.record.snapshot_every_s, scenario.dimension
-    return round(sum(plan_counts(scenario)) * (STATE_BYTES[d] + snapshots * SNAPSHOT_BYTES[d]))
+    def memory_mb(self, scenario: Scenario) -> int:
+        """Several times the 126 MB measured at 1 134 discs, 144 at 8 000, and what meshes take."""
+        triangles = sum(len(mesh.triangles) for mesh in scenario.scene.meshes)
+        grains_mb = sum(plan_counts(scenario)) // GRAINS_PER_MB
+        mesh_mb = READ_BYTES * triangles // 1_000_000
+        return BASE_MEMORY_MB + grains_mb + mesh_mb + _foam_mb(scenario)
 
+    def allowed_s(self, scenario: Scenario) -> float:
+        """Wall time on a machine slower than any measured."""
+        return self.planned_work(scenario) / SLOW_RATE / scenario.engine.ranks
 
-def computed_hash(scenario: Scenario) -> str:
-    """Hash of what the engine is told to compute, and of the pattern beside it."""
-    of_engine = registry.computed_hash(scenario)
-    if scenario.pattern is None:
-        return of_engine
-    return digest(of_engine, scenario_hash(scenario.pattern), pattern_fe.source_hash())
+    def planned_work(self, scenario: Scenario) -> float:
+        """Steps times grains in the box at the time, and again where windows are repeated."""
+        most = 1 if scenario.pattern is None else scenario.pattern.loop.most_passes
+        return min(most, PASSES) * grain_steps(build_program(scenario))
 
+    def predicted_s(self, scenario: Scenario) -> float:
+        """Wall time at fixed speeds."""
+        in_3d = IN_3D if scenario.dimension == 3 else 1.0
+        of_core = registry.engine_of(scenario).GRAIN_STEPS_PER_S
+        return self.planned_work(scenario) / (of_core * scenario.engine.ranks * in_3d)
 
-def threads(scenario: Scenario) -> int:
-    """Ranks of MPI, or threads."""
-    return scenario.engine.ranks
+    def beside_s(self, scenario: Scenario) -> float:
+        """Time that does not grow with the grains: measuring, and the pattern a pass or a step."""
+        return (MEASURING_3D_S if scenario.dimension == 3 else 0.0) + self._of_pattern_s(scenario)
 
+    def _of_pattern_s(self, scenario: Scenario) -> float:
+        if scenario.pattern is None:
+            return 0.0
+        loop = scenario.pattern.loop
+        if loop.scheme == "in_step":
+            components = _stepped_components(scenario)
+            entry_s = STEPPED_CACHED_S if components <= STEPPED_CACHED else STEPPED_ENTRY_S
+            return self.planned_steps(scenario) * components**2 * entry_s
+        if not loop.has_windows:
+            return 0.0
+        return min(loop.most_passes, PASSES) * self.planned_s(scenario) / loop.window_s * PASS_S
 
-def ranks(scenario: Scenario) -> int:
-    """MPI ranks; the ranks of some engines are threads of one process."""
-    return registry.mpi_ranks(scenario)
+    def planned_s(self, scenario: Scenario) -> float:
+        """Fill, estimated, discharge, vibration and rest."""
+        return run_s(build_program(scenario))
 
+    def planned_steps(self, scenario: Scenario) -> int:
+        """Time steps of a run: its fill and its rests, estimated, and its vibration."""
+        program = build_program(scenario)
+        return sum(math.ceil(stage_s(program, each) / scenario.step_s) for each in program.stages)
 
-def memory_mb(scenario: Scenario) -> int:
-    """Several times the 126 MB measured at 1 134 discs, 144 at 8 000, and what meshes take."""
-    triangles = sum(len(mesh.triangles) for mesh in scenario.scene.meshes)
-    mesh_mb = READ_BYTES * triangles // 1_000_000
-    return (
-        BASE_MEMORY_MB + sum(plan_counts(scenario)) // GRAINS_PER_MB + mesh_mb + _foam_mb(scenario)
-    )
+    def speed_class(self, scenario: Scenario) -> SpeedClass:
+        """Engine and dimension."""
+        return scenario.engine.name, scenario.dimension
+
+    def plan_cells(self, scenario: Scenario) -> Mapping[str, str]:
+        """Grains, time step and steps."""
+        takes_step_of_bed = scenario.time_step.bed_fraction is not None
+        return {
+            "grains": f"{sum(plan_counts(scenario)):,}",
+            "time step": f"{scenario.step_s:.3g} s" + (" planned" if takes_step_of_bed else ""),
+            "steps": f"{self.planned_steps(scenario):,}",
+        }
+
+    def notes(self, scenario: Scenario) -> list[Note]:
+        """Hardness, narrow places, thin walls, and what is hardly meant."""
+        return notes(scenario)
+
+    def settings_lines(self, scenarios: Iterable[Scenario]) -> list[str]:
+        """What is asked of the vibrating table."""
+        return table_lines(scenarios)
 
 
 def _foam_mb(scenario: Scenario) -> int:
@@ -180,169 +224,8 @@ def _foam_mb(scenario: Scenario) -> int:
     return 12 * numbers // 1_000_000
 
 
-def allowed_s(scenario: Scenario) -> float:
-    """Wall time on a machine slower than any measured."""
-    return planned_work(scenario) / SLOW_RATE / scenario.engine.ranks
-
-
-def planned_work(scenario: Scenario) -> float:
-    """Steps times grains in the box at the time, and again where windows are repeated."""
-    most = 1 if scenario.pattern is None else scenario.pattern.loop.most_passes
-    return min(most, PASSES) * grain_steps(build_program(scenario))
-
-
-def predicted_s(scenario: Scenario) -> float:
-    """Wall time at fixed speeds."""
-    in_3d = IN_3D if scenario.dimension == 3 else 1.0
-    of_core = registry.engine_of(scenario).GRAIN_STEPS_PER_S
-    return planned_work(scenario) / (of_core * scenario.engine.ranks * in_3d)
-
-
-def beside_s(scenario: Scenario) -> float:
-    """Time that does not grow with the grains: measuring, and the pattern a pass or a step."""
-    return (MEASURING_3D_S if scenario.dimension == 3 else 0.0) + _of_pattern_s(scenario)
-
-
-def _of_pattern_s(scenario: Scenario) -> float:
-    if scenario.pattern is None:
-        return 0.0
-    loop = scenario.pattern.loop
-    if loop.scheme == "in_step":
-        components = _stepped_components(scenario)
-        entry_s = STEPPED_CACHED_S if components <= STEPPED_CACHED else STEPPED_ENTRY_S
-        return planned_steps(scenario) * components**2 * entry_s
-    if not loop.has_windows:
-        return 0.0
-    return min(loop.most_passes, PASSES) * planned_s(scenario) / loop.window_s * PASS_S
-
-
 def _stepped_components(scenario: Scenario) -> int:
     """Components of the surface of a scenario's pattern."""
     from sandmould.pattern_fe.scene import pattern_of  # see resolved
 
     return pattern_of(scenario).surface.vertices_m.size
-
-
-def planned_s(scenario: Scenario) -> float:
-    """Fill, estimated, discharge, vibration and rest."""
-    return run_s(build_program(scenario))
-
-
-def planned_steps(scenario: Scenario) -> int:
-    """Time steps of a run: its fill and its rests, estimated, and its vibration."""
-    program = build_program(scenario)
-    return sum(math.ceil(stage_s(program, each) / scenario.step_s) for each in program.stages)
-
-
-def speed_class(scenario: Scenario) -> SpeedClass:
-    """Engine and dimension."""
-    return scenario.engine.name, scenario.dimension
-
-
-def plan_cells(scenario: Scenario) -> Mapping[str, str]:
-    """Grains, time step and steps."""
-    takes_step_of_bed = scenario.time_step.bed_fraction is not None
-    return {
-        "grains": f"{sum(plan_counts(scenario)):,}",
-        "time step": f"{scenario.step_s:.3g} s" + (" planned" if takes_step_of_bed else ""),
-        "steps": f"{planned_steps(scenario):,}",
-    }
-
-
-def notes(scenario: Scenario) -> list[Note]:
-    """How hard the bed is, obstacles thinner than a grain, and shells that were no cavities."""
-    smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
-    hardness = bed_hardness(scenario)
-    told = [Note(head, text, head) for head, text in hardness_lines(hardness)] if hardness else []
-    if rule := frequency_rule(scenario, hardness):
-        told.append(Note("frequency rule", rule, "Frequency"))
-    told += [Note(f"width of {name}", text) for name, text in narrow_spaces(scenario).items()]
-    if registry.calls_our_kernels(scenario) and not are_compiled("dem", _kernel_folder()):
-        text = (
-            "Sandmould's own code is not compiled on this machine yet. The first start compiles "
-            f"it: about {COMPILE_S:g} s of a core more, once."
-        )
-        told.append(Note("compiling", text))
-    told += _drive_notes(scenario)
-    if scenario.time_step.bed_fraction is not None:
-        text = (
-            "The price counts the planned time step. After the fill the step is "
-            f"{scenario.time_step.bed_fraction:g} of the exact limit of the filled bed. Nobody "
-            "knows that limit before; mostly it allows a longer step."
-        )
-        told.append(Note("time step of the bed", text))
-    solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
-    for solid in solids:
-        wall = thinnest_wall([solid], smallest_m)
-        if wall is not None:
-            place = ", ".join(number(float(x)) for x in wall.place_m)
-            text = (
-                f"{solid.name} has walls thinner than the smallest grain of "
-                f"{number(1e3 * smallest_m)} mm. The thinnest measures "
-                f"{number(1e3 * wall.thickness_m)} mm, at ({place}) m. A grain that is pressed in "
-                "by half of that comes out on the other side."
-            )
-            told.append(Note(f"walls of {solid.name}", text))
-    for i, obstacle in enumerate(scenario.obstacles):
-        if isinstance(obstacle, SolidMesh):
-            key = f"obstacles.{i}"
-            told += [
-                Note(f"drawing {key} {n}", text)
-                for n, text in enumerate(drawing_notes(obstacle, key))
-            ]
-    return [*told, *_pattern_notes(scenario)]
-
-
-def _drive_notes(scenario: Scenario) -> list[Note]:
-    """Accelerations that are hardly meant, such as after a slip in a unit."""
-    return [
-        Note(
-            f"acceleration {n}",
-            f"The box shakes at up to {number(stage.peak_acceleration_g)} g at "
-            f"{number(stage.frequency_hz)} Hz: check the amplitude and its unit.",
-        )
-        for n, stage in enumerate(scenario.vibrations)
-        if stage.unbalance is None and stage.peak_acceleration_g > HIGH_ACCELERATION_G
-    ]
-
-
-def _pattern_notes(scenario: Scenario) -> list[Note]:
-    """What was repaired in the drawing of a pattern, and how good its mesh is."""
-    if scenario.pattern is None or not isinstance(scenario.pattern.shape, PatternDrawing):
-        return []
-    from sandmould.pattern_fe.quality import mesh_sentence
-    from sandmould.pattern_fe.scene import pattern_of
-
-    said = [
-        *drawing_notes(scenario.pattern.shape, "pattern.shape"),
-        mesh_sentence(scenario, pattern_of(scenario)),
-    ]
-    return [Note(f"mesh of the pattern {n}", text) for n, text in enumerate(said)]
-
-
-PLANNING = Planning[Scenario](
-    work_unit="grain-steps",
-    resolved=resolved,
-    problems=problems,
-    engine_problem=registry.engine_problem,
-    measures=MEASURES,
-    sources=sources,
-    template_hash=template_hash,
-    computed_hash=computed_hash,
-    threads=threads,
-    ranks=ranks,
-    memory_mb=memory_mb,
-    allowed_s=allowed_s,
-    planned_work=planned_work,
-    predicted_s=predicted_s,
-    planned_s=planned_s,
-    speed_class=speed_class,
-    plan_cells=plan_cells,
-    fill=fill,
-    state_bytes=state_bytes,
-    beside_s=beside_s,
-    notes=notes,
-    settings_lines=table_lines,
-    speed=SPEED,
-    measuring=MEASURING,
-)

@@ -34,23 +34,23 @@ class SolidificationStudy(CastingStudy):
             yield Problem("reference", self.reference, f"a point of the sweep, such as {swept[0]}")
 
 
-def _planning() -> Planning[Solidification]:
-    from sandmould.kinds.solidification.planning import PLANNING
+def _open_planning() -> Planning[Solidification]:
+    from sandmould.kinds.solidification.planning import SolidificationPlanning
 
-    return PLANNING
-
-
-def _execution() -> Execution[Solidification]:
-    from sandmould.kinds.solidification.execution import EXECUTION
-
-    return EXECUTION
+    return SolidificationPlanning()
 
 
-SOLIDIFICATION = Kind(
+def _open_execution() -> Execution[Solidification]:
+    from sandmould.kinds.solidification.execution import SolidificationExecution
+
+    return SolidificationExecution()
+
+
+SOLIDIFICATION: Kind[Solidification] = Kind(
     name="solidification",
     scenario=Solidification,
     study=SolidificationStudy,
-    open_planning=_planning,
-    open_execution=_execution,
+    open_planning=_open_planning,
+    open_execution=_open_execution,
     material=MetalAndMould,
 )

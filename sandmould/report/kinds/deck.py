@@ -11,30 +11,30 @@ from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
 
-def _deck_notes(
-    scenario: OwnDeck, collected: Collected, seeks_best: bool, is_controlled: bool
-) -> tuple[str, ...]:
-    return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
+class DeckReport(KindReport[OwnDeck]):
+    """See ``KindReport``."""
 
+    def notes(
+        self, scenario: OwnDeck, collected: Collected, seeks_best: bool, is_controlled: bool
+    ) -> tuple[str, ...]:
+        """Whose deck it is."""
+        return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
 
-def _deck_pages(findings: Findings[OwnDeck]) -> KindPages:
-    scenario, collected = findings.scenario, findings.collected
-    curves = _deck_curves(scenario, collected.of_sweep, findings.verdict)
-    return KindPages(
-        "deck.html",
-        deck_method(scenario, collected.keys, collected.summary),
-        "the end of the deck's log",
-        (),
-        {"curves": curves},
-        curve_figures(curves),
-        grounds=scatter_ground(findings.verdict, "their seed", findings.study.seeks_best),
-    )
+    def pages(self, findings: Findings[OwnDeck], film_budget_bytes: int) -> KindPages:
+        """See ``KindPages``."""
+        scenario, collected = findings.scenario, findings.collected
+        curves = _deck_curves(scenario, collected.of_sweep, findings.verdict)
+        return KindPages(
+            "deck.html",
+            deck_method(scenario, collected.keys, collected.summary),
+            "the end of the deck's log",
+            {"curves": curves},
+            curve_figures(curves),
+            grounds=scatter_ground(findings.verdict, "their seed", findings.study.seeks_best),
+        )
 
 
 def _deck_curves(scenario: OwnDeck, collected: Collected, verdict: Verdict) -> tuple[Curve, ...]:
     """The objective first, then the other measures."""
     measures = dict.fromkeys([verdict.measure, *scenario.measures])
     return measure_curves(collected, verdict, list(measures), whole_conclusion)
-
-
-DECK_REPORT = KindReport(_deck_notes, _deck_pages)

@@ -10,41 +10,40 @@ from sandmould.scenario.flow import MetalFlow, StillTank
 from sandmould.study.collect import Collected
 
 
-def _flow_notes(
-    scenario: MetalFlow, collected: Collected, seeks_best: bool, is_controlled: bool
-) -> tuple[str, ...]:
-    """What the paper leaves open."""
-    gradient = (
-        "The gradient as printed, eq. (3), points the wrong way and makes every run fail. The "
-        f"gradient used here, {scheme_of(scenario).gradient}, is a choice."
-    )
-    if isinstance(scenario.case, StillTank):
-        return (gradient,)
-    return (
-        gradient,
-        "The paper gives neither the particle size in space nor the speed of the stream.",
-    )
+class FlowReport(KindReport[MetalFlow]):
+    """See ``KindReport``."""
 
+    def notes(
+        self, scenario: MetalFlow, collected: Collected, seeks_best: bool, is_controlled: bool
+    ) -> tuple[str, ...]:
+        """What the paper leaves open."""
+        gradient = (
+            "The gradient as printed, eq. (3), points the wrong way and makes every run fail. The "
+            f"gradient used here, {scheme_of(scenario).gradient}, is a choice."
+        )
+        if isinstance(scenario.case, StillTank):
+            return (gradient,)
+        return (
+            gradient,
+            "The paper gives neither the particle size in space nor the speed of the stream.",
+        )
 
-def _flow_pages(findings: Findings[MetalFlow]) -> KindPages:
-    scenario, of_sweep = findings.scenario, findings.collected.of_sweep
-    pages = flow_pages(
-        findings.study_folder, scenario, of_sweep, findings.verdict, findings.film_budget_bytes
-    )
-    return KindPages(
-        "flow.html",
-        flow_method(scenario, findings.collected.keys),
-        "the end of the run",
-        (),
-        {"pages": pages},
-        {
-            **pictures(stability_map=pages.map, fields=pages.fields),
-            **numbered("histories", (history.chart for history in pages.histories)),
-        },
-        answer=pages.answer,
-        grounds=pages.grounds,
-        steps=pages.steps,
-    )
-
-
-FLOW_REPORT = KindReport(_flow_notes, _flow_pages)
+    def pages(self, findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
+        """See ``KindPages``."""
+        scenario, of_sweep = findings.scenario, findings.collected.of_sweep
+        pages = flow_pages(
+            findings.study_folder, scenario, of_sweep, findings.verdict, film_budget_bytes
+        )
+        return KindPages(
+            "flow.html",
+            flow_method(scenario, findings.collected.keys),
+            "the end of the run",
+            {"pages": pages},
+            {
+                **pictures(stability_map=pages.map, fields=pages.fields),
+                **numbered("histories", (history.chart for history in pages.histories)),
+            },
+            answer=pages.answer,
+            grounds=pages.grounds,
+            steps=pages.steps,
+        )

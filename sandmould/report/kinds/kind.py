@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic
@@ -18,6 +18,7 @@ from sandmould.report.method import Row
 from sandmould.report.next_steps import NextStep
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sureness import Ground
+from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
@@ -26,19 +27,19 @@ from sandmould.study.collect import Collected
 class KindPages:
     """The part of a report that depends on what is simulated."""
 
-    template: str
+    template: str = "shell.html"
     """File of ``templates/report``."""
-    method: tuple[Row, ...]
-    ends: str
+    method: tuple[Row, ...] = ()
+    ends: str = "the end of the run"
     """When measures are taken, where the objective names no time."""
-    advice: tuple[str, ...]
-    """What follows the verdict."""
-    context: Mapping[str, Any]
+    context: Mapping[str, Any] = field(default_factory=dict)
     """What the template is given beside what all are given."""
     figures: Mapping[str, Chart | bytes] = field(default_factory=dict)
     """What is written as files too, by name."""
     beside: Mapping[str, str] = field(default_factory=dict)
     """Scripts for the folder ``SPHERES`` beside the page, by file name."""
+    advice: tuple[str, ...] = ()
+    """What follows the verdict."""
     answer: str = ""
     """Answers the title's question in one sentence; empty where the objective does."""
     grounds: tuple[Ground, ...] = ()
@@ -51,35 +52,67 @@ class KindPages:
 
 @dataclass(frozen=True)
 class Findings(Generic[ScenarioT]):
-    """What the pages of a kind are drawn from."""
+    """What a report is made from."""
 
     study_folder: Path
-    study: Study
-    scenario: ScenarioT
-    """Of the run that is shown."""
-    collected: Collected
-    verdict: Verdict
-    film_budget_bytes: int
-    """Most that the film of one run may weigh."""
     href: str
     """Address of the study's folder, seen from the report."""
-    by_setting: Mapping[str, ScenarioT]
-    """A scenario of each setting, by its label."""
+    study: Study
+    collected: Collected
+    verdict: Verdict
+    scenario: ScenarioT
+    """Of the run that is shown."""
+    by_setting: Mapping[str, tuple[ScenarioT, pd.DataFrame]]
+    """Scenario and rows of the summary of the settings that are listed, by label."""
+
+    @property
+    def scenarios(self) -> Mapping[str, ScenarioT]:
+        """A scenario of each of these settings, by its label."""
+        return {label: scenario for label, (scenario, _) in self.by_setting.items()}
 
 
-@dataclass(frozen=True)
 class KindReport(Generic[ScenarioT]):
-    """What reports of one kind of study say and show of their own."""
+    """What reports of one kind of study say and show of their own: nothing, unless it says so."""
 
-    notes: Callable[[ScenarioT, Collected, bool, bool], tuple[str, ...]]
-    """What the simulation leaves open; arguments are those of ``notes_of``."""
-    pages: Callable[[Findings[ScenarioT]], KindPages]
-    """What it draws."""
-    shows_drives: bool = False
-    """Whether settings are listed with the drive of a vibrating table."""
-    robustness: Callable[[Path, Study, Collected, ScenarioT], RobustnessPages | None] | None = None
-    """What its controls say; arguments are those of ``robustness_of``."""
-    mode: Callable[[ScenarioT, pd.DataFrame], BedMode | None] | None = None
-    """First mode of the bed, for a frequency; arguments are those of ``mode_of``."""
-    heaps: Callable[[Path, pd.DataFrame, Verdict, ScenarioT], tuple[Heap, ...]] | None = None
-    """Pictures of what was measured; arguments are those of ``heaps_of``."""
+    def pages(self, findings: Findings[ScenarioT], film_budget_bytes: int) -> KindPages:
+        """What it draws.
+
+        Parameters
+        ----------
+        findings : Findings
+        film_budget_bytes : int
+            Most that the film of one run may weigh.
+        """
+        return KindPages()
+
+    def notes(
+        self, scenario: ScenarioT, collected: Collected, seeks_best: bool, is_controlled: bool
+    ) -> tuple[str, ...]:
+        """What the simulation leaves open.
+
+        Parameters
+        ----------
+        scenario : scenario of the kind
+        collected : Collected
+        seeks_best, is_controlled : bool
+            Whether the study looks for the best setting; whether its controls have been run.
+        """
+        return ()
+
+    def drive(self, scenario: ScenarioT, runs: pd.DataFrame) -> BoxDrive | None:
+        """Drive of the vibrating table at a setting; parameters are those of ``drive_of``."""
+        return None
+
+    def robustness(self, findings: Findings[ScenarioT]) -> RobustnessPages | None:
+        """What its controls say."""
+        return None
+
+    def mode(self, findings: Findings[ScenarioT]) -> BedMode | None:
+        """First mode of the bed, for a frequency."""
+        return None
+
+    def heaps(
+        self, study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: ScenarioT
+    ) -> tuple[Heap, ...]:
+        """Pictures of what was measured; parameters are those of ``steepest_heaps``."""
+        return ()

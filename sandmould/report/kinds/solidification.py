@@ -15,36 +15,41 @@ from sandmould.statistics.verdict import Verdict, rank_runs
 from sandmould.study.collect import Collected
 
 
-def _solidification_notes(
-    scenario: Solidification, collected: Collected, seeks_best: bool, is_controlled: bool
-) -> tuple[str, ...]:
-    flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
-    return (flat,) if scenario.dimensions == 2 else ()
+class SolidificationReport(KindReport[Solidification]):
+    """See ``KindReport``."""
 
+    def notes(
+        self, scenario: Solidification, collected: Collected, seeks_best: bool, is_controlled: bool
+    ) -> tuple[str, ...]:
+        """What two dimensions leave out."""
+        flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
+        return (flat,) if scenario.dimensions == 2 else ()
 
-def _solidification_pages(findings: Findings[Solidification]) -> KindPages:
-    study, scenario, verdict = findings.study, findings.scenario, findings.verdict
-    of_sweep, keys = findings.collected.of_sweep, findings.collected.keys
-    # A study whose file is missing is read as one of sand.
-    reference = study.reference if isinstance(study, SolidificationStudy) else {}
-    best = _run_of(of_sweep.summary, verdict) if study.seeks_best else ""
-    pictured_run = choose_pictured_run(reference, of_sweep, best)
-    pages = solid_pages(findings.study_folder, reference, scenario, of_sweep, verdict, pictured_run)
-    return KindPages(
-        "solidification.html",
-        solid_method(scenario, keys),
-        "the end of the run",
-        (),
-        {"pages": pages},
-        {
-            **pictures(fields=pages.fields),
-            **numbered("error_cost", pages.error_cost),
-            **curve_figures(pages.curves),
-        },
-        answer="" if study.seeks_best else pages.answer,
-        grounds=pages.grounds,
-        steps=_steps(scenario, bool(pages.reference)),
-    )
+    def pages(self, findings: Findings[Solidification], film_budget_bytes: int) -> KindPages:
+        """See ``KindPages``."""
+        study, scenario, verdict = findings.study, findings.scenario, findings.verdict
+        of_sweep, keys = findings.collected.of_sweep, findings.collected.keys
+        # A study whose file is missing is read as one of sand.
+        reference = study.reference if isinstance(study, SolidificationStudy) else {}
+        best = _run_of(of_sweep.summary, verdict) if study.seeks_best else ""
+        pictured_run = choose_pictured_run(reference, of_sweep, best)
+        pages = solid_pages(
+            findings.study_folder, reference, scenario, of_sweep, verdict, pictured_run
+        )
+        return KindPages(
+            "solidification.html",
+            solid_method(scenario, keys),
+            "the end of the run",
+            {"pages": pages},
+            {
+                **pictures(fields=pages.fields),
+                **numbered("error_cost", pages.error_cost),
+                **curve_figures(pages.curves),
+            },
+            answer="" if study.seeks_best else pages.answer,
+            grounds=pages.grounds,
+            steps=_steps(scenario, bool(pages.reference)),
+        )
 
 
 def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...]:
@@ -59,6 +64,3 @@ def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...
 def _run_of(summary: pd.DataFrame, verdict: Verdict) -> str:
     """The best run of the objective; empty where none finished."""
     return rank_runs(summary, verdict.measure, verdict.better).get("best", "")
-
-
-SOLIDIFICATION_REPORT = KindReport(_solidification_notes, _solidification_pages)

@@ -13,7 +13,8 @@ from sandmould.kinds.registry import kind_of
 from sandmould.study.plan.fills import predicted_s
 
 START_S = 0.3
-"""What a run takes beside its steps: its process and its measures (docs/workflow_cost.md)."""
+"""What a run takes beside its steps: its process and its measures
+(docs/developers/workflow_cost.md)."""
 
 
 def is_done(folder: Path) -> bool:

@@ -97,7 +97,7 @@ def open_study(path: Path, text: str | None = None) -> OpenStudy:
     kind = _kind(files)
     problems = [p for f in files for p in _wrong_units(kind.study, f)]
     origin = Origin(file={"": file_name})
-    tree: Tree = {"scenario": kind.defaults()}
+    tree: Tree = {"scenario": kind.defaults}
     material = _material(files, kind)
     if material is not None and kind.material is not None:
         problems += _wrong_units(kind.material, material)

@@ -298,7 +298,7 @@ def test_the_page_says_what_was_measured(summary: Path, fake: Peer, tmp_path: Pa
     assert "| 25 | GrainLearning | nearest |" in text
     assert "| 25 | no method | nearest run |" in text
     assert "GrainLearning, 25 degrees, ended before the cap: two generations are enough." in text
-    assert f"environment of GrainLearning | numpy {np.__version__}" in text
+    assert f"- GrainLearning: numpy {np.__version__}" in text
     found_alone = "0.450 ± 0.200, 0.120 ± 0.050 | yes, 2.5 bits"
     row = f"| 0.400, 0.100 | 25.3, none | 25.1, 0.2 | {found_alone} | off the map | – |"
     assert row in text

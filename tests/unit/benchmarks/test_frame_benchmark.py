@@ -10,12 +10,17 @@ from typing import Any
 import pytest
 
 from benchmarks.frame import Benchmark, BenchmarkRun, Parts, benchmark, table
+from benchmarks.frame.benchmark import CODE, product_code
 from sandmould import ROOT
 
 PAGED = (
-    "agreement", "arpm", "at_rest", "calibration", "engines", "frequency_law", "mps", "prices",
-    "reliability", "scaling", "stability", "sweeps",
+    "agreement", "arpm", "at_rest", "calibration", "core_loop", "engines", "frequency_law",
+    "lammps_decks", "mps", "prices", "rebound", "reliability", "scaling", "size", "size_ratio",
+    "stability", "sweeps",
 )  # fmt: skip
+WRITTEN = (
+    "Written by `python -m benchmarks.theme`; do not edit. Measured at a commit that was not kept"
+)
 ORIGIN = {"commit": "abc", "machine": {"processor": "a core"}, "versions": {}}
 
 
@@ -56,7 +61,7 @@ class Theme:
         self.benchmark = Benchmark(
             str(folder / "theme" / "__main__.py"), "A theme.",
             parts={"first": self.first, "second": self.second},
-            pages={"theme.md": lambda results: f"{results['first']} {results['second']}\n"},
+            pages={"theme.md": lambda results: f"# T\n\n{results['first']} {results['second']}\n"},
             extent="all", quick="little",
         )  # fmt: skip
 
@@ -74,6 +79,7 @@ def theme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Theme:
     monkeypatch.setattr(benchmark, "SCRATCH", tmp_path / "scratch")
     monkeypatch.setattr(benchmark, "ROOT", tmp_path)
     monkeypatch.setattr(benchmark, "provenance", lambda scenario: dict(ORIGIN))
+    monkeypatch.setattr(benchmark, "product_code", lambda: "code")
     return Theme(tmp_path)
 
 
@@ -84,13 +90,15 @@ def test_a_stopped_benchmark_goes_on(theme: Theme, tmp_path: Path) -> None:
     theme.stops = False
     theme.benchmark.command([])
     assert theme.measured == ["first of all", "second"]
-    assert (tmp_path / "docs" / "theme.md").read_text() == "1 3\n"
+    page = (tmp_path / "docs" / "theme.md").read_text()
+    assert page == f"# T\n\n{WRITTEN}.\n\n1 3\n"
     # What is whole is measured anew, a part alone where it is named.
     theme.benchmark.command(["--part", "first"])
     results = json.loads((tmp_path / "theme" / "results.json").read_text())
-    assert results == {"first": 3, "second": 3}
+    assert results == {"first": 3, "second": 3, CODE: {"first": "code", "second": "code"}}
     theme.benchmark.command(["--page"])
-    assert (tmp_path / "docs" / "theme.md").read_text() == "3 3\n"
+    page = (tmp_path / "docs" / "theme.md").read_text()
+    assert page == f"# T\n\n{WRITTEN}.\n\n3 3\n"
     assert len(theme.measured) == 3
 
 
@@ -119,9 +127,25 @@ def test_a_quick_benchmark_leaves_the_committed_results_alone(theme: Theme, tmp_
 def test_no_page_is_written_before_all_is_measured(theme: Theme, tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="no page: second of"):
         theme.benchmark.command(["--part", "first"])
-    assert json.loads((tmp_path / "theme" / "results.json").read_text()) == {"first": 1}
+    kept = json.loads((tmp_path / "theme" / "results.json").read_text())
+    assert kept == {"first": 1, CODE: {"first": "code"}}
     with pytest.raises(SystemExit):
         theme.benchmark.command(["--part", "third"])
+
+
+@pytest.mark.parametrize("part", ["first", "second"])
+def test_a_page_says_that_a_part_is_of_older_code(theme: Theme, part: str) -> None:
+    codes = {"first": "code", "second": "code", part: "earlier"}
+    results = {"first": 1, "second": 3, "origin": {"commit": "abc"}, CODE: codes}
+    page = theme.benchmark.text("theme.md", results)
+    assert "Measured at commit abc with older code than that of today." in page
+    del results[CODE]
+    assert theme.benchmark.text("theme.md", results) == page
+
+
+@pytest.mark.slow
+def test_the_code_of_the_product_has_a_hash() -> None:
+    assert len(product_code()) == 12
 
 
 def test_a_table_has_a_line_a_row() -> None:
@@ -138,5 +162,6 @@ def test_pages_are_those_of_the_committed_results(name: str) -> None:
     path = Path(theme.main).with_name("results.json")
     results: dict[str, Any] = json.loads(path.read_text("utf-8")) if path.exists() else {}
     assert theme.theme == name
-    for page, text in theme.pages.items():
-        assert text(results) == (ROOT / "docs" / page).read_text(encoding="utf-8"), page
+    for page in theme.pages:
+        committed = (ROOT / "docs" / page).read_text(encoding="utf-8")
+        assert theme.text(page, results) == committed, page

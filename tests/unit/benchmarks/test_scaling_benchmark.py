@@ -86,7 +86,8 @@ def test_page_and_picture_are_made_from_numbers(found: dict[str, Any], tmp_path:
     assert "| one more point, to its report | 9.1 (5 runs) | 10.0 (5 runs) | – |" in text
     assert "| graph, collection and report, a run | 0.510 | 0.060 | 0.011 |" in text
     assert "33 kB and 5.5 ms of a core for each job" in text  # of three a run
-    assert "a run takes 1.92 s" in text  # in a shared job, without the start of Snakemake
+    # Without the start of Snakemake.
+    assert "one in shared jobs 1.92 s" in text
     assert "0 of 40 finished runs redone" in text
     draw(found, tmp_path / "scaling.png")
     assert (tmp_path / "scaling.png").stat().st_size > 1e4

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.engines.beds import Bed
 from benchmarks.engines.timing import median_interval
-from benchmarks.size.__main__ import BENCHMARK, copied, page
+from benchmarks.size.__main__ import copied, page
 from benchmarks.size.mesh import ellipsoid, round_pattern
-from sandmould import ROOT
-
-RESULTS = Path(BENCHMARK.main).with_name("results.json")
 
 
 @pytest.fixture
@@ -61,11 +56,6 @@ def test_the_interval_of_a_median_goes_by_ranks() -> None:
     found = median_interval(list(range(12, 0, -1)))
     assert found == {"median": 6.5, "low": 3.0, "high": 10.0}
     assert math.isnan(median_interval([1.0, 2.0])["high"])
-
-
-def test_the_committed_page_is_that_of_the_results() -> None:
-    results = json.loads(RESULTS.read_text(encoding="utf-8"))
-    assert (ROOT / "docs" / "size.md").read_text(encoding="utf-8") == page(results)
 
 
 def test_what_is_not_measured_is_told() -> None:

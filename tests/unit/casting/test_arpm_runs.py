@@ -3,17 +3,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sandmould.casting.arpm.contact_case import contact_elements
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.plates_case import plates_layout, read_plates
 from sandmould.casting.arpm.power_diagram import power_exchange
 from sandmould.casting.arpm.probes import probe_weights
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import UnstableError, solidify
 from sandmould.casting.arpm.super_steps import stage_weights
+from tests.verification.castings.contact import contact_elements
+from tests.verification.castings.plates import plates_layout, read_plates
 
 STEEL = ThermalMaterial("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
 SAND = ThermalMaterial("sand", 1600.0, 1130.0, 1.255)

@@ -13,7 +13,6 @@ from sandmould.casting.mps.particles import DUMMY, FLUID, WALL, at_rest, lattice
 from sandmould.casting.mps.pressure import ClosedRegionError
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.sources import SOURCES
-from sandmould.casting.mps.stability import run_still
 from sandmould.casting.mps.tank import still_tank
 from sandmould.casting.mps.viscosity import LAPLACIANS
 from sandmould.casting.mps.weight import make_kernel
@@ -66,8 +65,6 @@ def test_metals_and_kernels_that_cannot_be():
         make_kernel(2, SIZE_M, reach=1.0)
     with pytest.raises(ValueError, match="period"):
         make_kernel(2, SIZE_M, period_m=(4 * SIZE_M, 0.0, 0.0))
-    with pytest.raises(ValueError, match="duration"):
-        run_still(Scheme(), 0.0)
 
 
 def test_the_papers_tank_has_its_particles():

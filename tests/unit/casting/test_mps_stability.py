@@ -10,19 +10,16 @@ from sandmould.casting.mps.neighbours import find_candidates, find_neighbours
 from sandmould.casting.mps.particles import FLUID, at_rest, lattice
 from sandmould.casting.mps.probes import History, pressure_at, pressure_nearest
 from sandmould.casting.mps.scheme import Scheme
-from sandmould.casting.mps.stability import (
-    StabilityRating,
+from sandmould.casting.mps.stability import StabilityRating, rate_stability, still_hops
+from sandmould.casting.mps.tank import open_tank
+from sandmould.casting.mps.weight import make_kernel
+from tests.verification.castings.still_fluid import (
     compression_gain,
     ideal_pa,
     probe_places,
-    rate_stability,
     run_still,
-    stability_map,
-    still_hops,
     table_2,
 )
-from sandmould.casting.mps.tank import open_tank
-from sandmould.casting.mps.weight import make_kernel
 
 
 def history(deviation_pa: float, top_m: float) -> History:
@@ -58,18 +55,6 @@ def test_the_conditions_of_table_2():
     assert (first.dt_max_s, first.relaxations, first.source_share) == (1e-4, 1, 1.0)
     assert (last.dt_max_s, last.relaxations, last.source_share) == (2e-3, 10, 0.1)
     assert ideal_pa() == pytest.approx([735.0, 1225.0, 1715.0])
-
-
-def test_the_map_is_a_full_grid():
-    runs = list(stability_map((1e-3, 2e-3), (1, 2), (0.5,), duration_s=2e-3))
-    assert [(r.scheme.dt_max_s, r.scheme.relaxations) for r in runs] == [
-        (1e-3, 1),
-        (1e-3, 2),
-        (2e-3, 1),
-        (2e-3, 2),
-    ]
-    assert runs[1].name == "MR2-0.5"
-    assert all(run.verdict in StabilityRating for run in runs)
 
 
 def test_a_run_that_fails_says_why():

@@ -14,6 +14,7 @@ from sandmould.reference.new_answers import (
     WHY_HELD,
     NewStudy,
     applies,
+    engines,
     finer_scale,
     number_in,
     remarks,
@@ -31,9 +32,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("cavity", ["tube", "hole_up", "hole_down", "none"])
 def test_each_drive_with_each_cavity_plans(cavity: str) -> None:
     for hold in ("acceleration", "velocity", "displacement", "unbalance"):
-        for engine in (
-            ("reference", "lammps") if applies("engine", hold, cavity) else ("reference",)
-        ):
+        for engine in engines() if applies("engine", hold, cavity) else ["reference"]:
             path = Path(f"{hold}_{engine}.yaml")
             answers = {"hold": hold, "cavity": cavity, "engine": engine}
             found = NewStudy.model_validate(answers | {"sand_height_mm": 95.0})
@@ -111,6 +110,7 @@ def test_it_asks_what_is_held_first_and_asks_again_what_cannot_be_used() -> None
         (["--opening-mm", "1"], "--size-scale (its default) = 6.0 cannot be used: valid is less"),
         (["--amplitude-mm", "150", "--hold", "displacement"], "valid is a number of at most 100"),
         (["--cavity-depth-mm", "0.2 m"], "valid is less than 120 mm, so that it lies in the box"),
+        (["--engine", "liggghts"], "--engine = 'liggghts' cannot be used: valid is one of "),
         (["--width-mm", "0.2 km"], "valid is a number in mm or with its unit"),
     ],
 )

@@ -131,7 +131,7 @@ def test_a_module_tells_how_it_is_called(
 def test_the_process_that_renders_templates_says_that_it_is_started_by_us(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    path = ROOT / "sandmould" / "engines" / "own_deck" / "template_process.py"
+    path = ROOT / "sandmould" / "kinds" / "deck" / "own" / "template_process.py"
     for arguments in ([], ["--help"], ["one", "two", "three"]):
         assert str(end_of(path, arguments, monkeypatch)).startswith("usage: ")
 
@@ -155,7 +155,7 @@ def test_a_drawing_that_is_a_device_or_a_pipe(based_on: str, scene: str, elsewhe
         assert any("folder or a device" in line for line in lines), lines
 
 
-@pytest.mark.parametrize("module", ["simulate", "from_files", "records"])
+@pytest.mark.parametrize("module", ["simulate", "records"])
 def test_a_module_tells_of_a_folder_that_it_cannot_use(
     module: str, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -163,8 +163,7 @@ def test_a_module_tells_of_a_folder_that_it_cannot_use(
     Path("folder").mkdir()
     for name, content in JUNK.items():
         Path(name).mkdir()
-        for file in ("scenario.yaml", "pattern.yaml"):
-            Path(name, file).write_bytes(content)
+        Path(name, "scenario.yaml").write_bytes(content)
         Path(f"{name}.yaml").write_bytes(content)
     names = [f"{name}.yaml" if module == "records" else name for name in (*JUNK, "folder")]
     for name in (*names, "absent"):

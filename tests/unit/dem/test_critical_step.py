@@ -8,17 +8,13 @@ import numpy as np
 import pytest
 
 from sandmould.dem.contact_law import Law
-from sandmould.dem.critical_step import (
-    active_contacts,
-    grain_step,
-    simplified_step,
-    whole_step,
-)
+from sandmould.dem.critical_step import active_contacts, whole_step
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import NONE, Damping
 from sandmould.dem.solver import Solver
 from sandmould.dem.steps import DemScene
 from sandmould.dem.surfaces import Surfaces
+from tests.verification.grain_limits import grain_step, simplified_step
 
 K_N_M = 7e4
 MASS_KG = 2e-3

@@ -152,7 +152,7 @@ def test_vertices_reach_their_target_and_stay() -> None:
     surfaces = Surfaces(2)
     surfaces.add_facets("line", [(0, 0), (1, 0)], [(0, 1)])
     surfaces.add_facets("belt", [(0, 5), (1, 5)], [(0, 1)])
-    surfaces.set_belt("belt", (3.0, 0.0))
+    surfaces.arrays.vertex_velocity[2:] = (3.0, 0.0)
     arrays, before = surfaces.arrays, surfaces.arrays.vertices.copy()
     surfaces.set_motion("line", [(0, 0.3), (1, 0.6)], window_s=1.0, step_s=0.25)
     for _ in range(4):

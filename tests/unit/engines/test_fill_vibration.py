@@ -13,7 +13,7 @@ from sandmould.engines.box_motion import displacements
 from sandmould.engines.durations import grain_steps, stage_s
 from sandmould.engines.program import build_program
 from sandmould.engines.step_counts import StepCounts
-from sandmould.kinds.sand.planning import PLANNING
+from sandmould.kinds.sand.kind import SAND
 from sandmould.scenario.checks import problems
 from sandmould.scenario.fill import FillVibration
 from sandmould.study.plan.expand import expand
@@ -161,7 +161,7 @@ def test_runs_share_a_fill_that_vibrates_alike_and_no_other(tmp_path: Path) -> N
         "layer_s: 0.5}}}\nsweep: {keys: {fill.vibration.acceleration_g: [1.0, 1.5], "
         "vibration.0.frequency_hz: [40, 50]}}\n"
     )
-    runs, fills = share_fills(expand(open_study(path)), PLANNING)
+    runs, fills = share_fills(expand(open_study(path)), SAND.planning)
     assert len(fills) == 2
     for run in runs:
         acceleration = run.parameters["fill.vibration.acceleration_g"]

@@ -20,8 +20,7 @@ from sandmould.execution.screen.screen import Screen
 from sandmould.execution.screen.so_far import so_far_text
 from sandmould.execution.screen.table import counts_text, study_table
 from sandmould.execution.screen.view import RunView, StudyView
-from sandmould.kinds.sand import speed
-from sandmould.kinds.sand.speed import SPEED
+from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.kinds.stored_speed import STORED
 from sandmould.runs import words
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -170,8 +169,8 @@ def test_the_time_left_knows_a_speed_that_is_measured_after_the_first_line(
     monkeypatch.setattr("sandmould.execution.screen.screen.LINE_EVERY_S", 0.0)
     screen = Screen(plan, RESULTS, 2, live=False)
     screen.look()
-    monkeypatch.setattr(speed, "_measure_rate", lambda scenario: 1.0)  # a very slow machine
-    SPEED.measured(plan.runs[0].scenario, RESULTS)
+    monkeypatch.setattr(SandSpeed, "trial", lambda *_: 1.0)  # a very slow machine
+    SandSpeed().measured(plan.runs[0].scenario, RESULTS)
     screen.look()
     guessed, measured = capsys.readouterr().err.splitlines()
     assert guessed.endswith((" s left", " min left"))

@@ -13,7 +13,7 @@ import yaml
 
 from sandmould.engines.registry import deck_hash
 from sandmould.execution.status import run_status, status_text
-from sandmould.kinds.sand.planning import planned_work
+from sandmould.kinds.sand.kind import SAND
 from sandmould.runs.claim import CLAIM_FILE
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -49,7 +49,7 @@ def ended(plan: Plan, place: int, outcome: Outcome, wall_s: float) -> None:
               "template_sha256": deck_hash(run.scenario)}  # fmt: skip
     (folder / "provenance.json").write_text(json.dumps(origin))
     RunOutcome(outcome, "why it is so", 1.0, 1.0).write(folder / "outcome.json")
-    steps = planned_work(run.scenario)
+    steps = SAND.planning.planned_work(run.scenario)
     (folder / "cost.tsv").write_text(f"wall_s\tcpu_s\tgrain_steps\n{wall_s}\t{wall_s}\t{steps}\n")
 
 

@@ -14,6 +14,8 @@ from sandmould.kinds.kind import Kind
 from sandmould.kinds.registry import KINDS
 
 HOUSES = ("sandmould.analysis.", "sandmould.kinds.")
+COMPUTES = "sandmould.kinds.deck.own."
+"""What renders and runs a deck of the user's own, whose log has the measures."""
 DRAW_OR_DESCRIBE = (
     "plots", "flow_plots", "freezing_plots", "export", "bent_files", "kind", "measures",
 )  # fmt: skip
@@ -28,7 +30,7 @@ def imported(path: Path) -> Iterator[Path]:
             names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
         for name in names:
             file = ROOT / f"{name.replace('.', '/')}.py"
-            if name.startswith(HOUSES) and file.is_file():
+            if name.startswith(HOUSES) and not name.startswith(COMPUTES) and file.is_file():
                 yield file
 
 

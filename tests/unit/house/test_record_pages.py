@@ -42,7 +42,7 @@ def test_a_new_record_gets_a_page_that_keeps_what_is_written(tmp_path: Path) -> 
     page.write_text(written, encoding="utf-8")
     assert RecordPage(folder).text() == written
     assert RecordPage(folder).answer == "85 Hz is best."
-    assert "| runs | 32, all finished |" in written
+    assert "/tube_demo.yaml)): 32, all finished." in written
     assert "| [tube_demo](tube_demo/README.md) |" in index_text([RecordPage(folder)])
 
 

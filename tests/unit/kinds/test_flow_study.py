@@ -16,7 +16,7 @@ import yaml
 from sandmould.bad_input import BadInputError
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.scheme import Scheme
-from sandmould.casting.mps.stability import StabilityRating, table_2
+from sandmould.casting.mps.stability import StabilityRating
 from sandmould.casting.mps.stability_measures import by_window, measure_flow
 from sandmould.drawing.animation import ABSENT
 from sandmould.drawing.flow_film import make_flow_film
@@ -31,6 +31,7 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
 from sandmould.study.plan.price import Prices
+from tests.verification.castings.still_fluid import table_2
 
 TANK = {"kind": "tank", "particle_m": 0.004, "width_m": 0.016, "depth_m": 0.032}
 SHOULDER = {"kind": "shoulder", "particle_m": 0.00625}

@@ -10,8 +10,7 @@ import pytest
 import yaml
 
 from sandmould.bad_input import BadInputError
-from sandmould.kinds.deck import execution as deck_execution
-from sandmould.kinds.deck import planning as deck
+from sandmould.kinds.deck.kind import DECK
 from sandmould.kinds.deck.own.deck import check_unchanged, render, with_hashes
 from sandmould.kinds.deck.own.thermo import read_thermo
 from sandmould.report.page import write_report
@@ -172,7 +171,9 @@ def test_a_changed_template_is_another_run_and_stops_a_planned_one(tmp_path: Pat
     check_unchanged(after.scenario)
     with pytest.raises(BadInputError, match="plan the study again"):
         check_unchanged(before.scenario)
-    assert deck.computed_hash(before.scenario) == deck.computed_hash(after.scenario)
+    assert DECK.planning.computed_hash(before.scenario) == DECK.planning.computed_hash(
+        after.scenario
+    )
     assert with_hashes(before.scenario) == before.scenario
 
 
@@ -230,7 +231,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
             '{"code": 0, "detail": "", "simulated_s": 1.0, "planned_s": 0.0}'
         )
         (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
-        deck_execution.measure(run, of_run)
+        DECK.execution.measure(run, of_run)
         assert (of_run / "final.png").stat().st_size > 5000
     collect(folder)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
@@ -266,10 +267,10 @@ def test_a_deck_that_goes_on_too_far_has_failed(tmp_path: Path) -> None:
     runs = expand(open_study(opened(tmp_path, ONE_GRAIN, steps=100)))
     for run in (runs[0], runs[-1]):
         folder = tmp_path / "runs" / run.run
-        ended = deck_execution.compute(run, folder).outcome
+        ended = DECK.execution.compute(run, folder).outcome
         assert (ended.outcome, ended.detail) == (Outcome.FINISHED, "")
         # restart.b holds step 100: what is left to do is nothing, or 100 steps for `run 100`
-        ended = deck_execution.compute(run, folder).outcome
+        ended = DECK.execution.compute(run, folder).outcome
         if run is runs[-1]:
             assert ended.outcome is Outcome.FINISHED
         else:
@@ -288,4 +289,4 @@ def test_a_deck_that_ends_elsewhere_has_failed(tmp_path: Path) -> None:
     ):  # fmt: skip
         run = expand(open_study(opened(tmp_path, text, steps=steps)))[-1]
         folder = tmp_path / f"of_{steps}" / "runs" / run.run
-        assert deck_execution.compute(run, folder).outcome.detail == said
+        assert DECK.execution.compute(run, folder).outcome.detail == said

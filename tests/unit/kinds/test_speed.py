@@ -6,14 +6,15 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from sandmould import ROOT
 from sandmould.engines.session import Session
 from sandmould.kinds.registry import kind_of
-from sandmould.kinds.sand.speed import _measure_rate, _spent_s, _window_rate
-from sandmould.kinds.stored_speed import STORED, stored_speed
+from sandmould.kinds.sand.speed import SandSpeed, _spent_s, _window_rate
+from sandmould.kinds.stored_speed import STORED, StoredSpeed
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from tests.scenes import tube_scene
@@ -47,7 +48,9 @@ def test_an_engine_in_a_process_of_its_own_counts() -> None:
 
 
 @pytest.mark.slow
-def test_sand_that_settles_is_timed_while_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sand_that_settles_is_timed_while_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Each window has work, though a layer ends by itself after 2 s, before the last of them."""
     windows: list[float] = []
 
@@ -59,7 +62,7 @@ def test_sand_that_settles_is_timed_while_it_does(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("sandmould.kinds.sand.speed.WINDOWS", 16)
     coarse = {"sand": {"disc_thickness_m": 0.1}, "time_step": {"fraction": 0.8}}
     scene = tube_scene(engine={"name": "reference"}, vibration=[], **coarse)
-    rate = _measure_rate(scene)
+    rate = SandSpeed().trial(scene, tmp_path)
     assert rate is not None
     assert 0.0 < min(windows) <= rate <= max(windows)
 
@@ -78,11 +81,15 @@ def test_castings_are_priced_by_a_trial_on_this_machine(name: str, tmp_path: Pat
 def test_a_speed_is_measured_once_and_a_damaged_file_is_written_anew(tmp_path: Path) -> None:
     trials: list[str] = []
 
-    def trial(scenario: str) -> float | None:
-        trials.append(scenario)
-        return None if scenario == "fails" else 2.0
+    class Speed(StoredSpeed[Any]):
+        def computed_by(self, scenario: str) -> str:
+            return scenario
 
-    speed = stored_speed(lambda scenario: scenario, trial)  # type: ignore[arg-type, type-var]
+        def trial(self, scenario: str, results: Path) -> float | None:
+            trials.append(scenario)
+            return None if scenario == "fails" else 2.0
+
+    speed = Speed()
     assert speed.measured("fails", tmp_path) is None
     assert not (tmp_path / STORED).exists()
     for _ in range(2):

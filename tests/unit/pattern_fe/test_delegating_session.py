@@ -18,13 +18,8 @@ GIVEN: dict[str, tuple[Any, ...]] = {
     "set_state": (np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 3))),
     "start_stage": (Mock(),),
     "advance": (0.5,),
-    "vertex_loads": ("pattern",),
-    "move_surface": ("pattern", np.zeros((3, 2)), 0.1),
-    "restore_checkpoint": (Mock(),),
-    "attach_mover": ("pattern", Mock()),
     "write_checkpoint": (Path("folder"),),
     "share": ("value",),
-    "hold_rest": ("why",),
 }
 
 

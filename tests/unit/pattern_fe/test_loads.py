@@ -11,12 +11,20 @@ from numpy.typing import NDArray
 
 from sandmould.geometry.mesh import signed_volumes_m3
 from sandmould.geometry.mesh_file import read_surface
+from sandmould.pattern_fe.distance import Distance, distance_from_drawing
 from sandmould.pattern_fe.export import write_stl, write_surface
 from sandmould.pattern_fe.loads import pressure_above_and_below_pa, vertex_pressure_pa
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.perimeter import Perimeter
-from sandmould.pattern_fe.shapes import bar, frame, mesh_of
-from tests.patterns import FOOT, KINDS, _one_thread, l_pattern, pattern_of_kind  # noqa: F401
+from sandmould.pattern_fe.shapes import bar, mesh_of
+from tests.patterns import (
+    FOOT,
+    KINDS,
+    _one_thread,  # noqa: F401
+    frame,
+    l_pattern,
+    pattern_of_kind,
+)
 
 Array = NDArray[np.float64]
 
@@ -83,9 +91,14 @@ def test_uniform_pressure_is_found_at_flat_parts_edges_and_corners(kind: str) ->
     assert vertex_pressure_pa(surface, load) == pytest.approx(1500.0)
 
 
+def distance(pattern: Pattern, displacement_m: Array) -> Distance:
+    moved = pattern.surface.moved(pattern.on_surface(displacement_m))
+    return distance_from_drawing(pattern.surface, moved)
+
+
 def test_distance_counts_what_leaves_the_drawing_not_what_slides_along_it() -> None:
     pattern = Pattern(mesh_of(bar(0.02, 0.01), 0.01), FOOT, thickness_m=0.1)
-    found = pattern.distance(np.tile([1e-3, 0.0], (len(pattern.space.node_m), 1)))
+    found = distance(pattern, np.tile([1e-3, 0.0], (len(pattern.space.node_m), 1)))
     # of 12 vertices 5 mm apart, three on the right leave and one on the left goes inside
     assert found.largest_m == pytest.approx(1e-3)
     assert found.rms_m == pytest.approx(1e-3 * np.sqrt(4.0 / 12.0))
@@ -94,7 +107,7 @@ def test_distance_counts_what_leaves_the_drawing_not_what_slides_along_it() -> N
 
 def test_distance_from_a_drawing_with_a_hole_is_positive_in_the_hole() -> None:
     pattern = Pattern(mesh_of(frame(0.01, 0.06, 0.08), 0.01), FOOT, thickness_m=0.02)
-    found = pattern.distance(np.tile([1e-3, 0.0], (len(pattern.space.node_m), 1)))
+    found = distance(pattern, np.tile([1e-3, 0.0], (len(pattern.space.node_m), 1)))
     x, y = pattern.surface.vertices_m.T
     into = np.isclose(x, 0.01) & (y > 0.01 + 1e-9) & (y < 0.07 - 1e-9)  # left side of the hole
     assert found.vertex_m[into] == pytest.approx(1e-3)
@@ -103,7 +116,7 @@ def test_distance_from_a_drawing_with_a_hole_is_positive_in_the_hole() -> None:
 
 def test_distance_in_3d_is_that_to_the_nearest_triangle() -> None:
     pattern = pattern_of_kind("hexahedra", 1)
-    found = pattern.distance(0.05 * (pattern.space.node_m - 0.01))
+    found = distance(pattern, 0.05 * (pattern.space.node_m - 0.01))
     # a cube 5 % larger: corners sqrt(3)/2 mm away, faces 0.5 mm
     assert found.largest_m == pytest.approx(np.sqrt(3.0) * 0.5e-3)
     assert 0.5e-3 < found.rms_m < np.sqrt(3.0) * 0.5e-3
@@ -146,7 +159,7 @@ def test_fields_for_paraview_come_back(tmp_path: Path, kind: str) -> None:
     assert surface.point_data["pressure_pa"] == pytest.approx(1500.0)
     assert np.allclose(surface.points[:, :d], pattern.surface.vertices_m + on_surface)
     away_m = surface.point_data["distance_m"]
-    assert np.abs(away_m).max() == pytest.approx(pattern.distance(displacement).largest_m)
+    assert np.abs(away_m).max() == pytest.approx(distance(pattern, displacement).largest_m)
     write_surface(tmp_path / "bare.vtu", pattern.surface, on_surface)
     bare = meshio.read(tmp_path / "bare.vtu")
     assert set(bare.point_data) == {"displacement_m", "distance_m"}
@@ -171,7 +184,7 @@ def test_loads_of_a_wrong_shape_or_value_are_refused() -> None:
         pattern.solve_linear(load[:3])
     load[0, 0] = np.nan
     with pytest.raises(ValueError, match="component that is not finite"):
-        pattern.solve_nonlinear(load)
+        pattern.solve_large(load)
 
 
 def test_even_pressures_above_and_below_a_flange_are_found_again() -> None:

@@ -13,7 +13,8 @@ from skfem import MeshTet
 
 from sandmould.bad_input import BadInputError
 from sandmould.engines.program import build_program
-from sandmould.kinds.sand import planning as sand
+from sandmould.kinds.kind import BASE_MEMORY_MB
+from sandmould.kinds.sand.kind import SAND
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.opening import open_coupled
 from sandmould.pattern_fe.quality import mesh_sentence, tetrahedron_quality
@@ -45,7 +46,7 @@ def drawn(file: Path, unit_m: float = 1.0, **pattern: Any) -> Scenario:
 
 @pytest.mark.parametrize(("file", "unit_m"), [(BRACKET, 1e-3), (STEP, 1.0)])
 def test_a_drawn_bracket_is_foam_where_it_is_put(file: Path, unit_m: float) -> None:
-    scenario = sand.resolved(drawn(file, unit_m))
+    scenario = SAND.planning.resolved(drawn(file, unit_m))
     pattern, (mesh,) = pattern_of(scenario), scenario.scene.meshes
     np.testing.assert_array_equal(mesh.vertices_m, pattern.surface.vertices_m)
     # straight sides of 16 mm along a rim of 30 mm
@@ -56,10 +57,12 @@ def test_a_drawn_bracket_is_foam_where_it_is_put(file: Path, unit_m: float) -> N
     np.testing.assert_allclose(low_m - PLACE, [-0.03, -0.03, -0.008], atol=2e-3)
     assert scenario.pattern is not None
     assert len(getattr(scenario.pattern.shape, "sha256", "")) == 64
-    (note,) = [n.text for n in sand.notes(scenario) if n.about.startswith("mesh of the pattern")]
+    (note,) = [
+        n.text for n in SAND.planning.notes(scenario) if n.about.startswith("mesh of the pattern")
+    ]
     assert (note,) == drawing_sentences(scenario) == (mesh_sentence(scenario, pattern),)
     assert f"{pattern.space.mesh.nelements} tetrahedra of 16" in note
-    assert sand.memory_mb(scenario) > sand.BASE_MEMORY_MB
+    assert SAND.planning.memory_mb(scenario) > BASE_MEMORY_MB
 
 
 def test_a_turned_bracket_reaches_along_y() -> None:
@@ -134,14 +137,14 @@ def test_a_part_turned_inside_out_is_turned_and_that_is_told(tmp_path: Path) -> 
     meshio.stl.write(str(path), mesh, binary=True)
     scenario = with_surface(drawn(path, 0.03, supports={"clamped": ["bottom"]}))
     assert scenario.scene.meshes[0].measure == pytest.approx(0.03**3)
-    told = [note.text for note in sand.notes(scenario)]
+    told = [note.text for note in SAND.planning.notes(scenario)]
     assert any("pattern.shape had 12 triangles turned inside out" in text for text in told)
 
 
 def test_a_report_tells_a_drawing_that_has_changed(tmp_path: Path) -> None:
     path = tmp_path / "part.stl"
     meshio.stl.write(str(path), meshio.Mesh(CORNERS, [("triangle", FACETS)]), binary=True)
-    scenario = sand.resolved(drawn(path, 0.03, supports={"clamped": ["bottom"]}))
+    scenario = SAND.planning.resolved(drawn(path, 0.03, supports={"clamped": ["bottom"]}))
     taller = meshio.Mesh(CORNERS * [1.0, 1.0, 1.1], [("triangle", FACETS)])
     meshio.stl.write(str(path), taller, binary=True)
     assert drawing_sentences(scenario) == (
@@ -164,7 +167,7 @@ def test_a_plan_tells_what_a_surface_of_many_triangles_takes(
 
 
 def test_a_mesh_other_than_the_planned_one_does_not_start(tmp_path: Path) -> None:
-    scenario = sand.resolved(drawn(BRACKET, 1e-3))
+    scenario = SAND.planning.resolved(drawn(BRACKET, 1e-3))
     solid = scenario.obstacles[-1]
     assert isinstance(solid, Triangles)
     moved = tuple((x + 1e-6, y, z) for x, y, z in solid.vertices_m)

@@ -13,11 +13,19 @@ from skfem import MeshQuad, MeshTri
 
 from sandmould.pattern_fe.checks import check_inside, check_mesh
 from sandmould.pattern_fe.material import Foam
-from sandmould.pattern_fe.mesh_file import read_mesh, write_mesh
+from sandmould.pattern_fe.mesh_file import read_mesh
 from sandmould.pattern_fe.pattern import Pattern
-from sandmould.pattern_fe.shapes import bar, frame, l_shape, mesh_of, t_shape, with_sides
+from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, t_shape, with_sides
 from sandmould.pattern_fe.supports import Supports
-from tests.patterns import FOOT, KINDS, _one_thread, mesh_of_kind, pattern_of_kind  # noqa: F401
+from tests.patterns import (
+    FOOT,
+    KINDS,
+    _one_thread,  # noqa: F401
+    frame,
+    mesh_of_kind,
+    pattern_of_kind,
+    write_mesh,
+)
 
 
 @pytest.mark.parametrize(
@@ -277,7 +285,7 @@ def test_impossible_foam_is_refused(foam: dict[str, float], said: str) -> None:
 def test_statics_of_a_loose_pattern_is_refused(supports: Supports, said: str) -> None:
     pattern = pattern_of_kind("quadrilaterals", 1, supports)
     load = np.zeros_like(pattern.space.node_m)
-    for solve in (pattern.solve_linear, pattern.solve_nonlinear):
+    for solve in (pattern.solve_linear, pattern.solve_large):
         with pytest.raises(ValueError, match=said):
             solve(load)
 

@@ -9,9 +9,9 @@ import pytest
 
 from sandmould.bad_input import BadInputError
 from sandmould.pattern_fe.coupling.interface import with_surface
-from sandmould.pattern_fe.mesh_file import write_mesh
 from sandmould.pattern_fe.shapes import bar, mesh_of
 from sandmould.scenario.scenario import Scenario
+from tests.patterns import write_mesh
 
 BAR: dict[str, Any] = {
     "shape": {"kind": "bar", "width_m": 0.04, "height_m": 0.006},

@@ -15,16 +15,16 @@ from skfem import MeshTet
 from sandmould.bad_input import BadInputError
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.step_counts import StepCounts
-from sandmould.kinds.sand import planning as sand
+from sandmould.kinds.sand.kind import SAND
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.session import window_ends
-from sandmould.pattern_fe.mesh_file import write_mesh
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.pattern_fe.shapes import bar, mesh_of, with_sides
 from sandmould.scenario.checks import problems
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
+from tests.patterns import write_mesh
 
 L_SCENE: dict[str, Any] = {
     "box": {"width_m": 0.2, "height_m": 0.2},
@@ -216,7 +216,6 @@ def test_a_mesh_file_of_tetrahedra_meets_the_sand(tmp_path: Path) -> None:
             {"loop": {"scheme": "per_layer"}, "young_modulus_pa": 1e3},
             r"scheme = 'per_layer' .* for so soft a foam",
         ),
-        ({}, {"loop": {"exchange": "files"}}, r"loop.exchange = 'files' .* memory in 3D"),
         ({"engine": {"name": "liggghts"}, "frame": "box"}, {}, r"engine.name = 'liggghts' .* lamm"),
         ({"dimension": 2}, {"depth_m": 0.1, "position_m": [0.06, 0.0]}, r"depth_m = 0.1 .* null"),
     ],
@@ -254,9 +253,11 @@ def test_foam_that_keeps_its_volume_is_told(ratio: float) -> None:
 
 
 def test_another_foam_is_another_result() -> None:
-    one, other = (sand.resolved(l_scene(young_modulus_pa=e)) for e in (1e6, 2e6))
-    assert sand.computed_hash(one) != sand.computed_hash(other)
-    assert sand.template_hash(one) != sand.template_hash(one.model_copy(update={"pattern": None}))
+    one, other = (SAND.planning.resolved(l_scene(young_modulus_pa=e)) for e in (1e6, 2e6))
+    assert SAND.planning.computed_hash(one) != SAND.planning.computed_hash(other)
+    assert SAND.planning.template_hash(one) != SAND.planning.template_hash(
+        one.model_copy(update={"pattern": None})
+    )
 
 
 def test_windows_fill_a_record_with_whole_samples() -> None:
@@ -284,7 +285,6 @@ def test_windows_fill_a_record_with_whole_samples() -> None:
             "scheme = 'measured' .* valid is one_way, per_layer, fixed, ait",
         ),
         ("liggghts", {}, "pattern.loop.repeats = 12 cannot be used: valid is 0 on eng"),
-        ("lammps", {"scheme": "in_step", "exchange": "files"}, "exchange = 'files' .* no windows"),
     ],
 )
 def test_what_an_engine_cannot_couple_is_told(engine: str, loop: dict[str, Any], says: str) -> None:
@@ -292,10 +292,10 @@ def test_what_an_engine_cannot_couple_is_told(engine: str, loop: dict[str, Any],
     tree = {**L_SCENE, "engine": {"name": engine}, "frame": frame}
     tree["pattern"] = {**L_SCENE["pattern"], "loop": loop}
     with pytest.raises(BadInputError, match=says):
-        sand.resolved(Scenario.model_validate(tree))
+        SAND.planning.resolved(Scenario.model_validate(tree))
 
 
 def test_a_gate_beside_a_pattern_is_told() -> None:
     scenario = Scenario.model_validate({**L_SCENE, "discharge": {"gate": "gate"}})
     with pytest.raises(BadInputError, match=r"discharge.gate = 'gate' .* absent in a scene with"):
-        sand.resolved(scenario)
+        SAND.planning.resolved(scenario)

@@ -7,7 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sandmould.reference.contents import OF_STUDY
 from sandmould.report.page import write_report
+from sandmould.runs.columns import OF_RUN
 from tests.finished_study import FLOW, finished_study, study_text
 from tests.undescribed import undescribed
 
@@ -42,3 +44,8 @@ def test_each_file_and_column_of_a_finished_study_is_described(
     table = pd.read_csv(run / "measures.tsv", sep="\t").assign(colour="red")
     table.to_csv(run / "measures.tsv", sep="\t", index=False)
     assert undescribed(folder) == ["measures.tsv: colour", "notes.txt"]
+
+
+def test_names_that_own_measures_cannot_have_are_the_columns_of_the_tables() -> None:
+    tables = [file for file in OF_STUDY if file.name in ("runs.tsv", "summary.tsv", "curves.tsv")]
+    assert {c.name for file in tables for c in file.columns if "<" not in c.name} == OF_RUN

@@ -10,8 +10,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sandmould.bad_input import BadInputError
+from sandmould.kinds.sand.kind import SAND
 from sandmould.kinds.sand.measures import MEASURES
-from sandmould.kinds.sand.planning import resolved
 from sandmould.reference.reference import measures_text
 from sandmould.runs.hashing import said, scenario_hash
 from sandmould.runs.measures import measures_of
@@ -101,7 +101,7 @@ def test_a_mesh_bounds_a_cavity_and_its_hash_is_planned(tmp_path: Path) -> None:
     space = cavity_space(mesh, 3, "cavities.0")
     assert space.space.measure == pytest.approx(8e-6)
     assert_allclose(space.inward, [1, 0, 0])
-    (planned,) = resolved(Scenario(dimension=3, cavities=(mesh,))).cavities
+    (planned,) = SAND.planning.resolved(Scenario(dimension=3, cavities=(mesh,))).cavities
     assert isinstance(planned, MeshCavity)
     assert planned.sha256 is not None
 

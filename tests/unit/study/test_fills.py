@@ -13,7 +13,7 @@ import yaml
 from sandmould.definition.run import FILL
 from sandmould.execution.status import status_text
 from sandmould.execution.tidy import orphans
-from sandmould.kinds.sand.planning import PLANNING
+from sandmould.kinds.sand.kind import SAND
 from sandmould.report.tables import key_numbers
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, total_s
 from sandmould.runs.formatting import size_text
@@ -81,7 +81,7 @@ def test_scenes_without_vibration_share_none(tmp_path: Path) -> None:
         replace(run, scenario=run.scenario.model_copy(update={"vibration": ()}))
         for run in plan.runs
     ]
-    assert share_fills(still, PLANNING) == (still, [])
+    assert share_fills(still, SAND.planning) == (still, [])
 
 
 def test_the_cross_check_on_another_engine_fills_by_itself(tmp_path: Path) -> None:
@@ -116,7 +116,7 @@ def test_work_of_a_fill_is_counted_once(tmp_path: Path) -> None:
     assert text.splitlines()[1].startswith("fill ")
     assert "4 runs, " in text
     assert "The 4 runs start from 2 fills of the box. A fill is computed once" in text
-    room = size_text(sum(PLANNING.state_bytes(fill.scenario) for fill in plan.fills))
+    room = size_text(sum(SAND.planning.state_bytes(fill.scenario) for fill in plan.fills))
     assert f"Together the fills take about {room} of the disk." in text
 
 
@@ -166,7 +166,7 @@ def test_rounds_and_controls_of_the_vibration_go_on_from_the_fills_of_the_sweep(
     study = open_study(STUDIES[0] / "tube_certified.yaml")
     swept = expand(study)
     point = {FREQUENCY: 77.0}
-    runs, fills = share_fills(expand(study, [(point, 1)], (40.0, 80.0, 160.0)), PLANNING)
+    runs, fills = share_fills(expand(study, [(point, 1)], (40.0, 80.0, 160.0)), SAND.planning)
     of_sweep = {run.seed: run.fill for run in runs if run.part == "sweep"}
     assert len(of_sweep) == len({run.seed for run in swept})
     (added,) = (run for run in runs if run.parameters == point)

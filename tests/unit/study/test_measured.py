@@ -9,7 +9,7 @@ import pytest
 from sandmould import ROOT
 from sandmould.bad_input import BadInputError
 from sandmould.kinds.registry import KINDS
-from sandmould.reference.reference import PAGES, measures_text
+from sandmould.reference.reference import measures_text, pages
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -115,8 +115,8 @@ def test_every_kind_says_what_each_measure_means() -> None:
 
 def test_pages_are_in_step_with_the_code() -> None:
     refresh = "run `python -m sandmould.reference.reference` and commit the pages"
-    for path, page in PAGES.items():
-        assert path.read_text(encoding="utf-8") == page(), refresh
+    for path, text in pages().items():
+        assert path.read_text(encoding="utf-8") == text, refresh
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "config" / "scenarios").glob("*.yaml")))

@@ -17,8 +17,8 @@ from sandmould.bad_input import BadInputError
 from sandmould.definition.run import RUN_NAME, Run
 from sandmould.engines.durations import REST_AFTER_FALL_S, REST_AFTER_MOTION_S, run_s, stage_s
 from sandmould.engines.program import build_program
-from sandmould.kinds.sand import speed
-from sandmould.kinds.sand.planning import planned_steps, planned_work, predicted_s
+from sandmould.kinds.sand.planning import SandPlanning
+from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.kinds.stored_speed import STORED
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.placement import loose_height_m, plan_counts
@@ -33,6 +33,7 @@ from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
 from sandmould.study.plan.price import BEGIN_S, END_S, Prices
 
 LAMMPS = ("lammps", 2)
+SAND = SandPlanning()
 MEASURED = "at the speed measured on this machine"
 THREE = """\
 based_on: tube
@@ -122,11 +123,11 @@ def price_line(text: str) -> str:
 def test_plan_is_announced_without_an_engine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(speed, "_measure_rate", lambda scenario: pytest.fail("an engine started"))
+    monkeypatch.setattr(SandSpeed, "trial", lambda *_: pytest.fail("an engine started"))
     plan = open_plan(ROOT / "config" / "studies" / "tube_demo.yaml")
     assert price_line(announce(plan, tmp_path, 1)).endswith(", an estimate")
     assert not (tmp_path / STORED).exists()
-    monkeypatch.setattr(speed, "_measure_rate", lambda scenario: 1e7)
+    monkeypatch.setattr(SandSpeed, "trial", lambda *_: 1e7)
     assert capsys.readouterr().err == ""
     measure_speeds(plan, tmp_path)
     assert capsys.readouterr().err.startswith("Measuring the speed of this machine, once: about ")
@@ -179,8 +180,8 @@ def test_stages_are_falls_and_vibrations() -> None:
     lasting = [stage_s(program, stage) for stage in stages]
     assert lasting == pytest.approx(expected)
     steps = [time / scene.step_s for time in expected]
-    assert planned_steps(scene) == pytest.approx(sum(steps), abs=5)
-    assert planned_work(scene) == pytest.approx(300 * sum(steps[:2]) + 500 * sum(steps[2:]))
+    assert SAND.planned_steps(scene) == pytest.approx(sum(steps), abs=5)
+    assert SAND.planned_work(scene) == pytest.approx(300 * sum(steps[:2]) + 500 * sum(steps[2:]))
 
 
 def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
@@ -200,13 +201,13 @@ def test_settling_is_planned_no_longer_than_its_rule_allows() -> None:
 
 def test_price_of_an_unknown_machine_is_an_estimate(demo: list[Run]) -> None:
     last = price_line(plan_table(demo, Prices(), 1))
-    seconds = BEGIN_S + END_S + sum(START_S + predicted_s(r.scenario) for r in demo)
+    seconds = BEGIN_S + END_S + sum(START_S + SAND.predicted_s(r.scenario) for r in demo)
     assert last.startswith("9 runs")
     assert last.endswith(f"Wall time on 1 cores with report: {duration_text(seconds)}, an estimate")
 
 
 def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
-    total = sum(planned_work(r.scenario) for r in demo)
+    total = sum(SAND.planned_work(r.scenario) for r in demo)
     # times well inside the range of their unit: the sums above carry round-off
     table = plan_table(demo, Prices({LAMMPS: total / 9000}), 1)
     lines = table.splitlines()
@@ -219,7 +220,7 @@ def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
     halved = plan_table(demo, Prices({LAMMPS: total / 90_000}), 2)
     assert price_line(halved).endswith(f"on 2 cores with report: {longer}, {MEASURED}")
     # On more cores than runs the longest run decides.
-    longest = max(planned_work(r.scenario) for r in demo)
+    longest = max(SAND.planned_work(r.scenario) for r in demo)
     alone = duration_text(BEGIN_S + END_S + START_S + 300)
     shortest = plan_table(demo, Prices({LAMMPS: longest / 300}), 99)
     assert price_line(shortest).endswith(f"on 99 cores with report: {alone}, {MEASURED}")

@@ -13,9 +13,7 @@ from sandmould.kinds.sand.planning import (
     MEASURING_3D_S,
     PASS_S,
     PASSES,
-    beside_s,
-    planned_s,
-    planned_work,
+    SandPlanning,
 )
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.expand import expand
@@ -31,6 +29,7 @@ from sandmould.study.plan.price import (
     study_s,
 )
 
+SAND = SandPlanning()
 REFERENCE: SpeedClass = ("reference", 2)
 RATES = {REFERENCE: 1e7, ("lammps", 2): 1e6}
 
@@ -73,9 +72,9 @@ def test_a_study_has_its_start_and_its_report() -> None:
 
 def test_a_run_has_its_process_and_its_steps(demo: list[Run]) -> None:
     run = of_engine(demo, "reference")[0]
-    assert foretold_s(run, RATES) == pytest.approx(planned_work(run.scenario) / 1e7)
+    assert foretold_s(run, RATES) == pytest.approx(SAND.planned_work(run.scenario) / 1e7)
     assert Prices(RATES).piece(run).wall_s == pytest.approx(
-        START_S + planned_work(run.scenario) / 1e7
+        START_S + SAND.planned_work(run.scenario) / 1e7
     )
 
 
@@ -99,10 +98,10 @@ def test_one_odd_run_does_not_set_the_price(demo: list[Run]) -> None:
 
 def test_passes_of_a_pattern_take_time_whatever_the_grains() -> None:
     small = expand(open_study(ROOT / "config" / "studies" / "l_pattern_small.yaml"))[0].scenario
-    windows = planned_s(small) / small.pattern.loop.window_s
-    assert beside_s(small) == pytest.approx(PASSES * PASS_S * windows)
+    windows = SAND.planned_s(small) / small.pattern.loop.window_s
+    assert SAND.beside_s(small) == pytest.approx(PASSES * PASS_S * windows)
     sand = expand(open_study(ROOT / "config" / "studies" / "tube_demo.yaml"))[0].scenario
-    assert beside_s(sand) == 0.0
+    assert SAND.beside_s(sand) == 0.0
 
 
 def test_a_matrix_beyond_the_cache_costs_more_an_entry(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,7 +114,7 @@ def test_a_matrix_beyond_the_cache_costs_more_an_entry(monkeypatch: pytest.Monke
     costs_s: list[float] = []
     for components in (800, 1_600, 3_200):
         monkeypatch.setattr(planning, "_stepped_components", lambda _, n=components: n)
-        costs_s.append(beside_s(scenario) - MEASURING_3D_S)
+        costs_s.append(SAND.beside_s(scenario) - MEASURING_3D_S)
     assert costs_s[1] == pytest.approx(4 * costs_s[0])
     assert costs_s[2] > 12 * costs_s[1]
 

@@ -57,7 +57,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         When template or files are no longer those of the plan.
     """
     check_unchanged(scenario)
-    engine = deck_reader(scenario.engine.name)
+    engine, reader = engine_module(scenario.engine.name), deck_reader(scenario.engine.name)
     world = engine.communicator()
     is_root = world is None or world.rank == 0
     work = folder / "work"
@@ -90,7 +90,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         watch = _Watch(log, Progress(run, work, scenario.steps, "steps"), is_root)
         try:
             with watch:
-                engine.read_deck(output, _DECK, log)
+                reader.read_deck(output, _DECK, log)
             break
         except EngineStop as stop:
             if restart and read_thermo([log] if log.exists() else []).table.empty:
@@ -105,7 +105,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
             keep_found(study_folder, key, run, missing)
         if said := missing or _wrong_end(scenario, thermo, bool(restart)):
             outcome, detail = Outcome.BAD_INPUT, said
-    cost.version = str(engine_module(scenario.engine.name).installed_version())
+    cost.version = str(engine.installed_version())
     cost.grains = thermo.grains
     cost.steps, cost.grain_steps, cost.engine_wall_s = (
         thermo.steps, thermo.grain_steps, thermo.loop_s
