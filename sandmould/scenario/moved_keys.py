@@ -18,6 +18,7 @@ _SCHEME = {
     "source": "density", "gradient": "least", "laplacian": "lattice", "surface": 0.985,
     "courant": 0.1, "tolerance": 3e-3, "tension": False, "shifting": 0.0, "restitution": 0.2,
 }  # fmt: skip
+_TURNED = "absent: only a plate is turned; turn what a file draws in the drawing"
 _CYLINDER = "absent: the cylinder is the paper's, 180 mm high, 40 mm wide below and 25 mm above"
 REMOVED: dict[str, tuple[Any, str]] = {
     "cross_check": (None, _ABSENT),
@@ -43,8 +44,12 @@ REMOVED: dict[str, tuple[Any, str]] = {
     ),
     "scenario.cavities.angle_deg": (
         0.0,
-        "absent: a cavity that leans is of kind polygon in 2D and of kind mesh in 3D",
+        "absent: a cavity that leans is of kind polygon in 2D and drawn so, of kind mesh, in 3D",
     ),
+    "scenario.obstacles.angle_deg": (0.0, _TURNED),
+    "scenario.shapes.angle_deg": (0.0, _TURNED),
+    "scenario.pattern.shape.angle_deg": (0.0, _TURNED),
+    "scenario.pattern.loop.limit_share": (0.5, "absent: it is 0.5 in the scheme measured"),
     "scenario.pattern.loop.exchange": (
         "memory",
         "absent: sand and pattern always exchange loads and displacements in memory",

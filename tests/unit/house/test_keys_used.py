@@ -35,16 +35,11 @@ PHYSICS = {
     "Loop.mass_scale": "tests/verification/test_coupling_monolithic.py",
     "Loop.damping_ratio": "tests/verification/test_coupling_monolithic.py",
     "PatternConfig.depth_m": "tests/unit/pattern_fe/test_pattern_scene.py",
-    "PatternDrawing.angle_deg": "tests/unit/pattern_fe/test_pattern_drawing.py",
 }
 """Keys that no shipped study sets, each with the test that knows the exact answer."""
 EXEMPT = {
     "DeckStudy.trust_deck": "a shipped study that trusted decks would be copied with its trust",
 }
-LEAVING = {
-    "Loop.limit_share", "SolidMesh.angle_deg",
-}  # fmt: skip
-"""Keys that go with the exchange of loads by files."""
 STUDIES = (
     "config/studies", "config/scenarios", "config/materials", "benchmarks/reliability/studies",
 )  # fmt: skip
@@ -143,7 +138,7 @@ def test_every_key_stands_in_a_study_or_a_test_of_physics() -> None:
     users = {said(key): key for key in keys if not _is_planned(key)}
     ours = shipped()
     without = {name for name, key in users.items() if key not in ours}
-    assert without == PHYSICS.keys() | EXEMPT.keys() | LEAVING
+    assert without == PHYSICS.keys() | EXEMPT.keys()
     for name, file in PHYSICS.items():
         assert name.split(".")[1] in (ROOT / file).read_text(), file
 

@@ -32,6 +32,8 @@ CASES: list[tuple[str, str, Any, Any]] = [
     ("tank_small", "replicates", 1, 2),
     ("tank_small", "scenario.gradient", "least", "sum"),
     ("tank_small", "scenario.probes", [], [{"name": "a", "at_m": [0.01, 0.01]}]),
+    ("l_pattern", "scenario.pattern.loop.exchange", "memory", "files"),
+    ("l_pattern", "scenario.pattern.loop.limit_share", 0.5, 0.9),
     ("shoulder_pour", "scenario.case.starts", "empty", "full"),
     ("plates_small", "scenario.stepping", "local", "super"),
     ("plates_small", "scenario.refuse_ratio", True, False),

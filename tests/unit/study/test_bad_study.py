@@ -44,14 +44,13 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     ),
     "key that is no more": (
         "based_on: l_pattern\nscenario: {pattern: {loop: {exchange: files}}}",
-        "trial.yaml: scenario.pattern.loop.exchange = 'files' cannot be used: valid is nothing in "
-        "its place, for the key is no more: sand and pattern always exchange loads and "
-        "displacements in memory.",
+        "trial.yaml: scenario.pattern.loop.exchange = 'files' cannot be used: valid is absent: "
+        "sand and pattern always exchange loads and displacements in memory.",
     ),
     "swept key that is no more": (
         "based_on: l_pattern\nsweep: {keys: {pattern.loop.predicts: [true, false]}}",
         "trial.yaml: sweep.keys.pattern.loop.predicts = [True, False] cannot be used: valid is "
-        "nothing in its place, for the key is no more: shorter windows (pattern.loop.window_s) "
+        "absent: shorter windows (pattern.loop.window_s) "
         "follow a surface that moves.",
     ),
     "swept value": (
