@@ -31,7 +31,7 @@ from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
 from sandmould.runs.formatting import listed, name_of, number, setting_text
-from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 

@@ -13,11 +13,11 @@ from sandmould.execution.simulate import measure_run, render_run, simulate
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.columns import CLOCK
 from sandmould.runs.measures import measures_of
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
+from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solidification import Solidification
 from sandmould.study.plan.plan_files import write_plan
 from tests.hopper import DEEP, hopper_scene
 from tests.instep import bed_scene

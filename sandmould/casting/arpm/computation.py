@@ -30,7 +30,7 @@ from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, peak_memory_bytes
 from sandmould.runs.progress import Progress
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 
 PRODUCTS = ("series.tsv", "fields.npz")
 CHECKPOINT = "checkpoint.bin"

@@ -22,7 +22,7 @@ from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, peak_memory_bytes
 from sandmould.runs.progress import Progress
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 PRODUCTS = ("series.tsv", "fields.npz")
 CHECKPOINT = "checkpoint.bin"

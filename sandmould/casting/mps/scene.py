@@ -23,7 +23,7 @@ from sandmould.casting.mps.shoulder import (
     stream,
 )
 from sandmould.casting.mps.tank import open_tank
-from sandmould.scenario.flow import MetalFlow, ShoulderedCylinder, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, ShoulderedCylinder, StillTank
 
 FEWEST = 4
 """Particles across a tank or a bore."""

@@ -13,7 +13,7 @@ from sandmould.casting.mps import scene
 from sandmould.casting.mps.probes import History, window_means
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
 from sandmould.casting.mps.stability import StabilityRating, rate_stability, still_hops
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 NOISE_WINDOW_S = 0.01
 """A second deviation is taken of means over windows of this length: with c_poi = 1 fluid is thrown

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from sandmould.definition.study import CastingStudy, kind_key
 from sandmould.kinds.kind import Execution, Kind, Planning
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
 
 class FlowStudy(CastingStudy):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from sandmould.bad_input import Problem
 from sandmould.casting.mps.shoulder import PAPERS, POUR_M_S
 from sandmould.limits import FRAMES, PARTICLES, RECORDS
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 
 def limit_problems(scenario: MetalFlow) -> Iterator[Problem]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sandmould.casting.mps.scene import probes_of
 from sandmould.runs.measures import Measure, MeasureGroup, once
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
 MEASURES: tuple[MeasureGroup[MetalFlow], ...] = (
     MeasureGroup(

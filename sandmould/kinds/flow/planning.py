@@ -11,7 +11,7 @@ from sandmould.kinds.flow.limits import limit_problems
 from sandmould.kinds.flow.measures import MEASURES
 from sandmould.kinds.flow.speed import FlowSpeed
 from sandmould.kinds.kind import BASE_MEMORY_MB, Note, SpeedClass
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 PARTICLES_PER_MB = 300
 RECORD_BYTES = 28

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from sandmould.kinds.stored_speed import StoredSpeed
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
 TIMED_S = 0.5
 

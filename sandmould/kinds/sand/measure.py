@@ -42,7 +42,7 @@ from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.kinds.sand.outflow import add_outflow, measure_outflow
 from sandmould.runs.columns import OVERLAP_P99_FRACTION
 from sandmould.runs.files import replaced
-from sandmould.scenario.cavity_checks import free_share
+from sandmould.scenario.checks.cavities import free_share
 from sandmould.scenario.scenario import Scenario
 
 

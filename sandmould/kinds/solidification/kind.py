@@ -11,7 +11,7 @@ from sandmould.bad_input import Problem
 from sandmould.definition.study import CastingStudy, kind_key
 from sandmould.definition.sweep import points
 from sandmould.kinds.kind import Execution, Kind, Planning
-from sandmould.scenario.solidification import MetalAndMould, Solidification
+from sandmould.scenario.casting.solidification import MetalAndMould, Solidification
 
 
 class SolidificationStudy(CastingStudy):

@@ -6,7 +6,7 @@ from sandmould.casting.mps.scene import scheme_of
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.report.flow import flow_method, flow_pages
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 from sandmould.study.collect import Collected
 
 

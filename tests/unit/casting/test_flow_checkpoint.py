@@ -14,7 +14,7 @@ from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.products import Computed
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
 SHOULDER = {"kind": "shoulder", "particle_m": 0.00625, "rate_kg_s": 0.2}
 POURED = MetalFlow(case=SHOULDER, duration_s=0.02, record_s=0.005, relaxations=2)

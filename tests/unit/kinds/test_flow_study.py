@@ -25,7 +25,7 @@ from sandmould.report.flow import _hopping
 from sandmould.report.flow_map import _parts, condition_text, said_of, stability_map
 from sandmould.report.page import write_report
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study

@@ -22,7 +22,7 @@ from sandmould.scenario.cavities import (
     PolygonCavity,
     cavity_space,
 )
-from sandmould.scenario.cavity_checks import cavity_problems, free_share
+from sandmould.scenario.checks.cavities import cavity_problems, free_share
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.load_study import open_study
 from tests.unit.meshes import CORNERS, FACETS

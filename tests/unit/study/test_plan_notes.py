@@ -17,7 +17,7 @@ from sandmould.casting.arpm.estimates import cooled, freezes_s
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
 from sandmould.kinds.sand import notes as notes_of_sand
-from sandmould.scenario.wall_thickness import thinnest_wall
+from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
@@ -193,7 +193,7 @@ def test_estimate_sees_symmetry_and_is_near_the_run(element_m: float) -> None:
 
 
 def _steel(tree: dict[str, Any]) -> Any:
-    from sandmould.scenario.solidification import Solidification
+    from sandmould.scenario.casting.solidification import Solidification
 
     def values(node: Any) -> Any:
         if isinstance(node, dict):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from sandmould.scenario.casting_shapes import Place, Rectangle, Shape
+from sandmould.scenario.casting.shapes import Place, Rectangle, Shape
 from sandmould.scenario.quantity import NAME, PLANNED, Section, quantity
 from sandmould.scenario.sand import ARGUED
 
