@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from sandmould.bad_input import BadInputError
+from sandmould.definition.certificate import SEEDS
 from sandmould.execution import run_study
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
@@ -298,9 +299,9 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
     assert rows["run"].tolist() == computed
     assert (rows["part"][:22] == "sweep").all()
     held = rows[rows["part"] == "control: hold velocity"]
-    assert sorted(held[FREQUENCY]) == [low, low, high, high]
+    assert sorted(held[FREQUENCY]) == [low] * SEEDS + [high] * SEEDS
     swept = rows[rows["part"] == "sweep"]
-    assert all((swept[FREQUENCY] == f).sum() >= 2 for f in (low, best, high))
+    assert all((swept[FREQUENCY] == f).sum() >= SEEDS for f in (low, best, high))
     # Again: nothing is left to compute.
     many = len(computed)
     assert run_study.run_study(Path("trial.yaml"), []) == 0
