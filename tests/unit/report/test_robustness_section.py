@@ -114,7 +114,7 @@ def test_the_certificate_has_a_row_a_control_and_the_beds_spectrum(tmp_path: Pat
     names = [row[0].text for row in pages.table.rows]
     assert names == [
         "the sweep itself", "displacement held", "velocity held", "bed depth x0.5",
-        "bed depth x2", "time step x0.5", "engine lammps",
+        "bed depth x2", "time step x0.5", "engine reference",
     ]  # fmt: skip
     assert {row[-1].text for row in pages.table.rows[1:]} == {"stays"}
     assert pages.spring_table is not None

@@ -103,7 +103,7 @@ def test_planted_difference_between_engines_is_found(tmp_path: Path) -> None:
     assert judged[FILL, "lammps", "reference"] == "different"
     assert judged[FILL, "liggghts", "reference"] == "different"
     assert judged["solid_fraction", "lammps", "reference"] == "equivalent"
-    sentences = agreement_sentences(found, 0.9)
+    sentences = agreement_sentences(found)
     assert sentences == (
         "They differ by more than the margin in fill of the tube (lammps – reference and "
         "liggghts – reference), at 90 %.",
@@ -118,14 +118,14 @@ def test_engine_without_finished_runs_is_not_tested(tmp_path: Path) -> None:
     found = compare_study(collected.summary, collected.keys, read_study(folder))
     untested = [c for c in found if "liggghts" in (c.first, c.second)]
     assert {c.agreement.verdict for c in untested} == {"not tested"}
-    said = agreement_sentences(found, 0.9)
+    said = agreement_sentences(found)
     assert any(s.startswith("Not tested: solid fraction (2 of 3 pairs)") for s in said)
 
 
 def test_all_equivalent_is_said_in_one_sentence(tmp_path: Path) -> None:
     collected = gather(write_twins(tmp_path / "twins", EQUAL, DENSE))
     found = compare_study(collected.summary, collected.keys, read_study(tmp_path / "twins"))
-    assert agreement_sentences(found, 0.9) == (
+    assert agreement_sentences(found) == (
         "All 6 comparisons agree within the margins set beforehand, at 90 %.",
     )
 
