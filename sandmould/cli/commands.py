@@ -204,13 +204,13 @@ def tidy(
         typer.echo(f"{number} run folders removed, {size} freed")
 
 
-@app.command(epilog="Example: sandmould pack my_study.yaml -o runs.tar.xz")
+@app.command(epilog="Example: sandmould pack my_study.yaml -o runs.zip")
 def pack(
     study: StudyFile,
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", metavar="FILE", show_default="STUDY_runs.tar.xz",
+            "--output", "-o", metavar="FILE", show_default="STUDY_runs.zip",
             help="File to write; a folder takes one more, of the runs that no pack in it holds.",
         ),
     ] = None,
@@ -237,7 +237,7 @@ def pack(
     typer.echo(packed.text())
 
 
-@app.command(epilog="Example: sandmould unpack runs.tar.xz")
+@app.command(epilog="Example: sandmould unpack runs.zip")
 def unpack(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE...", help="What sandmould pack wrote.")

@@ -24,7 +24,8 @@ from sandmould import ROOT
 from sandmould.definition.run import Run
 from sandmould.definition.study import Study
 from sandmould.digest import digest
-from sandmould.execution.packs.pack import SUFFIX, packed_in
+from sandmould.execution.packs.archive import SUFFIX
+from sandmould.execution.packs.pack import packed_in
 from sandmould.execution.packs.recorded import RECORDS, record_part
 from sandmould.kinds.registry import kind_of
 from sandmould.module_main import run_main

@@ -151,7 +151,7 @@ def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
     for name, size in sizes.items():
         try:
             now = (folder / name).stat().st_size
-        except OSError:
+        except (OSError, ValueError):  # no file can have such a name
             return f"{name} is missing"
         if now != size:
             return f"{name} has {now} of {size} bytes"

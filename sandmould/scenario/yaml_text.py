@@ -115,6 +115,23 @@ def load_planned(text: str) -> Any:
     return yaml.load(text, Loader=_OF_THE_PLAN)
 
 
+def is_of_a_plan(text: bytes) -> bool:
+    """Whether a text that anybody may have written is one that ``load_planned`` can be given.
+
+    It is nested no deeper than a study, and no alias repeats a part of it.
+    """
+    depth = 0
+    try:
+        for event in yaml.parse(text, Loader=_OF_THE_PLAN):
+            opens = isinstance(event, yaml.CollectionStartEvent)
+            depth += opens - isinstance(event, yaml.CollectionEndEvent)
+            if depth > YAML_DEPTH.most or isinstance(event, yaml.AliasEvent):
+                return False
+    except (yaml.YAMLError, ValueError):
+        return False
+    return True
+
+
 def fault_of(error: Exception) -> str:
     """What a parser found, with its line, as a sentence without its full stop."""
     mark = getattr(error, "problem_mark", None)

@@ -7,14 +7,15 @@ damage would get past the outermost check.
 from __future__ import annotations
 
 import io
-import lzma
+import json
 import random
 import re
 import struct
-import tarfile
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
+
+from sandmould.digest import digest
 
 ODD_NUMBERS = (
     b"0", b"-1", b"1", b"nan", b"inf", b"-inf", b"1e308", b"-1e-320", b"9" * 40, b"2147483648",
@@ -28,6 +29,8 @@ ODD_WORDS = (
 ODD_BYTES = (0, 1, 0x7F, 0x80, 0xFF)
 _NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 _MOST_BYTES = 300_000
+PACKED = "manifest.json"
+"""List of the files of a pack of runs, with their sizes and hashes."""
 Mutation = Callable[[bytes, random.Random], bytes]
 
 
@@ -46,8 +49,6 @@ def mutated(data: bytes, others: Sequence[bytes], chance: random.Random) -> byte
         return _archive(data, chance)
     if data[:8] == b"\x89PNG\r\n\x1a\n" and chance.random() < 0.7:
         return _picture(data, chance)
-    if data[:6] == b"\xfd7zXZ\0" and chance.random() < 0.8:
-        return _pack(data, chance)
     for _ in range(chance.choice((1, 1, 1, 2, 3, 6))):
         if chance.random() < 0.1:
             other = chance.choice(others)
@@ -143,7 +144,7 @@ _TEXT: tuple[Mutation, ...] = (
 
 
 def _archive(data: bytes, chance: random.Random) -> bytes:
-    """An archive of arrays with one of them damaged, gone, renamed or exchanged."""
+    """An archive with one of its parts damaged, gone, renamed or exchanged."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     name = chance.choice(list(parts))
@@ -155,12 +156,28 @@ def _archive(data: bytes, chance: random.Random) -> bytes:
     elif how == 2:
         parts["other_" + name] = parts.pop(name)
     else:
-        parts[name] = chance.choice((*_BINARY, _odd_number))(parts[name], chance)
+        parts[name] = chance.choice(_BINARY + _TEXT)(parts[name], chance)
+    if PACKED in parts and chance.random() < 0.7:
+        parts[PACKED] = _listed_again(parts)
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for part, content in parts.items():
             archive.writestr(zipfile.ZipInfo(part), content)  # without the time of day
     return file.getvalue()
+
+
+def _listed_again(parts: dict[str, bytes]) -> bytes:
+    """List of the files of a pack with the sizes and hashes that they have now."""
+    try:
+        listed = json.loads(parts[PACKED])
+        listed["files"] = {
+            name.partition("/")[2]: {"size": len(part), "sha256": digest(part)}
+            for name, part in parts.items()
+            if name != PACKED
+        }
+    except (ValueError, TypeError, RecursionError):
+        return parts[PACKED]
+    return json.dumps(listed).encode()
 
 
 def _picture(data: bytes, chance: random.Random) -> bytes:
@@ -176,19 +193,3 @@ def _picture(data: bytes, chance: random.Random) -> bytes:
         struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
         for name, body in chunks
     )
-
-
-def _pack(data: bytes, chance: random.Random) -> bytes:
-    """A pack of runs with its archive or its index damaged, the sizes around it right again."""
-    try:
-        inner = lzma.decompress(data)
-        head = tarfile.TarInfo.frombuf(inner[:512], "utf-8", "strict")
-    except (lzma.LZMAError, tarfile.HeaderError):
-        return chance.choice(_BINARY)(data, chance)
-    if chance.random() < 0.3:
-        return lzma.compress(chance.choice(_BINARY)(inner, chance), preset=0)
-    index, rest = inner[512 : 512 + head.size], inner[512 + head.size + (-head.size % 512) :]
-    index = chance.choice(_TEXT)(index, chance)
-    head.size = len(index)
-    padded = index + bytes(-len(index) % 512)
-    return lzma.compress(head.tobuf(tarfile.USTAR_FORMAT) + padded + rest, preset=0)

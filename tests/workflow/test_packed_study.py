@@ -54,12 +54,12 @@ def test_half_a_study_and_a_whole_one_go_on_elsewhere(
     undisturbed = finished_study(Path("two.yaml"))
     first, second = (tmp_path / RESULTS / "two" / "runs" / run.run for run in undisturbed.runs)
     second.rename(tmp_path / "aside")
-    assert "two_runs.tar.xz: 1 runs, " in command("pack", "two.yaml")
+    assert "two_runs.zip: 1 runs, " in command("pack", "two.yaml")
     (tmp_path / "aside").rename(second)
 
     # Half of it is there: the other half alone is computed.
     here = go_to(tmp_path / "here", study)
-    assert command("unpack", "../two_runs.tar.xz") == "two: 1 runs taken\n"
+    assert command("unpack", "../two_runs.zip") == "two: 1 runs taken\n"
     taken = times(here)
     assert list(taken) == [first.name]
     run()
@@ -71,7 +71,7 @@ def test_half_a_study_and_a_whole_one_go_on_elsewhere(
     # All of it is there: nothing is computed, and report and tables are the same to the byte.
     command("pack", "two.yaml")
     there = go_to(tmp_path / "there", study)
-    assert command("unpack", "../here/two_runs.tar.xz") == "two: 2 runs taken\n"
+    assert command("unpack", "../here/two_runs.zip") == "two: 2 runs taken\n"
     taken = times(there)
     said = run()
     assert "Compute" not in said

@@ -312,7 +312,7 @@ def test_packed_runs_need_no_fill_and_its_cost_travels(
     summary = (folder / "summary.tsv").read_bytes()
     assert b"\tfill_cpu_s" in summary
     end = [*(folder / fill.place / END_CHECKPOINT).iterdir()]
-    small, whole = (pack(plan, RESULTS, Path(f"{name}.tar.xz"), checkpoints=name == "whole").path
+    small, whole = (pack(plan, RESULTS, Path(f"{name}.zip"), checkpoints=name == "whole").path
                     for name in ("small", "whole"))  # fmt: skip
     for path, checkpoints in ((small, False), (whole, False), (whole, True)):
         shutil.rmtree(RESULTS)

@@ -2,39 +2,45 @@
 
 from __future__ import annotations
 
-import collections
 import contextlib
-import itertools
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from sandmould.bad_input import BadInputError, Problem
+from sandmould.definition.run import FILL, FILLS, Run
 from sandmould.digest import file_digest
-from sandmould.execution.packs.archive import Archive
-from sandmould.execution.packs.index import (
+from sandmould.execution.packs.archive import (
     AT_END,
     OUTCOME_FILE,
+    SCENARIO_FILE,
     WORK,
-    Member,
-    PackedRun,
-    same_computation,
+    Pack,
+    PackedFile,
+    identity_of,
+    is_at_end,
+    open_pack,
+    reasons_lines,
 )
 from sandmould.execution.packs.rounds import merge_rounds
 from sandmould.execution.process import is_locked, take_turn
-from sandmould.runs.manifest import read_manifest, read_origin
-from sandmould.runs.outcome import RunOutcome
-from sandmould.study.plan.lacking import UNREADABLE
+from sandmould.kinds.registry import kind_of
+from sandmould.runs.checkpoint_folders import END_CHECKPOINT
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import DECK_FILE, read_origin
+from sandmould.runs.products import LAST_WORK
+from sandmould.scenario.yaml_text import is_of_a_plan
+from sandmould.study.plan.build_plan import writing
+from sandmould.study.plan.lacking import UNREADABLE, Need, lack_of, template_hashes
+from sandmould.study.plan.plan_files import read_run
+from sandmould.study.rounds.round_log import ROUNDS_FILE
 
-_PART = "unpacking.partial"
-"""Folder of a run that its files are written to until all are whole."""
 _COMPARED = ("series.tsv", "measures.tsv")
-_LISTED = 6
 _BUSY = "being computed here"
+_REMOVE = "remove its folder to take the packed one"
 
 
 @dataclass
@@ -43,8 +49,6 @@ class Unpacked:
 
     study: str
     taken: list[str] = field(default_factory=list)
-    fills: list[str] = field(default_factory=list)
-    """Those that runs share, each for its cost or whole."""
     checkpoints: list[str] = field(default_factory=list)
     there: list[str] = field(default_factory=list)
     """At their end here before."""
@@ -57,27 +61,13 @@ class Unpacked:
 
     def text(self) -> str:
         """What a person should know."""
-        parts = [f"{len(self.taken)} runs taken"]
-        if self.checkpoints:
-            parts.append(f"{len(self.checkpoints)} checkpoints taken")
-        if self.there:
-            parts.append(f"{len(self.there)} here already")
-        lines = [f"{self.study}: {', '.join(parts)}"]
-        if self.other_digits:
-            lines.append(
-                f"  computed here and there with other digits, ours stay: "
-                f"{_names(self.other_digits)}"
-            )
-        reasons: dict[str, list[str]] = {}
-        for run, why in self.left.items():
-            reasons.setdefault(why, []).append(run)
-        lines += [f"  not taken: {_names(runs)}, {why}" for why, runs in reasons.items()]
+        more = {"checkpoints taken": self.checkpoints, "here already": self.there}
+        parts = [f"{len(runs)} {what}" for what, runs in more.items() if runs]
+        lines = [", ".join([f"{self.study}: {len(self.taken)} runs taken", *parts])]
+        other = dict.fromkeys(self.other_digits, "ours stay")
+        lines += reasons_lines(other, "computed here and there with other digits")
+        lines += reasons_lines(self.left, "not taken")
         return "\n".join([*lines, *([f"  {self.rounds}"] if self.rounds else [])])
-
-
-def _names(runs: list[str]) -> str:
-    more = len(runs) - _LISTED
-    return ", ".join(runs[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def unpack(path: Path, results: Path, checkpoints: bool = False) -> Unpacked:
@@ -89,153 +79,132 @@ def unpack(path: Path, results: Path, checkpoints: bool = False) -> Unpacked:
     results : Path
         Folder of all results.
     checkpoints : bool
-        Whether runs that are not at their end are taken: engines read their files, so they should
-        come from somebody you trust.
+        Whether runs that are not at their end are taken, and the states of fills: engines read
+        their files, so they should come from somebody you trust.
 
     Raises
     ------
     BadInputError
-        Where the file is no pack of ours or is damaged. Runs before the damage are taken.
+        Where the file is no pack of ours or is damaged, or the disk takes no more. No run is taken
+        then.
     """
-    with open_pack(path) as archive:
-        folder = results / archive.index.study
-        turn = take_turn(folder)
-        try:
-            unpacked = Unpacked(archive.index.study)
+    with open_pack(path) as pack, take_turn(results / pack.study) or contextlib.nullcontext():
+        folder, unpacked = results / pack.study, Unpacked(pack.study)
+        chosen = [p for p in pack.runs if _is_wanted(pack, p, folder, checkpoints, unpacked)]
+        template_hash = template_hashes()
 
-            def wanted(name: str, run: PackedRun) -> bool:
-                place = folder / run.place(name)
-                if run.is_fill:
-                    return wants_fill(place)
-                return _is_wanted(place, run, checkpoints, unpacked)
+        def judge(place: str, part: Path) -> str:
+            return _judged(pack.study, place, part, template_hash)
 
-            place_runs(archive, folder, wanted, unpacked, checkpoints)
-            return unpacked
-        finally:
-            if turn:
-                turn.close()
+        take(pack, folder, chosen, judge, unpacked, states=checkpoints)
+        return unpacked
 
 
-@contextlib.contextmanager
-def open_pack(path: Path) -> Iterator[Archive]:
-    """Open a pack; what is wrong with it becomes one sentence."""
-    try:
-        with path.open("rb") as file:
-            yield Archive(path, file)
-    except ValueError as error:
-        valid = f"a whole pack of runs, as sandmould pack writes it: {error}"
-        raise BadInputError([Problem("FILE", str(path), valid)]) from None
-
-
-def place_runs(
-    archive: Archive,
+def take(
+    pack: Pack,
     folder: Path,
-    wanted: Callable[[str, PackedRun], bool],
+    places: Iterable[str],
+    judge: Callable[[str, Path], str],
     unpacked: Unpacked,
-    checkpoints: bool = False,
+    *,
+    states: bool = False,
 ) -> None:
-    """Put runs into the results of a study, each once all of its files are whole.
+    """Put runs and fills into ``results/<study>``, once the files of all are whole.
 
     Parameters
     ----------
-    archive : Archive
+    pack : Pack
     folder : Path
-        ``results/<study>``.
-    wanted : callable
-        Whether a run is taken, from its name and what the pack holds of it.
+    places : iterable of str
+    judge : callable
+        Why a run at its end that lies in a folder is not taken; empty where it is.
     unpacked : Unpacked
         Takes what became of each run.
-    checkpoints : bool
+    states : bool
         Whether a fill is taken with the state that runs go on from, or for its cost alone.
 
     Raises
     ------
-    ValueError
-        Where the archive is damaged.
-    BadInputError
-        Where it does not fit on the disk.
+    ValueError, BadInputError
+        Where the pack is damaged, or does not fit on the disk.
     """
-    index = archive.index
-    chosen = {name for name, run in index.runs.items() if wanted(name, run)}
-    needed = sum(index.runs[name].bytes for name in chosen)
-    folder.mkdir(parents=True, exist_ok=True)
-    if needed > (free := shutil.disk_usage(folder).free):
-        valid = f"a folder with {needed / 1e9:.1f} GB of room: it has {free / 1e9:.1f}"
-        raise BadInputError([Problem("results", str(folder), valid)])
-    for run, files in itertools.groupby(archive.members(), lambda item: item[0].run):
-        if run in chosen:
-            packed = index.runs[run]
-            if packed.is_fill and not checkpoints:
-                files = _of_its_cost(files)
-            _take(folder / packed.place(run), packed, files, unpacked)
-            chosen.remove(run)
-            continue
-        for _, chunks in files:
-            if run:
-                collections.deque(chunks, maxlen=0)
-            else:
-                unpacked.rounds = merge_rounds(b"".join(chunks), folder)
-        if not chosen:
-            return
-
-
-def take_rounds(archive: Archive, folder: Path) -> bool:
-    """Take the rounds of a pack alone; whether it has any."""
-    if archive.index.rounds:
-        _, chunks = next(archive.members())
-        merge_rounds(b"".join(chunks), folder)
-    return archive.index.rounds is not None
-
-
-def _of_its_cost(
-    files: Iterator[tuple[Member, Iterator[bytes]]],
-) -> Iterator[tuple[Member, Iterator[bytes]]]:
-    """Files of a fill that no engine reads."""
-    for member, chunks in files:
-        if member.path in AT_END:
-            yield member, chunks
-        else:
-            collections.deque(chunks, maxlen=0)
-
-
-def _take(
-    place: Path,
-    run: PackedRun,
-    files: Iterator[tuple[Member, Iterator[bytes]]],
-    unpacked: Unpacked,
-) -> None:
-    """Write a run's files beside what lies in its folder; once all are whole they move there."""
-    part = place / _PART
-    shutil.rmtree(part, ignore_errors=True)
-    try:
-        for member, chunks in files:
-            (part / member.path).parent.mkdir(parents=True, exist_ok=True)
-            with (part / member.path).open("wb") as out:
-                out.writelines(chunks)
-        if run.at_end:
-            _check(part, run)
-        if is_locked(place):
-            unpacked.left[place.name] = _BUSY
-        else:
-            _move(part, place)
-            ended = unpacked.fills if run.is_fill else unpacked.taken
-            (ended if run.at_end else unpacked.checkpoints).append(place.name)
-    finally:
+    part = folder / "unpacking.partial"
+    files = {
+        place: [path for path in pack.runs[place] if states or path in AT_END or not _fill(place)]
+        for place in places
+    }
+    needed = sum(pack.runs[place][path].size for place, paths in files.items() for path in paths)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(part, ignore_errors=True)
-        with contextlib.suppress(OSError):
-            place.rmdir()  # of a damaged pack nothing stays
+        if needed > (free := shutil.disk_usage(folder).free):
+            valid = f"a folder with {needed / 1e9:.1f} GB of room: it has {free / 1e9:.1f}"
+            raise BadInputError([Problem("results", str(folder), valid)])
+        try:
+            pack.extract({ROUNDS_FILE} & set(pack.listed.files), part)
+            for place, paths in files.items():
+                pack.extract((f"{place}/{path}" for path in paths), part)
+            if (part / ROUNDS_FILE).exists():
+                unpacked.rounds = merge_rounds((part / ROUNDS_FILE).read_bytes(), folder)
+            for place, paths in files.items():
+                at_end, name = OUTCOME_FILE in paths, Path(place).name
+                if why := (judge(place, part / place) if at_end else ""):
+                    unpacked.left[name] = why
+                elif is_locked(folder / place):
+                    unpacked.left[name] = _BUSY
+                else:
+                    _move(part / place, folder / place)
+                    if not _fill(place):
+                        (unpacked.taken if at_end else unpacked.checkpoints).append(name)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
 
 
-def _check(part: Path, run: PackedRun) -> None:
-    """See that a run is what the index says."""
+def unusable(run: Run, folder: Path, template_hash: Callable[[Run], str]) -> str:
+    """Why a start would compute a run at its end that lies in a folder; empty where it would not.
+
+    A fill without the state that runs go on from tells its cost alone.
+    """
+    if run.part != FILL or (folder / END_CHECKPOINT).exists():
+        lack = lack_of(run, folder, template_hash)
+        return f"a start would compute it: {lack.why}" if lack.need is Need.COMPUTE else ""
+    with contextlib.suppress(*UNREADABLE):
+        of = read_origin(folder)["scenario_sha256"]
+        if is_at_end(folder) and of == scenario_hash(run.scenario):
+            return ""
+    return "it is not told what it cost"
+
+
+def wants_fill(place: Path) -> bool:
+    """Whether a fill is taken: one that is here, or on its way, stays."""
+    return not (is_at_end(place) or (place / WORK).exists() or is_locked(place))
+
+
+def _judged(study: str, place: str, part: Path, template_hash: Callable[[Run], str]) -> str:
+    """Why a run is not taken that may come from anywhere.
+
+    Files that a scenario names are not opened: whether a deck of the user's own is the same is for
+    the start to say.
+    """
+    path = part / SCENARIO_FILE
     try:
-        RunOutcome.read(part / OUTCOME_FILE)
-        read_manifest(part)
-        same = same_computation(run, read_origin(part))
-    except UNREADABLE:
-        same = False
-    if not same:
-        raise ValueError(f"run {part.parent.name} is not what its index says")
+        if not is_of_a_plan(path.read_bytes()):
+            return f"its {SCENARIO_FILE} is not as a plan writes it"
+        run = read_run(path)
+    except (BadInputError, FileNotFoundError):
+        return f"its {SCENARIO_FILE} cannot be read by this version"
+    if (run.study, run.place) != (study, place):
+        return f"its {SCENARIO_FILE} is that of another run"
+
+    def stated(_: Run) -> str:
+        return str(read_origin(part)["template_sha256"])
+
+    own = kind_of(run.scenario).planning.program is not None
+    return unusable(run, part, stated if own else template_hash)
+
+
+def _fill(place: str) -> bool:
+    return place.startswith(f"{FILLS}/")
 
 
 def _move(part: Path, place: Path) -> None:
@@ -246,7 +215,8 @@ def _move(part: Path, place: Path) -> None:
     now = time.time()
     for path in part.rglob("*"):
         os.utime(path, (now, now))
-    for name in (OUTCOME_FILE, WORK, "last_work"):
+    place.mkdir(parents=True, exist_ok=True)
+    for name in (OUTCOME_FILE, WORK, LAST_WORK):
         _remove(place / name)
     for path in sorted(part.iterdir(), key=lambda path: path.name == OUTCOME_FILE):
         _remove(place / path.name)
@@ -254,59 +224,38 @@ def _move(part: Path, place: Path) -> None:
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+    shutil.rmtree(path, ignore_errors=True)
+    path.unlink(missing_ok=True)
 
 
-def _is_wanted(place: Path, run: PackedRun, checkpoints: bool, unpacked: Unpacked) -> bool:
-    """Whether a run is taken; why not goes to what became of it."""
-    name = place.name
-    if _at_end(place):
-        if not run.at_end:
-            unpacked.there.append(name)
-        elif not same_computation(run, _origin_or_none(place)):
-            unpacked.left[name] = (
-                "at its end here with another scenario, deck or solver: remove its folder to take "
-                "the packed one"
-            )
-        else:
-            unpacked.there.append(name)
-            if any(_differs(place / table, run) for table in _COMPARED):
-                unpacked.other_digits.append(name)
-    elif is_locked(place):
-        unpacked.left[name] = _BUSY
-    elif run.at_end:
-        return True
-    elif not checkpoints:
-        unpacked.left[name] = "not at its end: --checkpoints takes its checkpoint (docs/trust.md)"
-    elif (place / WORK).exists():
-        unpacked.left[name] = "begun here as well"
-    else:
-        return True
-    return False
-
-
-def wants_fill(place: Path) -> bool:
-    """Whether a fill is taken: one that is here, or on its way, stays."""
-    return not (_at_end(place) or (place / WORK).exists() or is_locked(place))
-
-
-def _at_end(place: Path) -> bool:
-    try:
-        RunOutcome.read(place / OUTCOME_FILE)
-    except UNREADABLE:
+def _is_wanted(pack: Pack, place: str, folder: Path, checkpoints: bool, unpacked: Unpacked) -> bool:
+    """Whether a run or a fill is taken; why a run is not goes to what became of it."""
+    files, here = pack.runs[place], folder / place
+    at_end, is_begun = OUTCOME_FILE in files, (here / WORK).exists()
+    if _fill(place):
+        return at_end and wants_fill(here)
+    same = pack.listed.identities.get(place) == identity_of(here)
+    if is_at_end(here) and (same or not at_end):
+        unpacked.there.append(here.name)
+        if any(_differs(here / table, files) for table in _COMPARED):
+            unpacked.other_digits.append(here.name)
         return False
-    return True
+    why = ""
+    if is_at_end(here):
+        why = f"at its end here with another scenario, deck or solver: {_REMOVE}"
+    elif is_locked(here):
+        why = _BUSY
+    elif at_end and is_begun and _differs(here / DECK_FILE, files):
+        why = f"begun here with another deck: {_REMOVE}"
+    elif not at_end and not checkpoints:
+        why = "not at its end: --checkpoints takes its checkpoint (docs/trust.md)"
+    elif not at_end and is_begun:
+        why = "begun here as well"
+    unpacked.left |= {here.name: why} if why else {}
+    return not why
 
 
-def _origin_or_none(place: Path) -> dict[str, Any]:
-    with contextlib.suppress(*UNREADABLE):
-        return read_origin(place)
-    return {}
-
-
-def _differs(table: Path, run: PackedRun) -> bool:
-    packed = run.files.get(table.name)
-    return packed is not None and table.is_file() and file_digest(table) != packed.sha256
+def _differs(path: Path, files: Mapping[str, PackedFile]) -> bool:
+    """Whether a file that is here is another in a pack."""
+    packed = files.get(path.name)
+    return packed is not None and path.is_file() and file_digest(path) != packed.sha256

@@ -306,13 +306,13 @@ def prepare(
 
 
 @contextlib.contextmanager
-def writing(folder: Path) -> Iterator[None]:
-    """Say in one sentence that results cannot be written."""
+def writing(folder: Path, key: str = "results") -> Iterator[None]:
+    """Say in one sentence that results cannot be written, or what else ``key`` names."""
     try:
         yield
     except OSError as error:
-        valid = f"a folder that takes files: {error.filename} does not ({error.strerror})"
-        raise BadInputError([Problem("results", str(folder), valid)]) from None
+        valid = f"a folder that takes files: {error.filename or 'it'} does not ({error.strerror})"
+        raise BadInputError([Problem(key, str(folder), valid)]) from None
 
 
 def price(plan: Plan, results: Path, cores: int) -> str:

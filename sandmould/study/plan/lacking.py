@@ -26,7 +26,7 @@ from sandmould.runs.manifest import (
 )
 from sandmould.runs.outcome import Outcome, RunOutcome
 
-UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError)
+UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError)
 """What reading a broken file may raise."""
 LISTED = 12
 _OF_ANY_COMPUTED = (OLDER_COST, "series.tsv")
