@@ -7,7 +7,7 @@ import numpy as np
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.scene import surroundings_of
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.pattern import MeshFile
 from sandmould.scenario.scenario import Scenario
 

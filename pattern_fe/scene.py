@@ -20,7 +20,7 @@ from sandmould.pattern_fe.checks import check_inside
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.mesh_file import read_mesh
 from sandmould.pattern_fe.pattern import Pattern
-from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, t_shape
+from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of
 from sandmould.pattern_fe.supports import Supports
 from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.pattern_fe.volume_mesh import drawing_mesh
@@ -158,12 +158,11 @@ def _mesh(config: PatternConfig, size_m: tuple[float, ...]) -> Any:
         depth_m = size_m[1] - config.position_m[1] if config.depth_m is None else config.depth_m
     if isinstance(shape, Bar):
         return mesh_of(bar(shape.width_m, shape.height_m), config.element_m, depth_m)
-    across_m = shape.reach_m if isinstance(shape, LShape) else shape.width_m
-    if shape.thickness_m >= min(shape.height_m, across_m):
-        valid = "below its height and its reach or width"
+    if shape.thickness_m >= min(shape.height_m, shape.reach_m):
+        valid = "below its height and its reach"
         raise ValueError(f"thickness is {shape.thickness_m:g} m, valid is {valid}")
-    make = l_shape if isinstance(shape, LShape) else t_shape
-    return mesh_of(make(shape.thickness_m, shape.height_m, across_m), config.element_m, depth_m)
+    rectangles = l_shape(shape.thickness_m, shape.height_m, shape.reach_m)
+    return mesh_of(rectangles, config.element_m, depth_m)
 
 
 @contextmanager

@@ -44,15 +44,6 @@ def l_shape(thickness_m: float, height_m: float, reach_m: float) -> list[Rectang
     ]
 
 
-def t_shape(thickness_m: float, height_m: float, width_m: float) -> list[Rectangle]:
-    """Stem in the middle under a flange of a width."""
-    middle_m = 0.5 * width_m
-    return [
-        (middle_m - 0.5 * thickness_m, 0.0, middle_m + 0.5 * thickness_m, height_m),
-        (0.0, height_m - thickness_m, width_m, height_m),
-    ]
-
-
 def mesh_of(rectangles: Sequence[Rectangle], element_m: float, depth_m: float | None = None) -> Any:
     """Mesh a union of rectangles that overlap or share sides.
 

@@ -13,7 +13,6 @@ from sandmould.geometry.mesher import is_step, step_tetrahedra, surface_tetrahed
 from sandmould.limits import SOLID_ELEMENTS
 from sandmould.pattern_fe.shapes import with_sides
 from sandmould.scenario.pattern import PatternDrawing
-from sandmould.scenario.solids import turn_about_vertical
 
 Array = NDArray[np.float64]
 _FILL = 5.0
@@ -48,7 +47,6 @@ def drawing_mesh(shape: PatternDrawing, drawn: TriangleMesh, size_m: float) -> A
     SOLID_ELEMENTS.check("pattern.element_m", _FILL * drawn.measure / size_m**3, size_m)
     if is_step(shape.path):
         nodes_m, tetrahedra = step_tetrahedra(shape.path, size_m)
-        nodes_m = nodes_m @ turn_about_vertical(shape).T
     else:
         nodes_m, tetrahedra = surface_tetrahedra(drawn.vertices_m, drawn.triangles, size_m)
     SOLID_ELEMENTS.check("pattern.element_m", len(tetrahedra), size_m)

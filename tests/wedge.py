@@ -84,7 +84,7 @@ def staggered(pattern: Pattern, scenario: Scenario, folder: Path, **changes: Any
     """The staggered loop of a scene."""
     values: dict[str, Any] = {
         "window_s": 2e-4, "scheme": "quasi_newton", "factor": 0.1, "least_factor": 1e-3,
-        "most_factor": 1.0, "limit_share": 0.5, "repeats": 0, "tolerance": 1e-9,
+        "most_factor": 1.0, "repeats": 0, "tolerance": 1e-9,
         "largest_displacement_m": 0.01,
     }  # fmt: skip
     # Unchecked: the limit of a factor may lie above 1, which no scenario may ask for.

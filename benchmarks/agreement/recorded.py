@@ -23,7 +23,6 @@ class Recorded:
     title: str
     replicates: int
     """Those of the record; the study may ask for others by now."""
-    confidence: float
     record: dict[str, Any]
     keys: tuple[str, ...]
     """Keys whose values are compared."""
@@ -33,7 +32,7 @@ class Recorded:
     @property
     def sentences(self) -> tuple[str, ...]:
         """Whether its settings agree."""
-        return agreement_sentences(self.compared, self.confidence)
+        return agreement_sentences(self.compared)
 
 
 def read_recorded(folder: Path) -> Recorded:
@@ -51,7 +50,6 @@ def read_recorded(folder: Path) -> Recorded:
         folder.name,
         study.title,
         summary[REPLICATE].nunique(),
-        study.equivalence.confidence,
         record,
         study.equivalence.keys,
         compare_study(summary, swept_keys(summary), study),

@@ -132,14 +132,13 @@ def page(records: Path = RECORDS) -> str:
         Naming the studies that have no record yet.
     """
     factors: list[Factor] = []
-    margins, confidences = set(), set()
+    margins = set()
     for recorded in read_all(records, STUDIES):
         summary = read_summary(records / recorded.name)
         factors += factors_of(recorded, summary, recorded.keys)
         margins |= {c.agreement.margin for c in recorded.compared if c.measure == MEASURE}
-        confidences.add(recorded.confidence)
-    (margin,), (confidence,) = margins, confidences  # one sentence holds for all
+    (margin,) = margins  # one sentence holds for all
     return render(Path(__file__).with_name("repose_settings.md.j2"), {
-        "factors": factors, "margin": margin, "confidence": confidence,
+        "factors": factors, "margin": margin,
         "number": number, "name_of": name_of,
     })  # fmt: skip

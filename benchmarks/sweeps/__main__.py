@@ -86,7 +86,7 @@ def _certified(scale: float, duration_s: float, replicates: int) -> dict[str, An
         scenario, [25, 35, 50, 70, 100, 140], replicates=replicates,
         equivalence={"margins": {"tube_fill_fraction": 0.03}},
         refine={"rounds": 1, "runs": 6, "interval": {FREQUENCY: 20}},
-        certificate={"controls": ["hold", "bed_depth"], "replicates": 3},
+        certificate={"controls": ["hold", "bed_depth"]},
     )  # fmt: skip
 
 

@@ -28,6 +28,8 @@ fast just because their residuals need not fall at every step. A surface that cr
 sand at rest has larger residuals than one that stands still, too: dashpots resist it."""
 _PARTS = (0.1, 0.5)
 """Least and greatest part of a way that led farther off, as line searches have them."""
+_LIMIT_SHARE = 0.5
+"""Of the limit 2 / (1 + gain), in the measured scheme."""
 _FILTER = 1e-2
 """Part of a change that must be new: below it is noise of the sand."""
 
@@ -69,13 +71,13 @@ class FixedRelaxation(Relaxation):
 class MeasuredRelaxation(FixedRelaxation):
     """A part of the limit 2 / (1 + g) of a fixed factor, for a gain that was measured."""
 
-    def __init__(self, first: float, least: float, most: float, limit_share: float) -> None:
+    def __init__(self, first: float, least: float, most: float) -> None:
         super().__init__(first)
-        self._least, self._most, self._limit_share = least, most, limit_share
+        self._least, self._most = least, most
 
     def set_limit(self, limit: float) -> None:
         """Take up the limit that a new gain sets."""
-        self.factor = float(np.clip(self._limit_share * limit, self._least, self._most))
+        self.factor = float(np.clip(_LIMIT_SHARE * limit, self._least, self._most))
 
     def state(self) -> dict[str, Array]:
         """The factor."""
@@ -240,9 +242,7 @@ def relaxation_of(loop: Loop) -> Relaxation:
     if loop.scheme in ("fixed", "per_layer"):
         return FixedRelaxation(loop.factor)
     if loop.scheme == "measured":
-        return MeasuredRelaxation(
-            loop.factor, loop.least_factor, loop.most_factor, loop.limit_share
-        )
+        return MeasuredRelaxation(loop.factor, loop.least_factor, loop.most_factor)
     if loop.scheme == "aitken":
         return AitkenRelaxation(loop.factor, loop.least_factor, loop.most_factor)
     return QuasiNewtonRelaxation(loop.factor, _COLUMNS, _FILTER)

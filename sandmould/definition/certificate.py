@@ -11,7 +11,6 @@ from pydantic import Field
 from sandmould.bad_input import Problem
 from sandmould.definition.sweep import Sweep, points
 from sandmould.scenario.box import Tube
-from sandmould.scenario.engine import EngineName
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.scenario import Scenario
@@ -22,6 +21,11 @@ Control = Literal[
     "spectrum",
 ]  # fmt: skip
 
+RATIO = 1.41
+"""Between neighbouring frequencies of the controls."""
+SEEDS = 4
+"""Of every control."""
+
 
 class RobustnessChecks(Section):
     """Controls at frequencies round the optimum, which tell the sand from the model."""
@@ -30,21 +34,11 @@ class RobustnessChecks(Section):
         (),
         "hold: the other amplitudes held constant. springs: springs of bed and walls x 0.25 and "
         "4, with each amplitude held, at seven frequencies. bed_depth: x 0.5 and 2. grain_scale: "
-        "x 0.75 and 1.5. tube_length: x 0.6 and 1.5. time_step: x 0.5. engine: another one. "
-        "spectrum: the bed's own frequencies, from a small shake.",
+        "x 0.75 and 1.5. tube_length: x 0.6 and 1.5. time_step: x 0.5. engine: lammps, or "
+        "reference in a study on lammps. spectrum: the bed's own frequencies, from a small shake. "
+        "Each is computed with four seeds at the best frequency, 1.41 times it and 1/1.41 of it.",
         source=ARGUED,
     )
-    ratio: float = quantity(
-        1.41,
-        "Each control is computed at three frequencies: the optimum, the optimum over this "
-        "number, and the optimum times it. The control springs also takes its second and third "
-        "power: seven frequencies.",
-        source=ARGUED,
-        gt=1,
-        le=4,
-    )
-    replicates: int = quantity(4, "Seeds of every control.", source=ARGUED, ge=2, le=100)
-    engine: EngineName = quantity("lammps", "Engine of the control engine.", source=ARGUED)
     sand_wave_speed: SandWaveSpeed | None = Field(
         None,
         description="Speed of compression waves in the real sand, with its source. An optimum that "
@@ -63,9 +57,9 @@ def frequency_among(keys: Sequence[str]) -> str:
     return key if key.endswith(".frequency_hz") else ""
 
 
-def round_best_hz(best_hz: float, ratio: float) -> tuple[float, ...]:
+def round_best_hz(best_hz: float) -> tuple[float, ...]:
     """Frequencies of the controls: the best in the middle."""
-    return tuple(float(f"{best_hz * by:.3g}") for by in (1 / ratio, 1.0, ratio))
+    return tuple(float(f"{best_hz * by:.3g}") for by in (1 / RATIO, 1.0, RATIO))
 
 
 def spanned_hz(certified_hz: Sequence[float]) -> dict[int, float]:
@@ -92,7 +86,7 @@ def provisional_hz(checks: RobustnessChecks, sweep: Sweep, scenario: Section) ->
     if not checks.controls:
         return ()
     swept = sorted(float(p[frequency_key(sweep)]) for p in points(sweep, scenario))
-    return round_best_hz(swept[len(swept) // 2], checks.ratio)
+    return round_best_hz(swept[len(swept) // 2])
 
 
 def problems(
@@ -115,8 +109,5 @@ def problems(
         where = f"certificate.controls.{i}"
         if control in checks.controls[:i]:
             yield Problem(where, control, "each control once")
-        if control == "engine" and checks.engine == scenario.engine.name:
-            valid = f"another engine than the study's own, {scenario.engine.name}"
-            yield Problem("certificate.engine", checks.engine, valid)
         if control == "tube_length" and not any(isinstance(o, Tube) for o in scenario.obstacles):
             yield Problem(where, control, "a control of what the scene has: there is no tube")

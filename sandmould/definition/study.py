@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
@@ -125,3 +125,17 @@ class Study(Section):
     def problems(self) -> Iterable[Problem]:
         """What is wrong with the sections that only its kind has, where the sweep is sound."""
         return ()
+
+
+class StudyBesideSand(Study):
+    """A study of a kind that has none of the sections that change a scene of sand."""
+
+    cross_check: ClassVar[CrossCheck | None] = None  # type: ignore[misc]
+    certificate: ClassVar[RobustnessChecks] = RobustnessChecks()  # type: ignore[misc]
+    calibration: ClassVar[Calibration] = Calibration()  # type: ignore[misc]
+
+
+class CastingStudy(StudyBesideSand):
+    """A study in which nothing is drawn by lot: a setting is one run."""
+
+    replicates: ClassVar[int] = 1  # type: ignore[misc]

@@ -266,7 +266,9 @@ def _paths(sweep: Sweep, scenario: Section) -> Iterator[Problem]:
         except KeyError:
             near = difflib.get_close_matches(key, list(key_paths(base)), n=3, cutoff=0.5)
             keys = f"nearest are {', '.join(near)}" if near else "such as sand.size_scale"
-            valid = instead_of(key.split(".")) or f"a key of the scenario; {keys}"
+            parts = ["scenario", *key.split(".")]
+            told = (instead_of(parts[:n]) for n in range(2, len(parts) + 1))
+            valid = next(filter(None, told), f"a key of the scenario; {keys}")
             yield Problem(where, stated, valid)
         inside = [k for k in sweep.swept if k.startswith(key + ".")]
         if inside:

@@ -47,12 +47,9 @@ def cut_m(scenario: Scenario) -> float | None:
     """Where a 3D scene is cut open, y in m: at a tube, cavity, mesh or round solid, or midway."""
     if scenario.dimension == 2:
         return None
-    tubes = [o for o in scenario.obstacles if isinstance(o, Tube)]
-    if tubes and tubes[0].axis_y_m is not None:
-        return tubes[0].axis_y_m
     spaces = [cavity.space for cavity in scenario.scene.cavities]
     solids = [*spaces, *(s for s in scenario.scene.solids if not isinstance(s, Block))]
-    if not tubes and solids:
+    if solids and not any(isinstance(o, Tube) for o in scenario.obstacles):
         y = solids[0].corners()[:, 1]
         return 0.5 * float(y.min() + y.max())
     return scenario.box.depth_m / 2

@@ -15,6 +15,9 @@ from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 
+ENERGY_FACTOR = 5.0
+"""Kinetic energy, over the most that the fall and the vibration can give, that stops a run."""
+
 
 @dataclass(frozen=True)
 class Health:
@@ -84,7 +87,7 @@ class Guard:
         fastest = max((math.hypot(*g.velocity_m_s) for g in s.fill.grains if g.velocity_m_s),
                       default=0.0)  # fmt: skip
         bound = mass * (s.gravity_m_s2 * top + 2 * wall**2 + 0.5 * fastest**2)
-        self._energy_bound_j = s.guard.kinetic_energy_factor * bound
+        self._energy_bound_j = ENERGY_FACTOR * bound
 
     def check(self, snapshot: Snapshot) -> Health:
         """Measure a snapshot.

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.box import Piston
-from sandmould.scenario.discharge import Discharge
+from sandmould.scenario.discharge import FLOW_SETTLING, Discharge
 from sandmould.scenario.fill import FillVibration, Settling
 from sandmould.scenario.placement import PlannedLayer, plan_counts, plan_layer, portion_of
 from sandmould.scenario.scenario import Scenario
@@ -70,7 +70,7 @@ class Stage:
     def longest_key(self) -> str:
         """Key of the scenario that limits the time in which the sand must come to rest."""
         if self.kind is StageKind.DISCHARGE:
-            return "discharge.settling.longest_s"
+            return "discharge.duration_s"
         if self.kind is StageKind.REST and self.number:
             return f"vibration.{self.number - 1}.longest_s"
         return "fill.settling.longest_s"
@@ -145,7 +145,7 @@ def _flow(scenario: Scenario, discharge: Discharge) -> Iterator[Stage]:
     if opening:
         yield Stage(StageKind.OPEN, slides=gate, steps=opening, duration_s=opening_s)
     if duration_s is None:
-        yield Stage(StageKind.DISCHARGE, opens=gate, settling=discharge.settling)
+        yield Stage(StageKind.DISCHARGE, opens=gate, settling=FLOW_SETTLING)
     else:
         steps, left_s = counts.steps(duration_s) - opening, duration_s - opening_s
         yield Stage(StageKind.DISCHARGE, opens=gate, steps=steps, duration_s=left_s)

@@ -16,12 +16,12 @@ from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, SandSession
+from sandmould.scenario.checks.unbalance import unbalance_key
 from sandmould.scenario.engine import ENGINE_NAMES, DeckReader, EngineName
 from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh
-from sandmould.scenario.unbalance_checks import unbalance_key
 
 _OF_EVERY_ENGINE = (
     "scenario/placement.py", "engines/program.py", "engines/step_counts.py",

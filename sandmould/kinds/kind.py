@@ -26,8 +26,6 @@ AnyScenario = Section
 ScenarioT = TypeVar("ScenarioT", bound=Section)
 SpeedClass = tuple[str, int]
 """Engine and dimension: what the speed of a core depends on most."""
-OF_SAND = ("cross_check", "calibration", "certificate")
-"""Sections of a study that speak of sand."""
 CORE_SECONDS = "core-seconds"
 BASE_MEMORY_MB = 600
 """Python and its libraries."""
@@ -112,10 +110,6 @@ class Planning(ABC, Generic[ScenarioT]):
     def engine_problem(self, scenario: ScenarioT) -> Problem | None:
         """Why this machine cannot compute it."""
         return None
-
-    def vibration_s(self, scenario: ScenarioT) -> float:
-        """Time of vibration, over which measures are taken; 0 where they are those of the end."""
-        return 0.0
 
     def template_hash(self, scenario: ScenarioT) -> str:
         """Hash of all that turns a scenario into a deck, and of our solver where it takes part."""
@@ -249,8 +243,6 @@ class Kind(Generic[ScenarioT]):
     open_execution: Callable[[], Execution[ScenarioT]]
     material: type[Section] | None = None
     """What a material file holds for it; None where it has none."""
-    absent: tuple[str, ...] = OF_SAND
-    """Sections that a study of this kind does not have."""
     draws_by_lot: bool = False
     """Whether runs of other seeds differ, so that replicates tell something."""
     labels_have_units: bool = True

@@ -18,6 +18,7 @@ from sandmould.statistics.agreement import (
     interval_text,
     speeds,
 )
+from sandmould.statistics.equivalence import PERCENT
 from sandmould.study.collect import Collected, compare_study
 
 _TINTS = {
@@ -64,26 +65,24 @@ def agreement_pages(collected: Collected, study: Study) -> AgreementPages | None
     compared = compare_study(collected.summary, collected.keys, study)
     if not compared:
         return None
-    confidence = study.equivalence.confidence
-    percent = f"{100 * confidence:g} %"
     return AgreementPages(
-        sentences=agreement_sentences(compared, confidence),
+        sentences=agreement_sentences(compared),
         sound=all(c.agreement.verdict == "equivalent" for c in compared),
         is_question=bool(study.equivalence.keys),
-        table=_table(compared, percent),
+        table=_table(compared),
         charts=tuple(_chart([c for c in compared if c.measure == m])
                      for m in dict.fromkeys(c.measure for c in compared)),
         speeds=_speed_table(collected.summary),
-        percent=percent,
+        percent=PERCENT,
         over=listed([name_of(key) for key in study.equivalence.over]),
     )  # fmt: skip
 
 
-def _table(compared: Sequence[Compared], percent: str) -> Table:
+def _table(compared: Sequence[Compared]) -> Table:
     columns = (
         Column("measure", False),
         Column("compared", False),
-        *map(Column, ("first", "second", "difference", f"{percent} interval", "margin", "n")),
+        *map(Column, ("first", "second", "difference", f"{PERCENT} interval", "margin", "n")),
         Column("verdict", False),
     )
     rows, marked = [], []

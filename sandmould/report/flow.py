@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from sandmould.analysis.flow_plots import draw_frame, frame_of
 from sandmould.casting.mps import scene
-from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
-from sandmould.casting.mps.stability import StabilityRating
+from sandmould.casting.mps.scheme import G_M_S2
+from sandmould.casting.mps.shoulder import HOP_SPEED_M_S, PAPERS
+from sandmould.casting.mps.stability import QUIET_PA, StabilityRating
+from sandmould.casting.mps.stability_measures import NOISE_WINDOW_S
 from sandmould.drawing.figures import png
 from sandmould.drawing.flow_film import SHADES, FlowFilm, make_flow_film
 from sandmould.report.flow_map import condition_text, said_of, stability_map
@@ -29,7 +31,7 @@ from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
 from sandmould.runs.formatting import listed, name_of, number, setting_text
-from sandmould.scenario.flow import MetalFlow, PouredMetal, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
@@ -116,7 +118,7 @@ def flow_pages(
         curves=measure_curves(
             collected, verdict, [*probes, "largest_speed_m_s"], lambda *_: ""
         ),
-        pours=not isinstance(scenario.case, StillTank) and scenario.case.starts == "empty",
+        pours=not isinstance(scenario.case, StillTank),
         answer=next(iter(_hopping(scenario, ranked, collected.keys)), "")
         or _calm(scenario, ranked, collected.keys),
         grounds=_grounds(scenario),
@@ -177,10 +179,10 @@ def _sentences(
             f"runs that held are {number(share * errors.min(), 2)} to "
             f"{number(share * errors.max(), 2)} % off it."
         )
-        calm = (pd.to_numeric(ranked[f"{name}_window_sd_pa"]) < scenario.quiet_pa).sum()
+        calm = (pd.to_numeric(ranked[f"{name}_window_sd_pa"]) < QUIET_PA).sum()
         said.append(
             "A run is judged by how much the pressure of single steps deviates. Of means over "
-            f"{1e3 * scenario.noise_window_s:g} ms it deviates by less than {scenario.quiet_pa:g} "
+            f"{1e3 * NOISE_WINDOW_S:g} ms it deviates by less than {QUIET_PA:g} "
             f"Pa in {calm} of {len(ranked)} runs. The paper does not say which of both it means."
         )
     return tuple(said)
@@ -221,14 +223,14 @@ def _grounds(scenario: MetalFlow) -> tuple[Ground, ...]:
     return (
         Ground(
             "Calm",
-            f"the pressure at {name} deviates by less than {scenario.quiet_pa:g} Pa (standard "
+            f"the pressure at {name} deviates by less than {QUIET_PA:g} Pa (standard "
             "deviation), and no metal hops.",
         ),
         Ground("Chance", "nothing in these runs is left to it: one run of each setting is enough."),
         Ground(
             "Method",
             "the gradient as the paper prints it makes every run fail; another one, "
-            f"{scenario.gradient}, is used instead.",
+            f"{scene.scheme_of(scenario).gradient}, is used instead.",
         ),
     )
 
@@ -262,7 +264,7 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
     for name in names:
         columns += [Column(f"{name}: mean, Pa"), Column(f"{name}: deviation, Pa")]
         value_columns += [(f"{name}_mean_pa", 4), (f"{name}_sd_pa", 3)]
-    window = f"{name_of(deepest)}: deviation of {1e3 * scenario.noise_window_s:g} ms means, Pa"
+    window = f"{name_of(deepest)}: deviation of {1e3 * NOISE_WINDOW_S:g} ms means, Pa"
     columns += [Column(window), Column("fastest, m/s"), Column("mean speed, m/s")]
     value_columns += [
         (f"{deepest}_window_sd_pa", 3),
@@ -325,28 +327,28 @@ def _collisions(scenario: MetalFlow, keys: Sequence[str]) -> str:
 
 def flow_method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Row, ...]:
     """How the runs were computed; see ``sand_method``."""
-    case, metal = scenario.case, scenario.metal
+    case, metal, scheme = scenario.case, scenario.metal, scene.scheme_of(scenario)
     size_mm = 1e3 * case.particle_m
     if isinstance(case, StillTank):
         where = (f"metal at rest in a tank, {1e3 * case.width_m:g} mm wide and "
                  f"{1e3 * case.depth_m:g} mm deep, in two dimensions")  # fmt: skip
     else:
-        begins = f"poured at {1e3 * case.rate_kg_s:g} g/s" if case.starts == "empty" else "full"
-        where = (f"a cylinder {1e3 * case.height_m:g} mm high, {1e3 * case.lower_m:g} mm wide "
-                 f"below and {1e3 * case.upper_m:g} mm above, {begins}")  # fmt: skip
+        where = (f"a cylinder {1e3 * PAPERS.height_m:g} mm high, {1e3 * PAPERS.lower_m:g} mm "
+                 f"wide below and {1e3 * PAPERS.upper_m:g} mm above, poured at "
+                 f"{1e3 * case.rate_kg_s:g} g/s")  # fmt: skip
     return (
         Row("Method", "moving particles, semi-implicit (MPS), with the improved multiple "
             "relaxation of Hirata and Anzai (2017)"),
         Row("Case", f"{where}; particles of {size_mm:g} mm"),
-        Row("Metal", f"{metal.name}: {metal.density_kg_m3:g} kg/m³, {metal.viscosity_m2_s:g} "
-            f"m²/s; gravity {metal.gravity_m_s2:g} m/s²"),
-        Row("Scheme", f"source {scenario.source.replace('_', ' ')}, gradient {scenario.gradient}, "
-            f"Laplacian {scenario.laplacian}, surface below {scenario.surface:g} of the full "
-            f"number density, Courant number {scenario.courant:g}; Poisson equation to "
-            f"{scenario.tolerance:g}; {_collisions(scenario, keys)}"),
+        Row("Metal", f"{metal.density_kg_m3:g} kg/m³, {metal.viscosity_m2_s:g} m²/s; gravity "
+            f"{G_M_S2:g} m/s²"),
+        Row("Scheme", f"source {scheme.source}, gradient {scheme.gradient}, "
+            f"Laplacian {scheme.laplacian}, surface below {scheme.surface:g} of the full "
+            f"number density, Courant number {scheme.courant:g}; Poisson equation to "
+            f"{scheme.tolerance:g}; {_collisions(scenario, keys)}"),
         Row("Measures", f"from {scenario.measured_from_s:g} to {scenario.duration_s:g} s, at the "
             "particle nearest to each probe; excellent: deviation at the deepest probe below "
-            f"{scenario.quiet_pa:g} Pa and no hopping; good: the run ends; failed: a guard stops "
+            f"{QUIET_PA:g} Pa and no hopping; good: the run ends; failed: a guard stops "
             "it"),
         Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
     )  # fmt: skip

@@ -113,13 +113,11 @@ def statistics_method(objective: Objective, ends: str, draws_by_lot: bool) -> Ro
     ----------
     objective : Objective
     ends : str
-        When measures are taken without a time.
+        When measures are taken.
     draws_by_lot : bool
         Whether runs of one setting differ by their seeds.
     """
-    at_s = objective.at_vibration_s
-    at = ends if at_s is None else f"{at_s:g} s of vibration"
-    compared = f"{name_of(objective.measure)} at {at}, {objective.better} is better"
+    compared = f"{name_of(objective.measure)} at {ends}, {objective.better} is better"
     if not draws_by_lot:
         return Row("Statistics", f"{compared}. Nothing is drawn by lot, so a setting is one run.")
     return Row(

@@ -22,7 +22,7 @@ from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import listed, name_of, number, seconds, setting_text
-from sandmould.scenario.solidification import MouldMaterial, Solidification
+from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.study.plan.plan_files import read_run

@@ -102,7 +102,10 @@ class Plate(Section):
 
 
 class Tube(Section):
-    """A straight horizontal tube along x: two plates in 2D, flat facets or round in 3D."""
+    """A straight horizontal tube along x: two plates in 2D, flat facets or round in 3D.
+
+    In 3D it lies in the middle of the box's depth.
+    """
 
     kind: Literal["tube"]
     name: str = quantity("tube", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
@@ -120,9 +123,6 @@ class Tube(Section):
     )
     left_end_x_m: float = quantity(..., "x of the tube's left end.", unit="m", source="user", ge=0)
     axis_height_m: float = quantity(..., "Height of the axis.", unit="m", source="user", gt=0)
-    axis_y_m: float | None = quantity(
-        None, "y of the axis in 3D; the middle of the box unless given.", unit="m", source=ARGUED
-    )
     closed_end: Literal["none", "left", "right"] = quantity(
         "right", "Which end is closed; the mouth is the other one.", source=ARGUED
     )
@@ -174,8 +174,7 @@ def plate_blocks(plate: Plate, dimension: int) -> list[Block]:
 def _tube_axis_point(tube: Tube, box: Box, dimension: int) -> Array:
     if dimension == 2:
         return np.array([0.0, tube.axis_height_m])
-    y = box.depth_m / 2 if tube.axis_y_m is None else tube.axis_y_m
-    return np.array([0.0, y, tube.axis_height_m])
+    return np.array([0.0, box.depth_m / 2, tube.axis_height_m])
 
 
 def polygon_outline(polygon: Polygon) -> Outline:

@@ -41,12 +41,7 @@ class BoxCavity(Section):
     size_m: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
         ..., "Edge lengths, one a dimension.", unit="m", source="user", min_length=2, max_length=3
     )
-    angle_deg: float = quantity(
-        0.0, "Turn in the plane of x and the vertical.", unit="deg", source="user", ge=-180, le=180
-    )
-    opens: Side = quantity(
-        "up", "Side that it is open at, before its turn; front and back in 3D.", source=ARGUED
-    )
+    opens: Side = quantity("up", "Side that it is open at; front and back in 3D.", source=ARGUED)
 
 
 class PolygonCavity(Section):
@@ -91,7 +86,7 @@ CAVITY_KINDS = {2: ("box", "polygon"), 3: ("box", "cylinder", "mesh")}
 
 
 def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
-    """Unit vector from the side that a cavity opens to into it, before its turn.
+    """Unit vector from the side that a cavity opens to into it.
 
     Parameters
     ----------
@@ -142,7 +137,7 @@ def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
     if isinstance(cavity, BoxCavity):
         plate = Plate(kind="plate", **cavity.model_dump(exclude={"kind", "opens"}))
         (block,) = plate_blocks(plate, dimension)
-        return Cavity(cavity.name, block, into @ block.axes)
+        return Cavity(cavity.name, block, into)
     if isinstance(cavity, PolygonCavity):
         polygon = Polygon(kind="polygon", name=cavity.name, vertices_m=cavity.vertices_m)
         return Cavity(cavity.name, polygon_outline(polygon), into)

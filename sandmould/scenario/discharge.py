@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-from pydantic import Field
-
 from sandmould.geometry.geometry import Array
 from sandmould.scenario.box import Plate, plate_blocks
 from sandmould.scenario.fill import Settling
 from sandmould.scenario.quantity import Section, quantity
-from sandmould.scenario.sand import ARGUED
 
 LEFT_OF_GATE = 1e-6
 """Share of its length that a gate has when it has slid away, for a facet must have some length."""
-
-
-class FlowSettling(Settling):
-    """How long a flow may take to be over."""
-
-    shortest_s: float = quantity(
-        0.2, "A flow counts as over no sooner than this.", unit="s", source=ARGUED, ge=0, le=100
-    )
-    longest_s: float = quantity(
-        20.0, "A flow not over by then ends the run.", unit="s", source=ARGUED, gt=0, le=1000
-    )
+FLOW_SETTLING = Settling(shortest_s=0.2, longest_s=20.0)
+"""How long a flow may take to be over, where no duration is stated."""
 
 
 class Discharge(Section):
@@ -45,14 +33,12 @@ class Discharge(Section):
     )
     duration_s: float | None = quantity(
         None,
-        "How long the sand flows, the opening included; until it rests unless given.",
+        "How long the sand flows, the opening included. Unless given, until it rests: for at "
+        "least 0.2 s, and a flow that is not over after 20 s ends the run.",
         unit="s",
         source="user",
         gt=0,
         le=1000,
-    )
-    settling: FlowSettling = Field(
-        FlowSettling(), description="How long the flow may take to be over."
     )
 
 

@@ -154,14 +154,6 @@ class Fill(Section):
     spout: Spout | None = Field(
         None, description="Spout that each layer is poured through; all at once unless given."
     )
-    nominal_solid_fraction: float | None = quantity(
-        None,
-        "Solid fraction that turns a layer's height into grains; 0.80 in 2D and 0.58 in 3D "
-        "unless given.",
-        source=ARGUED,
-        gt=0,
-        lt=1,
-    )
     settling: Settling = Field(Settling(), description="How long a layer may take to settle.")
     vibration: FillVibration | None = Field(
         None, description="Vibration while the layers are poured; the box stands unless given."

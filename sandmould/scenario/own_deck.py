@@ -10,7 +10,7 @@ from pydantic import Field
 
 from sandmould import ROOT
 from sandmould.scenario.engine import DeckReader
-from sandmould.scenario.quantity import NAME, Section, quantity
+from sandmould.scenario.quantity import NAME, PLANNED, Section, quantity
 from sandmould.scenario.sand import ARGUED
 
 RESERVED = ("seed", "run", "study", "restart", "restart_files")
@@ -42,8 +42,8 @@ class OwnDeck(Section):
     files: tuple[Annotated[str, Field(min_length=1)], ...] = quantity(
         (), "Further files that the deck reads; they lie beside it when it runs.", source="user"
     )
-    sha256: dict[str, str] = Field(
-        {}, description="Hash of template and files; the plan of a study writes it."
+    sha256: dict[str, str] = quantity(
+        {}, "Hash of template and files; the plan of a study writes it.", source=PLANNED
     )
     values: dict[Annotated[str, Field(pattern=NAME)], Any] = Field(
         {}, description="Names that the template is given; any of them can be swept."

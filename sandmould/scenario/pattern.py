@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from sandmould import ROOT
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
-from sandmould.scenario.solids import DRAWING_ANGLE, DRAWING_FILE, DRAWING_HASH, DRAWING_UNIT
+from sandmould.scenario.solids import DRAWING_FILE, DRAWING_HASH, DRAWING_UNIT
 
 ROJEK = "Rojek 2004, section 4.3"
 
@@ -37,15 +37,6 @@ class LShape(Section):
     thickness_m: float = _length("Thickness of stem and flange.")
     height_m: float = _length("From the foot to the top of the flange.")
     reach_m: float = _length("From the back of the stem to the tip of the flange.")
-
-
-class TShape(Section):
-    """A stem in the middle under a flange."""
-
-    kind: Literal["t_shape"]
-    thickness_m: float = _length("Thickness of stem and flange.")
-    height_m: float = _length("From the foot to the top of the flange.")
-    width_m: float = _length("Width of the flange.")
 
 
 class MeshFile(Section):
@@ -76,7 +67,6 @@ class PatternDrawing(Section):
     file: str = DRAWING_FILE
     sha256: str | None = DRAWING_HASH
     unit_m: float = DRAWING_UNIT
-    angle_deg: float = DRAWING_ANGLE
 
     @property
     def path(self) -> Path:
@@ -84,7 +74,7 @@ class PatternDrawing(Section):
         return Path(os.path.normpath(ROOT / self.file))
 
 
-Shape = Annotated[Bar | LShape | TShape | MeshFile | PatternDrawing, Field(discriminator="kind")]
+Shape = Annotated[Bar | LShape | MeshFile | PatternDrawing, Field(discriminator="kind")]
 
 
 class Hung(Section):
@@ -173,9 +163,6 @@ class Loop(Section):
     )
     most_factor: float = quantity(
         0.5, "Greatest share of Aitken's or measured.", source=ARGUED, gt=0, le=1
-    )
-    limit_share: float = quantity(
-        0.5, "Share in the measured scheme of the limit 2 / (1 + gain).", source=ARGUED, gt=0, le=1
     )
     repeats: int = quantity(
         12, "Times that a window is computed again at most; 0 on LIGGGHTS.", source=ARGUED,

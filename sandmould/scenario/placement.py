@@ -56,7 +56,7 @@ class PlannedLayer:
 
 def nominal_fraction(s: Scenario) -> float:
     """Solid fraction that turns the height of a layer into grains."""
-    return s.fill.nominal_solid_fraction or NOMINAL_FRACTION[s.dimension]
+    return NOMINAL_FRACTION[s.dimension]
 
 
 def _mean_grain_measure(s: Scenario) -> float:

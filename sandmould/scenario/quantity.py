@@ -14,6 +14,8 @@ NAME = r"^[a-z][a-z0-9_]*$"
 NO_DEFAULT = PydanticUndefined
 """In place of a default that there is none of."""
 FIRST = "first_default"
+PLANNED = "plan"
+"""Source of a value that the plan of a study writes, and no user."""
 
 
 class Section(BaseModel):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import difflib
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -15,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.limits import YAML_BYTES
-from sandmould.scenario.moved_keys import called, instead_of
+from sandmould.scenario.moved_keys import called, holds_anyway, instead_of
 from sandmould.scenario.quantity import units_at
 from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
 from sandmould.scenario.units import number_of
@@ -169,6 +170,8 @@ def validated(model: type[ModelT], tree: Tree, origin: Origin, above: str = "") 
         # JSON's strict mode takes lists for tuples, but neither "50" nor true for a number.
         return model.model_validate_json(json.dumps(tree, default=str), strict=True)
     except ValidationError as error:
+        if (left := _without_removed(tree, error.errors(), above)) is not None:
+            return validated(model, left, origin, above)
         findings = [(item, _problem(model, tree, item, origin, above)) for item in error.errors()]
         problems: dict[str, Problem] = {}
         for item, problem in findings:
@@ -182,6 +185,20 @@ def validated(model: type[ModelT], tree: Tree, origin: Origin, above: str = "") 
                 valid = f"{before.valid} or {problem.valid}"
                 problems[problem.key] = replace(problem, valid=valid)
         raise BadInputError(list(problems.values())) from None
+
+
+def _without_removed(tree: Tree, items: Iterable[Any], above: str) -> Tree | None:
+    """The tree without keys that are no more and state what holds now; None where it has none."""
+    left = None
+    for item in items:
+        parts = _key_parts(tree, item["loc"], False)
+        if item["type"] == "extra_forbidden" and holds_anyway([above, *parts], item["input"]):
+            left = copy.deepcopy(tree) if left is None else left
+            section: Any = left
+            for part in parts[:-1]:
+                section = section[int(part) if isinstance(section, list) else part]
+            del section[parts[-1]]
+    return left
 
 
 def _is_beside_the_point(item: Any, key: str, findings: list[tuple[Any, Problem]]) -> bool:
@@ -216,19 +233,24 @@ def _problem(model: type[BaseModel], tree: Tree, item: Any, origin: Origin, abov
     parts = _key_parts(tree, item["loc"], is_missing and not lacks_entry)
     key = ".".join(([above] if above else []) + parts) or "file"
     value = None if is_missing and not lacks_entry else item.get("input")
-    return Problem(key, value, _valid(model, tree, context, item, parts), origin.file_of(key))
+    tag = [str(context["tag"])] if item["type"] == "union_tag_invalid" else []
+    instead = instead_of([above, *parts, *tag])
+    valid = _valid(model, tree, context, item, parts, instead)
+    return Problem(key, value, valid, origin.file_of(key))
 
 
-def _valid(model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: list[str]) -> str:
+def _valid(
+    model: type[BaseModel], tree: Tree, context: Any, item: Any, parts: list[str], instead: str
+) -> str:
     kind = item["type"]
     if kind == "too_long" or (kind == "missing" and isinstance(item["loc"][-1], int)):
         lengths = standing_lengths(model, tree, parts)
         if lengths:  # nothing where another branch of a union takes as many
             several = f"a list of {' or '.join(map(str, lengths))} entries"
             return "" if len(item["input"]) in lengths else several
+    if kind in ("extra_forbidden", "union_tag_invalid") and instead:
+        return instead
     if kind == "extra_forbidden":
-        if instead := instead_of(parts):
-            return instead
         keys = standing_keys(model, tree, parts[:-1])
         near = difflib.get_close_matches(parts[-1], keys, n=1, cutoff=0.5)
         hint = f" (did you mean {near[0]}?)" if near else ""

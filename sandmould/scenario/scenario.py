@@ -43,12 +43,6 @@ class Recording(Section):
     snapshot_every_s: float = quantity(
         0.05, "Interval of snapshots of all grains.", unit="s", source=ARGUED, gt=0, le=100
     )
-    export: Literal["none", "moments", "all"] = quantity(
-        "moments",
-        "Snapshots that are also written for ParaView and OVITO: those at 0, 1/8, 1/2 and 1 of "
-        "the vibration, or all.",
-        source=ARGUED,
-    )
     orientation: bool = quantity(
         False,
         "Whether snapshots hold the orientation of every grain, eqs. (8)-(13).",
@@ -74,13 +68,6 @@ class GuardLimits(Section):
 
     largest_overlap_fraction: float = quantity(
         0.5, "Largest overlap over the smaller radius.", source=ARGUED, gt=0, le=FULL_OVERLAP
-    )
-    kinetic_energy_factor: float = quantity(
-        5.0,
-        "Kinetic energy over the most that the fall and the vibration can give.",
-        source=ARGUED,
-        gt=1,
-        le=1e6,
     )
     wall_limit_s: float | None = quantity(
         None, "Wall time after which the run stops with a checkpoint.", unit="s",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +16,7 @@ from sandmould.geometry.drawing_file import MeshFileError, file_hash
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.mesher import is_step
 from sandmould.geometry.revolved import Revolved
-from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.quantity import PLANNED, Section, quantity
 
 Array = NDArray[np.float64]
 MANY_TRIANGLES = 100_000
@@ -65,7 +64,7 @@ DRAWING_FILE: Any = quantity(
 DRAWING_HASH: Any = quantity(
     None,
     "Hash of the file; the plan of a study writes it, so that another drawing is another run.",
-    source="user",
+    source=PLANNED,
     pattern=r"^[0-9a-f]{64}$",
 )
 DRAWING_UNIT: Any = quantity(
@@ -77,10 +76,6 @@ DRAWING_UNIT: Any = quantity(
     gt=0,
     le=100,
 )
-DRAWING_ANGLE: Any = quantity(
-    0.0, "Turn about the vertical through the file's origin.", unit="deg", source="user",
-    ge=-360, le=360,
-)  # fmt: skip
 """Keys of whatever is drawn in a file, an obstacle or a pattern."""
 
 
@@ -92,7 +87,6 @@ class SolidMesh(Section):
     file: str = DRAWING_FILE
     sha256: str | None = DRAWING_HASH
     unit_m: float = DRAWING_UNIT
-    angle_deg: float = DRAWING_ANGLE
     position_m: tuple[float, float, float] = quantity(
         (0.0, 0.0, 0.0), "Place of the file's origin in the box.", unit="m", source="user"
     )
@@ -104,19 +98,19 @@ class SolidMesh(Section):
 
 
 class Triangles(Section):
-    """A solid bounded by triangles given in place, 3D only: a pattern stands in its scene so."""
+    """A solid bounded by triangles given in place, 3D only: so a plan puts a pattern in a scene."""
 
     kind: Literal["triangles"]
     name: str = quantity(
-        "triangles", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$"
+        "triangles", "Name in tables.", source=PLANNED, pattern=r"^[a-z][a-z0-9_]*$"
     )
     vertices_m: tuple[tuple[float, float, float], ...] = quantity(
-        ..., "Vertices.", unit="m", source="user", min_length=4
+        ..., "Vertices.", unit="m", source=PLANNED, min_length=4
     )
     triangles: tuple[tuple[int, int, int], ...] = quantity(
         ...,
         "Vertices of each triangle, counted from 0, counter-clockwise seen from outside.",
-        source="user",
+        source=PLANNED,
         min_length=4,
     )
 
@@ -152,19 +146,15 @@ def cylinder_along(
 
 
 class Drawing(NamesFile, Protocol):
-    """A section that names a file of a solid, and its unit and turn."""
+    """A section that names a file of a solid, and its unit."""
 
     @property
     def unit_m(self) -> float:
         """Length that stands for 1 in it."""
 
-    @property
-    def angle_deg(self) -> float:
-        """Turn about the vertical."""
-
 
 def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
-    """Geometry of a mesh, turned, scaled and shifted into the box.
+    """Geometry of a mesh, scaled and shifted into the box.
 
     Parameters
     ----------
@@ -182,7 +172,7 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
 
 
 def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]:
-    """Closed surface of a drawing about its own origin, turned and scaled.
+    """Closed surface of a drawing about its own origin, scaled.
 
     Parameters
     ----------
@@ -214,13 +204,7 @@ def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]
         vertices, triangles = read_surface(drawing.path)
     except MeshFileError as fault:
         raise BadInputError([Problem(f"{key}.file", file_name, str(fault))]) from fault
-    return drawing.unit_m * vertices @ turn_about_vertical(drawing).T, triangles
-
-
-def turn_about_vertical(drawing: Drawing) -> Array:
-    """Matrix that turns a drawing about the vertical, (3, 3) float64."""
-    c, s = math.cos(math.radians(drawing.angle_deg)), math.sin(math.radians(drawing.angle_deg))
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return drawing.unit_m * vertices, triangles
 
 
 def unit_hint(size_m: Array, box_m: Array, unit_m: float) -> str:

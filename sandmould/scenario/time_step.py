@@ -17,13 +17,6 @@ class TimeStep(Section):
     fraction: float = quantity(
         0.5, "Time step over the critical one.", source=ARGUED, ge=1e-3, le=1
     )
-    coordination: float | None = quantity(
-        None,
-        "Contacts a grain can have; 6 in 2D and 12 in 3D (densest equal grains) unless given.",
-        source=ARGUED,
-        ge=1,
-        le=30,
-    )
     rotational_inertia: Literal["physical", "scaled"] = quantity(
         "physical",
         "Moments of inertia. physical: as they are. scaled: raised to m r^2 k_T / k_n, so that "
@@ -45,6 +38,8 @@ class TimeStep(Section):
     )
 
 
+CONTACTS = {2: 6.0, 3: 12.0}
+"""That a grain can have, as the densest packings of equal grains have them."""
 LEAST_STEPS_A_PERIOD = 20
 """Time steps of a period of vibration."""
 
@@ -130,7 +125,7 @@ def critical_step(
     sand : Sand
     contact : Contact
     time_step : TimeStep
-        Its coordination and its rotational inertia count.
+        Its rotational inertia counts.
     dimension : int
 
     Returns
@@ -142,7 +137,7 @@ def critical_step(
     The paper's (51) is the case of one contact with a fixed body. The smallest class stands for
     all, since omega goes as 1/sqrt(m).
     """
-    contacts = time_step.coordination or (6.0 if dimension == 2 else 12.0)
+    contacts = CONTACTS[dimension]
     factor = inertia_factor(sand, contact, time_step, dimension)
     smallest = sand.classes(dimension)[0].diameter_m
     mass = sand.grain_mass_kg(smallest, dimension)

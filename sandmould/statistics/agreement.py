@@ -22,7 +22,7 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import listed, name_of, number, setting_text, value_text
 from sandmould.statistics.config import Equivalence
-from sandmould.statistics.equivalence import Agreement, agree
+from sandmould.statistics.equivalence import PERCENT, Agreement, agree
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import by_block, group_settings
 
@@ -108,7 +108,7 @@ def compare_pair(
     for measure, margin in equivalence.margins.items():
         values = [usable_values(r, measure).dropna() for r in rows]
         first, second = (by_block(r, v, over) for r, v in zip(rows, values, strict=True))
-        agreement = agree(first, second, margin, equivalence.confidence)
+        agreement = agree(first, second, margin)
         comparisons.append(Compared(measure, key, *pair, where, at_values, agreement))
     return tuple(comparisons)
 
@@ -118,15 +118,13 @@ def agreement_table(compared: Sequence[Compared]) -> pd.DataFrame:
     return pd.DataFrame([c.row() for c in compared], columns=list(COLUMNS))
 
 
-def agreement_sentences(compared: Sequence[Compared], confidence: float) -> tuple[str, ...]:
+def agreement_sentences(compared: Sequence[Compared]) -> tuple[str, ...]:
     """Say first whether all agree, then what does not.
 
     Parameters
     ----------
     compared : sequence of Compared
         At least one.
-    confidence : float
-        Of the intervals.
     """
     by_verdict: Mapping[str, list[Compared]] = {
         verdict: [c for c in compared if c.agreement.verdict == verdict]
@@ -134,14 +132,13 @@ def agreement_sentences(compared: Sequence[Compared], confidence: float) -> tupl
     }
     different, open_ = by_verdict["different"], by_verdict["not resolved"]
     untested, total = by_verdict["not tested"], len(compared)
-    percent = f"{100 * confidence:g} %"
     if len(by_verdict["equivalent"]) == total:
         what = "The pair agrees" if total == 1 else f"All {total} comparisons agree"
-        return (f"{what} within the margins set beforehand, at {percent}.",)
+        return (f"{what} within the margins set beforehand, at {PERCENT}.",)
     sentences = []
     if different:
         sentences.append(
-            f"They differ by more than the margin in {_named(different, compared)}, at {percent}."
+            f"They differ by more than the margin in {_named(different, compared)}, at {PERCENT}."
         )
     if open_:
         first = "Not resolved" if not sentences else "Also not resolved"

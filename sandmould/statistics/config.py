@@ -36,14 +36,6 @@ class Objective(Section):
     reported_best: tuple[Reported, ...] = Field(
         (), description="Values of the one swept key that others have found best."
     )
-    at_vibration_s: float | None = quantity(
-        None,
-        "Time of vibration at which the measure is taken, at full speed. Unless given, it is "
-        "taken at the end of the run, where the sand is at rest again.",
-        unit="s",
-        source=ARGUED,
-        ge=0,
-    )
 
 
 class SandWaveSpeed(Section):
@@ -83,14 +75,6 @@ class Equivalence(Section):
         {},
         description="Columns of measures.tsv, each with the largest difference of means that "
         "counts as none, in the unit of the column.",
-    )
-    confidence: float = quantity(
-        0.9,
-        "Confidence of the interval that must lie inside the margin: 0.9 makes two one-sided "
-        "tests at 5 %.",
-        source=ARGUED,
-        ge=0.5,
-        lt=1,
     )
 
 

@@ -13,6 +13,9 @@ from scipy.special import stdtr, stdtrit
 from sandmould.statistics.mean_tests import compare_means
 
 EquivalenceVerdict = Literal["equivalent", "different", "not resolved", "not tested"]
+CONFIDENCE = 0.9
+"""Of the interval that must lie inside the margin: two one-sided tests at 5 %."""
+PERCENT = "90 %"
 POWER = 0.8
 """Chance of a verdict that the estimate of further replicates is made for."""
 MOST_REPLICATES = 1000
@@ -43,9 +46,7 @@ class Agreement:
         return self.means[0] - self.means[1]
 
 
-def agree(
-    first: pd.Series[float], second: pd.Series[float], margin: float, confidence: float = 0.9
-) -> Agreement:
+def agree(first: pd.Series[float], second: pd.Series[float], margin: float) -> Agreement:
     """Test whether two means differ by less than a margin.
 
     The interval of the difference inside the margin is the same as two one-sided t tests, each at
@@ -59,8 +60,6 @@ def agree(
         Values by block: replicates that share their seeds have one label. Blocks that both have
         are compared in pairs; without a common one the groups are compared by Welch's test.
     margin : float
-    confidence : float
-        Of the interval.
 
     Returns
     -------
@@ -81,13 +80,13 @@ def agree(
     if test is None:
         return _without_spread(first, means, margin, n)
     result, paired = test
-    low, high = result.confidence_interval(confidence)
+    low, high = result.confidence_interval(CONFIDENCE)
     ci = float(low), float(high)
     verdict = classify_interval(ci, margin)
     if verdict != "not resolved":
         return Agreement(means, ci, margin, n, paired, verdict, "")
-    error = (ci[1] - ci[0]) / 2 / float(stdtrit(result.df, 0.5 + confidence / 2))
-    more = _more(abs(difference), error * math.sqrt(n), margin, confidence, n, paired)
+    error = (ci[1] - ci[0]) / 2 / float(stdtrit(result.df, 0.5 + CONFIDENCE / 2))
+    more = _more(abs(difference), error * math.sqrt(n), margin, n, paired)
     note = (
         f"more than {MOST_REPLICATES} replicates would be needed: the difference lies about on "
         "the margin"
@@ -118,9 +117,7 @@ def _without_spread(
     return Agreement(means, ci, margin, n, True, classify_interval(ci, margin), note)
 
 
-def _more(
-    size: float, spread: float, margin: float, confidence: float, n: int, paired: bool
-) -> int | None:
+def _more(size: float, spread: float, margin: float, n: int, paired: bool) -> int | None:
     """Further replicates after which a verdict is likely, if size and spread stay as they are.
 
     Parameters
@@ -129,14 +126,14 @@ def _more(
         Of the difference, without its sign.
     spread : float
         Standard error of the difference times the root of n.
-    margin, confidence : float
+    margin : float
     n : int
     paired : bool
     """
     replicates = np.arange(n + 1, MOST_REPLICATES + 1)
     freedom = (replicates - 1) * (1 if paired else 2)
     error = spread / np.sqrt(replicates)
-    need = stdtrit(freedom, 0.5 + confidence / 2)
+    need = stdtrit(freedom, 0.5 + CONFIDENCE / 2)
     chance = stdtr(freedom, (size - margin) / error - need)
     if size < margin:
         inside = stdtr(freedom, (margin - size) / error - need)

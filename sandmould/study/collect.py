@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from sandmould.definition.own_measures import with_own_measures
 from sandmould.definition.study import Study
@@ -78,7 +77,7 @@ class Collected:
     """What the runs of a study left behind."""
 
     summary: pd.DataFrame
-    """One row a run: its parameters, outcome, measures at the objective's time, and cost."""
+    """One row a run: its parameters, outcome, measures at its end, and cost."""
     curves: pd.DataFrame
     """One row a snapshot of every run: its parameters and all measures."""
     keys: tuple[str, ...]
@@ -108,7 +107,7 @@ def collect(study_folder: Path) -> None:
         When ``runs.tsv`` itself cannot be read; a broken run is told in its row instead.
     """
     study = read_study(study_folder)
-    gathered = gather(study_folder, study.objective.at_vibration_s, study.own_measures)
+    gathered = gather(study_folder, study.own_measures)
     compared = compare_study(gathered.summary, gathered.keys, study)
     sweep = gathered.of_sweep
     tables = {
@@ -213,7 +212,6 @@ def read_study(study_folder: Path) -> Study:
 
 def gather(
     study_folder: Path,
-    at_vibration_s: float | None = None,
     own_measures: Mapping[str, str] = MappingProxyType({}),
 ) -> Collected:
     """Read every run of a study; what is missing becomes NaN, what is broken is told in ``detail``.
@@ -222,9 +220,6 @@ def gather(
     ----------
     study_folder : Path
         ``results/<study>`` with ``runs.tsv`` and ``runs/<run>/``.
-    at_vibration_s : float, s, optional
-        Time of vibration at which the measures of the summary are taken; the last snapshot of
-        each run unless given.
     own_measures : mapping of str to str, optional
         Formulas of the study's own measures, by name.
 
@@ -237,7 +232,7 @@ def gather(
     OSError, ValueError
         When ``runs.tsv`` itself cannot be read.
     """
-    return gather_runs(read_runs(study_folder), study_folder, at_vibration_s, own_measures)
+    return gather_runs(read_runs(study_folder), study_folder, own_measures)
 
 
 def read_runs(study_folder: Path) -> pd.DataFrame:
@@ -251,7 +246,6 @@ def read_runs(study_folder: Path) -> pd.DataFrame:
 def gather_runs(
     runs: pd.DataFrame,
     study_folder: Path,
-    at_vibration_s: float | None = None,
     own_measures: Mapping[str, str] = MappingProxyType({}),
 ) -> Collected:
     """The same of some of the runs: rows of ``read_runs``, numbered from 0."""
@@ -280,7 +274,7 @@ def gather_runs(
         DETAIL: details,
         SIMULATED_S: [o.simulated_s if o else np.nan for o in outcomes],
         PLANNED_S: [o.planned_s if o else np.nan for o in outcomes],
-        **_of_measures_and_costs(outcomes, measures, costs, at_vibration_s),
+        **_of_measures_and_costs(outcomes, measures, costs),
     }
     table = pd.DataFrame(summary).infer_objects()
     if FILL in table:
@@ -328,14 +322,11 @@ def _curves(summary: pd.DataFrame, keys: Sequence[str], measures: RunTables) -> 
 
 
 def _of_measures_and_costs(
-    outcomes: Sequence[RunOutcome | None],
-    measures: RunTables,
-    costs: RunTables,
-    at_vibration_s: float | None,
+    outcomes: Sequence[RunOutcome | None], measures: RunTables, costs: RunTables
 ) -> dict[str, pd.Series[Any]]:
-    """Columns of the summary from each run's measures at the objective's time and its cost."""
+    """Columns of the summary from each run's last measures and its cost."""
     every = range(len(outcomes))
-    taken = _rows_at(outcomes, measures, at_vibration_s)
+    taken = _last_rows(outcomes, measures)
     measured = measures.rows.loc[list(taken.values())].set_axis(list(taken)).reindex(every)
     bounds = costs.bounds(len(outcomes))
     last = {place: bounds[place + 1] - 1 for place in every if bounds[place] < bounds[place + 1]}
@@ -362,49 +353,19 @@ def _of_measures_and_costs(
     return columns
 
 
-def _rows_at(
-    outcomes: Sequence[RunOutcome | None], measures: RunTables, at_vibration_s: float | None
-) -> dict[int, int]:
-    """Row of the measures that the summary takes of each run that has one, by its place."""
+def _last_rows(outcomes: Sequence[RunOutcome | None], measures: RunTables) -> dict[int, int]:
+    """Row of the measures at the end of each run that finished, by its place."""
     if measures.rows.empty:
         return {}
-    clock_s = measures.rows[[TIME_S, VIBRATION_TIME_S]].to_numpy(dtype=np.float64)
+    # a snapshot that could not be read has a row without a time
+    has_time = measures.rows[TIME_S].notna().to_numpy()
     bounds = measures.bounds(len(outcomes)).tolist()
     rows = {}
     for place, outcome in enumerate(outcomes):
-        is_finished = outcome is not None and outcome.outcome is Outcome.FINISHED
-        own_s = clock_s[bounds[place] : bounds[place + 1]]
-        row = _row_at(own_s, at_vibration_s, is_finished)
-        if row is not None:
-            rows[place] = bounds[place] + row
+        read = np.flatnonzero(has_time[bounds[place] : bounds[place + 1]])
+        if len(read) and outcome is not None and outcome.outcome is Outcome.FINISHED:
+            rows[place] = bounds[place] + int(read[-1])
     return rows
-
-
-def _row_at(
-    clock_s: NDArray[np.float64], at_vibration_s: float | None, is_finished: bool
-) -> int | None:
-    """Snapshot nearest a time of vibration, or at the end of a run that finished.
-
-    None where the run never got there.
-
-    A stage lasts whole periods and snapshots come at intervals, so half an interval either way
-    counts as reached.
-    """
-    # a snapshot that could not be read has a row without a time
-    rows = np.flatnonzero(~np.isnan(clock_s[:, 0]))
-    if not len(rows):
-        return None
-    if at_vibration_s is None:
-        return int(rows[-1]) if is_finished else None
-    rows = rows[clock_s[rows, 1] >= 0]
-    shaken = clock_s[rows, 1]
-    if not len(shaken):
-        return None
-    interval_s = float(np.diff(shaken).max()) if len(shaken) > 1 else 0.0
-    place = int(np.argmin(np.abs(shaken - at_vibration_s)))
-    if abs(shaken[place] - at_vibration_s) > 0.5 * interval_s + 1e-9:
-        return None
-    return int(rows[place])
 
 
 def _with_clock(table: pd.DataFrame) -> pd.DataFrame:

@@ -28,7 +28,6 @@ VIBRATED: dict[str, Any] = {
 }
 SHORT: dict[str, Any] = {
     "fill": {"layers": [{"count": 15}, {"count": 65}]},
-    "discharge": {"settling": {"shortest_s": 0.1}},
     "rest": {"rms_speed_m_s": 0.05, "discharge_rms_speed_m_s": 0.3, "load_tolerance": 0.1},
     "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.02}],
 }

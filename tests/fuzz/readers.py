@@ -51,11 +51,9 @@ def _surface(path: Path) -> object:
 
 
 def _picture(path: Path) -> object:
-    from sandmould.scenario.casting_shapes import CastPicture, solid_of
+    from sandmould.scenario.casting.shapes import CastPicture, solid_of
 
-    shape = CastPicture.model_validate(
-        {"kind": "image", "file": str(path), "pixel_m": 1e-3, "low_m": [0.0, 0.0]}
-    )
+    shape = CastPicture.model_validate({"kind": "image", "file": str(path), "pixel_m": 1e-3})
     return solid_of(shape, "shapes.0")
 
 

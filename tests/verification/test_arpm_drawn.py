@@ -23,7 +23,7 @@ from sandmould.casting.arpm.solidification import SolidificationResult, solidify
 from sandmould.geometry.geometry import Block
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
-from sandmould.scenario.casting_shapes import Body, Pixels
+from sandmould.scenario.casting.shapes import Body, Pixels
 from tests.radial_casting import lumped_s, radial_frozen_s
 from tests.verification.castings.exact import stefan_front
 

@@ -16,7 +16,7 @@ from sandmould.kinds.sand.kind import SAND
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.run_tables import read_costs
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.plan_files import write_plan

@@ -57,7 +57,7 @@ class Plate:
 def settings(**changes: Any) -> Loop:
     values: dict[str, Any] = {
         "window_s": 0.002, "scheme": "fixed", "factor": 0.02, "least_factor": 0.005,
-        "most_factor": 1.0, "limit_share": 0.5, "repeats": 0, "tolerance": 0.01,
+        "most_factor": 1.0, "repeats": 0, "tolerance": 0.01,
         "largest_displacement_m": 0.02,
     }  # fmt: skip
     return Loop(**(values | changes))

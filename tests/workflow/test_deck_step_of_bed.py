@@ -104,7 +104,6 @@ def test_so_does_that_of_a_run_that_fills_by_itself_and_opens_a_gate(
         engine,
         frame="laboratory",
         fill={"layers": [{"count": 80}]},
-        discharge={"settling": {"shortest_s": 0.1}},
         rest={"rms_speed_m_s": 0.05, "discharge_rms_speed_m_s": 0.3, "load_tolerance": 0.1},
         vibration=[{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.02}],
         time_step={"bed_fraction": 0.7},

@@ -13,11 +13,11 @@ from sandmould.execution.simulate import measure_run, render_run, simulate
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.columns import CLOCK
 from sandmould.runs.measures import measures_of
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
+from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solidification import Solidification
 from sandmould.study.plan.plan_files import write_plan
 from tests.hopper import DEEP, hopper_scene
 from tests.instep import bed_scene
@@ -40,7 +40,7 @@ DAM = {
         {"kind": "plate", "name": "gate", "centre_m": [0.06, 0.06], "size_m": [0.004, 0.12]}
     ],
     "sand": {"size_scale": 4.0, "size_classes": 3, "disc_thickness_m": 0.1},
-    "discharge": {"gate": "gate", "settling": {"shortest_s": 0.01}},
+    "discharge": {"gate": "gate", "duration_s": 0.01},
 }
 STEEL = {
     "name": "steel", "density_kg_m3": 7200, "heat_capacity_j_kg_k": 711, "conductivity_w_m_k": 29,
@@ -71,7 +71,7 @@ def bed(scheme: str) -> Scenario:
 
 def hopper(**changes: Any) -> Scenario:
     brief = {key: BRIEF[key] for key in ("fill", "rest", "vibration")}
-    discharge = {"gate": "gate", "settling": {"shortest_s": 0.01}}
+    discharge = {"gate": "gate", "duration_s": 0.01}
     return hopper_scene("reference", **brief | {"discharge": discharge} | changes)
 
 
@@ -114,9 +114,7 @@ SCENES = {
     "casting": lambda: casting(2),
     "casting in 3D": lambda: casting(3),
     "tank": lambda: flow(kind="tank", particle_m=0.004, width_m=0.016, depth_m=0.032),
-    "shoulder": lambda: flow(
-        kind="shoulder", particle_m=0.00625, height_m=0.06, lower_m=0.0375, starts="full"
-    ),
+    "shoulder": lambda: flow(kind="shoulder", particle_m=0.00625),
 }
 
 

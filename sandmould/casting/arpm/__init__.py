@@ -10,7 +10,7 @@ from pathlib import Path
 from sandmould import ROOT, geometry
 from sandmould.digest import code_identity
 
-_SHARED = ("casting_shapes", "solidification", "solids")
+_SHARED = ("casting/shapes", "casting/solidification", "solids")
 
 
 def source_files() -> list[Path]:

@@ -17,6 +17,7 @@ from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.estimates import least_sand_share
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.front import middle_frozen_s
+from sandmould.casting.arpm.marching import STEP_SHARE
 from sandmould.casting.arpm.solidification import (
     Cooling,
     CoolingProgress,
@@ -29,7 +30,7 @@ from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, peak_memory_bytes
 from sandmould.runs.progress import Progress
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 
 PRODUCTS = ("series.tsv", "fields.npz")
 CHECKPOINT = "checkpoint.bin"
@@ -62,7 +63,7 @@ def engine_of(scenario: Solidification) -> str:
 
 def no_cost(scenario: Solidification) -> ElementCost:
     """Cost of a run that has not begun."""
-    return ElementCost(engine_of(scenario), 1, math.nan, scenario.step_share, source_hash())
+    return ElementCost(engine_of(scenario), 1, math.nan, STEP_SHARE, source_hash())
 
 
 def compute(scenario: Solidification, folder: Path, run: str) -> Computed:

@@ -22,7 +22,7 @@ from sandmould.arrays import Flags, Floats, Ints
 from sandmould.casting.arpm.cut_volume import held_of, inside_any, volumes
 from sandmould.casting.arpm.drawn_surface import Pieces, pieces_of
 from sandmould.casting.arpm.raster import MOULD, Cut, Raster
-from sandmould.scenario.casting_shapes import Body
+from sandmould.scenario.casting.shapes import Body
 
 _OFF = 1e-3
 """Sizes of a cell beside a piece of surface where it is asked what lies there."""

@@ -19,7 +19,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from sandmould.arrays import Flags, Floats, Ints
 from sandmould.casting.arpm.raster import MOULD, Raster, inside_solid
-from sandmould.scenario.casting_shapes import Body, Pixels
+from sandmould.scenario.casting.shapes import Body, Pixels
 
 SAMPLES = {2: 256, 3: 64}
 """Points of a cut cell in 2D and 3D at which it is asked what lies there."""

@@ -11,7 +11,7 @@ from sandmould.arrays import Flags, Floats, Ints
 from sandmould.geometry.geometry import Block
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
-from sandmould.scenario.casting_shapes import Body, Pixels
+from sandmould.scenario.casting.shapes import Body, Pixels
 
 SMOOTH_PIXELS = 2.0
 """Standard deviation over which the direction of a picture's edge is taken: a staircase of pixels

@@ -17,7 +17,7 @@ from scipy.special import erfc, erfcx
 
 from sandmould.arrays import Ints
 from sandmould.casting.arpm.raster import MOULD, Raster
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 
 WINDOW = 1.5
 """Radii of the thickest place within which its own volume and surface are counted: a square's

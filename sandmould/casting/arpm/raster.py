@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sandmould.arrays import Flags, Floats, Ints
-from sandmould.scenario.casting_shapes import Body, held_by
+from sandmould.scenario.casting.shapes import Body, held_by
 
 MOULD = 0
 """Material of all that is not painted."""

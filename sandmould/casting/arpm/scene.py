@@ -15,12 +15,12 @@ from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.estimates import Cooled, cooled, freezes_s
 from sandmould.casting.arpm.filling import Filling, check_casting
 from sandmould.casting.arpm.kernel import check_sizes
+from sandmould.casting.arpm.marching import STEP_SHARE
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster, painted
-from sandmould.casting.arpm.super_steps import STAGES
-from sandmould.scenario.casting_shapes import Body, Rectangle, solid_of
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.shapes import Body, Rectangle, solid_of
+from sandmould.scenario.casting.solidification import Solidification
 
 KERNEL_FORMS = ("printed", "corrected", "symmetric")
 CASTING = 1
@@ -118,10 +118,7 @@ def filling_of(scenario: Solidification) -> Filling:
 
 def method_of(scenario: Solidification) -> HeatMethod:
     """How elements exchange heat and go forward in time."""
-    return HeatMethod(
-        scenario.exchange, scenario.stepping, scenario.kernel_size, scenario.refuse_ratio,
-        step_share=scenario.step_share, threads=scenario.threads,
-    )  # fmt: skip
+    return HeatMethod(scenario.exchange, kernel_size=scenario.kernel_size, threads=scenario.threads)
 
 
 def problems(scenario: Solidification) -> list[Problem]:
@@ -146,10 +143,8 @@ def _misfits(scenario: Solidification) -> Iterator[Problem]:
             "the surface on which it acts"
         )
         yield Problem("exchange", scenario.exchange, valid)
-    has_ratio = scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.refuse_ratio
-    if has_ratio and scenario.kernel_size < 2.0:
-        valid = "at least 2 where sizes double, or any with refuse_ratio: false"
-        yield Problem("kernel_size", scenario.kernel_size, valid)
+    if scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.kernel_size < 2.0:
+        yield Problem("kernel_size", scenario.kernel_size, "at least 2 where sizes double")
     yield from _places(scenario)
     names = [probe.name for probe in scenario.probes]
     for i, probe in enumerate(scenario.probes):
@@ -191,7 +186,7 @@ def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
 
 def _ratio(scenario: Solidification) -> Iterator[Problem]:
     """Sizes of elements that a kernel's rule forbids."""
-    if scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.refuse_ratio:
+    if scenario.exchange in KERNEL_FORMS and scenario.layers:
         it = scenario
         fault = _size_fault(it.box, it.shapes, it.element_m, it.layers, it.kernel_size)
         if fault:
@@ -228,12 +223,9 @@ def expected_element_steps(scenario: Solidification) -> float:
     elements, filling = elements_of(scenario), filling_of(scenario)
     capacity = np.array([it.capacity_j_m3_k for it in filling.materials])
     spread = (capacity / filling.conductivity_w_m_k)[elements.material]
-    limit_s = scenario.step_share * spread * elements.size_m**2 / (2 * elements.dimensions)
+    limit_s = STEP_SHARE * spread * elements.size_m**2 / (2 * elements.dimensions)
     limit_s = np.minimum(limit_s, scenario.record_s)  # steps end at records
     lasts_s = expected_s(scenario)
-    if scenario.stepping == "local" and scenario.exchange != "difference":
+    if scenario.exchange != "difference":
         return float(np.sum(lasts_s / limit_s))
-    steps = len(limit_s) * lasts_s / float(limit_s.min())
-    if scenario.stepping == "super" and scenario.exchange != "difference":
-        return steps * 4.0 * STAGES / (STAGES**2 + STAGES - 2)
-    return steps
+    return len(limit_s) * lasts_s / float(limit_s.min())

@@ -14,7 +14,7 @@ from sandmould.digest import code_identity
 def source_files() -> list[Path]:
     """Files of the solver, and that of the scenario which computes for it."""
     own = Path(__file__).parent.glob("[!_]*.py")
-    return sorted([*own, ROOT / "sandmould" / "scenario" / "flow.py"])
+    return sorted([*own, ROOT / "sandmould" / "scenario" / "casting" / "flow.py"])
 
 
 def source_hash() -> str:

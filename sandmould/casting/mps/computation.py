@@ -16,12 +16,13 @@ from sandmould.casting.mps import source_files as source_files
 from sandmould.casting.mps.flow import EscapedError, Flow, FlowProgress
 from sandmould.casting.mps.pressure import ClosedRegionError
 from sandmould.casting.mps.record import OF_FLUID, FlowRecord
+from sandmould.casting.mps.scheme import G_M_S2
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.hashing import solution_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, peak_memory_bytes
 from sandmould.runs.progress import Progress
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 PRODUCTS = ("series.tsv", "fields.npz")
 CHECKPOINT = "checkpoint.bin"
@@ -114,7 +115,7 @@ class _Course:
     def __init__(self, scenario: MetalFlow, checkpoint: CheckpointFile) -> None:
         self.flow = scene.open_flow(scenario)
         self._ladle = scene.ladle_of(scenario, self.flow)
-        up = -np.asarray(self.flow.metal.gravity_m_s2) / scenario.metal.gravity_m_s2
+        up = -np.asarray(self.flow.metal.gravity_m_s2) / G_M_S2
         self.record = FlowRecord(scene.places_of(scenario), scenario.record_s, up)
         self._checkpoint = checkpoint
         self._clock_s = {"cpu_s": time.process_time(), "wall_s": time.monotonic()}

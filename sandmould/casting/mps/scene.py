@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import fields
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from sandmould.bad_input import Problem
 from sandmould.casting.mps.flow import Flow, solves
 from sandmould.casting.mps.particles import Floats
-from sandmould.casting.mps.scheme import VISCOUS_SHARE, LiquidMetal, Scheme
+from sandmould.casting.mps.scheme import G_M_S2, VISCOUS_SHARE, LiquidMetal, Scheme
 from sandmould.casting.mps.shoulder import (
+    PAPERS,
     POUR_HEIGHT,
     POUR_M_S,
-    Casting,
     Ladle,
     open_shoulder,
     ring_m,
     stream,
 )
 from sandmould.casting.mps.tank import open_tank
-from sandmould.scenario.flow import MetalFlow, PressureProbe, ShoulderedCylinder, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, ShoulderedCylinder, StillTank
 
 FEWEST = 4
 """Particles across a tank or a bore."""
@@ -33,9 +33,22 @@ LEVELS = 8
 """Levels of metal at which the length of a step is foreseen."""
 
 
+class PressureProbe(NamedTuple):
+    """A place whose pressure is recorded."""
+
+    name: str
+    """Its column is <name>_pa."""
+    at_m: tuple[float, float]
+    """In a tank: x and height. In a cylinder: distance from the axis and height; the mean of eight
+    places round the axis counts."""
+
+
 def scheme_of(scenario: MetalFlow) -> Scheme:
-    """How it is computed; keys are called as the scheme's own."""
-    return Scheme(**{field.name: getattr(scenario, field.name) for field in fields(Scheme)})
+    """How it is computed: the paper's way, with the keys that it varies."""
+    return Scheme(
+        scenario.dt_max_s, scenario.relaxations, scenario.source_share,
+        collision_distance=scenario.collision_distance,
+    )  # fmt: skip
 
 
 def cells_of(case: StillTank) -> tuple[int, int]:
@@ -43,46 +56,39 @@ def cells_of(case: StillTank) -> tuple[int, int]:
     return round(case.width_m / case.particle_m), round(case.depth_m / case.particle_m)
 
 
-def casting_of(case: ShoulderedCylinder) -> Casting:
-    """Its shape."""
-    return Casting(case.height_m, case.lower_m, case.upper_m)
+def open_flow(scenario: MetalFlow, full: bool = False) -> Flow:
+    """Particles where they start, or in a cylinder full of metal at rest.
 
-
-def open_flow(scenario: MetalFlow) -> Flow:
-    """Particles where they start; ValueErrors are those of ``problems``."""
+    ValueErrors are those of ``problems``.
+    """
     case, metal, scheme = scenario.case, scenario.metal, scheme_of(scenario)
     plane = isinstance(case, StillTank)
-    gravity = (0.0, -metal.gravity_m_s2, 0.0) if plane else (0.0, 0.0, -metal.gravity_m_s2)
+    gravity = (0.0, -G_M_S2, 0.0) if plane else (0.0, 0.0, -G_M_S2)
     liquid = LiquidMetal(metal.density_kg_m3, metal.viscosity_m2_s, gravity)
     if isinstance(case, StillTank):
         return open_tank(scheme, liquid, *cells_of(case), case.particle_m)
-    full = case.starts == "full"
-    return open_shoulder(case.particle_m, scheme, full, liquid, casting_of(case))
+    return open_shoulder(case.particle_m, scheme, full, liquid)
 
 
 def ladle_of(scenario: MetalFlow, flow: Flow) -> Ladle | None:
     """What pours; None where nothing does."""
     case = scenario.case
-    if isinstance(case, StillTank) or case.starts == "full":
-        return None
-    return Ladle(flow, case.rate_kg_s, casting_of(case))
+    return None if isinstance(case, StillTank) else Ladle(flow, case.rate_kg_s, PAPERS)
 
 
 def probes_of(scenario: MetalFlow) -> tuple[PressureProbe, ...]:
-    """The scenario's probes, or the paper's places."""
+    """Where pressure is recorded: at the places of the paper."""
     case = scenario.case
-    if scenario.probes:
-        return scenario.probes
     if isinstance(case, StillTank):
         depths_m = [share * case.depth_m for share in DEPTHS]
         return tuple(
-            PressureProbe(name=f"h{1e3 * h:.0f}", at_m=(0.5 * case.width_m, case.depth_m - h))
+            PressureProbe(f"h{1e3 * h:.0f}", (0.5 * case.width_m, case.depth_m - h))
             for h in depths_m
         )
-    ring_at_m = 0.25 * (case.lower_m + case.upper_m)
+    ring_at_m = 0.25 * (PAPERS.lower_m + PAPERS.upper_m)
     return (
-        PressureProbe(name="bottom", at_m=(0.0, 0.5 * case.particle_m)),
-        PressureProbe(name="shoulder", at_m=(ring_at_m, 0.5 * case.height_m - case.particle_m)),
+        PressureProbe("bottom", (0.0, 0.5 * case.particle_m)),
+        PressureProbe("shoulder", (ring_at_m, 0.5 * PAPERS.height_m - case.particle_m)),
     )
 
 
@@ -103,13 +109,13 @@ def level_m(scenario: MetalFlow, particles: int) -> float:
     case = scenario.case
     if isinstance(case, StillTank):
         return case.depth_m
-    return casting_of(case).level_m(case.particle_m, particles)
+    return PAPERS.level_m(case.particle_m, particles)
 
 
 def ideal_pa(scenario: MetalFlow, particles: int) -> dict[str, float]:
     """Hydrostatic pressure at the probes under so many particles of metal, Pa."""
     top_m, metal = level_m(scenario, particles), scenario.metal
-    by_depth = metal.density_kg_m3 * metal.gravity_m_s2
+    by_depth = metal.density_kg_m3 * G_M_S2
     return {p.name: by_depth * max(0.0, top_m - p.at_m[1]) for p in probes_of(scenario)}
 
 
@@ -122,7 +128,7 @@ def problems(scenario: MetalFlow) -> list[Problem]:
     """List what keeps a well-typed scenario from being run."""
     case = scenario.case
     sizes = _tank_sizes(case) if isinstance(case, StillTank) else _cylinder_sizes(scenario, case)
-    return [*sizes, *_times(scenario), *_probes(scenario)]
+    return [*sizes, *_times(scenario)]
 
 
 def _tank_sizes(case: StillTank) -> Iterator[Problem]:
@@ -135,14 +141,14 @@ def _tank_sizes(case: StillTank) -> Iterator[Problem]:
 
 
 def _cylinder_sizes(scenario: MetalFlow, case: ShoulderedCylinder) -> Iterator[Problem]:
-    most_m = min(case.upper_m, 0.5 * case.height_m) / FEWEST
+    most_m = PAPERS.upper_m / FEWEST
     if case.particle_m > most_m * (1.0 + 1e-9):
-        valid = f"at most {most_m:.4g} m, a quarter of the bore and of half the height"
+        valid = f"at most {most_m:.4g} m, a quarter of the bore"
         yield Problem("case.particle_m", case.particle_m, valid)
-    elif case.starts == "empty":
+    else:
         try:
             density = scenario.metal.density_kg_m3
-            stream(case.particle_m, case.rate_kg_s, density, casting_of(case))
+            stream(case.particle_m, case.rate_kg_s, density, PAPERS)
         except ValueError as error:
             yield Problem("case.rate_kg_s", case.rate_kg_s, f"less ({error})")
 
@@ -156,33 +162,15 @@ def _times(scenario: MetalFlow) -> Iterator[Problem]:
         yield Problem("record_s", scenario.record_s, f"at most the duration, {ends_s:g} s")
 
 
-def _probes(scenario: MetalFlow) -> Iterator[Problem]:
-    case, names = scenario.case, [probe.name for probe in scenario.probes]
-    for i, probe in enumerate(scenario.probes):
-        across_m, height_m = probe.at_m
-        if isinstance(case, StillTank):
-            inside = 0.0 < across_m < case.width_m and 0.0 < height_m < case.depth_m
-            where = f"above 0 and below {case.width_m:g} m across and {case.depth_m:g} m high"
-        else:
-            inside = across_m >= 0.0 and bool(
-                casting_of(case).holds(np.array([[across_m, 0.0, height_m]]))[0]
-            )
-            where = "a distance from the axis and a height inside the casting"
-        if not inside:
-            yield Problem(f"probes.{i}.at_m", list(probe.at_m), where)
-        if probe.name in names[:i]:
-            yield Problem(f"probes.{i}.name", probe.name, "each name once")
-
-
 @lru_cache(maxsize=8)
 def _counts(case: StillTank | ShoulderedCylinder) -> tuple[int, int, int]:
     """Particles of the mould, of fluid at the start and of fluid at the end."""
     flow = open_flow(MetalFlow(case=case))
     begins = int(flow.fluid.sum())
     mould = len(flow.particles.kind) - begins
-    if isinstance(case, StillTank) or case.starts == "full":
+    if isinstance(case, StillTank):
         return mould, begins, begins
-    return mould, begins, len(casting_of(case).filled_m(case.particle_m))
+    return mould, begins, len(PAPERS.filled_m(case.particle_m))
 
 
 def fluid_of(scenario: MetalFlow) -> int:
@@ -207,8 +195,8 @@ def expected_work(scenario: MetalFlow) -> float:
     for part in range(LEVELS if poured_s else 0):
         fluid = int(begins + (part + 0.5) * part_s / poured_s * (ends - begins))
         drop_m = max(0.0, _mouth_m(case) - level_m(scenario, fluid))
-        fastest = math.sqrt(POUR_M_S**2 + 2.0 * scenario.metal.gravity_m_s2 * drop_m)
-        dt_s = min(still_s, scenario.courant * case.particle_m / fastest)
+        fastest = math.sqrt(POUR_M_S**2 + 2.0 * G_M_S2 * drop_m)
+        dt_s = min(still_s, scheme.courant * case.particle_m / fastest)
         work += part_s / dt_s * solves(scheme, fluid, fluid + mould)
     return work
 
@@ -223,4 +211,4 @@ def _pouring_s(scenario: MetalFlow, particles: int) -> float:
 
 def _mouth_m(case: StillTank | ShoulderedCylinder) -> float:
     """Height that metal is poured from."""
-    return 0.0 if isinstance(case, StillTank) else case.height_m + POUR_HEIGHT * case.particle_m
+    return 0.0 if isinstance(case, StillTank) else PAPERS.height_m + POUR_HEIGHT * case.particle_m

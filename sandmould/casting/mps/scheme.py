@@ -12,6 +12,9 @@ from sandmould.casting.mps.viscosity import LAPLACIANS
 VISCOUS_SHARE = 0.2
 """Of r0^2/nu, the longest stable explicit step of the viscosity (0.3 on a square lattice)."""
 
+G_M_S2 = 9.8
+"""The paper's 1960 Pa under 80 mm mean 9.8."""
+
 
 @dataclass(frozen=True)
 class LiquidMetal:
@@ -21,8 +24,7 @@ class LiquidMetal:
     """Molten aluminium, table 1."""
     viscosity_m2_s: float = 1e-5
     """Table 1."""
-    gravity_m_s2: tuple[float, float, float] = (0.0, -9.8, 0.0)
-    """The paper's 1960 Pa under 80 mm mean 9.8."""
+    gravity_m_s2: tuple[float, float, float] = (0.0, -G_M_S2, 0.0)
 
     def __post_init__(self) -> None:
         """Refuse what is no fluid."""

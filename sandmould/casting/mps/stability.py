@@ -28,9 +28,7 @@ class StabilityRating(Enum):
     """A guard stopped the run: the velocity diverged, fluid left the mould, no pressure found."""
 
 
-def rate_stability(
-    stopped: str, hops: bool, deviation_pa: float, quiet_pa: float = QUIET_PA
-) -> StabilityRating:
+def rate_stability(stopped: str, hops: bool, deviation_pa: float) -> StabilityRating:
     """Rate a run as the paper's figure 6 does, by numbers its text gives.
 
     Parameters
@@ -40,13 +38,11 @@ def rate_stability(
     hops : bool
     deviation_pa : float, Pa
         Standard deviation in time of the pressure at the deepest place.
-    quiet_pa : float, Pa
     """
     if stopped:
         return StabilityRating.FAILED
-    return (
-        StabilityRating.EXCELLENT if deviation_pa < quiet_pa and not hops else StabilityRating.GOOD
-    )
+    calm = deviation_pa < QUIET_PA and not hops
+    return StabilityRating.EXCELLENT if calm else StabilityRating.GOOD
 
 
 def still_hops(history: History, filled_m: float, spacing_m: float) -> bool:

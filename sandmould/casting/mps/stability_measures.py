@@ -13,8 +13,11 @@ from sandmould.casting.mps import scene
 from sandmould.casting.mps.probes import History, window_means
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S
 from sandmould.casting.mps.stability import StabilityRating, rate_stability, still_hops
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
+NOISE_WINDOW_S = 0.01
+"""A second deviation is taken of means over windows of this length: with c_poi = 1 fluid is thrown
+up in one step and falls in the next."""
 _MEANS = ("mean_speed_m_s", "kinetic_energy_j_kg", "step_iterations")
 
 
@@ -27,7 +30,7 @@ class StabilityMeasures:
     sd_pa: dict[str, float]
     """Standard deviation in time, step by step."""
     window_sd_pa: dict[str, float]
-    """The same of means over ``noise_window_s``."""
+    """The same of means over ``NOISE_WINDOW_S``."""
     ideal_pa: dict[str, float]
     """Hydrostatic, of the metal that is there at the end."""
     peak_speed_m_s: float
@@ -54,7 +57,7 @@ def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> Stab
     is_measured = not stopped and len(past.time_s) > 0
     nothing = [math.nan] * len(names)
     sd = past.deviation_pa().tolist() if is_measured else nothing
-    windows = past.deviation_pa(scenario.noise_window_s).tolist() if is_measured else nothing
+    windows = past.deviation_pa(NOISE_WINDOW_S).tolist() if is_measured else nothing
     sd_pa = dict(zip(names, sd, strict=True))
     hops = _hops(scenario, table, whole)
     return StabilityMeasures(
@@ -65,7 +68,7 @@ def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> Stab
         float(past.largest_speed_m_s.max()) if is_measured else math.nan,
         float(np.average(past.mean_speed_m_s, weights=past.dt_s)) if is_measured else math.nan,
         hops,
-        rate_stability(stopped, hops, sd_pa[scene.deepest(scenario)], scenario.quiet_pa),
+        rate_stability(stopped, hops, sd_pa[scene.deepest(scenario)]),
     )
 
 

@@ -73,8 +73,7 @@ class SoFar:
             self._settings = len(setting_rows(swept, swept_keys(swept)))
         rows = self._planned[self._planned[RUN].isin(self._unread)].reset_index(drop=True)
         self._unread = []
-        at_s, own = self._study.objective.at_vibration_s, self._study.own_measures
-        new = gather_runs(rows, self._folder, at_s, own).summary
+        new = gather_runs(rows, self._folder, self._study.own_measures).summary
         parts = [part for part in (self._summary, new) if not part.empty]
         self._summary = pd.concat(parts, ignore_index=True) if parts else self._summary
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from sandmould.definition.study import Study, kind_key
+from sandmould.definition.study import StudyBesideSand, kind_key
 from sandmould.kinds.kind import Execution, Kind, Planning
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import quantity
 from sandmould.scenario.sand import ARGUED
 
 
-class DeckStudy(Study):
+class DeckStudy(StudyBesideSand):
     """A study of a deck of the user's own."""
 
     kind: Literal["deck"] = kind_key("deck")
+    material: ClassVar[str | None] = None  # type: ignore[misc]
     scenario: OwnDeck = Field(
         ..., description="What the template is given, and what is read from its log."
     )

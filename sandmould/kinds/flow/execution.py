@@ -16,7 +16,7 @@ from sandmould.casting.mps.stability_measures import by_window, measure_flow
 from sandmould.definition.run import Run
 from sandmould.kinds.casting import CastingExecution, read_fields, write_measures, write_picture
 from sandmould.runs.outcome import RunOutcome
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
 
 class FlowExecution(CastingExecution[MetalFlow]):

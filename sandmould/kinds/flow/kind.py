@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from sandmould.definition.study import Study, kind_key
+from sandmould.definition.study import CastingStudy, kind_key
 from sandmould.kinds.kind import Execution, Kind, Planning
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
 
-class FlowStudy(Study):
+class FlowStudy(CastingStudy):
     """A study of metal that flows."""
 
     kind: Literal["flow"] = kind_key("flow")
+    material: ClassVar[str | None] = None  # type: ignore[misc]
     scenario: MetalFlow = Field(
         ..., description="The metal, where it flows, and how that is computed."
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sandmould.casting.mps.scene import probes_of
 from sandmould.runs.measures import Measure, MeasureGroup, once
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
 MEASURES: tuple[MeasureGroup[MetalFlow], ...] = (
     MeasureGroup(
@@ -31,7 +31,7 @@ MEASURES: tuple[MeasureGroup[MetalFlow], ...] = (
             Measure("<probe>_pa", "Pressure at the probe <probe>, mean over a record."),
             Measure("<probe>_mean_pa", "Mean in time of the pressure at <probe>."),
             Measure("<probe>_sd_pa", "Standard deviation in time of that pressure."),
-            Measure("<probe>_window_sd_pa", "The same of means over noise_window_s."),
+            Measure("<probe>_window_sd_pa", "The same of means over 10 ms."),
             Measure("<probe>_error_pa", "That mean less the hydrostatic pressure at <probe>."),
         ),
     ),

@@ -11,7 +11,7 @@ from sandmould.kinds.flow.limits import limit_problems
 from sandmould.kinds.flow.measures import MEASURES
 from sandmould.kinds.flow.speed import FlowSpeed
 from sandmould.kinds.kind import BASE_MEMORY_MB, Note, SpeedClass
-from sandmould.scenario.flow import MetalFlow, ShoulderedCylinder, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 PARTICLES_PER_MB = 300
 RECORD_BYTES = 28
@@ -69,8 +69,7 @@ class FlowPlanning(CastingPlanning[MetalFlow]):
 
     def notes(self, scenario: MetalFlow) -> Sequence[Note]:
         """Poured metal whose particles may pass through each other."""
-        poured = isinstance(scenario.case, ShoulderedCylinder) and scenario.case.starts == "empty"
-        if not poured or scenario.collision_distance > 0.0:
+        if isinstance(scenario.case, StillTank) or scenario.collision_distance > 0.0:
             return ()
         text = (
             "Metal is poured with collision_distance 0. Both settings of shoulder_pour broke off "

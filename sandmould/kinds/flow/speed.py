@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from sandmould.kinds.stored_speed import StoredSpeed
-from sandmould.scenario.flow import MetalFlow, ShoulderedCylinder
+from sandmould.scenario.casting.flow import MetalFlow
 
 TIMED_S = 0.5
 
@@ -25,10 +25,7 @@ class FlowSpeed(StoredSpeed[MetalFlow]):
         """Particle-solves per second of one core, in the first steps; of a mould that is full."""
         from sandmould.casting.mps import scene
 
-        if isinstance(scenario.case, ShoulderedCylinder):
-            full = scenario.case.model_copy(update={"starts": "full"})
-            scenario = scenario.model_copy(update={"case": full})
-        flow = scene.open_flow(scenario)
+        flow = scene.open_flow(scenario, full=True)
         with contextlib.suppress(ArithmeticError):
             flow.step()  # compiled before it is timed
         before, begun_s = flow.cost.particle_solves, time.process_time()

@@ -52,7 +52,6 @@ SAND: Kind[Scenario] = Kind(
     open_planning=_open_planning,
     open_execution=_open_execution,
     material=Material,
-    absent=(),
     draws_by_lot=True,
     labels_have_units=False,
 )

@@ -42,7 +42,7 @@ from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.kinds.sand.outflow import add_outflow, measure_outflow
 from sandmould.runs.columns import OVERLAP_P99_FRACTION
 from sandmould.runs.files import replaced
-from sandmould.scenario.cavity_checks import free_share
+from sandmould.scenario.checks.cavities import free_share
 from sandmould.scenario.scenario import Scenario
 
 
@@ -146,13 +146,12 @@ def write_picture(scenario: Scenario, folder: Path, out: Path) -> None:
 
 
 def write_exports(scenario: Scenario, folder: Path, out: Path) -> None:
-    """Write snapshots for ParaView (``.vtu``) and OVITO (``.dump``) as ``record.export`` asks.
+    """Write the snapshots at the moments for ParaView (``.vtu``) and OVITO (``.dump``).
 
     They go into one archive beside the folder, ``exports.zip``: a folder of them would be most of
     the files of a sweep. A pattern's bent surface is always written, into the folder: it is what
     the run was made for.
     """
-    wanted = scenario.record.export
     moments = list_moments(folder)
     if scenario.pattern is not None:
         from sandmould.kinds.sand.bent_files import (
@@ -161,12 +160,10 @@ def write_exports(scenario: Scenario, folder: Path, out: Path) -> None:
 
         out.mkdir(exist_ok=True)
         write_bent(scenario, folder, out)
-    if wanted == "none" or not moments:
+    if not moments:
         return
     last_s = moments[-1].vibration_time_s
-    chosen = (
-        moments if wanted == "all" else {nearest(moments, f * last_s) for f in MOMENTS.values()}
-    )
+    chosen = {nearest(moments, f * last_s) for f in MOMENTS.values()}
     with tempfile.TemporaryDirectory() as name, replaced(out.with_suffix(".zip")) as partial:
         written = Path(name)
         if scenario.scene.solids:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from sandmould.geometry.geometry import Revolved
 from sandmould.runs.formatting import listed, number
 from sandmould.scenario.box import Tube
+from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.wall_thickness import thinnest_wall
 
 LEAST_GRAINS = 5.0
 """Of the largest diameter: in narrower spaces a few grains form an arch and stop the others."""

@@ -13,11 +13,11 @@ from sandmould.kinds.sand.hardness_text import hardness_lines
 from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.kinds.sand.table_motion import frequency_rule
 from sandmould.runs.formatting import number
+from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, drawing_notes
-from sandmould.scenario.wall_thickness import thinnest_wall
 
 HIGH_ACCELERATION_G = 20.0
 """Peak acceleration above which a plan asks whether the amplitude is meant so."""

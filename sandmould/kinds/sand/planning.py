@@ -19,7 +19,7 @@ from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.kinds.sand.table_motion import table_lines
 from sandmould.limits import FRAMES, RECORDS
 from sandmould.runs.hashing import scenario_hash
-from sandmould.scenario import checks
+from sandmould.scenario.checks.scene import problems as scene_problems
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
@@ -93,7 +93,7 @@ class SandPlanning(Planning[Scenario]):
 
     def problems(self, scenario: Scenario) -> list[Problem]:
         """What keeps a scene from being computed, and more records of it than anyone can use."""
-        return checks.problems(scenario) or [*self._records(scenario)]
+        return scene_problems(scenario) or [*self._records(scenario)]
 
     def _records(self, scenario: Scenario) -> Iterator[Problem]:
         lasts_s, record = self.planned_s(scenario), scenario.record
@@ -134,10 +134,6 @@ class SandPlanning(Planning[Scenario]):
         if scenario.pattern is None:
             return of_engine
         return digest(of_engine, scenario_hash(scenario.pattern), pattern_fe.source_hash())
-
-    def vibration_s(self, scenario: Scenario) -> float:
-        """The whole vibration."""
-        return sum(stage.whole_duration_s for stage in scenario.vibrations)
 
     def threads(self, scenario: Scenario) -> int:
         """Ranks of MPI, or threads."""

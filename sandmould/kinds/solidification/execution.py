@@ -13,7 +13,7 @@ from sandmould.analysis.freezing import freezing
 from sandmould.casting.arpm import computation, scene
 from sandmould.definition.run import Run
 from sandmould.kinds.casting import CastingExecution, read_fields, write_measures, write_picture
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 
 
 class SolidificationExecution(CastingExecution[Solidification]):

@@ -8,13 +8,13 @@ from typing import Any, Literal
 from pydantic import Field
 
 from sandmould.bad_input import Problem
-from sandmould.definition.study import Study, kind_key
+from sandmould.definition.study import CastingStudy, kind_key
 from sandmould.definition.sweep import points
 from sandmould.kinds.kind import Execution, Kind, Planning
-from sandmould.scenario.solidification import MetalAndMould, Solidification
+from sandmould.scenario.casting.solidification import MetalAndMould, Solidification
 
 
-class SolidificationStudy(Study):
+class SolidificationStudy(CastingStudy):
     """A study of a casting in its mould."""
 
     kind: Literal["solidification"] = kind_key("solidification")

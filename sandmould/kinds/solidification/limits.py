@@ -9,7 +9,7 @@ import numpy as np
 
 from sandmould.bad_input import Problem
 from sandmould.limits import CELLS, RECORDS
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 
 
 def limit_problems(scenario: Solidification) -> Iterator[Problem]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sandmould.runs.measures import Measure, MeasureGroup, once
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 
 MEASURES: tuple[MeasureGroup[Solidification], ...] = (
     MeasureGroup(

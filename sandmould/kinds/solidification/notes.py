@@ -16,9 +16,9 @@ from sandmould.casting.arpm.estimates import (
 )
 from sandmould.kinds.kind import Note
 from sandmould.runs.formatting import number
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
+from sandmould.scenario.checks.wall_thickness import ThinWall, thinnest_wall
 from sandmould.scenario.solids import SolidMesh, drawing_notes
-from sandmould.scenario.wall_thickness import ThinWall, thinnest_wall
 
 FEWEST_ELEMENTS = 2
 """Through a wall: with fewer its inside and its surface are one."""

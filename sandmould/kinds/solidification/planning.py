@@ -13,8 +13,8 @@ from sandmould.kinds.solidification.limits import limit_problems
 from sandmould.kinds.solidification.measures import MEASURES
 from sandmould.kinds.solidification.notes import notes
 from sandmould.kinds.solidification.speed import SolidificationSpeed
-from sandmould.scenario.casting_shapes import with_file_hash
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.shapes import with_file_hash
+from sandmould.scenario.casting.solidification import Solidification
 
 ELEMENTS_PER_MB = 500
 MEASURED_ELEMENT_S = 7e-6

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from sandmould.kinds.stored_speed import StoredSpeed
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 
 TIMED_S = 0.5
 STEPS = 10

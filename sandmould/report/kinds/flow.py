@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from sandmould.casting.mps.scene import scheme_of
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.report.flow import flow_method, flow_pages
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
-from sandmould.scenario.flow import MetalFlow, StillTank
+from sandmould.scenario.casting.flow import MetalFlow, StillTank
 from sandmould.study.collect import Collected
 
 
@@ -18,7 +19,7 @@ class FlowReport(KindReport[MetalFlow]):
         """What the paper leaves open."""
         gradient = (
             "The gradient as printed, eq. (3), points the wrong way and makes every run fail. The "
-            f"gradient used here, {scenario.gradient}, is a choice."
+            f"gradient used here, {scheme_of(scenario).gradient}, is a choice."
         )
         if isinstance(scenario.case, StillTank):
             return (gradient,)

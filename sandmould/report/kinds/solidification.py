@@ -10,7 +10,7 @@ from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.next_steps import NextStep
 from sandmould.report.solidification import choose_pictured_run, solid_method, solid_pages
 from sandmould.report.time_series import curve_figures
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 from sandmould.statistics.verdict import Verdict, rank_runs
 from sandmould.study.collect import Collected
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sandmould.bad_input import BadInputError, Problem
-from sandmould.definition.certificate import frequency_key, spanned_hz
+from sandmould.definition.certificate import SEEDS, frequency_key, spanned_hz
 from sandmould.definition.comparing import ENGINE
 from sandmould.definition.run import Part, Run
 from sandmould.definition.sweep import Point, points, value_at
@@ -84,7 +84,7 @@ def expand(
     if certificate.controls and certified_hz:
         controlled = {step: {key: f} for step, f in spanned_hz(certified_hz).items()
                       if step in swept_steps(certificate)}  # fmt: skip
-    seeds = range(1, certificate.replicates + 1)
+    seeds = range(1, SEEDS + 1)
     added += [(point, seeds) for point in controlled.values()]
     for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point, labels, measured)

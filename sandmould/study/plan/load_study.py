@@ -108,7 +108,6 @@ def open_study(path: Path, text: str | None = None) -> OpenStudy:
             for section in _OF_SWEEP:
                 tree.pop(section, None)
         tree = merge(tree, file.tree, origin, file.name)
-    problems += [replace(p, file=origin.file_of(p.key)) for p in _not_of_its_kind(kind, tree)]
     if problems:
         raise BadInputError(problems)
     study = validated(kind.study, tree, origin)
@@ -134,15 +133,6 @@ def _kind(files: list[_File]) -> Kind[Any]:
     """Kind of the study, by the last file that states it."""
     stated = [f for f in files if "kind" in f.tree]
     return kind_named(stated[-1].tree["kind"], stated[-1].name) if stated else DEFAULT_KIND
-
-
-def _not_of_its_kind(kind: Kind[Any], tree: Tree) -> Iterator[Problem]:
-    """Sections that studies of a kind do not have."""
-    for name in (*kind.absent, *(() if kind.material else ("material",))):
-        if tree.get(name):
-            yield Problem(name, tree[name], f"absent in a study of kind {kind.name}")
-    if not kind.draws_by_lot and tree.get("replicates", 1) != 1:
-        yield Problem("replicates", tree["replicates"], "1: nothing in a run is drawn by lot")
 
 
 def _reported(study: Study) -> Iterator[Problem]:

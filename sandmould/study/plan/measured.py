@@ -25,7 +25,7 @@ def measured_in(study: Study, kind: Kind[Any], scenario: AnyScenario) -> list[Me
 
 
 def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[Problem]:
-    """List the measures and times asked for that a scene of a study will not have.
+    """List the measures asked for that a scene of a study will not have.
 
     Parameters
     ----------
@@ -43,12 +43,6 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
     for key, name in _asked(study):
         if name not in has and not nothing_asked:
             yield Problem(key, name, _valid(name, has, _about(key, name, study, kind)))
-    at, vibration_s = study.objective.at_vibration_s, kind.planning.vibration_s(scenario)
-    if at is not None and vibration_s == 0.0:
-        yield Problem("objective.at_vibration_s", at, "absent: nothing vibrates in this scene")
-    elif at is not None and at > vibration_s:
-        valid = f"at most {vibration_s:g} s, the end of the vibration"
-        yield Problem("objective.at_vibration_s", at, valid)
 
 
 def problems_elsewhere(study: Study, results: Path) -> Iterator[Problem]:

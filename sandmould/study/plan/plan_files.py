@@ -14,7 +14,7 @@ from pydantic import create_model
 from sandmould.definition.run import FILL, Part, Run
 from sandmould.definition.study import Study
 from sandmould.kinds.kind import Note
-from sandmould.kinds.registry import DEFAULT_KIND, KINDS, kind_named, kind_of
+from sandmould.kinds.registry import KINDS, kind_named, kind_of
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import size_text
 from sandmould.runs.progress import duration_text
@@ -181,10 +181,10 @@ def read_run(path: Path) -> Run:
 
 
 def _kind_of_older(tree: Tree) -> str:
-    """Kind of a run whose file does not state it: the one whose scenario has all its keys."""
+    """Kind of a run whose file does not state it: the one whose scenario has most of its keys."""
     keys = set(tree.get("scenario") or ())
-    fits = (kind.name for kind in KINDS.values() if keys <= set(kind.scenario.model_fields))
-    return next(fits, DEFAULT_KIND.name)
+    has = {name: len(keys & set(kind.scenario.model_fields)) for name, kind in KINDS.items()}
+    return max(has, key=lambda name: has[name])
 
 
 def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:

@@ -95,7 +95,7 @@ def choose_controls(
     objective = study.objective
     optimum = find_optimum(summary, keys, objective.measure, objective.better)
     best_hz = optimum.setting[keys[0]]
-    return replace(log, certified_hz=round_best_hz(best_hz, study.certificate.ratio))
+    return replace(log, certified_hz=round_best_hz(best_hz))
 
 
 def next_replicates(

@@ -14,10 +14,9 @@ from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.products import Computed
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
-SHOULDER = {"kind": "shoulder", "particle_m": 0.00625, "height_m": 0.05, "lower_m": 0.0375,
-            "rate_kg_s": 0.2}  # fmt: skip
+SHOULDER = {"kind": "shoulder", "particle_m": 0.00625, "rate_kg_s": 0.2}
 POURED = MetalFlow(case=SHOULDER, duration_s=0.02, record_s=0.005, relaxations=2)
 TANK = {"kind": "tank", "particle_m": 0.004, "width_m": 0.024, "depth_m": 0.032}
 STILL = MetalFlow(case=TANK, duration_s=0.03, record_s=0.005, source_share=1.0)

@@ -16,7 +16,7 @@ from sandmould.casting.mps.sources import SOURCES
 from sandmould.casting.mps.tank import still_tank
 from sandmould.casting.mps.viscosity import LAPLACIANS
 from sandmould.casting.mps.weight import make_kernel
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
 
 SIZE_M = 2e-3
 

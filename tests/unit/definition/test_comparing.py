@@ -189,10 +189,6 @@ def test_price_is_that_of_each_engine(planned: Planned) -> None:
             "trial.yaml: equivalence.margins.tube_fill_fraction = 0 cannot be used: valid is a "
             "number greater than 0.",
         ),
-        (
-            {"equivalence": {"confidence": 1, **MARGINS}},
-            "trial.yaml: equivalence.confidence = 1 cannot be used: valid is a number less than 1.",
-        ),
     ],
 )
 def test_comparison_that_cannot_be_made_is_told(

@@ -16,10 +16,10 @@ from sandmould.definition.sweep import (
     value_at,
 )
 from sandmould.limits import RUNS
-from sandmould.scenario.flow import MetalFlow
+from sandmould.scenario.casting.flow import MetalFlow
+from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solidification import Solidification
 
 SCENE = Scenario(seed=1)
 BASE = SCENE.model_dump(mode="json")

@@ -14,7 +14,7 @@ from sandmould.engines.durations import grain_steps, stage_s
 from sandmould.engines.program import build_program
 from sandmould.engines.step_counts import StepCounts
 from sandmould.kinds.sand.kind import SAND
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.fill import FillVibration
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import share_fills

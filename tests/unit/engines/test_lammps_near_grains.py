@@ -21,7 +21,7 @@ from tests.scenes import tube_scene
 
 SHORT: dict[str, Any] = {
     "fill": {"layers": [{"count": 20, "repeat": 2}], "settling": {"longest_s": 0.09}},
-    "discharge": {"settling": {"shortest_s": 0.05, "longest_s": 0.1}},
+    "discharge": {"duration_s": 0.1},
     "vibration": [{"acceleration_g": 3.0, "frequency_hz": 50.0, "duration_s": 0.02}],
 }
 TUBE = {name: SHORT[name] for name in ("fill", "vibration")}

@@ -13,7 +13,7 @@ from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_problem
 from sandmould.engines.step_counts import StepCounts
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene
 from tests.verification.cases.bench import RADIUS_M, Bench, law, scene, stiffness

@@ -11,7 +11,7 @@ import pytest
 from sandmould.bad_input import BadInputError
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene

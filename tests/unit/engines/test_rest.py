@@ -149,7 +149,7 @@ def test_a_bed_that_never_rests_ends_with_its_speed_and_its_loads_in_figures(
         ),
         (
             {"discharge": {"gate": "g", "settling": {"rms_speed_m_s": 0.02}}},
-            r"discharge.settling.rms_speed_m_s .* the key rest.discharge_rms_speed_m_s, where",
+            r"discharge.settling = .* by rest.discharge_rms_speed_m_s",
         ),
         (
             {"record": {"load_every_steps": 5}},
@@ -159,4 +159,4 @@ def test_a_bed_that_never_rests_ends_with_its_speed_and_its_loads_in_figures(
 )
 def test_a_key_that_has_moved_is_refused_with_its_new_name(tree: dict[str, Any], says: str) -> None:
     with pytest.raises(BadInputError, match=says):
-        validated(Scenario, tree, Origin())
+        validated(Scenario, tree, Origin(), "scenario")

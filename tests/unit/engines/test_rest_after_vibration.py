@@ -20,7 +20,7 @@ from sandmould.engines.registry import engine_of
 from sandmould.engines.step_counts import StepCounts
 from sandmould.kinds.sand.measure import measure_snapshot
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.reading import Origin, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind

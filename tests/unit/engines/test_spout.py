@@ -11,7 +11,7 @@ import pytest
 from sandmould.engines.program import build_program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.step_counts import StepCounts
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import SOFT, WHAT_LIGGGHTS_CAN
 from tests.scenes import tube_scene

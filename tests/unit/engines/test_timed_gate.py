@@ -15,7 +15,7 @@ from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_of, engine_problem
 from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.scenario import Scenario
 from tests.hopper import FLOOR_M, HALF_OUTLET_M, MIDDLE_M, hopper_scene
 

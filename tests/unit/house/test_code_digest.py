@@ -186,7 +186,7 @@ def test_a_pattern_is_hashed_by_what_its_room_computes() -> None:
     ("solver", "files"),
     [
         (arpm, ["casting/arpm/local_steps.py", "casting/arpm/material.py", "scenario/solids.py"]),
-        (mps, ["casting/mps/pressure.py", "scenario/flow.py"]),
+        (mps, ["casting/mps/pressure.py", "scenario/casting/flow.py"]),
         (dem, ["dem/contact_law.py", "dem/solver.py"]),
     ],
 )

@@ -53,12 +53,6 @@ def test_the_summary_takes_what_is_measured_at_rest(study: Path) -> None:
     assert row[FILL] == 0.0
 
 
-def test_a_time_of_vibration_is_one_at_full_speed(study: Path) -> None:
-    row = gather(study, at_vibration_s=DURATION_S).summary.set_index("run").loc[RUN]
-    assert row["measured_stage"] == "vibrate"
-    assert row[FILL] > 0.1
-
-
 def test_curves_end_with_the_vibration(study: Path) -> None:
     found = gather(study)
     own = found.curves[found.curves["run"] == RUN]

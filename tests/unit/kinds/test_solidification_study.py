@@ -22,7 +22,7 @@ from sandmould.report.page import write_report
 from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.scenario.solidification import Solidification
+from sandmould.scenario.casting.solidification import Solidification
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -104,7 +104,7 @@ def test_what_cannot_solidify_is_told_in_one_sentence(
     ("top", "told"),
     [
         ({"replicates": 2}, "replicates = 2 .* nothing in a run is drawn by lot"),
-        ({"certificate": {"controls": ["hold"]}}, "absent in a study of kind solidification"),
+        ({"certificate": {"controls": ["hold"]}}, "valid is absent: only studies of sand"),
         ({"material": "rojek_2004"}, "a material of kind solidification: hirata_2019"),
         (
             {"sweep": {"keys": {"element_m": [0.01, 0.005]}}, "reference": {"element_m": 0.002}},
@@ -187,14 +187,6 @@ def measured(folder: Path, **scenario: Any) -> Path:
     return of_run
 
 
-def test_too_long_a_step_is_an_outcome(tmp_path: Path) -> None:
-    folder = one_run(tmp_path, stepping="explicit", step_share=3.0)
-    outcome = RunOutcome.read(folder / "outcome.json")
-    assert outcome.outcome is Outcome.UNSTABLE
-    assert "the time step is too long" in outcome.detail
-    measure_run(folder)  # what there is
-
-
 def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:
     folder = one_run(tmp_path, until_s=10.0)
     outcome = RunOutcome.read(folder / "outcome.json")
@@ -215,7 +207,7 @@ def test_sizes_that_break_the_rule_are_told_before_anything_starts(tmp_path: Pat
     told = r"layers = \[2, 1\] .* the smaller must measure at least 1/c_k"
     with pytest.raises(BadInputError, match=told):
         expand(open_study(opened(tmp_path, **uneven)))
-    for changed in ({"layers": [4]}, {"refuse_ratio": False}, {"exchange": "faces"}):
+    for changed in ({"layers": [4]}, {"exchange": "faces"}):
         assert expand(open_study(opened(tmp_path, **uneven | changed)))
 
 

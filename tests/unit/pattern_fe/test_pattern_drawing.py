@@ -65,14 +65,6 @@ def test_a_drawn_bracket_is_foam_where_it_is_put(file: Path, unit_m: float) -> N
     assert SAND.planning.memory_mb(scenario) > BASE_MEMORY_MB
 
 
-def test_a_turned_bracket_reaches_along_y() -> None:
-    shape = {"kind": "drawing", "file": str(BRACKET), "unit_m": 1e-3, "angle_deg": 90.0}
-    scenario = drawn(BRACKET, shape=shape, position_m=[0.06, 0.04, 0.045],
-                     supports={"clamped": ["bottom"]})  # fmt: skip
-    high_m = pattern_of(scenario).surface.vertices_m.max(axis=0) - [0.06, 0.04, 0.045]
-    assert high_m[1] == pytest.approx(0.05, abs=1e-6)
-
-
 def test_quality_is_that_of_balls_in_and_round_an_element() -> None:
     regular = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
     corner = np.vstack([np.zeros(3), np.eye(3)])

@@ -15,7 +15,7 @@ from sandmould.pattern_fe.checks import check_inside, check_mesh
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.mesh_file import read_mesh
 from sandmould.pattern_fe.pattern import Pattern
-from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, t_shape, with_sides
+from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, with_sides
 from sandmould.pattern_fe.supports import Supports
 from tests.patterns import (
     FOOT,
@@ -33,7 +33,6 @@ from tests.patterns import (
     [
         (bar(0.02, 0.01), 200.0),
         (l_shape(0.015, 0.06, 0.075), 15 * 60 + 60 * 15),
-        (t_shape(0.01, 0.05, 0.03), 10 * 40 + 30 * 10),
         (frame(0.01, 0.06, 0.08), 60 * 80 - 40 * 60),
     ],
 )

@@ -21,7 +21,7 @@ from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.session import window_ends
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.pattern_fe.shapes import bar, mesh_of, with_sides
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import write_mesh

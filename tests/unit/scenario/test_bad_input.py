@@ -175,7 +175,7 @@ CASES: dict[str, tuple[str, str]] = {
         "valid is a plate among the obstacles: there is none.",
     ),
     "discharge without a gate": (
-        "based_on: tube\nscenario: {discharge: {settling: {longest_s: 9}}}",
+        "based_on: tube\nscenario: {discharge: {duration_s: 9}}",
         "trial.yaml: scenario.discharge.gate = None cannot be used: "
         "valid is a value: this key must be given.",
     ),
@@ -210,9 +210,9 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "key of another kind": (
         "based_on: tube\nscenario: {obstacles: [{kind: tube, diameter_m: 0.02, length_m: 0.05, "
-        "left_end_x_m: 0.07, axis_height_m: 0.02, angle_deg: 90}]}",
-        "trial.yaml: scenario.obstacles.0.angle_deg = 90 cannot be used: valid is one of the keys "
-        "axis_height_m, axis_y_m, closed_end, diameter_m, facets, kind, left_end_x_m, length_m, "
+        "left_end_x_m: 0.07, axis_height_m: 0.02, radius_m: 90}]}",
+        "trial.yaml: scenario.obstacles.0.radius_m = 90 cannot be used: valid is one of the keys "
+        "axis_height_m, closed_end, diameter_m, facets, kind, left_end_x_m, length_m, "
         "name, section, wall_thickness_m.",
     ),
     "misspelt key of a kind": (

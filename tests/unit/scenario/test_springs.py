@@ -10,7 +10,7 @@ import pytest
 from sandmould.engines.deck_lines import Lines
 from sandmould.engines.lammps.render import render_deck
 from sandmould.engines.program import build_program
-from sandmould.scenario.checks import problems
+from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.contact import Contact
 from sandmould.scenario.sand import Sand
 from sandmould.scenario.scenario import Scenario

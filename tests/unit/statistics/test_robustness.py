@@ -200,10 +200,10 @@ def test_the_plan_prices_controls_that_are_still_to_come(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    opened(tmp_path, certificate={"controls": ["springs"], "replicates": 2})
+    opened(tmp_path, certificate={"controls": ["springs"]})
     plan = open_plan(tmp_path / "trial.yaml")
     said = price(plan, tmp_path / "results", 2)
-    # 2 x (7 + 6 + 6) runs of springs and six further frequencies of the sweep, 2 seeds each.
+    # 2 x (7 + 6 + 6) runs of springs and six further frequencies of the sweep, 4 seeds each.
     assert "Then, once the optimum is known, its controls: about 88 runs, 76 of them with" in said
     log = RoundLog(basis_of(plan.study.study), (), "The sweep is done.", CERTIFIED_HZ)
     (tmp_path / "results" / "trial").mkdir(parents=True)

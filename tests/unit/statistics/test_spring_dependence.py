@@ -27,7 +27,7 @@ from sandmould.statistics.spring_dependence import (
 )
 
 KEY, FILL = "vibration.0.frequency_hz", "tube_fill_fraction"
-CERTIFIED_HZ = round_best_hz(40.0, 1.41)
+CERTIFIED_HZ = round_best_hz(40.0)
 SPAN_HZ = tuple(spanned_hz(CERTIFIED_HZ).values())
 HOLDS = ("acceleration", "displacement", "velocity")
 CASES = tuple(

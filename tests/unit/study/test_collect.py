@@ -25,7 +25,6 @@ from sandmould.study.collect import (
 from tests.unit.report_study import (
     DURATION_S,
     FAILED,
-    FILLING_S,
     KEY,
     PLANTED,
     scenario,
@@ -81,14 +80,6 @@ def test_failed_run_has_gaps_and_says_why(study: Path) -> None:
     assert "passed through the floor" in row["detail"]
     assert math.isnan(row["tube_fill_fraction"])
     assert row["simulated_s"] < row["planned_s"]
-
-
-def test_objective_time_picks_the_snapshot_nearest_to_it(study: Path) -> None:
-    summary = gather(study, at_vibration_s=1.02).summary.set_index("run")
-    assert summary.loc["f50_r1", "measured_vibration_time_s"] == 1.0
-    assert summary.loc["f50_r1", "measured_time_s"] == FILLING_S + 1.0
-    assert math.isnan(summary.loc[FAILED, "measured_vibration_time_s"])
-    assert gather(study, at_vibration_s=3.0).summary.get("tube_fill_fraction") is None
 
 
 def test_missing_files_are_gaps(study: Path) -> None:
@@ -204,14 +195,11 @@ def test_study_reads_back_whole(study: Path) -> None:
     planned = SandStudy(
         title="Pack",
         scenario=scenario(50.0),
-        objective=Objective(measure="solid_fraction", better="smaller", at_vibration_s=1.0),
+        objective=Objective(measure="solid_fraction", better="smaller"),
     )
     text = yaml.safe_dump(planned.model_dump(mode="json"))
     (study / "study.yaml").write_text(text)
     assert read_study(study) == planned
-    collect(study)
-    summary = pd.read_csv(study / "summary.tsv", sep="\t")
-    assert set(summary["measured_vibration_time_s"].dropna()) == {1.0}
 
 
 def test_study_and_provenance_stand_in_without_their_files(study: Path) -> None:

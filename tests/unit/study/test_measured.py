@@ -81,11 +81,6 @@ CASES: dict[str, tuple[str, str]] = {
         "monolithic): nearest are pattern_stored_fraction, pattern_outside_fraction, "
         "pattern_under_fraction; sandmould measures lists all.",
     ),
-    "at a time of a scene at rest": (
-        "based_on: tube\nscenario: {vibration: []}\nobjective: {at_vibration_s: 0}",
-        "trial.yaml: objective.at_vibration_s = 0.0 cannot be used: valid is absent: nothing "
-        "vibrates in this scene.",
-    ),
 }
 
 

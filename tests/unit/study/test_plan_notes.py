@@ -17,7 +17,7 @@ from sandmould.casting.arpm.estimates import cooled, freezes_s
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
 from sandmould.kinds.sand import notes as notes_of_sand
-from sandmould.scenario.wall_thickness import thinnest_wall
+from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
@@ -97,8 +97,8 @@ def test_walls_of_a_picture(tmp_path: Path) -> None:
     y, x = np.indices(rows.shape)
     rows[(x - 20) ** 2 + (y - 30) ** 2 <= 15**2] = 0
     Image.fromarray(rows).save(tmp_path / "disc.png")
-    picture = {"kind": "image", "file": "disc.png", "pixel_m": 0.001, "low_m": [0.01, 0.01]}
-    room = {"low_m": [0.0, 0.0], "high_m": [0.08, 0.08]}
+    picture = {"kind": "image", "file": "disc.png", "pixel_m": 0.001}
+    room = {"low_m": [-0.01, -0.01], "high_m": [0.07, 0.07]}
     assert notes_of(tmp_path, shapes=[picture], box=room, probes=[], element_m=0.001) == []
     rows[28:31, 30:58] = 0
     Image.fromarray(rows).save(tmp_path / "disc.png")
@@ -193,7 +193,7 @@ def test_estimate_sees_symmetry_and_is_near_the_run(element_m: float) -> None:
 
 
 def _steel(tree: dict[str, Any]) -> Any:
-    from sandmould.scenario.solidification import Solidification
+    from sandmould.scenario.casting.solidification import Solidification
 
     def values(node: Any) -> Any:
         if isinstance(node, dict):

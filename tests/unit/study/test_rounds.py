@@ -262,7 +262,7 @@ def test_controls_beyond_the_sweep_open_no_round_that_has_ended(tmp_path: Path) 
 def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The runs are planted instead of computed: Snakemake itself is tested in tests/workflow."""
     monkeypatch.chdir(tmp_path)
-    opened(tmp_path, certificate={"controls": ["hold"], "replicates": 2})
+    opened(tmp_path, certificate={"controls": ["hold"]})
     calls: list[list[str]] = []
     computed: list[str] = []
 

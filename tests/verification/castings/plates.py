@@ -23,7 +23,7 @@ from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.solidification import CoolingProgress, SolidificationResult, solidify
 from sandmould.geometry.outline import Outline
-from sandmould.scenario.casting_shapes import FourPlates
+from sandmould.scenario.casting.shapes import FourPlates
 from sandmould.scenario.reading import Origin, merge, read_yaml
 
 MATERIALS = ROOT / "config" / "materials" / "hirata_2019.yaml"

@@ -20,7 +20,7 @@ from sandmould.geometry.geometry import Block
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline, outline_fault
 from sandmould.limits import PIXELS
-from sandmould.scenario.quantity import Section, quantity
+from sandmould.scenario.quantity import PLANNED, Section, quantity
 from sandmould.scenario.solids import SolidMesh, mesh_solid, with_hash
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ class FourPlates(Section):
 
 
 class CastPicture(Section):
-    """The dark pixels of a picture."""
+    """The dark pixels of a picture, whose lower left corner is the origin."""
 
     kind: Literal["image"]
     file: str = quantity(
@@ -133,13 +133,10 @@ class CastPicture(Section):
     sha256: str | None = quantity(
         None,
         "Hash of the file; the plan of a study writes it, so that another one is another run.",
-        source="user",
+        source=PLANNED,
         pattern=r"^[0-9a-f]{64}$",
     )
     pixel_m: float = quantity(..., "Side of a pixel.", unit="m", source="user", gt=0, le=1)
-    low_m: Flat = quantity(
-        (0.0, 0.0), "Place of the picture's lower left corner.", unit="m", source="user"
-    )
 
     @property
     def path(self) -> Path:
@@ -230,7 +227,7 @@ def _picture_solid(shape: CastPicture, key: str) -> Pixels:
     except MeshFileError as fault:
         problem = Problem(f"{key}.file", display_path(shape.path), str(fault))
         raise BadInputError([problem]) from fault
-    return Pixels("the picture", distance, shape.pixel_m, np.array(shape.low_m))
+    return Pixels("the picture", distance, shape.pixel_m, np.zeros(2))
 
 
 @lru_cache(maxsize=8)

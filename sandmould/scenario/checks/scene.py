@@ -11,9 +11,10 @@ from sandmould.geometry.drawing_file import MeshFileError
 from sandmould.geometry.outline import outline_fault
 from sandmould.limits import GRAINS
 from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_blocks, tube_wall
-from sandmould.scenario.cavity_checks import cavity_problems
+from sandmould.scenario.checks.cavities import cavity_problems
+from sandmould.scenario.checks.placed import placed_problems
+from sandmould.scenario.checks.unbalance import table_mass_problem, unbalance_problems
 from sandmould.scenario.moving_walls import piston_problems
-from sandmould.scenario.placed_checks import placed_problems
 from sandmould.scenario.placement import fall_s, plan_counts, portion_of, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import (
@@ -25,7 +26,6 @@ from sandmould.scenario.solids import (
     unit_hint,
 )
 from sandmould.scenario.time_step import LEAST_STEPS_A_PERIOD
-from sandmould.scenario.unbalance_checks import table_mass_problem, unbalance_problems
 from sandmould.scenario.vibration import Shaking, VibrationStage
 
 SHORTEST_STEP_S = 1e-9

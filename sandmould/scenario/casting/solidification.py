@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from sandmould.scenario.casting_shapes import Place, Rectangle, Shape
-from sandmould.scenario.quantity import NAME, Section, quantity
+from sandmould.scenario.casting.shapes import Place, Rectangle, Shape
+from sandmould.scenario.quantity import NAME, PLANNED, Section, quantity
 from sandmould.scenario.sand import ARGUED
 
 PAPER = "Hirata and Anzai 2019"
@@ -93,21 +93,8 @@ class Solidification(MetalAndMould):
         "differences.",
         source=ARGUED,
     )
-    stepping: Literal["explicit", "super", "local"] = quantity(
-        "local",
-        "One step for all, super time steps, or local steps; of no use to differences.",
-        source=ARGUED,
-    )
     kernel_size: float = quantity(
         2.1, "c_k of eq. (3); of no use to faces and differences.", source=PAPER, gt=1, le=10
-    )
-    refuse_ratio: bool = quantity(
-        True,
-        "Whether sizes that break the rule of 1/c_k are refused; of no use to faces.",
-        source=f"{PAPER}, section 4.3.2",
-    )
-    step_share: float = quantity(
-        0.95, "Time step over the longest stable one.", source=ARGUED, gt=0, le=10
     )
     threads: int = quantity(1, "Threads of one run.", source=ARGUED, ge=1, le=256)
     record_s: float = quantity(5.0, "Between records.", unit="s", source=ARGUED, gt=0)
@@ -121,7 +108,7 @@ class Solidification(MetalAndMould):
         source=ARGUED,
         gt=0,
     )
-    seed: int = quantity(1, "Nothing is drawn by lot: it changes no result.", source=ARGUED, ge=0)
+    seed: int = quantity(1, "Nothing is drawn by lot: it changes no result.", source=PLANNED, ge=0)
 
     @property
     def dimensions(self) -> int:

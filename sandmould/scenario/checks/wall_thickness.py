@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sandmould.geometry.geometry import Block
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
-from sandmould.scenario.casting_shapes import Body, Pixels, held_by
+from sandmould.scenario.casting.shapes import Body, Pixels, held_by
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

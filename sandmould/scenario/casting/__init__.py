@@ -1,0 +1,1 @@
+"""What is cast, in which mould: shapes, solidification, flow."""

@@ -1,0 +1,1 @@
+"""What keeps a well-typed scene from being run."""
