@@ -88,7 +88,7 @@ def sandmould(
     """Sand moulds for lost-foam casting: plan, run and report studies; results go to ./results."""
 
 
-app.command(epilog="Example: sandmould new my_study.yaml --yes --hold displacement")(new)
+app.command(epilog="Example: sandmould new tube --amplitude-mm 0.4 --frequency-hz 20 60")(new)
 
 
 @app.command(epilog="Example: sandmould plan tube_demo --cores 4")

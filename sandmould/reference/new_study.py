@@ -1,158 +1,155 @@
-"""The file of a first study, written from the answers to ``sandmould new``."""
+"""Short studies to begin with: templates with comments, filled by what a person knows."""
 
 from __future__ import annotations
 
-import textwrap
+import json
+import os
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem
-from sandmould.reference.new_answers import WALL_MM, WHY_HELD, NewStudy
+from sandmould.engines.deck import environment
+from sandmould.geometry.drawing_file import MeshFileError
 from sandmould.study.plan.build_plan import Plan, open_plan
 
+_HELD = ("acceleration_g", "velocity_mm_s", "amplitude_mm", "unbalance")
+_SHAKEN = {
+    "material": "rojek_2004",
+    "frequency_hz": (25.0, 140.0),
+    "acceleration_g": 1.5,
+    "velocity_mm_s": None,
+    "amplitude_mm": None,
+}
+_HOLE = {**_SHAKEN, "unbalance": None, "box_mm": (120.0, 110.0)}
+_OPTIONS: dict[str, dict[str, Any]] = {
+    "tube": {**_HOLE, "hole_mm": (25.0, 50.0)},
+    # 1.5 g raise no sand into a pocket that opens down
+    "pocket": {**_HOLE, "hole_mm": (25.0, 40.0), "opens": "down", "acceleration_g": 5.0},
+    "part": {**_SHAKEN, "drawing": None},
+    "deck": {},
+    "casting": {"material": "hirata_2019", "drawing": None},
+}
+"""Options of each study, and what is taken unless they are given."""
+_EXAMPLES = {
+    "part": "meshes/bracket.stl",
+    "deck": "decks/chute.in.j2",
+    "casting": "meshes/bracket.stl",
+}
+"""File of ``config`` that is copied beside a study where the user gives none."""
+_WALL_MM = 3.0
+"""Thickness of the walls round a hole: that of the shipped tube."""
+_ROOM_M = 0.03
+"""Sand round a part (argued)."""
+_ELEMENTS = 8
+"""Elements across the smallest extent of a casting (argued)."""
+_FOAM_M = 0.016
+"""Longest element of foam: that of the shipped bracket."""
+_GATE_M = 0.01
+"""Half the width of the gating that a part hangs from: that of the shipped bracket."""
 
-def refuse_present(path: Path) -> None:
-    """Refuse to write where there is a file.
+
+def write_new_study(name: str, path: Path, given: dict[str, Any]) -> Plan:
+    """Write a study and what it needs, and check it first as the plan does.
 
     Parameters
     ----------
+    name : str
+        Of its template.
     path : Path
+    given : dict
+        Options of ``sandmould new``, without those that were not given.
 
     Raises
     ------
     BadInputError
+        Where a file is there already, or options do not make a study. Nothing is written then.
     """
-    if path.exists():
-        raise BadInputError([Problem("FILE", str(path), "a new file, or --overwrite beside it")])
-
-
-def write_new_study(path: Path, answers: NewStudy) -> Plan:
-    """Write a study's file, and check it as the plan does.
-
-    Parameters
-    ----------
-    path : Path
-    answers : NewStudy
-
-    Raises
-    ------
-    BadInputError
-        Where answers do not go together. The sentence names the key of the file, which is then as
-        it was before.
-    """
-    before = path.read_bytes() if path.exists() else None
-    path.write_text(study_text(answers), encoding="utf-8")
+    if problems := list(_problems(name, given)):
+        raise BadInputError(problems)
+    example = "" if "drawing" in given else _EXAMPLES.get(name, "")
+    beside = path.with_suffix("".join(Path(example).suffixes)) if example else None
+    for each in (path, beside):
+        if each is not None and each.exists():
+            raise BadInputError([Problem("FILE", str(each), "a new file: none is replaced")])
+    if beside is not None:
+        shutil.copyfile(SHIPPED / "config" / example, beside)
     try:
-        return open_plan(path)
+        text = _study_text(name, path, given, beside)
+        plan = open_plan(path, text=text)
+        path.write_text(text, encoding="utf-8")
     except BadInputError:
-        if before is None:
-            path.unlink()
-        else:
-            path.write_bytes(before)
+        if beside is not None:
+            beside.unlink()
         raise
+    return plan
 
 
-def study_text(a: NewStudy) -> str:
-    """The file of a study.
-
-    Parameters
-    ----------
-    a : NewStudy
-    """
-    waves = f"  contact: {{wave_speed_m_s: {a.wave_speed_m_s:g}}}\n" if a.wave_speed_m_s else ""
-    layer_m = a.poured_mm / 3e3
-    return f"""\
-# Written by sandmould new. sandmould keys explains each key; sandmould plan prints the price.
-title: At which frequency does {_QUESTIONS[a.cavity]}?
-material: {a.material}
-scenario:
-  engine: {{name: {a.engine}}}
-  sand: {{size_scale: {a.size_scale:g}}}
-{waves}  time_step: {{fraction: 0.8}}
-  box: {{width_m: {_m(a.width_mm)}, height_m: {_m(a.height_mm)}}}
-{_cavity_text(a)}  fill: {{layers: [{{height_m: {layer_m:.5g}, repeat: 3}}]}}
-  rest: {{rms_speed_m_s: 0.02}}
-{textwrap.indent(textwrap.fill(WHY_HELD, 96), "  # ")}
-  vibration:
-    - hold: {a.hold}
-      frequency_hz: {a.borne[0].frequency_hz:g}
-{_amplitude_text(a)}      direction: {a.direction}
-      duration_s: {a.duration_s:g}
-sweep:
-  keys:
-    vibration.0.frequency_hz: [{", ".join(f"{s.frequency_hz:g}" for s in a.borne)}]
-replicates: {a.replicates}
-objective: {{measure: {_OBJECTIVES[a.cavity]}}}
-"""
+def _study_text(name: str, path: Path, given: dict[str, Any], beside: Path | None) -> str:
+    values = {n: v for n, v in (_OPTIONS[name] | given).items() if v is not None}
+    if (file := given.get("drawing", beside)) is not None:
+        values["file"] = json.dumps(os.path.relpath(file, path.parent), ensure_ascii=False)
+        values |= {} if name == "deck" else _placed(file)
+    return environment("study").get_template(f"{name}.yaml.j2").render(values, wall_mm=_WALL_MM)
 
 
-_QUESTIONS = {
-    "tube": "sand fill a blind tube best",
-    "hole_up": "sand fill a blind hole that opens upwards best",
-    "hole_down": "sand fill a blind hole that opens downwards best",
-    "none": "sand pack most densely",
-}
-_OBJECTIVES = {
-    "tube": "tube_fill_fraction",
-    "hole_up": "hole_fill_of_bed_fraction",
-    "hole_down": "hole_fill_of_bed_fraction",
-    "none": "solid_fraction",
-}
+def _problems(name: str, given: dict[str, Any]) -> Iterator[Problem]:
+    """Options that the study does not have, that exclude each other, or that are no amounts."""
+    for option, value in given.items():
+        key, amounts = _flag(option), value if isinstance(value, tuple) else (value,)
+        if option not in _OPTIONS[name]:
+            yield Problem(key, value, "absent", sentence=f"leave {key} out with {name}")
+        elif any(isinstance(n, float) and not 0 < n < np.inf for n in amounts):
+            yield Problem(key, value, "greater than 0")
+    if len(held := [_flag(option) for option in _HELD if option in given]) > 1:
+        sentence = f"give one of {' and '.join(held)}: only one can stay the same at every speed"
+        yield Problem(held[0], None, "", sentence=sentence)
+    if "hole_mm" in _OPTIONS[name]:
+        values = _OPTIONS[name] | given
+        across, up = values["hole_mm"] if name == "pocket" else reversed(values["hole_mm"])
+        width, height = values["box_mm"]
+        if across + 2 * _WALL_MM >= width or up + 2 * _WALL_MM >= height:
+            valid = f"a hole that lies with its walls in the box of {width:g} x {height:g} mm"
+            yield Problem("--hole-mm", values["hole_mm"], valid)
 
 
-def _m(length_mm: float) -> str:
-    """A length in m."""
-    return f"{length_mm / 1e3:.6g}"
+def _flag(option: str) -> str:
+    return f"--{option.replace('_', '-')}"
 
 
-def _amplitude_text(a: NewStudy) -> str:
-    if a.hold == "unbalance":
-        return (
-            "      unbalance:\n"
-            f"        moment_kg_m: {a.moment_kg_m:g}\n"
-            f"        moving_mass_kg: {a.moving_mass_kg:g}\n"
-            f"        mount_frequency_hz: {a.mount_frequency_hz:g}\n"
-            f"        flask_depth_m: {_m(a.flask_depth_mm)}\n"
-            f"      ramp_s: {0.1 * a.duration_s:g}\n"
-        )
-    stated = {
-        "acceleration": f"acceleration_g: {a.acceleration_g:g}",
-        "velocity": f"velocity_m_s: {_m(a.velocity_mm_s)}",
-        "displacement": f"displacement_m: {_m(a.amplitude_mm)}",
+def _placed(drawing: Path) -> dict[str, Any]:
+    """Box, elements and gating for a part, or its mould."""
+    from sandmould.geometry.mesh_file import is_step, read_surface  # slow to import
+
+    unit_m = 1.0 if is_step(drawing) else 0.001
+    try:
+        vertices, triangles = read_surface(drawing)
+    except MeshFileError as fault:
+        raise BadInputError([Problem("--drawing", str(drawing), str(fault))]) from fault
+    corners_m = unit_m * vertices[triangles]
+    low_m, high_m = corners_m.min(axis=(0, 1)), corners_m.max(axis=(0, 1))
+    size_m = high_m - low_m
+    position_m = _ROOM_M - low_m
+    # The gating holds the middle of the highest faces, or the face nearest to it.
+    lowest_m = corners_m[:, :, 2].min(axis=1)
+    tops_m = corners_m[lowest_m >= lowest_m.max() - 1e-3 * size_m[2]].mean(axis=1)
+    nearest = np.linalg.norm(tops_m - tops_m.mean(axis=0), axis=1).argmin()
+    gate_m = tops_m[nearest] + position_m
+    half_m = np.array([_GATE_M, _GATE_M, 0.0005])
+    element_m = max(round(float(size_m.min()) / _ELEMENTS, 4), 1e-4)
+    cells = np.ceil((size_m + 2 * _ROOM_M) / element_m)
+    mould_low_m = low_m - _ROOM_M
+    found = {
+        "box_m": size_m + _ROOM_M * np.array([2, 2, 4]),
+        "position_m": position_m,
+        "gate_m": np.array([gate_m - half_m, gate_m + half_m]),
+        "layer_m": (size_m[2] + 2 * _ROOM_M) / 2,
+        "foam_m": min(size_m.min(), _FOAM_M),
+        "element_m": element_m,
+        "mould_m": np.array([mould_low_m, mould_low_m + cells * element_m]),
     }
-    return f"      {stated[a.hold]}\n"
-
-
-def _cavity_text(a: NewStudy) -> str:
-    if a.cavity == "none":
-        return ""
-    if a.cavity == "tube":
-        return (
-            "  obstacles:\n"
-            "    - kind: tube\n"
-            "      name: tube\n"
-            f"      diameter_m: {_m(a.opening_mm)}\n"
-            f"      length_m: {_m(a.cavity_depth_mm)}\n"
-            f"      left_end_x_m: {_m(a.width_mm - a.cavity_depth_mm)}\n"
-            f"      axis_height_m: {_m(a.middle_mm)}\n"
-            "      closed_end: right\n"
-        )
-    side = -1.0 if a.opens_down else 1.0
-    x_mm, half_mm, deep_mm = a.width_mm / 2, a.opening_mm / 2, a.cavity_depth_mm
-    tall_mm, middle_mm = deep_mm + WALL_MM, a.middle_mm - side * WALL_MM / 2
-    end_mm = a.middle_mm - side * (deep_mm + WALL_MM) / 2
-    plates = (
-        ("left_side", x_mm - half_mm - WALL_MM / 2, middle_mm, WALL_MM, tall_mm),
-        ("right_side", x_mm + half_mm + WALL_MM / 2, middle_mm, WALL_MM, tall_mm),
-        ("closed_end", x_mm, end_mm, a.opening_mm, WALL_MM),
-    )
-    walls = "".join(
-        f"    - {{kind: plate, name: {name}, centre_m: [{_m(at_x_mm)}, {_m(at_z_mm)}], "
-        f"size_m: [{_m(wide_mm)}, {_m(high_mm)}]}}\n"
-        for name, at_x_mm, at_z_mm, wide_mm, high_mm in plates
-    )
-    return (
-        f"  obstacles:\n{walls}"
-        "  cavities:\n"
-        f"    - {{kind: box, name: hole, centre_m: [{_m(x_mm)}, {_m(a.middle_mm)}], "
-        f"size_m: [{_m(a.opening_mm)}, {_m(a.cavity_depth_mm)}], opens: {a.cavity[5:]}}}\n"
-    )
+    return {"unit_m": unit_m, **{n: np.round(value, 6).tolist() for n, value in found.items()}}

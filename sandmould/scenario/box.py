@@ -202,7 +202,7 @@ def _bore_sides(tube: Tube) -> int:
 def _closing_x_m(tube: Tube, box: Box) -> float | None:
     """Where a tube needs an end of its own: x of its closed end, unless the box wall closes it."""
     x = {"left": tube.left_end_x_m, "right": tube.right_end_x_m}.get(tube.closed_end)
-    return None if x is None or x <= 0 or x >= box.width_m else x
+    return None if x is None or x <= 0 or x >= box.width_m * (1 - 1e-9) else x
 
 
 def tube_blocks(tube: Tube, box: Box, dimension: int) -> list[Block]:

@@ -78,7 +78,8 @@ def pack(
     plan : Plan
     results : Path
     target : Path, optional
-        File to write; a folder takes one more file, of what no pack of the study in it holds.
+        File to write. A folder, made where a name has no ending, takes one more file, of what no
+        pack of the study in it holds.
     last_state : bool
         Whether snapshots before the last and exports are left out: films and pictures of earlier
         moments are not to be had from such a run any more, its tables are. Its own picture has
@@ -94,6 +95,9 @@ def pack(
     """
     study = plan.study.name
     target = target or Path(f"{study}_runs{SUFFIX}")
+    if not target.suffix and not target.exists():
+        with writing(target.parent, "--output"):
+            target.mkdir()
     if not target.is_dir() and target.suffix != SUFFIX:
         valid = f"a folder, or a file whose name ends in {SUFFIX}"
         raise BadInputError([Problem("--output", str(target), valid)])

@@ -8,5 +8,5 @@ from sandmould.cli.reference import COMMANDS, commands_page
 def test_page_is_in_step_with_the_command() -> None:
     refresh = "run `python -m sandmould.cli.reference` and commit the page"
     assert COMMANDS.read_text(encoding="utf-8") == commands_page(), refresh
-    assert "--cavity <tube|hole_up|hole_down|none>" in commands_page()
+    assert "NAME <tube|pocket|part|deck|casting>" in commands_page()
     assert "Example: sandmould compare" in commands_page()

@@ -1,27 +1,21 @@
-"""A first study by ``sandmould new``: asked for, or stated by options."""
+"""A first study by ``sandmould new``: five templates, filled by options."""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
-from sandmould.bad_input import BadInputError
+from sandmould import SHIPPED
 from sandmould.cli.commands import app
-from sandmould.reference.new_answers import (
-    WHY_HELD,
-    NewStudy,
-    applies,
-    engines,
-    finer_scale,
-    number_in,
-    remarks,
-)
-from sandmould.reference.new_study import write_new_study
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
-from sandmould.study.plan.build_plan import open_plan
+from sandmould.study.plan.build_plan import Plan, open_plan
+
+STL = SHIPPED / "config" / "meshes" / "bracket.stl"
 
 
 @pytest.fixture(autouse=True)
@@ -29,136 +23,168 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("cavity", ["tube", "hole_up", "hole_down", "none"])
-def test_each_drive_with_each_cavity_plans(cavity: str) -> None:
-    for hold in ("acceleration", "velocity", "displacement", "unbalance"):
-        for engine in engines() if applies("engine", hold, cavity) else ["reference"]:
-            path = Path(f"{hold}_{engine}.yaml")
-            answers = {"hold": hold, "cavity": cavity, "engine": engine}
-            found = NewStudy.model_validate(answers | {"sand_height_mm": 95.0})
-            plan = write_new_study(path, found)
-            assert len(plan.runs) == 16
-            scenario = plan.runs[0].scenario
-            assert scenario.vibration[0].hold == hold
-            level_m = predicted_bed_height_m(scenario, plan_counts(scenario))
-            assert level_m == pytest.approx(0.095, rel=0.005)
-            assert [c.name for c in scenario.cavities] == ["hole"] * cavity.startswith("hole")
+def new(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["new", *arguments])
+
+
+def written(*arguments: str) -> tuple[dict[str, Any], Plan]:
+    """The file that a study was written to, as its user reads it and as it plans."""
+    said = new(*arguments)
+    assert said.exit_code == 0, said.output
+    path = Path(said.output.partition(":")[0])
+    return yaml.safe_load(path.read_text()), open_plan(path)
 
 
 @pytest.mark.parametrize(
-    ("cavity", "size", "middle_mm"),
+    ("name", "kind", "runs", "files"),
     [
-        ("tube", {"opening_mm": 80.0}, 43.0),
-        ("hole_up", {"cavity_depth_mm": 45.0}, 25.5),
-        ("hole_down", {"cavity_depth_mm": 80.0}, 67.0),
+        ("tube", "sand", 16, ["my_tube.yaml"]),
+        ("pocket", "sand", 16, ["my_pocket.yaml"]),
+        pytest.param("part", "sand", 2, ["my_part.stl", "my_part.yaml"], marks=pytest.mark.slow),
+        ("deck", "deck", 10, ["my_deck.in.j2", "my_deck.yaml"]),
+        ("casting", "solidification", 1, ["my_casting.stl", "my_casting.yaml"]),
     ],
 )
-def test_a_large_hole_is_put_where_it_fits(
-    cavity: str, size: dict[str, float], middle_mm: float
+def test_each_study_plans_as_it_is(name: str, kind: str, runs: int, files: list[str]) -> None:
+    stated, plan = written(name)
+    assert stated["title"].endswith("?")
+    assert (plan.kind.name, len(plan.runs)) == (kind, runs)
+    assert sorted(path.name for path in Path.cwd().iterdir()) == files
+
+
+@pytest.mark.parametrize("name", ["tube", "pocket", "deck", "casting"])
+def test_each_line_with_a_value_says_what_it_is(name: str) -> None:
+    assert new(name, "mine.yaml").exit_code == 0
+    above = ""
+    for line in Path("mine.yaml").read_text().splitlines():
+        # what one comment says of a list or of a mapping holds for the lines below it
+        opens = line.rstrip().endswith(":") or "- kind:" in line
+        assert opens or "#" in line or "#" in above or above.lstrip().startswith("- {"), line
+        above = line
+
+
+@pytest.mark.parametrize(
+    ("options", "hold", "amplitude"),
+    [
+        (["--acceleration-g", "3"], "acceleration", {"acceleration_g": 3.0}),
+        (["--velocity-mm-s", "47"], "velocity", {"velocity_m_s": 0.047}),
+        (["--amplitude-mm", "0.05"], "displacement", {"displacement_m": 5e-05}),
+    ],
+)
+def test_what_stays_the_same_is_written_in_the_units_of_a_study(
+    options: list[str], hold: str, amplitude: dict[str, float]
 ) -> None:
-    found = NewStudy.model_validate({"cavity": cavity} | size)
-    assert found.middle_mm == middle_mm
-    low_mm, high_mm = found.solid_ends_mm
-    assert (low_mm >= 0.0, high_mm <= found.height_mm) == (True, True)
+    _, plan = written("tube", *options)
+    vibration = plan.runs[0].scenario.vibration[0]
+    assert vibration.hold == hold
+    for key, value in amplitude.items():
+        assert getattr(vibration, key) == value
 
 
-def test_options_answer_without_a_terminal() -> None:
-    options = ["--hold", "displacement", "--amplitude-mm", "0.0002 m", "--settings", "3"]
-    options += ["--lowest-hz", "20", "--highest-hz", "80", "--wave-speed-m-s", "130"]
-    said = CliRunner().invoke(app, ["new", "mine.yaml", "--yes", *options])
-    assert said.exit_code == 0, said.output
-    assert said.output.startswith("mine.yaml: 12 runs\n")
-    told = yaml.safe_load(Path("mine.yaml").read_text())
-    assert told["scenario"]["vibration"][0]["displacement_m"] == 0.0002
-    assert told["sweep"]["keys"] == {"vibration.0.frequency_hz": [20, 40, 80]}
-    assert told["scenario"]["contact"] == {"wave_speed_m_s": 130}
-    said = CliRunner().invoke(app, ["new", "mine.yaml", "--yes"])
-    assert (said.exit_code, said.stderr) == (
-        1, "FILE = 'mine.yaml' cannot be used: valid is a new file, or --overwrite beside it.\n"
-    )  # fmt: skip
-    assert CliRunner().invoke(app, ["new", "mine.yaml", "--yes", "--overwrite"]).exit_code == 0
-    assert len(open_plan(Path("mine.yaml")).runs) == 16
+def test_working_moment_and_mass_of_a_table_with_unbalance_motors() -> None:
+    _, plan = written("pocket", "--unbalance", "60", "300")
+    unbalance = plan.runs[0].scenario.vibration[0].unbalance
+    assert (unbalance.moment_kg_m, unbalance.moving_mass_kg) == (0.6, 300.0)
 
 
-def test_it_asks_what_is_held_first_and_asks_again_what_cannot_be_used() -> None:
-    typed = ["none held", "velocity", "fast", "0.05 m/s", "", "10", "", "", "horizontal"]
-    typed += ["0.001", *[""] * 6, "500", "", "100", "", "", "no_sand", "", "100", *[""] * 6]
-    said = CliRunner().invoke(app, ["new"], input="\n".join(typed))
-    assert said.exit_code == 0, said.output
-    assert said.output.startswith(WHY_HELD)
-    assert "Error: valid is one of 'acceleration', 'velocity'" in said.output
-    assert "Error: valid is a number in mm/s or with its unit" in said.output
-    assert "Error: valid is more than the lowest frequency, 25 Hz" in said.output
-    assert "g, so that two settings are left" in said.output
-    assert "Error: valid is less than 120 mm" in said.output
-    assert "Error: valid is from 15 to 95 mm, so that hole and walls lie in the box" in said.output
-    assert "Error: valid is one of rojek_2004" in said.output
-    assert "the largest grain must be smaller than the hole" in said.output
-    assert "Rotating mass" not in said.output
-    told = yaml.safe_load(Path("my_study.yaml").read_text())
-    stage = told["scenario"]["vibration"][0]
-    assert (stage["velocity_m_s"], stage["direction"]) == (0.05, "horizontal")
+def test_speeds_box_and_hole_land_in_their_keys() -> None:
+    options = ["--frequency-hz", "20", "160", "--box-mm", "400", "500", "--hole-mm", "30", "50"]
+    stated, plan = written("tube", "other.yaml", *options, "--material", "rojek_2004")
+    assert stated["material"] == "rojek_2004"
+    assert [run.scenario.vibration[0].frequency_hz for run in plan.runs[::4]] == [20, 40, 80, 160]
+    scenario = plan.runs[0].scenario
+    assert (scenario.box.width_m, scenario.box.height_m) == (0.4, 0.5)
+    tube = scenario.obstacles[0]
+    assert (tube.diameter_m, tube.length_m, tube.left_end_x_m) == (0.03, 0.05, 0.35)
+    assert stated["objective"] == {"measure": "tube_fill_of_bed_fraction"}
+
+
+@pytest.mark.parametrize("opens", ["down", "up"])
+def test_a_pocket_is_closed_at_the_end_that_it_does_not_open_to(opens: str) -> None:
+    _, plan = written("pocket", "--opens", opens, "--hole-mm", "30", "80")
+    scenario = plan.runs[0].scenario
+    (pocket,), (left, right, end) = scenario.cavities, scenario.obstacles
+    assert (pocket.opens, pocket.size_m) == (opens, (0.03, 0.08))
+    below = pocket.centre_m[1] - 0.04
+    above = pocket.centre_m[1] + 0.04
+    assert end.centre_m[1] == pytest.approx(above + 0.0015 if opens == "down" else below - 0.0015)
+    assert left.centre_m[0] + 0.0015 == pytest.approx(pocket.centre_m[0] - 0.015)
+    assert right.centre_m[0] - 0.0015 == pytest.approx(pocket.centre_m[0] + 0.015)
+
+
+@pytest.mark.parametrize("name", ["tube", "pocket"])
+@pytest.mark.parametrize("hole", [("25", "50"), ("80", "80")])
+def test_sand_stands_at_four_fifths_of_the_box(name: str, hole: tuple[str, str]) -> None:
+    _, plan = written(name, "--hole-mm", *hole)
+    scenario = plan.runs[0].scenario
+    level_m = predicted_bed_height_m(scenario, plan_counts(scenario))
+    assert level_m == pytest.approx(0.8 * scenario.box.height_m, rel=0.005)
+
+
+def test_a_drawing_is_named_as_its_study_sees_it_and_its_mould_has_whole_elements() -> None:
+    Path("parts").mkdir()
+    shutil.copyfile(STL, Path("parts", "Größe 2.stl"))
+    Path("studies").mkdir()
+    stated, plan = written("casting", "studies/mine.yaml", "--drawing", "parts/Größe 2.stl")
+    assert stated["scenario"]["shapes"][0]["file"] == "../parts/Größe 2.stl"
+    scenario = plan.runs[0].scenario
+    # the disc with its bracket is 80 x 60 x 16 mm, and an eighth of that an element
+    assert scenario.element_m == 0.002
+    assert scenario.box.low_m == (-0.06, -0.06, -0.038)
+    assert scenario.box.high_m == (0.08, 0.06, 0.038)
+    assert [path.name for path in Path("studies").iterdir()] == ["mine.yaml"]
+
+
+@pytest.mark.slow
+def test_a_part_of_foam_hangs_in_the_sand_by_its_top() -> None:
+    _, plan = written("part", "--drawing", str(STL), "--amplitude-mm", "0.4")
+    scenario = plan.runs[0].scenario
+    assert scenario.pattern.position_m == (0.06, 0.06, 0.038)
+    (gate,) = scenario.pattern.supports.hung
+    # its top lies 8 mm over the origin of the drawing
+    assert (gate.low_m[2], gate.high_m[2]) == (0.0455, 0.0465)
+    assert scenario.vibration[0].displacement_m == 0.0004
 
 
 @pytest.mark.parametrize(
-    ("options", "sentence"),
+    ("arguments", "sentence"),
     [
-        (["--velocity-mm-s", "1"], "leave --velocity-mm-s out with --hold acceleration."),
-        (["--opening-mm", "1", "--cavity", "none"], "leave --opening-mm out with --cavity none."),
-        (["--settings", "1"], "--settings = 1 cannot be used: valid is a number"),
-        (["--lowest-hz", "200"], "--highest-hz (its default) = 140.0 cannot be used: valid is"),
-        (["--opening-mm", "1"], "--size-scale (its default) = 6.0 cannot be used: valid is less"),
-        (["--amplitude-mm", "150", "--hold", "displacement"], "valid is a number of at most 100"),
-        (["--cavity-depth-mm", "0.2 m"], "valid is less than 120 mm, so that it lies in the box"),
-        (["--engine", "liggghts"], "--engine = 'liggghts' cannot be used: valid is one of "),
-        (["--width-mm", "0.2 km"], "valid is a number in mm or with its unit"),
+        (["tube", "--hole-mm", "0", "50"], "--hole-mm = (0.0, 50.0) cannot be used: valid is grea"),
+        (["tube", "--box-mm", "nan", "50"], "--box-mm = (nan, 50.0) cannot be used: valid is grea"),
+        (["pocket", "--acceleration-g", "-1"], "--acceleration-g = -1.0 cannot be used: valid is"),
+        (["tube", "--hole-mm", "25", "115"], "with its walls in the box of 120 x 110 mm."),
+        (["pocket", "--hole-mm", "115", "20"], "with its walls in the box of 120 x 110 mm."),
+        (["tube", "--hole-mm", "4", "50"], "diameter_m = 0.004 cannot be used: valid is more than"),
+        (["tube", "--frequency-hz", "50", "20"], "cannot be used: valid is a low smaller than hi"),
+        (["tube", "--material", "gold"], "valid is the name of a material of kind sand: "),
+        (["casting", "--hole-mm", "25", "50"], "leave --hole-mm out with casting."),
+        (["part", "--unbalance", "60", "300"], "leave --unbalance out with part."),
+        (["casting", "--drawing", "none.stl"], "valid is a readable file (No such file"),
+        (["casting", "--material", "gold"], "name of a material of kind solidification: "),
+        (["deck", "Mine.yaml"], "valid is small letters, digits and _, a letter first"),
+        (
+            ["tube", "--acceleration-g", "1", "--amplitude-mm", "1"],
+            "give one of --acceleration-g and --amplitude-mm: only one can stay the same",
+        ),
     ],
 )
-def test_what_cannot_be_used_is_one_sentence(options: list[str], sentence: str) -> None:
-    said = CliRunner().invoke(app, ["new", "--yes", *options])
+def test_nonsense_is_one_sentence_and_nothing_is_written(
+    arguments: list[str], sentence: str
+) -> None:
+    said = new(*arguments)
     assert said.exit_code == 1
     assert sentence in said.stderr
     assert len(said.stderr.splitlines()) == 1
-    assert not Path("my_study.yaml").exists()
+    assert list(Path.cwd().iterdir()) == []
 
 
-def test_a_file_that_does_not_plan_is_not_left_behind() -> None:
-    # the time step is too long for such a frequency, which the whole file alone tells
-    answers = {"lowest_hz": 9_000.0, "highest_hz": 10_000.0, "size_scale": 18.0}
-    Path("mine.yaml").write_text("before")
-    for name in ("mine.yaml", "new.yaml"):
-        with pytest.raises(BadInputError):
-            write_new_study(Path(name), NewStudy.model_validate(answers))
-    assert Path("mine.yaml").read_text() == "before"
-    assert not Path("new.yaml").exists()
-
-
-def test_settings_above_what_the_table_bears_are_left_out_and_idle_ones_named() -> None:
-    # 0.25 mm: (2 pi f)^2 0.25 mm / g is 0.63 g at 25 Hz, 6.2 g at 78.8 Hz, 19.7 g at 140 Hz
-    answers = {"hold": "displacement", "amplitude_mm": 0.25, "most_g": 10.0}
-    found = NewStudy.model_validate(answers)
-    assert [s.frequency_hz for s in found.borne] == [25.0, 44.4, 78.8]
-    said = remarks(found)
-    assert said[1].split() == [
-        *("25", "0.25", "39.3", "0.629"),
-        *["moves", "nothing:", "below", "1", "g"],
-    ]
-    assert "moves" not in said[2]
-    assert "Left out: 140 Hz, 19.7 g; the table bears 10 g." in said
-
-
-@pytest.mark.parametrize(
-    ("text", "unit", "value"),
-    [("0.25", "mm", 0.25), ("0.00025 m", "mm", 0.25), ("2cm", "mm", 20.0),
-     ("0.05 m/s", "mm/s", 50.0), ("50 Hz", "Hz", 50.0), ("1e2 mm", "mm", 100.0)],
-)  # fmt: skip
-def test_a_length_may_have_its_unit(text: str, unit: str, value: float) -> None:
-    assert number_in(text, unit) == value
-
-
-def test_a_hole_of_few_grains_is_warned_of_with_a_scale_that_mends_it() -> None:
-    found = NewStudy.model_validate({"opening_mm": 25.0})
-    finer = finer_scale(found)
-    assert finer is not None
-    assert any(f"--size-scale {finer:g} " in line for line in remarks(found))
-    assert finer_scale(found.model_copy(update={"size_scale": finer})) is None
+@pytest.mark.parametrize("there", ["mine.yaml", "mine.in.j2"])
+def test_no_file_is_replaced(there: str) -> None:
+    Path(there).write_text("before")
+    said = new("deck", "mine.yaml")
+    assert (said.exit_code, said.stderr) == (
+        1,
+        f"FILE = '{there}' cannot be used: valid is a new file: none is replaced.\n",
+    )
+    assert Path(there).read_text() == "before"
+    assert [path.name for path in Path.cwd().iterdir()] == [there]

@@ -118,6 +118,10 @@ def test_copy_with_other_obstacles_has_their_geometry() -> None:
 def test_tube_at_the_box_wall_needs_no_end() -> None:
     scene = build_scene(Box(width_m=0.08, height_m=0.1), (TUBE,), 2)
     assert [b.name for b in scene.blocks] == ["tube_lower", "tube_upper"]
+    # 0.35 + 0.05 is less than 0.4 by its last digit
+    tube = TUBE.model_copy(update={"left_end_x_m": 0.35})
+    scene = build_scene(Box(width_m=0.4, height_m=0.1), (tube,), 2)
+    assert [b.name for b in scene.blocks] == ["tube_lower", "tube_upper"]
 
 
 @pytest.mark.parametrize("facets", [4, 8, 16])

@@ -198,9 +198,11 @@ def records(folder: Path) -> Path:
 def test_page_on_the_engines_has_its_tables(tmp_path: Path) -> None:
     text = engine_twins.page(records(tmp_path))
     assert "# Do three engines fill and shake the same box alike?" in text
-    assert "| solid fraction | lammps − reference | 0.81" in text
+    assert "| lammps − reference | 0.00055 | −0.00074 to 0.0018 | ±0.005 | equivalent |" in text
     assert text.count("| equivalent |") >= 6
-    assert "Study `engine_twins`, 6 replicates," in text  # the file asks for more
+    assert (
+        "Study [engine_twins](results/engine_twins/README.md), 6 replicates," in text
+    )  # the file asks for more
     assert "| reference | 22 Jul 2025 | 6 | 21 M |" in text
     assert "2/5 m r²" in text
     assert "\n\n\n\n" not in text
@@ -208,6 +210,6 @@ def test_page_on_the_engines_has_its_tables(tmp_path: Path) -> None:
 
 def test_page_names_what_was_not_recorded(tmp_path: Path) -> None:
     folder = records(tmp_path)
-    shutil.rmtree(folder / "frames")
-    with pytest.raises(SystemExit, match="no record of frames"):
+    shutil.rmtree(folder / "engine_twins")
+    with pytest.raises(SystemExit, match="no record of engine_twins"):
         engine_twins.page(folder)
