@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
 import numpy as np
 import pytest
 
 from sandmould.casting.mps.flow import DivergedError, EscapedError, Flow, FlowGuard, FlowProgress
-from sandmould.casting.mps.operators import GRADIENTS
 from sandmould.casting.mps.particles import DUMMY, FLUID, WALL, at_rest, lattice
 from sandmould.casting.mps.pressure import ClosedRegionError
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.sources import SOURCES
 from sandmould.casting.mps.tank import still_tank
-from sandmould.casting.mps.viscosity import LAPLACIANS
 from sandmould.casting.mps.weight import make_kernel
-from sandmould.scenario.casting.flow import MetalFlow
 
 SIZE_M = 2e-3
 
@@ -43,13 +37,6 @@ def small_tank(guard: FlowGuard | None = None, scheme: Scheme | None = None) -> 
 def test_schemes_that_cannot_run(wrong, word):
     with pytest.raises(ValueError, match=word):
         Scheme(**wrong)
-
-
-@pytest.mark.parametrize(
-    ("key", "forms"), [("source", SOURCES), ("gradient", GRADIENTS), ("laplacian", LAPLACIANS)]
-)
-def test_a_scenario_offers_all_forms_that_there_are(key, forms):
-    assert get_args(MetalFlow.model_fields[key].annotation) == tuple(forms)
 
 
 def test_metals_and_kernels_that_cannot_be():

@@ -25,8 +25,9 @@ SAYS = (
     '"ModuleType" is missing following "EngineModule" protocol member: load_session',
     '"ModuleType" is missing following "EngineModule" protocol member: CAPABILITIES',
     '(got Module, expected "DeckReaderModule")',
-    '"LiggghtsSession" is missing following "Session" protocol member: move_surface',
-    '"ReferenceSession" is missing following "Session" protocol members: exact_limit_s, set_state',
+    '"LiggghtsSession" is missing following "SandSession" protocol member: move_surface',
+    '"ReferenceSession" is missing following "SandSession" protocol members: exact_limit_s, '
+    "set_state",
     'Argument 1 to "assert_never" has incompatible type "Literal[\'fourth\']"',
 )
 """Of each of them, and of an engine that the registry does not open."""
