@@ -31,7 +31,7 @@ def factor(angles: dict[float, float], cost: dict[float, float]) -> Factor:
         }
     )
     recorded = Recorded(
-        "planted", "Does it?", 8, 0.9, {"commit": "abc", "machine": {"processor": "one"}}, (KEY,),
+        "planted", "Does it?", 8, {"commit": "abc", "machine": {"processor": "one"}}, (KEY,),
         compare_study(summary, (KEY,), study), (),
     )  # fmt: skip
     (found,) = factors_of(recorded, summary, recorded.keys)
