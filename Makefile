@@ -1,7 +1,7 @@
 # `make` alone lists the targets: a line of two hashes above a target is its help.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
-OTHER_PYTHON ?= $(shell for python in python3.13 python3.12 "$$HOME"/.pyenv/versions/3.1[32]*/bin/python; do \
+OTHER_PYTHON ?= $(shell for python in python3.13 python3.12 "$$HOME"/.pyenv/versions/3.13*/bin/python; do \
   "$$python" -c '' 2> /dev/null && echo "$$python" && break; done)
 CORES ?= $(shell nproc)
 STUDY ?= config/studies/tube_demo.yaml
