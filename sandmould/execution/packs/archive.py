@@ -219,7 +219,7 @@ def _reading(what: str) -> Iterator[None]:
         raise ValueError(f"{what} ({error})") from None
 
 
-class _Bounded(io.BufferedReader):
+class _CountedBytes(io.BufferedReader):
     """A file that gives no more at a time than the heads of a pack's files take."""
 
     def read(self, size: int | None = -1, /) -> bytes:
@@ -235,7 +235,7 @@ def open_pack(path: Path) -> Iterator[Pack]:
     try:
         if path.exists() and not path.is_file():
             raise ValueError("it is no file")
-        with _Bounded(io.FileIO(path)) as file:
+        with _CountedBytes(io.FileIO(path)) as file:
             if file.peek(len(_OLDER)).startswith(_OLDER):
                 raise ValueError("an older version wrote this one: pack the runs again")
             yield Pack(file)
