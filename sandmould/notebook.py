@@ -31,8 +31,7 @@ from sandmould.runs.columns import RUN
 from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, read_collected
-from sandmould.study.plan.build_plan import RESULTS, known_prices, open_plan
-from sandmould.study.plan.handover import checked_plan
+from sandmould.study.plan.build_plan import RESULTS, checked_plan, known_prices, open_plan
 from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run
 from sandmould.study.plan.price import study_s
 

@@ -17,7 +17,7 @@ IMPORTED = {
     "preamble of a script": "snakemake.script",
     "imports of a run": "sandmould.execution.simulate",
     "imports of measuring": "sandmould.kinds.sand.measure",
-    "imports of a shared job": "sandmould.execution.batch_job",
+    "imports of a shared job": "sandmould.execution.jobs",
 }
 
 

@@ -10,9 +10,9 @@ import json
 import time
 from pathlib import Path
 
-from sandmould.execution.batch_job import compute_batch
+from sandmould.execution.jobs import compute_batch
+from sandmould.execution.loading import load_for
 from sandmould.execution.simulate import measure, render, simulate
-from sandmould.execution.worker import load
 from sandmould.module_main import run_main
 from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, prepare
 from sandmould.study.plan.lacking import lack_of
@@ -30,8 +30,9 @@ def main(study: str) -> None:
     folder = RESULTS / plan.study.name
     (folder / "logs").mkdir(exist_ok=True)
     for fill in plan.fills:
-        compute_batch([folder / fill.place], folder / "logs" / "fills", 1, "")
-    load(plan.runs[0].scenario)
+        scenario = folder / fill.place / "scenario.yaml"
+        compute_batch([str(scenario)], str(folder / "logs" / "fills"), 1, "")
+    load_for(plan.runs[0].scenario)
     for run in plan.runs[:WARM_UP]:
         _do(folder / run.place)
     begun_s = time.process_time()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILLS
-from sandmould.execution.process import is_locked
+from sandmould.execution.locks import is_locked
 from sandmould.runs.manifest import MANIFEST_FILE
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.build_plan import open_plan

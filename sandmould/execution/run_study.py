@@ -7,7 +7,6 @@ go on to Snakemake.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 import sys
@@ -19,13 +18,11 @@ import sandmould.runs.one_blas_thread  # noqa: F401
 from sandmould import SHIPPED
 from sandmould.bad_input import BAD_INPUT_EXIT
 from sandmould.execution.cluster.settings import may_be_elsewhere
+from sandmould.execution.locks import let_go
 from sandmould.execution.screen.ending import last_line, trouble
 from sandmould.execution.screen.screen import Screen
-from sandmould.execution.standby import standing_by
 from sandmould.execution.stopping import run_in_group, until_stopped
-from sandmould.study.plan.batches import is_done
-from sandmould.study.plan.build_plan import RESULTS, Plan, starts_jobs, writing
-from sandmould.study.plan.handover import checked_plan, hand_over
+from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, starts_jobs, writing
 from sandmould.study.plan.plan_files import SUMMARY
 
 
@@ -58,30 +55,21 @@ def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
 def _run_study(path: Path, options: Sequence[str], opening: str) -> int:
     plan = checked_plan(path)
     folder, study = RESULTS / plan.study.name, plan.study.study
-    with _standing_by(plan, options):
-        while study.refine.rounds or study.certificate.controls:
-            if _snakemake(plan, options, [str(folder / SUMMARY)]):
-                # Stopped, or broken outside the runs: a run that fails leaves its outcome.
-                return 1
-            from sandmould.study.next_round import decide_next  # statistics: slow to import
+    while study.refine.rounds or study.certificate.controls:
+        if _snakemake(plan, options, [str(folder / SUMMARY)]):
+            # Stopped, or broken outside the runs: a run that fails leaves its outcome.
+            return 1
+        from sandmould.study.next_round import decide_next  # statistics: slow to import
 
-            log, decision = decide_next(study, folder)
-            print(f"\n{decision}", file=sys.stderr, flush=True)
-            plan = checked_plan(path)
-            if log.ended:
-                break
-        status = _snakemake(plan, options, [])
+        log, decision = decide_next(study, folder)
+        print(f"\n{decision}", file=sys.stderr, flush=True)
+        plan = checked_plan(path)
+        if log.ended:
+            break
+    status = _snakemake(plan, options, [])
     if starts_jobs(options) and (said := last_line(folder)):
         print(said if status else f"{opening} {said}".strip())
     return status
-
-
-def _standing_by(plan: Plan, options: Sequence[str]) -> contextlib.AbstractContextManager[None]:
-    """Have what runs need loaded beforehand, where jobs are on this machine and any is left."""
-    left = any(not is_done(RESULTS / plan.study.name / run.place) for run in plan.runs)
-    if left and starts_jobs(options) and not may_be_elsewhere(options):
-        return standing_by([alike[0] for alike in plan.classes.values()])
-    return contextlib.nullcontext()
 
 
 def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> int:
@@ -92,7 +80,6 @@ def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> in
     workflow = ["--snakefile", str(SHIPPED / "Snakefile"), "--configfile", file]
     arguments = [*cores, *workflow, *options]
     arguments += ["--", *targets] if targets else []
-    hand_over(plan)
     work = partial(_be_snakemake, arguments)
     if not starts_jobs(options):
         return run_in_group(work)
@@ -117,7 +104,10 @@ def _be_snakemake(arguments: Sequence[str]) -> None:
     from snakemake.cli import main
 
     sys.argv = ["snakemake", *arguments]
-    main()
+    try:
+        main()
+    finally:
+        let_go()
 
 
 def stated_cores(options: Sequence[str]) -> int | None:

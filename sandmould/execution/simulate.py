@@ -1,7 +1,4 @@
-"""One run from its folder: ``python -m sandmould.execution.simulate FOLDER``.
-
-``sandmould.execution.process`` starts and watches it as a process of its own.
-"""
+"""One run from its folder: ``python -m sandmould.execution.simulate FOLDER``."""
 
 from __future__ import annotations
 
@@ -13,7 +10,6 @@ from typing import Any
 
 import sandmould.runs.one_blas_thread  # noqa: F401
 from sandmould.definition.run import Run
-from sandmould.execution.process import RESTARTABLE_EXIT
 from sandmould.kinds.registry import kind_of
 from sandmould.module_main import run_main
 from sandmould.runs.manifest import write_manifest
@@ -22,6 +18,9 @@ from sandmould.runs.products import Cost, finish
 from sandmould.runs.provenance import provenance_of
 from sandmould.scenario.quantity import Section
 from sandmould.study.plan.plan_files import read_run
+
+RESTARTABLE_EXIT = 75
+"""Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
 
 
 def render_run(folder: Path) -> None:
@@ -101,14 +100,11 @@ def _finish(folder: Path, scenario: Section, outcome: RunOutcome, cost: Cost) ->
     finish(folder, execution.products, outcome, cost, provenance(scenario, str(folder)))
 
 
-def main(folder: str, crash: str | None = None) -> int:
-    """Compute a run, or write down how another process of it crashed."""
-    if crash is None:
-        return simulate(Path(folder))
-    write_crash(Path(folder), crash)
-    return 0
+def main(folder: str) -> int:
+    """Compute a run, or one rank of it."""
+    return simulate(Path(folder))
 
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it as a kill does, silently
-    run_main(main, "python -m sandmould.execution.simulate FOLDER-OF-A-RUN [CRASH]", (1, 2))
+    run_main(main, "python -m sandmould.execution.simulate FOLDER-OF-A-RUN", (1,))

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from sandmould.definition.run import Run
 from sandmould.execution.cluster.queue import jobs_of, live_jobs, queue_lines
-from sandmould.execution.process import is_locked
+from sandmould.execution.locks import is_locked
 from sandmould.execution.tidy import freed_bytes, orphans
 from sandmould.execution.time_left import TimeLeft
 from sandmould.runs.claim import owner_of

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
+import multiprocessing
 import os
-import select
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from types import FrameType
+from types import FrameType, ModuleType
 from typing import IO
 
-from sandmould.execution.forked import END_SIGNALS, Work, fork, print_to
-from sandmould.runs.parent import end_with_parent
+from sandmould.runs.parent import end_with_parent, print_to
 
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 GRACE_S = 30.0
 """For Snakemake to cancel its jobs there."""
 
@@ -73,7 +73,7 @@ def _stopping() -> Iterator[None]:
 
 
 def run_in_group(
-    work: Work,
+    work: Callable[[], None],
     log: IO[str] | None = None,
     environment: Mapping[str, str] | None = None,
     look: Callable[[], float] | None = None,
@@ -87,7 +87,7 @@ def run_in_group(
     Parameters
     ----------
     work : callable
-        What the process does that is forked from this one; gives its exit status.
+        What the process does that is forked from this one; ends by ``SystemExit``.
     log : file, optional
         Takes all that it and its jobs print; the terminal unless given.
     environment : mapping of str to str, optional
@@ -106,50 +106,52 @@ def run_in_group(
     Stopped
         When a signal asked to end, after all processes ended.
     """
-    pid = fork(partial(_do, work, environment), partial(_begin, log), group=True)
-    try:
-        while not _has_ended(pid, look() if look is not None else None):
-            pass
-        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    except Stopped:
-        if asked_first:
-            _signal(pid, signal.SIGINT)
-            _has_ended(pid, GRACE_S)
-        _signal(pid, signal.SIGKILL)
-        with contextlib.suppress(ChildProcessError):
-            os.waitpid(pid, 0)
-        raise
+    # Its temporary files end with it, however it ends.
+    with tempfile.TemporaryDirectory(prefix="sandmould-") as temporary:
+        begin = partial(_begin, work, log, environment or {}, temporary)
+        process = multiprocessing.get_context("fork").Process(target=begin)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, END_SIGNALS)
+        process.start()
+        assert process.pid is not None
+        with contextlib.suppress(OSError):  # it does so itself, maybe later than a signal
+            os.setpgid(process.pid, process.pid)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        try:
+            while process.exitcode is None:
+                process.join(look() if look is not None else None)
+            return process.exitcode
+        except Stopped:
+            if asked_first:
+                _signal(process.pid, signal.SIGINT)
+                process.join(GRACE_S)
+            _signal(process.pid, signal.SIGKILL)
+            process.join()
+            raise
 
 
-def _begin(log: IO[str] | None) -> None:
+def _begin(
+    work: Callable[[], None],
+    log: IO[str] | None,
+    environment: Mapping[str, str],
+    temporary: str,
+) -> None:
     """Let a forked process be one of its own, as if a command had started it."""
+    os.setpgid(0, 0)
     for number in END_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             python = number is signal.SIGINT
             signal.signal(number, signal.default_int_handler if python else signal.SIG_DFL)
     end_with_parent(signal.SIGKILL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, END_SIGNALS)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.close(nothing)
-    print_to(*((1, 2) if log is None else (log.fileno(), log.fileno())))
-    atexit._clear()
-
-
-def _do(work: Work, environment: Mapping[str, str] | None) -> int | None:
-    os.environ.update(environment or {})
-    try:
-        return work()
-    finally:
-        atexit._run_exitfuncs()  # a forked process ends without, and the work may have left some
-
-
-def _has_ended(pid: int, wait_s: float | None) -> bool:
-    """Whether a process ends within some seconds; waits for it without a limit for None."""
-    end = os.pidfd_open(pid)
-    try:
-        return bool(select.select([end], [], [], wait_s)[0])
-    finally:
-        os.close(end)
+    print_to(log.fileno() if log is not None else None)
+    os.environ.update(environment)
+    tempfile.tempdir = temporary
+    # Processes that this one starts do not begin as the command did.
+    sys.modules["__main__"] = ModuleType("__main__")
+    work()
 
 
 def _signal(group: int, number: signal.Signals) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sandmould.definition.run import FILLS, RUN_NAME
-from sandmould.execution.process import is_locked
+from sandmould.execution.locks import is_locked
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.ownership import owner_path
 from sandmould.study.plan.plan_files import STUDY_FILE

@@ -208,7 +208,7 @@ class Execution(ABC, Generic[ScenarioT]):
         """Make the products in a work folder that a broken run never wrote, if others read them."""
 
     def load_computing(self, scenario: ScenarioT) -> None:
-        """Import what computing needs, for a worker that forks for each run.
+        """Import what computing needs, for a process that forks for each run.
 
         What starts threads, MPI or an engine must stay for the run's own process.
         """

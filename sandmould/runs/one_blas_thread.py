@@ -1,6 +1,6 @@
 """Imported before numpy by what computes runs: linear algebra has the thread that calls it.
 
-A run has the cores that its job was given, and a worker must not have threads when it forks.
+A run has the cores that its job was given, and the fork server must not have threads when it forks.
 """
 
 import os

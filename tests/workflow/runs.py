@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from sandmould.engines.program import Program, build_program
 from sandmould.engines.registry import engine_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.execution.jobs import compute_batch
 from sandmould.execution.simulate import render_run
 from sandmould.kinds.sand.execution import SandExecution
 from sandmould.runs.hashing import scenario_hash
@@ -60,6 +61,12 @@ def computed(scenario: Scenario, folder: Path) -> Path:
     folder = run_folder(scenario, folder)
     assert simulate(folder) == 0
     return folder
+
+
+def compute_all(folders: Sequence[Path], log: Path, side_by_side: int = 1) -> None:
+    """Render, compute and measure runs as one job does."""
+    scenarios = [str(folder / "scenario.yaml") for folder in folders]
+    compute_batch(scenarios, str(log), 1, "mpiexec", side_by_side)
 
 
 def kill_at_a_checkpoint(

@@ -14,7 +14,7 @@ from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import RefusedError
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_mover import StepMover
-from sandmould.execution.process import RESTARTABLE_EXIT
+from sandmould.execution.simulate import RESTARTABLE_EXIT
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario

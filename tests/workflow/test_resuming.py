@@ -12,7 +12,7 @@ from sandmould import ROOT
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
 from sandmould.engines.snapshot_file import stored_snapshots
-from sandmould.execution.process import RESTARTABLE_EXIT
+from sandmould.execution.simulate import RESTARTABLE_EXIT
 from sandmould.runs.checkpoint_folders import newest_checkpoint
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome

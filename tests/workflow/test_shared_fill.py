@@ -20,11 +20,10 @@ import yaml
 from sandmould.definition.run import FILLS, Run
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution.again import _failed_fill
-from sandmould.execution.batch_job import compute_batch
+from sandmould.execution.jobs import compute_run
 from sandmould.execution.packs import recorded
 from sandmould.execution.packs.pack import pack
 from sandmould.execution.packs.unpack import unpack
-from sandmould.execution.process import launch
 from sandmould.execution.simulate import render_run, simulate
 from sandmould.execution.status import status_text
 from sandmould.kinds.sand.kind import SAND
@@ -43,6 +42,7 @@ from tests.patterns import _one_thread  # noqa: F401
 from tests.scenes import TUBE_SCENE, tube_scene
 from tests.workflow.runs import (
     SOON,
+    compute_all,
     computed,
     kill_after_a_checkpoint,
     last_snapshot,
@@ -192,7 +192,7 @@ def test_a_fill_that_cannot_be_used_is_told_and_the_run_fills_by_itself(
     assert "fill" not in read_costs([shorter]).rows
     # The next start makes it again, for the runs that are left.
     assert lack_of_folder(fill) is Need.COMPUTE
-    compute_batch([fill, longer], tmp_path / "log", 1, "")
+    compute_all([fill, longer], tmp_path / "log")
     assert lack_of_folder(fill) is Need.NOTHING
     assert read_costs([longer]).rows["fill"].tolist() == [fill.name]
 
@@ -246,7 +246,7 @@ def test_two_jobs_never_make_one_fill(tmp_path: Path, capsys: pytest.CaptureFixt
             fcntl.flock(lock, fcntl.LOCK_UN)
 
         threading.Timer(0.3, other_job_ends).start()
-        launch(fill, tmp_path / "log")
+        compute_run(str(fill / "scenario.yaml"), str(tmp_path / "log"), 1, "")
     assert "waiting for the process that computes it already" in capsys.readouterr().err
     assert RunOutcome.read(fill / "outcome.json").detail == "by the other job"
 
@@ -262,7 +262,7 @@ def computed_sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plan = open_plan(Path("small.yaml"))
     announce(plan, RESULTS, 1)
     for runs in (plan.fills, plan.runs):
-        compute_batch([RESULTS / "small" / run.place for run in runs], place / "log", 1, "")
+        compute_all([RESULTS / "small" / run.place for run in runs], place / "log")
     os.chdir(before)
     return place
 
@@ -288,7 +288,7 @@ def test_what_is_lost_of_a_study_is_computed_from_its_fills(sweep: Plan) -> None
     assert set(plan.lacks(RESULTS)) == {fill.run, run.run}
     again = f"computed again: {fill.run} (end_checkpoint/solver.npz has 0 of "
     assert prepare(plan, RESULTS).startswith(again)
-    compute_batch([folder / fill.place, folder / run.place], Path("log").absolute(), 1, "")
+    compute_all([folder / fill.place, folder / run.place], Path("log").absolute())
     assert plan.lacks(RESULTS) == {}
     # One of the right size, and one of another scenario.
     shutil.rmtree(folder / run.place)

@@ -14,7 +14,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sandmould.execution.forked import PROCESS_NAME
+from sandmould.execution.pool import PROCESS_NAME
 from sandmould.runs.run_tables import read_costs
 from tests.workflow.slurm_node import SlurmNode, missing
 

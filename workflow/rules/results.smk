@@ -33,8 +33,8 @@ rule collect:
         runtime=30,
     message:
         "Collect the runs of the study"
-    script:
-        "../scripts/collect.py"
+    run:
+        jobs.do_job("sandmould.study.collect:collect", Path(FOLDER), log=log[0])
 
 
 rule calibrate:
@@ -55,8 +55,13 @@ rule calibrate:
         runtime=30,
     message:
         "Calibrate the sands of the study"
-    script:
-        "../scripts/calibrate.py"
+    run:
+        jobs.do_job(
+            "sandmould.study.calibration.run:write_calibration",
+            Path(FOLDER),
+            CALIBRATED,
+            log=log[0],
+        )
 
 
 rule report:
@@ -84,8 +89,13 @@ rule report:
         runtime=30,
     message:
         "Write the report {output.html}"
-    script:
-        "../scripts/report.py"
+    run:
+        jobs.do_job(
+            "sandmould.report.page:write_report",
+            Path(FOLDER),
+            Path(output.html),
+            log=log[0],
+        )
 
 
 rule check:
@@ -107,5 +117,7 @@ rule check:
         runtime=5,
     message:
         "Check that every run finished"
-    script:
-        "../scripts/check.py"
+    run:
+        jobs.do_job(
+            "sandmould.execution.check:failed_runs", Path(FOLDER), log=log[0]
+        )

@@ -20,8 +20,12 @@ rule render:
         runtime=SUBMISSION.runtime_min(10),
     message:
         "Render the deck of {wildcards.run}"
-    script:
-        "../scripts/render.py"
+    run:
+        jobs.do_job(
+            "sandmould.execution.simulate:render_run",
+            Path(input.scenario).parent,
+            log=log[0],
+        )
 
 
 rule fill:
@@ -47,8 +51,14 @@ rule fill:
         side_by_side=1,
     message:
         "Compute {wildcards.fill}, which runs share"
-    script:
-        "../scripts/batch.py"
+    run:
+        jobs.compute_batch(
+            list(input.scenarios),
+            log[0],
+            resources.tasks,
+            resources.mpi,
+            params.side_by_side,
+        )
 
 
 rule simulate:
@@ -75,8 +85,8 @@ rule simulate:
         runtime=runtime_min_of,
     message:
         "Compute {wildcards.run}"
-    script:
-        "../scripts/simulate.py"
+    run:
+        jobs.compute_run(input.scenario, log[0], resources.tasks, resources.mpi)
 
 
 rule measure:
@@ -112,8 +122,12 @@ rule measure:
         runtime=SUBMISSION.runtime_min(30),
     message:
         "Measure {wildcards.run}"
-    script:
-        "../scripts/measure.py"
+    run:
+        jobs.do_job(
+            "sandmould.execution.simulate:measure_run",
+            Path(input.scenario).parent,
+            log=log[0],
+        )
 
 
 rule batch:
@@ -139,5 +153,11 @@ rule batch:
         side_by_side=side_by_side_of,
     message:
         "Compute and measure the runs from {wildcards.batch} on"
-    script:
-        "../scripts/batch.py"
+    run:
+        jobs.compute_batch(
+            list(input.scenarios),
+            log[0],
+            resources.tasks,
+            resources.mpi,
+            params.side_by_side,
+        )

@@ -1,6 +1,5 @@
 # The study is validated and expanded before Snakemake builds its graph: bad input ends here, in
 # one sentence a problem.
-import atexit
 import os
 import sys
 
@@ -10,19 +9,22 @@ from sandmould.runs.words import say
 from sandmould.bad_input import BAD_INPUT_EXIT, BadInputError
 from sandmould.execution.cluster.settings import goes_to_slurm, may_be_elsewhere
 from sandmould.execution.cluster.submission import open_submission
+from sandmould.execution import jobs
+from sandmould.execution.locks import hold_turn
 from sandmould.execution.packs.recorded import take_up
+from sandmould.execution.pool import start_server
 from sandmould.study.plan.batches import alone
 from sandmould.study.plan.build_plan import (
     RESULTS,
     announce,
+    plan_at_hand,
     prepare,
     starts_jobs,
     study_path,
 )
 from sandmould.study.plan.plan_files import CHECKS as CHECK_TABLES
-from sandmould.study.plan.handover import plan_of
+from sandmould.study.plan.load_study import CALIBRATED
 from sandmould.study.plan.lacking import Need, notes_of
-from sandmould.execution.process import take_turn
 from sandmould.definition.run import FILL, RUN_NAME
 
 OVERRIDES = dict(workflow.config_settings.config)
@@ -33,13 +35,11 @@ BATCH_WALL_S = float(OVERRIDES.pop("batch_wall_s", 0))
 BATCH_LEAST = int(OVERRIDES.pop("batch_least", 1))
 BATCH_CORES = int(OVERRIDES.pop("batch_cores", 1))
 MPI = OVERRIDES.pop("mpi", "mpiexec")
-CORES = workflow._cores or os.cpu_count()
+CORES = workflow.resource_settings.cores or os.cpu_count()
 try:
-    PLAN = plan_of(study_path(workflow.configfiles, OVERRIDES))
+    PLAN = plan_at_hand(study_path(workflow.configfiles, OVERRIDES))
     if workflow.is_main_process and starts_jobs(sys.argv):
-        # Held until this process ends.
-        if turn := take_turn(RESULTS / PLAN.study.name):
-            atexit.register(turn.close)
+        hold_turn(RESULTS / PLAN.study.name)
         PLAN, taken = take_up(PLAN, RESULTS)
         if taken:
             say(taken)
@@ -64,6 +64,11 @@ try:
         say(announce(PLAN, RESULTS, CORES, measure))
         if said := prepare(PLAN, RESULTS, BATCHED, LACKING):
             say(f"{said}\n")
+        if is_here and starts_jobs(sys.argv) and LACKING:
+            start_server(
+                RESULTS / PLAN.study.name / run.place / "scenario.yaml"
+                for run in PLAN.first_of_each_class(LACKING)
+            )
         for said in SUBMISSION.said:
             say(said)
 except BadInputError as error:

@@ -15,6 +15,7 @@ from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILLS, LAST_MEASURED
 from sandmould.digest import digest
 from sandmould.engines.snapshot_file import OLDER, SNAPSHOTS, SnapshotFile, stored_snapshots
+from sandmould.execution.locks import is_locked
 from sandmould.execution.packs.archive import (
     AT_END,
     OUTCOME_FILE,
@@ -28,7 +29,6 @@ from sandmould.execution.packs.archive import (
     reasons_lines,
     write_pack,
 )
-from sandmould.execution.process import is_locked
 from sandmould.runs.formatting import size_text
 from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, Manifest, read_manifest
 from sandmould.study.plan.build_plan import Plan, writing

@@ -13,6 +13,7 @@ from pathlib import Path
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILL, FILLS, Run
 from sandmould.digest import file_digest
+from sandmould.execution.locks import is_locked, take_turn
 from sandmould.execution.packs.archive import (
     AT_END,
     OUTCOME_FILE,
@@ -26,7 +27,6 @@ from sandmould.execution.packs.archive import (
     reasons_lines,
 )
 from sandmould.execution.packs.rounds import merge_rounds
-from sandmould.execution.process import is_locked, take_turn
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT
 from sandmould.runs.hashing import scenario_hash

@@ -31,22 +31,22 @@ def read_calibrated(
     return calibrate(study.calibration, summary, (keys[0], keys[1]), others)
 
 
-def write_calibration(study_folder: Path, materials: Path) -> list[str]:
+def write_calibration(study_folder: Path, materials: Path) -> None:
     """Write the material files of a study's sands.
 
-    Returns
-    -------
-    list of str
-        One sentence a sand that was not found.
+    Raises
+    ------
+    SystemExit
+        At the end, with a sentence for each sand that was not found.
     """
     study = read_study(study_folder)
     summary = sweep_part(read_summary(study_folder))
     result = read_calibrated(study_folder, study, summary, swept_keys(summary))
     if result is None:
-        return []
+        return
     run = str(summary[RUN].iloc[0])
     scenario = read_run(study_folder / "runs" / run / "scenario.yaml").scenario
     write_materials(result, scenario, study_folder.name, materials)
-    return [
-        f"{estimate.sand.name}: {estimate.problem}" for estimate in result.sands if estimate.problem
-    ]
+    problems = [f"{found.sand.name}: {found.problem}" for found in result.sands if found.problem]
+    if problems:
+        raise SystemExit("\n".join(problems))

@@ -29,7 +29,7 @@ from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import later_line, plan_table, write_plan, write_study
 from sandmould.study.plan.price import Prices, computed_wall_s, ratios_of
-from sandmould.study.plan.trust import may_run
+from sandmould.study.plan.trust import check_letters, check_places, check_trust, may_run
 from sandmould.study.rounds.round_log import read_rounds
 
 RESULTS = Path("results")
@@ -67,6 +67,12 @@ class Plan:
             each: [max(alike, key=planning.planned_work), alike[0], alike[-1]]
             for each, alike in found.items()
         }
+
+    def first_of_each_class(self, lacking: Container[str]) -> list[Run]:
+        """Of the runs that lack something, the first of each class."""
+        speed_class = self.kind.planning.speed_class
+        left = [run for run in self.runs if run.run in lacking]
+        return list({speed_class(run.scenario): run for run in reversed(left)}.values())
 
     @cached_property
     def _by_name(self) -> dict[str, Run]:
@@ -212,6 +218,37 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
         raise BadInputError(list(problems.values()))
     shared, fills = share_fills(runs, planning)
     return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
+
+
+def checked_plan(path: Path, text: str | None = None) -> Plan:
+    """Open, validate and expand a study whose runs are to start.
+
+    Parameters
+    ----------
+    path : Path
+    text : str, optional
+        What its file will hold, where it is not written yet.
+
+    Raises
+    ------
+    BadInputError
+        With one sentence a problem; a place or a program that is not to be trusted is one.
+    """
+    plan = open_plan(path, text=text)
+    check_places(plan.study)
+    check_letters(plan.runs)
+    check_trust(plan.study, plan.runs)
+    _CHECKED[path.resolve()] = plan
+    return plan
+
+
+_CHECKED: dict[Path, Plan] = {}
+"""For a Snakemake that is forked from the command that has planned."""
+
+
+def plan_at_hand(path: Path) -> Plan:
+    """The plan that was checked last in this process, or a new one."""
+    return _CHECKED.get(path.resolve()) or checked_plan(path)
 
 
 def _later(

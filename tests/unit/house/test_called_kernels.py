@@ -10,7 +10,7 @@ import pytest
 from sandmould import called_kernels
 from sandmould.called_kernels import keep_kernels, kept_kernels, load_kernels, loaded_kernels
 from sandmould.compiled import njit
-from sandmould.execution import worker
+from sandmould.execution.loading import load_for
 from tests.scenes import tube_scene
 
 
@@ -48,5 +48,5 @@ def test_a_damaged_list_stops_no_run(kept: Path) -> None:
     scenario = tube_scene(engine={"name": "reference"})
     (kept / "called_reference_2.txt").write_text("[torn")
     before = loaded_kernels()
-    worker.load_kept(scenario)
+    load_for(scenario)
     assert loaded_kernels() == before

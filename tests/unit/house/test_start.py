@@ -34,7 +34,7 @@ def test_a_sweep_of_sand_is_planned_without_what_computes_or_draws(
     code = (
         "from pathlib import Path\n"
         "import sandmould.execution.run_study, sandmould.execution.screen.screen\n"
-        "from sandmould.study.plan.handover import checked_plan\n"
+        "from sandmould.study.plan.build_plan import checked_plan\n"
         "assert len(checked_plan(Path('trial.yaml')).runs) == 2"
     )
     assert loaded(code, tmp_path) == "[]"
@@ -44,11 +44,10 @@ def test_a_forked_snakemake_does_not_plan_again(tmp_path: Path) -> None:
     (tmp_path / "trial.yaml").write_text("based_on: tube\nsweep: {}\n")
     code = (
         "from pathlib import Path\n"
-        "from sandmould.study.plan import handover\n"
-        "plan = handover.checked_plan(Path('trial.yaml'))\n"
-        "other = handover.plan_of(Path('trial.yaml'))\n"
-        "assert other is not plan and [r.run for r in other.runs] == [r.run for r in plan.runs]\n"
-        "handover.hand_over(plan)\n"
-        "assert handover.plan_of(Path('trial.yaml').absolute()) is plan"
+        "from sandmould.study.plan.build_plan import checked_plan, plan_at_hand\n"
+        "first = plan_at_hand(Path('trial.yaml'))\n"
+        "assert plan_at_hand(Path('trial.yaml').absolute()) is first\n"
+        "last = checked_plan(Path('trial.yaml'))\n"
+        "assert last is not first and plan_at_hand(Path('trial.yaml')) is last"
     )
     loaded(code, tmp_path)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from sandmould.execution.process import _folder_lock, is_locked
+from sandmould.execution.locks import computing, is_locked
 from sandmould.runs import claim
 from sandmould.runs.claim import CLAIM_FILE, Claim, owner_of
 
@@ -98,10 +98,10 @@ def test_where_the_file_system_has_no_locks_the_claim_keeps_two_apart(
     entered = threading.Event()
 
     def second() -> None:
-        with _folder_lock(tmp_path):
+        with computing(tmp_path):
             entered.set()
 
-    with _folder_lock(tmp_path):
+    with computing(tmp_path):
         assert is_locked(tmp_path)
         beside = threading.Thread(target=second)
         beside.start()

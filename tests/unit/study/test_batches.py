@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,10 @@ import yaml
 
 from sandmould.definition.run import LAST_MEASURED, Run
 from sandmould.engines.registry import deck_hash
-from sandmould.execution import batch_job
-from sandmould.execution.batch_job import compute_batch
+from sandmould.execution import jobs
+from sandmould.execution.jobs import JobError
+from sandmould.execution.pool import End
+from sandmould.execution.simulate import RESTARTABLE_EXIT
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import write_manifest
@@ -24,7 +26,8 @@ from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import write_plan
+from sandmould.study.plan.plan_files import read_run, write_plan
+from tests.workflow.runs import compute_all
 
 FREQUENCY = "vibration.0.frequency_hz"
 STUDY: dict[str, Any] = {
@@ -119,31 +122,39 @@ def test_what_is_left_of_a_study_is_shared_out_by_itself(tmp_path: Path) -> None
 
 
 class Jobs:
-    """What a batch did, in place of an engine."""
+    """What a batch did, in place of an engine and in this process."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, stops: str = "") -> None:
         self.computed: list[str] = []
         self.measured: list[str] = []
         self.stops = stops
-        monkeypatch.setattr(batch_job, "render", self.render)
-        monkeypatch.setattr(batch_job, "load", lambda folders, ahead: None)
-        monkeypatch.setattr(batch_job, "compute_forked", self.compute)
-        monkeypatch.setattr(batch_job, "measure_forked", self.measure)
+        monkeypatch.setattr(jobs, "do", self.do)
+        monkeypatch.setattr(jobs, "start_server", lambda scenarios: None)
+        monkeypatch.setattr(jobs, "render", self.render)
+        monkeypatch.setattr(jobs, "_simulate", self.compute)
+        monkeypatch.setattr(jobs, "measure", self.measure)
+
+    def do(self, work: Callable[..., int | None], *given: Any, log: Path, name: str) -> End:
+        try:
+            return End(work(*given) or 0, "")
+        except OSError as error:
+            return End(1, str(error))
 
     def render(self, run: Run, folder: Path) -> None:
         (folder / "deck.in").write_text("run 1\n")
 
-    def compute(self, run: Run, folder: Path, log: Path, and_measure: bool) -> None:
+    def compute(self, folder: Path, ranks: int, mpi: str, run: Run) -> int:
         if folder.name == self.stops:
-            raise SystemExit(f"{folder} stopped early: the same command continues it.")
+            return RESTARTABLE_EXIT
         self.computed.append(folder.name)
         origin = {"scenario_sha256": scenario_hash(run.scenario),
                   "template_sha256": deck_hash(run.scenario)}  # fmt: skip
         (folder / "provenance.json").write_text(json.dumps(origin))
         write_manifest(folder, "computed", {})
         RunOutcome(Outcome.FINISHED, "", 1.0, 1.0).write(folder / "outcome.json")
+        return 0
 
-    def measure(self, run: Run, folder: Path, log: Path) -> None:
+    def measure(self, run: Run, folder: Path) -> None:
         self.measured.append(folder.name)
         (folder / LAST_MEASURED).touch()
         code = kind_of(run.scenario).planning.measuring_hash
@@ -162,17 +173,17 @@ def test_a_batch_goes_on_past_a_run_that_stopped_and_redoes_none(
     folders = planned(tmp_path)
     names = [folder.name for folder in folders]
     first = Jobs(monkeypatch, stops=names[1])
-    with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {names[1]}"):
-        compute_batch(folders, tmp_path / "log", 1, "mpiexec")
+    with pytest.raises(JobError, match=f"1 of 3 stopped or broke: {names[1]}"):
+        compute_all(folders, tmp_path / "log")
     assert "stopped early" in capfd.readouterr().err
     assert first.computed == first.measured == [names[0], names[2]]
     again = Jobs(monkeypatch)
-    compute_batch(folders, tmp_path / "log", 1, "mpiexec")
+    compute_all(folders, tmp_path / "log")
     assert again.computed == again.measured == [names[1]]
     # What was computed and not measured is measured alone.
     (folders[0] / LAST_MEASURED).unlink()
     last = Jobs(monkeypatch)
-    compute_batch(folders, tmp_path / "log", 1, "mpiexec")
+    compute_all(folders, tmp_path / "log")
     assert (last.computed, last.measured) == ([], [names[0]])
 
 
@@ -180,36 +191,30 @@ def test_a_run_that_breaks_does_not_stop_the_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     folders = planned(tmp_path)
-    jobs = Jobs(monkeypatch)
+    done = Jobs(monkeypatch)
 
-    def measure(run: Run, folder: Path, log: Path) -> None:
+    def measure(run: Run, folder: Path) -> None:
         if folder == folders[0]:
             raise OSError("no space left")
-        jobs.measure(run, folder, log)
+        done.measure(run, folder)
 
-    monkeypatch.setattr(batch_job, "measure_forked", measure)
-    with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {folders[0].name}"):
-        compute_batch(folders, tmp_path / "log", 1, "mpiexec")
+    monkeypatch.setattr(jobs, "measure", measure)
+    with pytest.raises(JobError, match=f"1 of 3 stopped or broke: {folders[0].name}"):
+        compute_all(folders, tmp_path / "log")
     assert f"{folders[0].name}: no space left" in capfd.readouterr().err
-    assert jobs.measured == [folder.name for folder in folders[1:]]
+    assert done.measured == [folder.name for folder in folders[1:]]
 
 
+@pytest.mark.parametrize("status", [jobs.ASKED_EXIT, -signal.SIGTERM])
 def test_a_job_that_is_asked_to_end_begins_no_other_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folders = planned(tmp_path)
-    jobs = Jobs(monkeypatch)
-
-    def measure(run: Run, folder: Path, log: Path) -> None:
-        os.kill(os.getpid(), signal.SIGTERM)
-        jobs.measure(run, folder, log)
-
-    monkeypatch.setattr(batch_job, "measure_forked", measure)
-    before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(SystemExit, match="2 of 3 stopped or broke"):
-        compute_batch(folders, tmp_path / "log", 1, "mpiexec")
-    assert jobs.measured == [folders[0].name]
-    assert signal.getsignal(signal.SIGTERM) == before
+    folders, begun = planned(tmp_path), []
+    Jobs(monkeypatch)
+    monkeypatch.setattr(jobs, "_simulate", lambda folder, *given: begun.append(folder) or status)
+    with pytest.raises(JobError, match="3 of 3 stopped or broke"):
+        compute_all(folders, tmp_path / "log")
+    assert begun == folders[:1]
 
 
 def test_runs_side_by_side_are_computed_once_each(
@@ -217,11 +222,11 @@ def test_runs_side_by_side_are_computed_once_each(
 ) -> None:
     folders = planned(tmp_path)
     Jobs(monkeypatch, stops=folders[1].name)
-    with pytest.raises(SystemExit, match=f"1 of 3 stopped or broke: {folders[1].name}"):
-        compute_batch(folders, tmp_path / "log", 1, "mpiexec", side_by_side=2)
+    with pytest.raises(JobError, match=f"1 of 3 stopped or broke: {folders[1].name}"):
+        compute_all(folders, tmp_path / "log", side_by_side=2)
     assert [is_done(folder) for folder in folders] == [True, False, True]
     Jobs(monkeypatch)
-    compute_batch(folders, tmp_path / "log", 1, "mpiexec", side_by_side=2)
+    compute_all(folders, tmp_path / "log", side_by_side=2)
     assert all(is_done(folder) for folder in folders)
 
 
@@ -229,14 +234,14 @@ def test_a_changed_scenario_or_solver_is_computed_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = planned(tmp_path)[0]
-    run = batch_job.read_run(folder / "scenario.yaml")
+    run = read_run(folder / "scenario.yaml")
     assert lack_of(run, folder) == Lack(Need.COMPUTE)
-    jobs = Jobs(monkeypatch)
-    compute_batch([folder], tmp_path / "log", 1, "mpiexec")
+    done = Jobs(monkeypatch)
+    compute_all([folder], tmp_path / "log")
     assert lack_of(run, folder) == WHOLE
     origin = json.loads((folder / "provenance.json").read_text())
     for key in ("scenario_sha256", "template_sha256"):
         (folder / "provenance.json").write_text(json.dumps(origin | {key: "another"}))
         assert lack_of(run, folder).need is Need.COMPUTE
-    compute_batch([folder], tmp_path / "log", 1, "mpiexec")
-    assert jobs.computed == jobs.measured == [folder.name] * 2
+    compute_all([folder], tmp_path / "log")
+    assert done.computed == done.measured == [folder.name] * 2

@@ -11,7 +11,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sandmould.execution.batch_job import compute_batch
 from sandmould.execution.simulate import measure_run
 from sandmould.execution.status import run_status, status_text
 from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, OLDER_COST, OLDER_ORIGIN
@@ -19,6 +18,7 @@ from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of, notes_of
 from tests.finished_study import finished_study, study_text
+from tests.workflow.runs import compute_all
 
 
 @pytest.fixture(scope="module")
@@ -192,10 +192,10 @@ def test_a_batch_mends_what_is_damaged(plan: Plan) -> None:
     folder = folder_of(plan)
     before = {name: (folder / name).read_text() for name in ("series.tsv", "measures.tsv")}
     cut("outcome.json")(folder)
-    compute_batch([folder], folder / "log", 1, "mpiexec")
+    compute_all([folder], folder / "log")
     assert lack(plan) == WHOLE
     removed("fields.vtu")(folder)
-    compute_batch([folder], folder / "log", 1, "mpiexec")
+    compute_all([folder], folder / "log")
     assert lack(plan) == WHOLE
     assert before == {name: (folder / name).read_text() for name in before}
     assert run_status(folder, lack(plan)).state == "done"

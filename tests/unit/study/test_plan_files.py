@@ -245,7 +245,7 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
     [
         # scikit-learn and scipy.stats take a second each.
         ("sandmould.execution.simulate", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
-        ("sandmould.execution.batch_job", ("sklearn", "scipy.stats", "snakemake")),
+        ("sandmould.execution.jobs", ("sklearn", "scipy.stats", "snakemake")),
         ("sandmould.study.plan.build_plan", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
     ],
 )

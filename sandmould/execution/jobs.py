@@ -1,0 +1,225 @@
+"""What Snakemake's jobs do, each by processes of the pool: runs, and what is made of them."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pkgutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import FrameType
+from typing import Any, TextIO
+
+from sandmould.called_kernels import loaded_kernels
+from sandmould.definition.run import LAST_MEASURED, Run
+from sandmould.execution.loading import keep_loaded
+from sandmould.execution.locks import computing
+from sandmould.execution.pool import SERVER_LOST, do, start_server
+from sandmould.execution.simulate import RESTARTABLE_EXIT, measure, render, simulate, write_crash
+from sandmould.runs.formatting import listed
+from sandmould.runs.parent import end_with_parent
+from sandmould.study.plan.batches import is_done
+from sandmould.study.plan.lacking import Need, lack_of
+from sandmould.study.plan.plan_files import read_run
+
+ASKED_EXIT = 143
+"""Exit status of a run that stopped early since its job is to end, as a shell gives SIGTERM."""
+_ASKED = (ASKED_EXIT, -signal.SIGTERM)
+_KILLED = (SERVER_LOST, -signal.SIGKILL, -signal.SIGINT, -signal.SIGHUP, 128 + signal.SIGKILL)
+_OUTCOME = "outcome.json"
+
+
+class JobError(Exception):
+    """A job did not reach its end; one sentence."""
+
+
+class AskedToEndError(JobError):
+    """A run stopped since its job was asked to end."""
+
+
+def do_job(work: str, *given: Any, log: str) -> None:
+    """Do one piece of work that computes no run.
+
+    Parameters
+    ----------
+    work : str
+        Module and function: what it imports is imported by its own process alone.
+    *given
+        What it takes.
+    log : str
+        Path of the file that takes what is printed.
+
+    Raises
+    ------
+    JobError
+        With its last words where it did not end well.
+    """
+    Path(log).unlink(missing_ok=True)
+    ended = do(_named, work, *given, log=Path(log))
+    if ended.status:
+        raise JobError(ended.words)
+
+
+def _named(work: str, *given: Any) -> None:
+    pkgutil.resolve_name(work)(*given)
+
+
+def compute_run(scenario: str, log: str, ranks: int, mpi: str) -> None:
+    """Compute a run whose deck is there; an outcome is written whatever happens.
+
+    Parameters
+    ----------
+    scenario : str
+        Path of its ``scenario.yaml``.
+    log : str
+    ranks : int
+        MPI ranks; 1 for an engine whose ranks are threads of one process.
+    mpi : str
+        Command that starts ranks, such as ``srun --mpi=pmi2``.
+
+    Raises
+    ------
+    JobError
+        When it stopped early, and the same command continues it.
+    """
+    start_server([Path(scenario)])
+    _see_to_end(_simulate, Path(scenario).parent, Path(log), ranks, mpi)
+
+
+def compute_batch(
+    scenarios: Sequence[str], log: str, ranks: int, mpi: str, side_by_side: int = 1
+) -> None:
+    """Render, compute and measure runs, those left out that are there already.
+
+    Parameters
+    ----------
+    scenarios : sequence of str
+        Paths of their ``scenario.yaml``.
+    log : str
+        Takes what all of them print.
+    ranks : int
+    mpi : str
+    side_by_side : int
+        Runs at a time.
+
+    Raises
+    ------
+    JobError
+        At the end, when a run stopped or broke: the same job continues it and redoes none.
+    """
+    start_server([Path(scenarios[0])])
+    asked_to_end = threading.Event()
+    folders = [Path(scenario).parent for scenario in scenarios]
+    Path(log).touch()
+
+    def compute(folder: Path) -> None:
+        if asked_to_end.is_set():
+            return
+        try:
+            _see_to_end(_do_all, folder, Path(log), ranks, mpi)
+        except JobError as error:  # one bad run must not stop the others
+            if isinstance(error, AskedToEndError):
+                asked_to_end.set()
+            print(f"{folder.name}: {error}", file=sys.stderr, flush=True)
+
+    with ThreadPoolExecutor(side_by_side) as threads:
+        list(threads.map(compute, folders))
+    if stopped := [folder.name for folder in folders if not is_done(folder)]:
+        raise JobError(f"{len(stopped)} of {len(folders)} stopped or broke: {listed(stopped)}")
+
+
+def _see_to_end(work: Callable[..., int], folder: Path, log: Path, ranks: int, mpi: str) -> None:
+    """Do some work on a run, and have its outcome written where it could not do so itself."""
+    outcome = folder / _OUTCOME
+    ended = do(work, folder, ranks, mpi, log=log, name=folder.name)
+    if ended.status and not outcome.exists():
+        if ended.status in _ASKED:
+            raise AskedToEndError("stopped early: the same command continues it")
+        if ended.status == RESTARTABLE_EXIT:
+            raise JobError("stopped early: the same command continues it")
+        if ended.status in _KILLED:
+            raise JobError("was killed: the same command continues it")
+        if not (folder / "work").exists():
+            raise JobError(ended.words)  # before it began
+        why = f"the process ended with status {ended.status}: {ended.words}"
+        if (writing := do(write_crash, folder, why, log=log, name=folder.name)).status:
+            raise JobError(writing.words)
+    if ended.status and work is _do_all:  # what is left is tried once more: its measures
+        ended = do(work, folder, ranks, mpi, log=log, name=folder.name)
+        if ended.status:
+            raise JobError(ended.words)
+
+
+def _do_all(folder: Path, ranks: int, mpi: str) -> int:
+    """Do what is missing of one run; the exit status."""
+    run = read_run(folder / "scenario.yaml")
+    if lack_of(run, folder).need is Need.COMPUTE:
+        for old in (_OUTCOME, LAST_MEASURED):
+            (folder / old).unlink(missing_ok=True)  # damaged, or of another scenario or deck
+        render(run, folder)
+        if status := _simulate(folder, ranks, mpi, run):
+            return status
+    else:
+        print(f"{folder.name}: computed already", file=sys.stderr)
+    if lack_of(run, folder).need is not Need.NOTHING:
+        measure(run, folder)
+    return 0
+
+
+def _simulate(folder: Path, ranks: int, mpi: str, run: Run | None = None) -> int:
+    """Compute a run; the exit status."""
+    with computing(folder) as lock, _asked_to_end() as is_asked:
+        if (folder / _OUTCOME).exists():
+            return 0  # finished meanwhile by a process that outlived its own Snakemake
+        if ranks > 1:
+            status = _in_ranks(folder, ranks, mpi, lock)
+        else:
+            run, before = run or read_run(folder / "scenario.yaml"), loaded_kernels()
+            status = simulate(folder, run)
+            keep_loaded(run.scenario, before)
+        return ASKED_EXIT if status == RESTARTABLE_EXIT and is_asked() else status
+
+
+@contextlib.contextmanager
+def _asked_to_end() -> Iterator[Callable[[], bool]]:
+    """Note whether SIGTERM comes, whoever handles it."""
+    read, write = os.pipe()
+    for end in (read, write):
+        os.set_blocking(end, False)
+    before = signal.set_wakeup_fd(write)
+
+    def is_asked() -> bool:
+        with contextlib.suppress(BlockingIOError):
+            return signal.SIGTERM in os.read(read, 4096)
+        return False
+
+    yield is_asked
+    signal.set_wakeup_fd(before)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # no stage is left that could stop softly
+    for end in (read, write):
+        os.close(end)
+
+
+def _in_ranks(folder: Path, ranks: int, mpi: str, lock: TextIO) -> int:
+    """Compute a run in several processes; the exit status, as a shell gives it."""
+    launcher, *options = mpi.split()
+    own = Path(sys.executable).parent / launcher  # that of our own environment, if it has it
+    command = [str(own) if own.exists() else launcher, *options, "-n", str(ranks)]
+    process = subprocess.Popen(
+        [*command, sys.executable, "-m", "sandmould.execution.simulate", str(folder)],
+        preexec_fn=end_with_parent,
+        # It holds the run's lock, too: killed, this process may end before it.
+        pass_fds=(lock.fileno(),),
+    )
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        process.terminate()
+
+    signal.signal(signal.SIGTERM, stop)
+    status = process.wait()
+    return status if status >= 0 else 128 - status

@@ -1,0 +1,39 @@
+"""What runs of a kind and an engine need, loaded before one begins."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any
+
+from sandmould.called_kernels import keep_kernels, kept_kernels, load_kernels, loaded_kernels
+from sandmould.kinds.registry import kind_of
+from sandmould.runs.provenance import commit, processor, versions
+
+
+def load_for(scenario: Any) -> None:
+    """Load what computes and measures runs like one, and the compiled code that such runs called.
+
+    Parameters
+    ----------
+    scenario : scenario
+        Of any kind.
+    """
+    kind = kind_of(scenario)
+    kind.execution.load_computing(scenario)
+    kind.execution.load_measuring(scenario)
+    with contextlib.suppress(Exception):  # a damaged list; what is not loaded is compiled later
+        load_kernels(kept_kernels(_class_of(scenario)) - loaded_kernels())
+    kind.planning.template_hash(scenario)
+    for asked_once in (commit, versions, processor):
+        asked_once()
+
+
+def keep_loaded(scenario: Any, before: set[str]) -> None:
+    """Note for later servers what a run has called that was not loaded before."""
+    if new := loaded_kernels() - before:
+        keep_kernels(_class_of(scenario), new)
+
+
+def _class_of(scenario: Any) -> str:
+    engine, dimension = kind_of(scenario).planning.speed_class(scenario)
+    return f"{engine}_{dimension}"

@@ -1,6 +1,0 @@
-"""Render the deck of one run."""
-
-import sandmould.runs.silent_interrupt  # noqa: F401
-from sandmould.execution.standby import do_job
-
-do_job("render_run", snakemake.input.scenario, snakemake.log[0])
