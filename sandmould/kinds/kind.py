@@ -103,6 +103,10 @@ class Planning(ABC, Generic[ScenarioT]):
         """The scenario with the hashes of the files that it names."""
         return scenario
 
+    def seeded(self, scenario: ScenarioT, seed: int) -> ScenarioT:
+        """A resolved scenario with another seed."""
+        return scenario.model_copy(update={"seed": seed})
+
     def problems(self, scenario: ScenarioT) -> list[Problem]:
         """What keeps a well-typed scenario from being run."""
         return []

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import json
+import re
+from pathlib import PurePosixPath
 from typing import Any, Literal, get_args, get_origin
 
 from sandmould.digest import digest
@@ -11,13 +13,17 @@ from sandmould.scenario.quantity import Section, first_default
 
 _ALWAYS = object()
 """In place of a default: the value counts whatever it is."""
+_FILE = re.compile(r"(.*\.)?(file|files|template)(\.\d+)*")
+"""Keys that name files."""
+_SHIPPED = re.compile(r"(?:sandmould/shipped/)?(config/(?:decks|meshes)/.+)")
+"""A file that comes with us, as seen from a checkout or from an installed package."""
 
 
 def scenario_hash(scenario: Section) -> str:
     """Hash of everything that a scenario says, whatever the order of its keys.
 
     A value at the key's first default says nothing: a key that comes or goes later changes no
-    hash of a scenario that leaves it alone.
+    hash of a scenario that leaves it alone. A file counts by its name and its hash.
     """
     return digest(json.dumps(said(scenario), sort_keys=True))
 
@@ -30,19 +36,31 @@ def said(scenario: Section) -> dict[str, Any]:
     return _said(scenario, scenario.model_dump(mode="json"))
 
 
-def _said(value: Any, dumped: Any) -> Any:
+def by_name(values: dict[str, Any]) -> dict[str, Any]:
+    """Values by key path, as JSON has them, with each file by its name in place of its path."""
+    return {key: _said(value, value, key) for key, value in values.items()}
+
+
+def _said(value: Any, dumped: Any, at: str = "") -> Any:
     if isinstance(value, Section):
         defaults = _defaults(type(value))
         return {
-            key: _said(getattr(value, key), dumped[key])
+            key: _said(getattr(value, key), dumped[key], key)
             for key, default in defaults.items()
             if key in dumped and (default is _ALWAYS or getattr(value, key) != default)
         }
     if isinstance(value, dict):
-        return {key: _said(value[key], dumped[key]) for key in dumped}
+        named = _name if at == "sha256" else str
+        return {named(key): _said(value[key], dumped[key], key) for key in dumped}
     if isinstance(value, (list, tuple)):
-        return [_said(item, part) for item, part in zip(value, dumped, strict=True)]
-    return dumped
+        return [_said(item, part, at) for item, part in zip(value, dumped, strict=True)]
+    return _name(dumped) if isinstance(dumped, str) and _FILE.fullmatch(at) else dumped
+
+
+def _name(path: str) -> str:
+    """Name of a file; of one that comes with us its place there, the same in all installations."""
+    shipped = _SHIPPED.fullmatch(path)
+    return shipped[1] if shipped else PurePosixPath(path).name
 
 
 @functools.cache

@@ -43,7 +43,9 @@ class OwnDeck(Section):
         (), "Further files that the deck reads; they lie beside it when it runs.", source="user"
     )
     sha256: dict[str, str] = quantity(
-        {}, "Hash of template and files; the plan of a study writes it.", source=PLANNED
+        {},
+        "Hash of the rendered deck and of each file; the plan of a study writes it.",
+        source=PLANNED,
     )
     values: dict[Annotated[str, Field(pattern=NAME)], Any] = Field(
         {}, description="Names that the template is given; any of them can be swept."

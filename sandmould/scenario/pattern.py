@@ -50,6 +50,7 @@ class MeshFile(Section):
         source="user",
         min_length=1,
     )
+    sha256: str | None = DRAWING_HASH
     unit_m: float = quantity(
         1.0, "Length that stands for 1 in the file.", unit="m", source="user", gt=0, le=100
     )

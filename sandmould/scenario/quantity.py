@@ -68,7 +68,20 @@ def first_default(section: type[BaseModel], key: str) -> Any:
     about = field.json_schema_extra
     if isinstance(about, dict) and FIRST in about:
         return about[FIRST]
-    return field.get_default(call_default_factory=True)
+    return _with_first_defaults(field.get_default(call_default_factory=True))
+
+
+def _with_first_defaults(default: Any) -> Any:
+    """A default with the first defaults of the keys that it leaves alone, at every depth."""
+    if isinstance(default, tuple):
+        return tuple(map(_with_first_defaults, default))
+    if not isinstance(default, Section):
+        return default
+    section = type(default)
+    unset = section.model_fields.keys() - default.model_fields_set
+    # a section may set keys by itself as it is read
+    left = [k for k in unset if getattr(default, k) == section.model_fields[k].get_default()]
+    return default.model_copy(update={key: first_default(section, key) for key in left})
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:

@@ -6,18 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sandmould import SHIPPED
 from sandmould.bad_input import Problem
 from sandmould.digest import SHORT, digest
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.measures import MEASURES
 from sandmould.kinds.deck.own import deck as own_deck
+from sandmould.kinds.deck.own.deck import DECKS
 from sandmould.kinds.deck.speed import DeckSpeed
 from sandmould.kinds.kind import Planning, SpeedClass, UserProgram
 from sandmould.scenario.own_deck import OwnDeck
-
-DECKS = SHIPPED / "config" / "decks"
-"""Decks that come with us."""
 
 
 class DeckProgram(UserProgram[OwnDeck]):
@@ -65,8 +62,12 @@ class DeckPlanning(Planning[OwnDeck]):
     measuring = ("sandmould/kinds/deck/measure.py",)
 
     def resolved(self, scenario: OwnDeck) -> OwnDeck:
-        """With the hashes of template and files."""
-        return own_deck.with_hashes(scenario)
+        """With the hashes of its files; that of its deck comes with the seed."""
+        return own_deck.with_file_hashes(scenario)
+
+    def seeded(self, scenario: OwnDeck, seed: int) -> OwnDeck:
+        """With the seed and the hash of the deck that is rendered with it."""
+        return own_deck.with_deck_hash(super().seeded(scenario, seed))
 
     def problems(self, scenario: OwnDeck) -> list[Problem]:
         """What keeps the template from being rendered."""
@@ -82,13 +83,8 @@ class DeckPlanning(Planning[OwnDeck]):
         return list(scenario.paths.values())
 
     def template_hash(self, scenario: OwnDeck) -> str:
-        """Hash of template and files as they are now."""
-        now = own_deck.with_hashes(scenario.model_copy(update={"sha256": {}})).sha256
-        return digest(*sorted(now.values()))[:SHORT]
-
-    def computed_hash(self, scenario: OwnDeck) -> str:
-        """Hash of the rendered deck and of the files that it reads."""
-        return digest(own_deck.render(scenario, "run", "study"), self.template_hash(scenario))
+        """Hash of the rendered deck and of the files that it reads, as planned."""
+        return digest(*sorted(scenario.sha256.values()))[:SHORT]
 
     def threads(self, scenario: OwnDeck) -> int:
         """One a rank."""

@@ -6,6 +6,7 @@ import importlib
 import tempfile
 from pathlib import Path
 
+from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.definition.run import FILL, Run
 from sandmould.engines import recording, registry
 from sandmould.engines.cost import cost_before
@@ -17,7 +18,9 @@ from sandmould.kinds.sand.fill_apart import fill_apart
 from sandmould.kinds.sand.shared_fill import lay_fill
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.products import SAND_PRODUCTS, Computed, Cost
+from sandmould.scenario.pattern import MeshFile
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import with_hash
 
 
 class SandExecution(Execution[Scenario]):
@@ -26,7 +29,15 @@ class SandExecution(Execution[Scenario]):
     products = SAND_PRODUCTS
 
     def render(self, run: Run, folder: Path) -> None:
-        """Write the deck and the layers."""
+        """Write the deck and the layers, unless a pattern's mesh has changed since the plan."""
+        pattern = run.scenario.pattern
+        if pattern is not None and isinstance(pattern.shape, MeshFile):
+            mesh = pattern.shape
+            now = with_hash(mesh.model_copy(update={"sha256": None}))
+            if mesh.sha256 not in (None, now.sha256):
+                valid = "the file that the study was planned with; this one has changed since"
+                file_name = display_path(mesh.path)
+                raise BadInputError([Problem("pattern.shape.file", file_name, valid)])
         _write_deck(build_program(run.scenario), run, folder)
 
     def compute(self, run: Run, folder: Path) -> Computed:

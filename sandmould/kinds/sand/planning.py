@@ -20,7 +20,7 @@ from sandmould.kinds.sand.table_motion import table_lines
 from sandmould.limits import FRAMES, RECORDS
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.checks.scene import problems as scene_problems
-from sandmould.scenario.pattern import PatternDrawing
+from sandmould.scenario.pattern import MeshFile, PatternDrawing
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import READ_BYTES, SolidMesh, with_hash
@@ -79,7 +79,7 @@ class SandPlanning(Planning[Scenario]):
             # scikit-fem: few studies need it
             from sandmould.pattern_fe.coupling.interface import with_surface
 
-            if isinstance(pattern.shape, PatternDrawing):
+            if isinstance(pattern.shape, MeshFile | PatternDrawing):
                 shape = with_hash(pattern.shape)
                 pattern = pattern.model_copy(update={"shape": shape})
                 scenario = scenario.model_copy(update={"pattern": pattern})

@@ -16,7 +16,7 @@ from sandmould.definition.sweep import Point, points, value_at
 from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.columns import CROSS_CHECK, CROSS_CHECK_OWN
-from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.hashing import by_name, scenario_hash
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
@@ -76,8 +76,9 @@ def expand(
     kind = kind_named(study.study.kind)
     labels = Labels(kind.scenario, kind.labels_have_units)
     every = range(1, study.study.replicates + 1)
-    swept = [(point, every) for point in points(study.study.sweep, study.study.scenario)]
-    added = [(point, range(replicate, replicate + 1)) for point, replicate in more]
+    planned = points(study.study.sweep, study.study.scenario)
+    swept = [(point, every) for point in planned]
+    added = [(_as_planned(point, planned), range(n, n + 1)) for point, n in more]
     certificate = study.study.certificate
     key = frequency_key(study.study.sweep)
     controlled = {}
@@ -117,6 +118,14 @@ def expand(
     if problems:
         raise BadInputError(list(problems.values())[:MOST_PROBLEMS])
     return list(runs.values())
+
+
+def _as_planned(point: Point, planned: Sequence[Point]) -> Point:
+    """A point of a round as the sweep has it now: the files that it names may have moved since."""
+    named = by_name(point)
+    if named == point or point in planned:
+        return point
+    return next((other for other in planned if by_name(other) == named), point)
 
 
 def scenes(study: OpenStudy) -> Iterator[AnyScenario]:
@@ -264,13 +273,13 @@ class _AtPoint:
         parameters = {key: value_at(dump, key) for key in self.point}
         engine = {ENGINE: self.kind.planning.speed_class(base)[0]} if source else {}
         if part.startswith("control"):
-            label = f"{letters(part)}_{self.labels.of(parameters)}"
+            label = f"{letters(part)}_{self.labels.of(by_name(parameters))}"
         else:
-            label = self.labels.of({**engine, **parameters})
+            label = self.labels.of(by_name({**engine, **parameters}))
         sources = {**dict(_sources(base, self.origin)), **source}
         own = base.seed
         for replicate in replicates:
-            scenario = base.model_copy(update={"seed": replicate_seed(own, replicate)})
+            scenario = self.kind.planning.seeded(base, replicate_seed(own, replicate))
             yield Run(
                 self.study.name,
                 f"{label}_r{replicate}_{scenario_hash(scenario)[:6]}",

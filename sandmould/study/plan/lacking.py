@@ -164,7 +164,11 @@ def template_hashes() -> Callable[[Run], str]:
 
     def template_hash(run: Run) -> str:
         # By the files that it is made from: reading them for each run took longer than all else.
-        sources = tuple(kind_of(run.scenario).planning.sources(run.scenario))
+        # A program of the user's is made for each run, and was read when it was planned.
+        planning = kind_of(run.scenario).planning
+        if planning.program is not None:
+            return planning.template_hash(run.scenario)
+        sources = tuple(planning.sources(run.scenario))
         if sources not in hashes:
             hashes[sources] = _template_hash(run)
         return hashes[sources]

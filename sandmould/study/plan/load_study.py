@@ -206,8 +206,7 @@ def _read(path: Path, text: str | None = None) -> _File:
 def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
     """A file's tree with the files that it names as seen from itself named as seen from ROOT.
 
-    So a run finds them from any working directory, and no path of this machine enters its
-    scenario as long as the file lies in the repository.
+    So a run finds them from any working directory; what counts of them is name and content.
     """
     if isinstance(tree, dict):
         return {n: _from_root(v, folder, f"{key}.{n}") for n, v in tree.items()}

@@ -52,7 +52,7 @@ def owner_path(folder: Path) -> Path | None:
 
 
 def check_owner(path: Path, folder: Path) -> None:
-    """Refuse results that belong to another study file of the same name.
+    """Refuse results that belong to another study file of the same name, while that is there.
 
     Parameters
     ----------
@@ -66,10 +66,10 @@ def check_owner(path: Path, folder: Path) -> None:
     BadInputError
         With the file that they belong to.
     """
-    owner, own = owner_of(folder), owner_text(path)
-    if owner is not None and owner != own:
+    owner, own = owner_path(folder), owner_text(path)
+    if owner is not None and owner_text(owner) != own:
         valid = (
-            f"a study file of another name, since {folder} belongs to {owner}; "
+            f"a study file of another name, since {folder} belongs to {owner_text(owner)}; "
             f"sandmould plan {path} --adopt takes it over"
         )
         raise BadInputError([Problem("STUDY", own, valid)])

@@ -53,6 +53,25 @@ def test_a_changed_default_changes_the_hash_of_those_that_take_it() -> None:
     assert scenario_hash(SceneWithMore()) != scenario_hash(Scene())
 
 
+class Study(Section):
+    """A key's default may be a section, or several."""
+
+    scene: Scene = Scene(seed=2)
+    scenes: tuple[Scene, ...] = (Scene(seed=3),)
+
+
+class LaterStudy(Section):
+    scene: SceneWithMore = SceneWithMore(seed=2)
+    scenes: tuple[SceneWithMore, ...] = (SceneWithMore(seed=3),)
+
+
+def test_a_changed_default_changes_the_hash_of_those_that_take_it_with_a_whole_section() -> None:
+    taken = {"gravity_m_s2": 9.8, "seed": 2}
+    assert said(LaterStudy()) == {"scene": taken, "scenes": [taken | {"seed": 3}]}
+    kept = SceneWithMore(gravity_m_s2=9.81, seed=2)
+    assert said(LaterStudy(scene=kept, scenes=(kept,))) == said(Study(scenes=(Scene(seed=2),)))
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_solution_is_of_all_seeds(seed: int) -> None:
     assert solution_hash(Scene(seed=seed), "1.0") == solution_hash(Scene(), "1.0")

@@ -77,6 +77,10 @@ def test_the_file_is_named_as_seen_from_the_working_folder(
         shutil.move(name, moved / name)
     monkeypatch.chdir(moved)
     assert sandmould("status", "a/trial.yaml").exit_code == 0
+    # A study that was moved takes its results with it: its file is no longer where they say.
+    shutil.move("a", "c")
+    assert sandmould("plan", "c/trial.yaml").exit_code == 0
+    assert owner_of(FOLDER) == "c/trial.yaml"
 
 
 def test_a_shipped_study_is_the_same_wherever_it_is_installed(tmp_path: Path) -> None:

@@ -85,7 +85,7 @@ def deck_key(scenario: OwnDeck, deck: str) -> str:
     """What decks have in common that print the same columns and are asked for the same."""
     printing = [" ".join(line) for line in _commands(deck) if line[0].startswith("thermo")]
     wanted = [f"{name} {column}" for name, column in scenario.measures.items()]
-    files = [f"{name} {sha}" for name, sha in scenario.sha256.items()]
+    files = [scenario.sha256[name] for name in scenario.files]
     return digest("\n".join([scenario.engine.name, *printing, *sorted(wanted), *sorted(files)]))
 
 

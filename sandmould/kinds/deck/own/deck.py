@@ -2,32 +2,62 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
+from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem
-from sandmould.digest import file_digest
+from sandmould.digest import digest, file_digest
 from sandmould.engines.ranks import Ranks
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own.columns import column_problems
 from sandmould.kinds.deck.own.template import MOST_CHARACTERS, names_in, rendered
 from sandmould.scenario.own_deck import RESERVED, OwnDeck
 
+DECKS = SHIPPED / "config" / "decks"
+"""Decks that come with us."""
 RESTART_FILES = ("restart.a", "restart.b")
 """Written in turn beside the folder that a deck runs in."""
 
 
-def with_hashes(scenario: OwnDeck) -> OwnDeck:
-    """The same run with the hashes of its files; without those that cannot be read."""
-    if scenario.sha256:
-        return scenario
-    return scenario.model_copy(update={"sha256": dict(_hashes(scenario))})
+def with_file_hashes(scenario: OwnDeck) -> OwnDeck:
+    """The same run with the hashes of the files beside its template that can be read."""
+    paths = {name: scenario.paths[name] for name in scenario.files}
+    hashes = {name: file_digest(path) for name, path in paths.items() if path.is_file()}
+    return scenario.model_copy(update={"sha256": hashes})
 
 
-def _hashes(scenario: OwnDeck) -> Iterator[tuple[str, str]]:
-    for name, path in scenario.paths.items():
-        if path.is_file():
-            yield name, file_digest(path)
+def with_deck_hash(scenario: OwnDeck) -> OwnDeck:
+    """The same run with the hash of what its template renders, if it can be rendered.
+
+    Two texts count: that of the beginning, and that of going on from a restart file. A template
+    that comes with us counts by its own text.
+    """
+    path = scenario.paths[scenario.template]
+    with contextlib.suppress(OSError, ValueError):
+        if path.is_relative_to(DECKS):
+            sha256 = file_digest(path)
+        else:
+            starts = ("", RESTART_FILES[0]) if "restart" in names_used(scenario) else ("",)
+            decks = (render(scenario, "run", "study", start) for start in starts)
+            sha256 = digest("\n".join(map(_commands, decks)))
+        hashes = {**scenario.sha256, scenario.template: sha256}
+        return scenario.model_copy(update={"sha256": hashes})
+    return scenario
+
+
+def _commands(deck: str) -> str:
+    """A deck without lines that hold a comment or nothing, unless they may be part of a command."""
+    if '"""' in deck:
+        return deck
+    kept, goes_on = [], False
+    for line in deck.splitlines():
+        text, follows = line.strip(), goes_on
+        goes_on = text.endswith("&")
+        if follows or goes_on or (text and not text.startswith("#")):
+            kept.append(line)
+    return "\n".join(kept)
 
 
 def problems(scenario: OwnDeck) -> list[Problem]:
@@ -73,7 +103,7 @@ def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
     yield from column_problems(scenario, deck)
 
 
-def names_used(scenario: OwnDeck) -> set[str]:
+def names_used(scenario: OwnDeck) -> frozenset[str]:
     """Names that a template takes from outside.
 
     Raises
@@ -128,7 +158,7 @@ def check_unchanged(scenario: OwnDeck) -> None:
     ------
     BadInputError
     """
-    now = dict(_hashes(scenario))
+    now = with_deck_hash(with_file_hashes(scenario)).sha256
     changed = [n for n, planned in scenario.sha256.items() if now.get(n) != planned]
     if changed:
         valid = "the file as it was planned: plan the study again to run it as it is now"

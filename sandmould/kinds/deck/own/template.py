@@ -34,7 +34,8 @@ class TemplateError(ValueError):
         super().__init__(f"line {line}: {fault}" if line else fault)
 
 
-def names_in(template: str) -> set[str]:
+@functools.lru_cache(maxsize=8)
+def names_in(template: str) -> frozenset[str]:
     """Names that a template takes from outside.
 
     Parameters
@@ -46,7 +47,7 @@ def names_in(template: str) -> set[str]:
     ------
     TemplateError
     """
-    return set(_ask({"template": template})["names"])
+    return frozenset(_ask({"template": template})["names"])
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
