@@ -57,12 +57,12 @@ def do_job(work: str, *given: Any, log: str) -> None:
     Raises
     ------
     JobError
-        With its last words where it did not end well.
+        Where it did not end well; it has said why, and its log keeps that.
     """
     Path(log).unlink(missing_ok=True)
     ended = do(_named, work, *given, log=Path(log))
     if ended.status:
-        raise JobError(ended.words)
+        raise JobError(f"stopped: {log} says why")
 
 
 def _named(work: str, *given: Any) -> None:

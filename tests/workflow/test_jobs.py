@@ -239,5 +239,6 @@ def test_a_job_that_fails_says_why(tmp_path: Path) -> None:
     (run / "scenario.yaml").write_text("kind: sand\n")
     with pytest.raises(JobError, match="1 of 1 stopped or broke: one_0"):
         compute_all([run], tmp_path / "log")
-    with pytest.raises(JobError, match="No such file"):
+    with pytest.raises(JobError, match="says why"):
         do_job("os:stat", str(tmp_path / "nothing"), log=str(tmp_path / "log"))
+    assert "No such file" in (tmp_path / "log").read_text()
