@@ -1,8 +1,9 @@
-"""What an engine's sessions can do, known before one is opened."""
+"""What an engine's sessions can do, known before one is opened, and what its ranks are."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Literal
 
 
@@ -33,3 +34,11 @@ class Capabilities:
     """Whether a gate opens in a stated time, and a wall of the box moves as a piston."""
     changes_checks: bool
     """Whether a session goes on from a checkpoint with checks at another interval."""
+
+
+class Ranks(Enum):
+    """How an engine shares the work of one run."""
+
+    PROCESSES = "MPI ranks, each a process"
+    THREADS = "threads of one process"
+    ONE = "one process without threads"

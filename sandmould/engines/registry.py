@@ -11,10 +11,9 @@ from typing import Any, Protocol, assert_never
 from sandmould import ROOT, geometry
 from sandmould.bad_input import Problem
 from sandmould.digest import code_identity, digest
-from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
-from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, SandSession
 from sandmould.scenario.checks.unbalance import unbalance_key
 from sandmould.scenario.engine import ENGINE_NAMES, DeckReader, EngineName

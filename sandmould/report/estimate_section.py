@@ -14,9 +14,8 @@ import pandas as pd
 from sandmould.definition.study import Study
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.kinds.kind import AnyScenario
-from sandmould.report.heaps import Heap
 from sandmould.report.kinds.registry import report_of
-from sandmould.report.repose_figures import draw_map, draw_posterior, plotted
+from sandmould.report.repose_figures import Heap, draw_map, draw_posterior, plotted
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN, total_s
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin

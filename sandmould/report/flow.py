@@ -20,6 +20,7 @@ from sandmould.casting.mps.scheme import G_M_S2
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S, PAPERS
 from sandmould.casting.mps.stability import QUIET_PA, StabilityRating
 from sandmould.casting.mps.stability_measures import NOISE_WINDOW_S
+from sandmould.drawing.animation import evenly
 from sandmould.drawing.figures import png
 from sandmould.drawing.flow_film import SHADES, FlowFilm, make_flow_film
 from sandmould.report.flow_map import condition_text, said_of, stability_map
@@ -151,10 +152,7 @@ def _pictured_runs(
         if (folder / "fields.npz").is_file():
             label = condition_text({key: row[key] for key in keys})
             drawable.append(_PicturedRun(folder.name, label, folder, str(row[CLASSIFICATION])))
-    places = (
-        np.linspace(0, len(drawable) - 1, min(PICTURED_RUNS, len(drawable))).round().astype(int)
-    )
-    return [drawable[place] for place in np.unique(places).tolist()]
+    return [drawable[place] for place in evenly(len(drawable), PICTURED_RUNS).tolist()]
 
 
 def _load(folder: Path) -> dict[str, NDArray[np.float64]]:

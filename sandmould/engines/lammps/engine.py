@@ -9,16 +9,15 @@ from typing import Any
 
 from sandmould.dem import source_files
 from sandmould.engines.bed_deck import sources_of_step
-from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
-from sandmould.engines.lammps.refusals import refuse as refuse
 from sandmould.engines.lammps.render import needs_callback
+from sandmould.engines.lammps.render import refuse as refuse
 from sandmould.engines.lammps.render import render_deck as render_deck
 from sandmould.engines.lammps.render import write_deck as write_deck
 from sandmould.engines.lammps.session import LammpsSession, load_library
 from sandmould.engines.program import Program
-from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import SandSession
 from sandmould.scenario.scenario import Scenario
 

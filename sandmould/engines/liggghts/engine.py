@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sandmould.engines.bed_deck import sources_of_step
-from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck
 from sandmould.engines.liggghts import OLDEST_VERSION
 from sandmould.engines.liggghts.process import executable, version_of
@@ -14,7 +14,6 @@ from sandmould.engines.liggghts.render import render_deck as render_deck
 from sandmould.engines.liggghts.render import write_deck as write_deck
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.program import Program
-from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import SandSession
 from sandmould.scenario.scenario import Scenario
 

@@ -13,9 +13,9 @@ from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart
 from sandmould.kinds.kind import ScenarioT
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.heaps import Heap
 from sandmould.report.method import Row
 from sandmould.report.next_steps import NextStep
+from sandmould.report.repose_figures import Heap
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sureness import Ground
 from sandmould.scenario.drive import BoxDrive

@@ -14,10 +14,10 @@ from sandmould.report.bed_mode import BedMode, bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.hard_limit_text import hard_limit_text
-from sandmould.report.heaps import Heap, steepest_heaps
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.loose_sand import LooseSandPages, loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
+from sandmould.report.repose_figures import Heap, steepest_heaps
 from sandmould.report.robustness import RobustnessPages, robustness_pages
 from sandmould.report.sand import SandPages, sand_pages
 from sandmould.report.sureness import sand_grounds, weak_ground

@@ -9,7 +9,7 @@ from pathlib import Path
 from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.digest import digest, file_digest
-from sandmould.engines.ranks import Ranks
+from sandmould.engines.capabilities import Ranks
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own.columns import column_problems
 from sandmould.kinds.deck.own.template import MOST_CHARACTERS, names_in, rendered
