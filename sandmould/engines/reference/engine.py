@@ -33,7 +33,6 @@ CAPABILITIES = Capabilities(
     repeats_windows=True,
     calls_movers=True,
     loads_of_every_step=True,
-    checkpoints_at_setups=False,
     moves_tables=True,
     moves_walls=True,
     changes_checks=True,
