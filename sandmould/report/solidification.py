@@ -21,7 +21,7 @@ from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
-from sandmould.runs.formatting import listed, name_of, number, seconds, setting_text
+from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
 from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
@@ -146,9 +146,8 @@ def _of_point(summary: pd.DataFrame, reference: Point) -> pd.DataFrame:
     """Rows of the reference; swept values are as ``runs.tsv`` has them."""
     chosen = np.ones(len(summary), dtype=bool)
     for key, value in reference.items():
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        column = summary[key].astype(float if is_number else str)
-        chosen &= (column == (float(value) if is_number else str(value))).to_numpy()
+        kind = float if is_number(value) else str
+        chosen &= (summary[key].astype(kind) == kind(value)).to_numpy()
     return summary[chosen]
 
 
