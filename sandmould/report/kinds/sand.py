@@ -13,7 +13,6 @@ from sandmould.kinds.sand.hardness_text import softness_warning
 from sandmould.report.bed_mode import BedMode, bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
-from sandmould.report.hard_limit_text import hard_limit_text
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.loose_sand import LooseSandPages, loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
@@ -59,7 +58,6 @@ class SandReport(KindReport[Scenario]):
 
             bending = bending_pages(folder, href, scenario, of_sweep, verdict, pages.pictured_run)
         loose = loose_sand_pages(folder, pages.pictured_run, of_sweep.summary, scenario)
-        limit = hard_limit_text(verdict, collected.keys, findings.scenarios)
         return KindPages(
             "sand.html",
             sand_method(scenario, collected.keys, collected.summary),
@@ -75,7 +73,7 @@ class SandReport(KindReport[Scenario]):
             },
             _sand_figures(pages, filling, bending, loose),
             pages.beside,
-            advice=(*(filling.advice if filling else ()), *filter(None, [limit])),
+            advice=filling.advice if filling else (),
             grounds=(
                 *sand_grounds(scenario, study, verdict),
                 *weak_ground(findings.scenarios),
