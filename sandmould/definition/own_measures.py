@@ -46,10 +46,6 @@ _VALID = "numbers, names of measures, + - * / **, brackets, min, max, abs and sq
 def parsed(formula: str) -> ast.expr:
     """Turn a formula into its tree, which has no part but those that are computed here.
 
-    Parameters
-    ----------
-    formula : str
-
     Raises
     ------
     FormulaError

@@ -60,12 +60,7 @@ class StagedSession(ABC):
     """What is named as valid where a mover of a surface is refused."""
 
     def __init__(self, program: Program) -> None:
-        """Stand before the first stage.
-
-        Parameters
-        ----------
-        program : Program
-        """
+        """Stand before the first stage."""
         self._program = program
         self._scenario = program.scenario
         self._counts = StepCounts.of(program.scenario)

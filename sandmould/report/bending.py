@@ -218,11 +218,6 @@ def _mm(length_m: float) -> str:
 def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     """Deflection of the tip over the whole run, clocks set to the start of vibration.
 
-    Parameters
-    ----------
-    collected : Collected
-    verdict : Verdict
-
     Returns
     -------
     Chart or None

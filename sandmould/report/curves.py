@@ -191,12 +191,6 @@ def objective_charts(
     Over its axis for one numeric key, in rows for other settings, and for many settings of
     several keys as one cloud of points a key.
 
-    Parameters
-    ----------
-    summary : DataFrame
-    verdict : Verdict
-    keys : sequence of str
-
     Returns
     -------
     tuple of Chart
@@ -322,12 +316,6 @@ def best_passage(
     collected: Collected, verdict: Verdict, measure: str
 ) -> tuple[float, float, float] | None:
     """A measure of the best setting at the start, at 3/4 and at the end of the vibration.
-
-    Parameters
-    ----------
-    collected : Collected
-    verdict : Verdict
-    measure : str
 
     Returns
     -------

@@ -37,10 +37,6 @@ def cavity_grid(
     most_points : int
     margin_m : float, m, optional
         How far the grid goes beyond the box round the cavity.
-
-    Returns
-    -------
-    CavityGrid
     """
     corners_m = cavity.space.corners()
     low_m = corners_m.min(axis=0) - margin_m

@@ -59,10 +59,6 @@ def bed_hardness(scenario: Scenario) -> Hardness | None:
     The pressure at the foot is rho phi g H: the sand's density times the solid fraction that turns
     a layer's height into grains, over the depth of the bed that is expected.
 
-    Parameters
-    ----------
-    scenario : Scenario
-
     Returns
     -------
     Hardness or None

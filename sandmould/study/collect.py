@@ -223,10 +223,6 @@ def gather(
     own_measures : mapping of str to str, optional
         Formulas of the study's own measures, by name.
 
-    Returns
-    -------
-    Collected
-
     Raises
     ------
     OSError, ValueError

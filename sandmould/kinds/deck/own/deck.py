@@ -61,12 +61,7 @@ def _commands(deck: str) -> str:
 
 
 def problems(scenario: OwnDeck) -> list[Problem]:
-    """List what keeps a template from being rendered with its values.
-
-    Parameters
-    ----------
-    scenario : OwnDeck
-    """
+    """List what keeps a template from being rendered with its values."""
     faults = [
         Problem("template" if n == scenario.template else "files", n, "a file that can be read")
         for n, path in scenario.paths.items()
