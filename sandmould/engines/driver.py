@@ -143,13 +143,9 @@ class Driver:
         return RunOutcome(outcome, detail, self._simulated_s, run_s(self._program))
 
     def _go_on(self, newest: tuple[Path, CheckpointMark] | None) -> bool:
-        """Compute in a session from a checkpoint, or from the beginning.
+        """Compute in a session from a checkpoint, or from the beginning; whether the run has ended.
 
-        Returns
-        -------
-        bool
-            Whether the run has reached its end: not where the filled bed has given another step,
-            with which the next session goes on.
+        It has not where the filled bed has given another step, with which the next session goes on.
         """
         mark = newest[1] if newest else None
         if mark is not None and mark.bed_limit_s is not None:

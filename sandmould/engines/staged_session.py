@@ -221,14 +221,8 @@ class StagedSession(ABC):
     ) -> Snapshot:
         """Make a snapshot of all grains, relative to the box, out of what the engine computes with.
 
-        Parameters
-        ----------
-        ids : (n,) int64
-            In ascending order, which is that of all other arrays.
-        position_m, velocity_m_s : (n, d) float64, m and m/s
-            In the frame of the computation.
-        spin_rad_s, radius_m, orientation
-            See ``Snapshot``.
+        Ids ascend, and all other arrays follow them; places and velocities are given in the frame
+        of the computation.
         """
         shift, speed = self._box_motion()
         start = self._vibration_start
@@ -309,15 +303,7 @@ class StagedSession(ABC):
 
     @abstractmethod
     def _change_step(self, earlier_s: float, steps: int) -> None:
-        """Compute with another step from now on.
-
-        Parameters
-        ----------
-        earlier_s : float
-            Step of the state that was restored; that of the session follows.
-        steps : int
-            That count as done from now on.
-        """
+        """Compute with the step of the session from now on, after a state restored with another."""
 
     @property
     def can_checkpoint(self) -> bool:
