@@ -17,7 +17,7 @@ from sandmould.geometry.geometry import Array, Block, Cavity, Scene, distance_wi
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
 from sandmould.geometry.revolved import Revolved
-from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, CavityGrid, cavity_grid
+from sandmould.scenario.cavities import CELLS_A_GRAIN, CavityGrid, cavity_grid
 
 FILLED_SHARE = 0.5
 """Of the bed's solid fraction, from which on a slab of a cavity counts as filled."""

@@ -11,8 +11,7 @@ from types import FrameType
 
 from sandmould.engines.bed_step import limit_moments, limit_warning, with_bed_step
 from sandmould.engines.blockage import what_blocks
-from sandmould.engines.cost import cost_before
-from sandmould.engines.durations import grain_steps, run_s
+from sandmould.engines.durations import cost_before, grain_steps, run_s
 from sandmould.engines.guard import Guard
 from sandmould.engines.program import Program, Stage, build_program
 from sandmould.engines.recording import Recorder

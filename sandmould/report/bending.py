@@ -20,8 +20,7 @@ from sandmould.kinds.sand.bending import convergence_log_of, verdict_of
 from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, study_sentence
 from sandmould.pattern_fe.quality import mesh_sentence
 from sandmould.pattern_fe.scene import pattern_of
-from sandmould.report.bending_figure import draw_outlines
-from sandmould.report.coupling_map import CouplingMap, coupling_map
+from sandmould.report.bending_figures import CouplingMap, coupling_map, draw_outlines
 from sandmould.report.curves import runs_of, setting_tints, time_chart
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import (

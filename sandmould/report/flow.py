@@ -18,15 +18,19 @@ from sandmould.analysis.flow_plots import draw_frame, frame_of
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.scheme import G_M_S2
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S, PAPERS
-from sandmould.casting.mps.stability import QUIET_PA, StabilityRating
-from sandmould.casting.mps.stability_measures import NOISE_WINDOW_S
+from sandmould.casting.mps.stability_measures import NOISE_WINDOW_S, QUIET_PA, StabilityRating
 from sandmould.drawing.animation import evenly
 from sandmould.drawing.figures import png
 from sandmould.drawing.flow_film import SHADES, FlowFilm, make_flow_film
-from sandmould.report.flow_map import condition_text, said_of, stability_map
+from sandmould.report.flow_charts import (
+    PressureHistory,
+    condition_text,
+    pressure_history,
+    said_of,
+    stability_map,
+)
 from sandmould.report.method import Row
 from sandmould.report.next_steps import NextStep
-from sandmould.report.pressure_histories import PressureHistory, pressure_history
 from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import Curve, measure_curves

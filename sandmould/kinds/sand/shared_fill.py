@@ -9,9 +9,8 @@ from pathlib import Path
 
 from sandmould.definition.run import FILLS, Run
 from sandmould.engines import registry
-from sandmould.engines.cost import cost_before
 from sandmould.engines.driver import Driver, Opening
-from sandmould.engines.durations import run_s
+from sandmould.engines.durations import cost_before, run_s
 from sandmould.engines.program import Program, build_program
 from sandmould.runs import checkpoint_folders as checkpoints
 from sandmould.runs.hashing import scenario_hash
