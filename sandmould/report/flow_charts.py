@@ -1,7 +1,7 @@
 """The stability map: which settings hold, over time step and relaxations, as the paper's figure 6.
 
-Beside it, what the text of Hirata and Anzai (2017) says of its own conditions, and the pressure at the
-probes of each run.
+Beside it, what the text of Hirata and Anzai (2017) says of its own conditions, and the pressure
+at the probes of each run.
 """
 
 from __future__ import annotations
