@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pandas as pd
 
@@ -14,11 +14,11 @@ from sandmould.report.bed_mode import BedMode, bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
-from sandmould.report.loose_sand import LooseSandPages, loose_sand_pages
+from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.repose_figures import Heap, steepest_heaps
 from sandmould.report.robustness import RobustnessPages, robustness_pages
-from sandmould.report.sand import SandPages, sand_pages
+from sandmould.report.sand import sand_pages
 from sandmould.report.sureness import sand_grounds, weak_ground
 from sandmould.report.time_series import curve_figures
 from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, TIME_STEP_S, finished
@@ -28,9 +28,6 @@ from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict, sand_notes
 from sandmould.study.collect import Collected
-
-if TYPE_CHECKING:
-    from sandmould.report.bending import BendingPages
 
 
 class SandReport(KindReport[Scenario]):
@@ -52,12 +49,13 @@ class SandReport(KindReport[Scenario]):
         filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
         own, href = study.own_measures, findings.href
         pages = sand_pages(folder, scenario, of_sweep, verdict, film_budget_bytes, href, own)
+        run = pages["pictured_run"]
         bending = None
         if scenario.pattern is not None:
             from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
 
-            bending = bending_pages(folder, href, scenario, of_sweep, verdict, pages.pictured_run)
-        loose = loose_sand_pages(folder, pages.pictured_run, of_sweep.summary, scenario)
+            bending = bending_pages(folder, href, scenario, of_sweep, verdict, run)
+        loose = loose_sand_pages(folder, run, of_sweep.summary, scenario)
         return KindPages(
             "sand.html",
             sand_method(scenario, collected.keys, collected.summary),
@@ -71,8 +69,8 @@ class SandReport(KindReport[Scenario]):
                 "ends_at_rest": scenario.ends_at_rest,
                 "filling": filling,
             },
-            _sand_figures(pages, filling, bending, loose),
-            pages.beside,
+            _sand_figures(pages, filling, bending, loose is not None),
+            pages["beside"],
             advice=filling.advice if filling else (),
             grounds=(
                 *sand_grounds(scenario, study, verdict),
@@ -125,21 +123,22 @@ def _softness(scenario: Scenario, summary: pd.DataFrame) -> str:
 
 
 def _sand_figures(
-    pages: SandPages,
+    pages: dict[str, Any],
     filling: FillingPages | None,
-    bending: BendingPages | None,
-    loose: LooseSandPages | None,
+    bending: dict[str, Any] | None,
+    has_loose: bool,
 ) -> dict[str, Chart | bytes]:
     """The sand at its moments, the pattern, filling over what is swept, and over time."""
     files: dict[str, Chart | bytes] = {}
-    if pages.panels:
-        files["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
-    if pages.panels and loose:
-        files["density"] = strip([(panel.heading, panel.by_density) for panel in pages.panels])
+    panels = pages["panels"]
+    if panels:
+        files["sand"] = strip([(panel["heading"], panel["by_layer"]) for panel in panels])
+    if panels and has_loose:
+        files["density"] = strip([(panel["heading"], panel["by_density"]) for panel in panels])
     if filling and filling.chart:
         files["filling"] = filling.chart
     if bending:
-        files |= pictures(pattern=bending.outlines)
-    if bending and bending.deflection:
-        files["deflection"] = bending.deflection
-    return files | curve_figures(pages.tubes)
+        files |= pictures(pattern=bending["outlines"])
+    if bending and bending["deflection"]:
+        files["deflection"] = bending["deflection"]
+    return files | curve_figures(pages["tubes"])
