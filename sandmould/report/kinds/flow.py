@@ -59,70 +59,66 @@ class _PicturedRun:
     verdict: str
 
 
-class FlowReport(KindReport[MetalFlow]):
-    """See ``KindReport``."""
+def _notes(
+    scenario: MetalFlow, collected: Collected, seeks_best: bool, is_controlled: bool
+) -> tuple[str, ...]:
+    """What the paper leaves open."""
+    gradient = (
+        "The gradient as printed, eq. (3), points the wrong way and makes every run fail. The "
+        f"gradient used here, {scene.scheme_of(scenario).gradient}, is a choice."
+    )
+    if isinstance(scenario.case, StillTank):
+        return (gradient,)
+    return (
+        gradient,
+        "The paper gives neither the particle size in space nor the speed of the stream.",
+    )
 
-    def notes(
-        self, scenario: MetalFlow, collected: Collected, seeks_best: bool, is_controlled: bool
-    ) -> tuple[str, ...]:
-        """What the paper leaves open."""
-        gradient = (
-            "The gradient as printed, eq. (3), points the wrong way and makes every run fail. The "
-            f"gradient used here, {scene.scheme_of(scenario).gradient}, is a choice."
-        )
-        if isinstance(scenario.case, StillTank):
-            return (gradient,)
-        return (
-            gradient,
-            "The paper gives neither the particle size in space nor the speed of the stream.",
-        )
 
-    def pages(self, findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
-        """Map, noise, histories, fields and films; the calmest runs first."""
-        scenario, collected = findings.scenario, findings.collected.of_sweep
-        keys = collected.keys
-        ranked = _ranked(scenario, collected.summary)
-        pictured = _pictured_runs(ranked, keys, findings.study_folder)
-        ideal_pa = scene.ideal_pa(scenario, scene.fluid_of(scenario))
-        highest_pa = max(ideal_pa.values())
-        filmed = [pictured[0], pictured[-1]][: min(FILMED, len(pictured))] if pictured else []
-        hopping = _hopping(scenario, ranked, keys)
-        measures = [*(f"{name}_pa" for name in ideal_pa), "largest_speed_m_s"]
-        stable = stability_map(ranked, keys)
-        fields = _fields(pictured, highest_pa)
-        histories = [
-            pressure_history(run.folder, run.label, run.verdict, ideal_pa) for run in pictured
-        ]
-        films = [
-            make_flow_film(
-                _load(run.folder), run.run, f"{run.label}: {run.verdict}", highest_pa,
-                film_budget_bytes // len(filmed),
-            )
-            for run in filmed
-        ]  # fmt: skip
-        shown = {
-            "map": stable,
-            "sentences": (*_sentences(scenario, ranked, ideal_pa), *hopping),
-            "noise": _noise(scenario, ranked, keys),
-            "histories": histories,
-            "fields": fields,
-            "films": films,
-            "colours": COLOURS,
-            "curves": measure_curves(collected, findings.verdict, measures, lambda *_: ""),
-            "pours": not isinstance(scenario.case, StillTank),
-        }
-        return KindPages(
-            "flow.html",
-            _method(scenario, keys),
-            context={"pages": shown},
-            figures={
-                **pictures(stability_map=stable, fields=fields),
-                **numbered("histories", (history.chart for history in histories)),
-            },
-            answer=next(iter(hopping), "") or _calm(scenario, ranked, keys),
-            grounds=_grounds(scenario),
-            steps=_steps(scenario, ranked),
+def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
+    """Map, noise, histories, fields and films; the calmest runs first."""
+    scenario, collected = findings.scenario, findings.collected.of_sweep
+    keys = collected.keys
+    ranked = _ranked(scenario, collected.summary)
+    pictured = _pictured_runs(ranked, keys, findings.study_folder)
+    ideal_pa = scene.ideal_pa(scenario, scene.fluid_of(scenario))
+    highest_pa = max(ideal_pa.values())
+    filmed = [pictured[0], pictured[-1]][: min(FILMED, len(pictured))] if pictured else []
+    hopping = _hopping(scenario, ranked, keys)
+    measures = [*(f"{name}_pa" for name in ideal_pa), "largest_speed_m_s"]
+    stable = stability_map(ranked, keys)
+    fields = _fields(pictured, highest_pa)
+    histories = [pressure_history(run.folder, run.label, run.verdict, ideal_pa) for run in pictured]
+    films = [
+        make_flow_film(
+            _load(run.folder), run.run, f"{run.label}: {run.verdict}", highest_pa,
+            film_budget_bytes // len(filmed),
         )
+        for run in filmed
+    ]  # fmt: skip
+    shown = {
+        "map": stable,
+        "sentences": (*_sentences(scenario, ranked, ideal_pa), *hopping),
+        "noise": _noise(scenario, ranked, keys),
+        "histories": histories,
+        "fields": fields,
+        "films": films,
+        "colours": COLOURS,
+        "curves": measure_curves(collected, findings.verdict, measures, lambda *_: ""),
+        "pours": not isinstance(scenario.case, StillTank),
+    }
+    return KindPages(
+        "flow.html",
+        _method(scenario, keys),
+        context={"pages": shown},
+        figures={
+            **pictures(stability_map=stable, fields=fields),
+            **numbered("histories", (history.chart for history in histories)),
+        },
+        answer=next(iter(hopping), "") or _calm(scenario, ranked, keys),
+        grounds=_grounds(scenario),
+        steps=_steps(scenario, ranked),
+    )
 
 
 def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
@@ -348,3 +344,6 @@ def _method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Row, ...]:
             "it"),
         Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
     )  # fmt: skip
+
+
+REPORT = KindReport(_pages, _notes)

@@ -51,55 +51,53 @@ class _Error:
     """Error (7) of the worst probe, % of the initial difference; NaN without probes."""
 
 
-class SolidificationReport(KindReport[Solidification]):
-    """See ``KindReport``."""
+def _notes(
+    scenario: Solidification, collected: Collected, seeks_best: bool, is_controlled: bool
+) -> tuple[str, ...]:
+    """What two dimensions leave out."""
+    flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
+    return (flat,) if scenario.dimensions == 2 else ()
 
-    def notes(
-        self, scenario: Solidification, collected: Collected, seeks_best: bool, is_controlled: bool
-    ) -> tuple[str, ...]:
-        """What two dimensions leave out."""
-        flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
-        return (flat,) if scenario.dimensions == 2 else ()
 
-    def pages(self, findings: Findings[Solidification], film_budget_bytes: int) -> KindPages:
-        """Fields, cooling curves, error and cost."""
-        study, scenario, verdict = findings.study, findings.scenario, findings.verdict
-        collected, keys = findings.collected.of_sweep, findings.collected.keys
-        # A study whose file is missing is read as one of sand.
-        reference = study.reference if isinstance(study, SolidificationStudy) else {}
-        best = _run_of(collected.summary, verdict) if study.seeks_best else ""
-        run = _pictured_run(reference, collected, best)
-        folder = findings.study_folder / "runs" / run
-        probes = [f"{probe.name}_k" for probe in scenario.probes]
-        curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"], lambda *_: "")
-        fields, sentences, spots = _fields(folder, scenario)
-        errors = _errors(reference, scenario, collected) if reference else []
-        error_cost = _error_charts(errors)
-        stand_ins = _stand_ins(folder / "scenario.yaml")
-        answer = _cheapest(errors, reference, collected) or sentences[0]
-        shown = {
-            "pictured_run": run,
-            "fields": fields,
-            "sentences": (*sentences, *stand_ins),
-            "spots": spots,
-            "curves": curves,
-            "reference": setting_text(reference) if reference else "",
-            "error_cost": error_cost,
-            "errors": _error_table(errors) if errors else None,
-        }
-        return KindPages(
-            "solidification.html",
-            _method(scenario, keys),
-            context={"pages": shown},
-            figures={
-                **pictures(fields=fields),
-                **numbered("error_cost", error_cost),
-                **curve_figures(curves),
-            },
-            answer="" if study.seeks_best else answer,
-            grounds=_grounds(bool(stand_ins), scenario),
-            steps=_steps(scenario, bool(reference)),
-        )
+def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPages:
+    """Fields, cooling curves, error and cost."""
+    study, scenario, verdict = findings.study, findings.scenario, findings.verdict
+    collected, keys = findings.collected.of_sweep, findings.collected.keys
+    # A study whose file is missing is read as one of sand.
+    reference = study.reference if isinstance(study, SolidificationStudy) else {}
+    best = _run_of(collected.summary, verdict) if study.seeks_best else ""
+    run = _pictured_run(reference, collected, best)
+    folder = findings.study_folder / "runs" / run
+    probes = [f"{probe.name}_k" for probe in scenario.probes]
+    curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"], lambda *_: "")
+    fields, sentences, spots = _fields(folder, scenario)
+    errors = _errors(reference, scenario, collected) if reference else []
+    error_cost = _error_charts(errors)
+    stand_ins = _stand_ins(folder / "scenario.yaml")
+    answer = _cheapest(errors, reference, collected) or sentences[0]
+    shown = {
+        "pictured_run": run,
+        "fields": fields,
+        "sentences": (*sentences, *stand_ins),
+        "spots": spots,
+        "curves": curves,
+        "reference": setting_text(reference) if reference else "",
+        "error_cost": error_cost,
+        "errors": _error_table(errors) if errors else None,
+    }
+    return KindPages(
+        "solidification.html",
+        _method(scenario, keys),
+        context={"pages": shown},
+        figures={
+            **pictures(fields=fields),
+            **numbered("error_cost", error_cost),
+            **curve_figures(curves),
+        },
+        answer="" if study.seeks_best else answer,
+        grounds=_grounds(bool(stand_ins), scenario),
+        steps=_steps(scenario, bool(reference)),
+    )
 
 
 def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...]:
@@ -310,3 +308,6 @@ def _conducts(it: MouldMaterial) -> str:
         f"{it.density_kg_m3:g} kg/m³, {it.heat_capacity_j_kg_k:g} J/kg/K, "
         f"{it.conductivity_w_m_k:g} W/m/K"
     )
+
+
+REPORT = KindReport(_pages, _notes)
