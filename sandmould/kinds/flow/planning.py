@@ -11,10 +11,10 @@ from sandmould.bad_input import Problem
 from sandmould.casting.mps import computation, scene, source_hash
 from sandmould.casting.mps.shoulder import PAPERS, POUR_M_S
 from sandmould.kinds.casting import CastingPlanning
-from sandmould.kinds.flow.measures import MEASURES
 from sandmould.kinds.kind import BASE_MEMORY_MB, Note, SpeedClass
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.limits import FRAMES, PARTICLES, RECORDS
+from sandmould.runs.measures import once, read_groups
 from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 PARTICLES_PER_MB = 300
@@ -54,7 +54,15 @@ class FlowPlanning(CastingPlanning[MetalFlow]):
     work_unit = computation.WORK
     solver = computation
     speed = FlowSpeed()
-    measures = MEASURES
+    measures = read_groups(
+        Path(__file__).with_name("measures.yaml"),
+        {
+            "every flow; from measured_from_s on, where it says so": lambda _: once(),
+            "at a probe, by its name; a flow without own probes has the paper's": lambda scenario: [
+                probe.name for probe in scene.probes_of(scenario)
+            ],
+        },
+    )
     # beside them only files of the solver: with those it is computed again
     measuring = (*CastingPlanning.measuring, "sandmould/kinds/flow/execution.py")
 

@@ -15,10 +15,10 @@ from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.estimates import least_sand_share
 from sandmould.kinds.casting import CastingPlanning
 from sandmould.kinds.kind import BASE_MEMORY_MB, Note, SpeedClass
-from sandmould.kinds.solidification.measures import MEASURES
 from sandmould.kinds.solidification.notes import notes
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.limits import CELLS, RECORDS
+from sandmould.runs.measures import once, read_groups
 from sandmould.scenario.casting.shapes import with_file_hash
 from sandmould.scenario.casting.solidification import Solidification
 
@@ -64,7 +64,14 @@ class SolidificationPlanning(CastingPlanning[Solidification]):
     work_unit = "element-steps"
     solver = computation
     speed = SolidificationSpeed()
-    measures = MEASURES
+    measures = read_groups(
+        Path(__file__).with_name("measures.yaml"),
+        {
+            "every casting": lambda _: once(),
+            "every casting, by axis": lambda scenario: "xyz"[: scenario.dimensions],
+            "with a probe, by its name": lambda scenario: [probe.name for probe in scenario.probes],
+        },
+    )
     measuring = (
         *CastingPlanning.measuring,
         "sandmould/analysis/freezing.py",
