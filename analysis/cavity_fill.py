@@ -17,7 +17,7 @@ from sandmould.geometry.geometry import Array, Block, Cavity, Scene, distance_wi
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
 from sandmould.geometry.revolved import Revolved
-from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, CavityGrid, cavity_grid
+from sandmould.scenario.cavities import CELLS_A_GRAIN, CavityGrid, cavity_grid
 
 FILLED_SHARE = 0.5
 """Of the bed's solid fraction, from which on a slab of a cavity counts as filled."""
@@ -73,10 +73,6 @@ def cavity_fill(
         Thickness of the slabs; changed so that a whole number of them makes the cavity's length.
     bed_fraction : float
         Solid fraction of the bed.
-
-    Returns
-    -------
-    CavityFill
     """
     corners_m = cavity.space.corners()
     reach_m = float(radius_m.max(initial=0.0))
@@ -154,10 +150,6 @@ def cavity_voids(
         What stands round the cavity, and in it.
     grain_m : float, m
         Diameter of the grain.
-
-    Returns
-    -------
-    CavityVoids
     """
     grid = _void_grid(cavity, grain_m)
     reach_m = 0.5 * grain_m * (1.0 - _ROUND_OFF)

@@ -50,10 +50,6 @@ def contacts(
         Walls and solids; without it only contacts between grains are counted.
     tolerance_m : float, m, optional
         Largest gap that still counts as contact.
-
-    Returns
-    -------
-    ContactCounts
     """
     n, dimension = position_m.shape
     count = np.zeros(n, dtype=np.int64)

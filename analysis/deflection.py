@@ -38,10 +38,6 @@ def farthest_corner(drawn_m: Array, held_m: Array) -> int:
     held_m : (k, d) float64, m
         Points that do not move.
 
-    Returns
-    -------
-    int
-
     Raises
     ------
     ValueError
@@ -63,10 +59,6 @@ def deflection(drawn_m: Array, now_m: Array, tip: int) -> Deflection:
         Vertices as drawn, and where they are.
     tip : int
         Vertex of the farthest corner.
-
-    Returns
-    -------
-    Deflection
     """
     moved_m = now_m - drawn_m
     largest_m = float(np.linalg.norm(moved_m, axis=1).max())

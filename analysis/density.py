@@ -50,10 +50,6 @@ def apparent_density(
     control_radius_m : float, m, optional
         Twice the largest radius, as in the paper, unless given.
 
-    Returns
-    -------
-    ApparentDensity
-
     Raises
     ------
     ValueError

@@ -196,10 +196,6 @@ def box_section(scene: Scene, low_m: float = 0.0, high_m: float = 0.0) -> Array:
 def box_levels_m(walls: tuple[Wall, ...]) -> tuple[float, float]:
     """Heights of floor and lid of a 3D box, infinite where there is none.
 
-    Parameters
-    ----------
-    walls : tuple of Wall
-
     Returns
     -------
     floor_m, lid_m : float, m

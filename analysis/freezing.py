@@ -40,10 +40,6 @@ def freezing(position_m: Array, frozen_s: Array, reach_m: float) -> Freezing:
     reach_m : float, m
         A hot spot freezes later than all elements within this distance.
 
-    Returns
-    -------
-    Freezing
-
     Raises
     ------
     ValueError

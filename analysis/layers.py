@@ -38,10 +38,6 @@ def layer_table(
     layer : (n,) int64
     bore : Bore, optional
         The tube whose sand is shared out; without it ``tube_share`` is NaN.
-
-    Returns
-    -------
-    LayerTable
     """
     number, row, count = np.unique(layer, return_inverse=True, return_counts=True)
     weight = radius_m ** position_m.shape[1]

@@ -75,10 +75,6 @@ def find_loose_sand(position_m: Array, radius_m: Array, scene: Scene, grain_m: f
         Its walls must close the box on every side; in 3D they must be upright or level.
     grain_m : float, m
         Diameter of the mass-median grain.
-
-    Returns
-    -------
-    LooseSand
     """
     ball_m, cell_m = 0.5 * BALL_GRAINS * grain_m, grain_m / CELLS_A_GRAIN
     grid, is_buried = _buried_places(position_m, radius_m, ball_m, cell_m)

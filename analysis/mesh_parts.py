@@ -61,11 +61,6 @@ def _triangle_part_m3(corners_m: Array, radius_m: Array) -> Array:
     Integrated in the triangle's plane, in polar coordinates round the foot of the centre: over a
     swept angle out to a radius rho, area and solid angle are rho^2/2 and 1 - h/sqrt(h^2 + rho^2).
     An edge at the distance d from the foot has rho = d/cos(angle), cut off at the sphere's rim.
-
-    Parameters
-    ----------
-    corners_m : (p, 3, 3) float64, m
-    radius_m : (p,) float64, m
     """
     edge_m = np.roll(corners_m, -1, axis=1) - corners_m
     normal = np.cross(edge_m[:, 0], edge_m[:, 1])

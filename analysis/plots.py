@@ -56,10 +56,6 @@ def scene_section(scene: Scene, height_m: float, cut_m: float | None = None) -> 
     cut_m : float, m, optional
         In 3D, y of the plane shown; the middle of the box unless given.
 
-    Returns
-    -------
-    SceneSection
-
     Raises
     ------
     ValueError
@@ -91,10 +87,6 @@ def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = No
         Up to which the box is shown.
     cut_m : float, m, optional
         In 3D, y of the plane shown; the middle of the box unless given.
-
-    Returns
-    -------
-    Axes
 
     Raises
     ------
@@ -135,10 +127,6 @@ def draw_grains(
         Values at the ends of the colour map; the smallest and largest unless given.
     cut_m : float, m, optional
         In 3D, y of the plane shown; midway between the outermost grains unless given.
-
-    Returns
-    -------
-    Axes
     """
     grains, in_plane = _collection(snapshot, ax, cut_m)
     if values is None:
@@ -161,10 +149,6 @@ def draw_by_layer(snapshot: Snapshot, ax: Axes, cut_m: float | None = None) -> A
     ax : Axes
     cut_m : float, m, optional
         As in :func:`draw_grains`.
-
-    Returns
-    -------
-    Axes
     """
     grains, in_plane = _collection(snapshot, ax, cut_m)
     colours = _colour_of(snapshot.layer[in_plane]).tolist()

@@ -49,10 +49,6 @@ def solid_fraction_profile(
     edges_m : (m + 1,) float64, m
         Rising heights.
 
-    Returns
-    -------
-    SolidFractionProfile
-
     Raises
     ------
     ValueError

@@ -44,10 +44,6 @@ def tube_fill(
     bore : Bore
     depth_edges_m : (m + 1,) float64, m, optional
         Rising depths behind the mouth, for a profile.
-
-    Returns
-    -------
-    TubeFill
     """
     part = sand_in_bore(position_m, radius_m, bore)
     depth_m, across_m = bore.local(position_m)

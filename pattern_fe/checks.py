@@ -19,10 +19,6 @@ _NAMED = 5
 def check_mesh(mesh: Any) -> None:
     """Refuse a mesh that is no single solid body.
 
-    Parameters
-    ----------
-    mesh : skfem.Mesh
-
     Raises
     ------
     ValueError

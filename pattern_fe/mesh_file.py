@@ -37,10 +37,6 @@ def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
     unit_m : float, m
         Length of the file's unit, 0.001 for millimetres.
 
-    Returns
-    -------
-    skfem.Mesh
-
     Raises
     ------
     ValueError

@@ -25,10 +25,6 @@ def tetrahedron_quality(mesh: Any) -> Array:
     r = 3 V / A, and 24 V R is the root of (a+b+c)(a+b-c)(a-b+c)(-a+b+c) for the products a, b, c of
     opposite edges.
 
-    Parameters
-    ----------
-    mesh : skfem.MeshTet
-
     Returns
     -------
     (ne,) float64

@@ -119,13 +119,7 @@ def _computed(
 
 
 def _supports(config: PatternConfig) -> Supports:
-    """What holds the pattern, as its elements take it.
-
-    Raises
-    ------
-    ValueError
-        When a free pattern is held by something else too.
-    """
+    """What holds the pattern; a ValueError where a free one is held by something else too."""
     given = config.supports
     held = given.clamped or given.resting or given.hung or given.bedding_n_m3
     if given.free and held:

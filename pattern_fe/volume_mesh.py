@@ -33,10 +33,6 @@ def drawing_mesh(shape: PatternDrawing, drawn: TriangleMesh, size_m: float) -> A
     size_m : float, m
         Longest side of an element, about.
 
-    Returns
-    -------
-    skfem.MeshTet
-
     Raises
     ------
     BadInputError

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.dem.addresses import table_of
-from sandmould.engines.step_mover import StepMover
+from sandmould.engines.session import StepMover
 from sandmould.pattern_fe.condensation import CondensedSurface
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 from sandmould.pattern_fe.coupling.contact_step import ContactArrays

@@ -73,12 +73,7 @@ def open_coupled(
 
 
 def _refuse_other_mesh(scenario: Scenario, pattern: Pattern) -> None:
-    """Refuse a drawn pattern that is not meshed here as where the study was planned.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """Refuse a drawn pattern that is not meshed here as where the study was planned."""
     config = scenario.pattern
     assert config is not None
     if not isinstance(config.shape, PatternDrawing):

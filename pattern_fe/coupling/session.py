@@ -265,12 +265,7 @@ class CoupledSession(PatternSession):
         )
 
     def _check(self) -> None:
-        """Stop where the next displacement is beyond all bounds.
-
-        Raises
-        ------
-        EngineStop
-        """
+        """Stop where the next displacement is beyond all bounds."""
         largest_m = float(np.linalg.norm(self._next, axis=1).max())
         if not largest_m <= self._loop.largest_displacement_m:
             raise EngineStop(

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from sandmould.bad_input import Problem
 from sandmould.definition.sweep import Range, Sweep
+from sandmould.runs.formatting import is_number
 from sandmould.statistics.calibration.config import Calibration
 
 OF_MATERIAL = ("sand.", "contact.", "background_damping.")
@@ -23,9 +24,7 @@ def problems(calibration: Calibration, sweep: Sweep) -> Iterator[Problem]:
     for key in keys:
         values = sweep.keys.get(key, ())
         stated = [p[key] for p in sweep.points] if sweep.design == "list" else values
-        numeric = isinstance(stated, Range) or all(
-            isinstance(v, int | float) and not isinstance(v, bool) for v in stated
-        )
+        numeric = isinstance(stated, Range) or all(map(is_number, stated))
         if not (key.startswith(OF_MATERIAL) and numeric):
             valid = f"a number of the material: a key that begins with {' or '.join(OF_MATERIAL)}"
             yield Problem("sweep.keys", key, valid)

@@ -10,9 +10,8 @@ import ast
 import difflib
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,52 +33,18 @@ class FormulaError(Exception):
     """A formula that cannot be used; its text says what would be valid."""
 
 
-@dataclass(frozen=True)
-class Number:
-    """A constant."""
-
-    value: float
-
-
-@dataclass(frozen=True)
-class Named:
-    """The value of a measure, or of another own one."""
-
-    name: str
-
-
-@dataclass(frozen=True)
-class Call:
-    """An operation or a function of some values."""
-
-    of: str
-    values: tuple[Node, ...]
-
-
-Node = Number | Named | Call
-
-_OPERATIONS: dict[type[ast.AST], str] = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.USub: "minus",
+_COMPUTED: dict[type[ast.AST] | str, Callable[..., Array]] = {
+    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide,
+    ast.Pow: np.power, ast.USub: np.negative,
+    "min": np.minimum, "max": np.maximum, "abs": np.abs, "sqrt": np.sqrt,
 }  # fmt: skip
-_COMPUTED: dict[str, Callable[..., Array]] = {
-    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power,
-    "minus": np.negative, "min": np.minimum, "max": np.maximum, "abs": np.abs, "sqrt": np.sqrt,
-}  # fmt: skip
-_TAKES_TWO_OR_MORE = ("min", "max")
-_TAKES_ONE = ("abs", "sqrt")
+_TAKE_ONE = ("abs", "sqrt")
+"""Functions of one value; the others take two or more."""
 _VALID = "numbers, names of measures, + - * / **, brackets, min, max, abs and sqrt"
 
 
-def parsed(formula: str) -> Node:
-    """Turn a formula into its tree.
-
-    Parameters
-    ----------
-    formula : str
-
-    Returns
-    -------
-    Node
+def parsed(formula: str) -> ast.expr:
+    """Turn a formula into its tree, which has no part but those that are computed here.
 
     Raises
     ------
@@ -89,46 +54,53 @@ def parsed(formula: str) -> Node:
     if len(formula) > MOST_LETTERS:
         raise FormulaError(f"a formula of at most {MOST_LETTERS} letters, not {len(formula):,}")
     try:
-        tree = ast.parse(formula.strip(), mode="eval")
+        tree = ast.parse(formula.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise FormulaError(f"one line of {_VALID}") from None
-    return _node(tree.body)
+    _check(tree)
+    return tree
 
 
-def _node(part: ast.expr) -> Node:
-    """The tree of a part; only what is listed here is let through."""
-    value = part.value if isinstance(part, ast.Constant) else None
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return Number(_finite(value))
-    if isinstance(part, ast.Name):
-        return Named(part.id)
-    if isinstance(part, ast.BinOp) and type(part.op) in _OPERATIONS:
-        return Call(_OPERATIONS[type(part.op)], (_node(part.left), _node(part.right)))
-    if isinstance(part, ast.UnaryOp) and isinstance(part.op, ast.USub):
-        return Call("minus", (_node(part.operand),))
+def _apart(part: ast.expr) -> tuple[type[ast.AST] | str, list[ast.expr]]:
+    """What a part does, and the values that it does it to; nothing of a number or a name."""
+    if isinstance(part, ast.BinOp):
+        return type(part.op), [part.left, part.right]
+    if isinstance(part, ast.UnaryOp):
+        return type(part.op), [part.operand]
     if isinstance(part, ast.Call) and isinstance(part.func, ast.Name):
-        return _call(part, part.func.id)
-    raise FormulaError(f"{_VALID}; {_shown(part)} is none of these")
+        return part.func.id, part.args
+    return "", []
 
 
-def _call(part: ast.Call, function: str) -> Call:
-    if function not in (*_TAKES_TWO_OR_MORE, *_TAKES_ONE):
+def _check(part: ast.expr) -> None:
+    """Refuse a part that is not listed here, or holds one."""
+    does, values = _apart(part)
+    if isinstance(part, ast.Constant) and type(part.value) in (int, float):
+        _check_number(part.value)
+    elif isinstance(part, ast.Call) and isinstance(does, str) and does:
+        _check_call(part, does)
+    elif not isinstance(part, ast.Name) and does not in _COMPUTED:
+        raise FormulaError(f"{_VALID}; {_shown(part)} is none of these")
+    for value in values:
+        _check(value)
+
+
+def _check_call(part: ast.Call, function: str) -> None:
+    if function not in _COMPUTED:
         raise FormulaError(f"{_VALID}; {function} is no function of these")
-    fits = len(part.args) == 1 if function in _TAKES_ONE else len(part.args) >= 2
+    takes_one = function in _TAKE_ONE
+    fits = len(part.args) == 1 if takes_one else len(part.args) >= 2
     if part.keywords or not fits:
-        takes = "one value" if function in _TAKES_ONE else "two values or more"
-        raise FormulaError(f"{function} of {takes}")
-    return Call(function, tuple(_node(value) for value in part.args))
+        raise FormulaError(f"{function} of {'one value' if takes_one else 'two values or more'}")
 
 
-def _finite(value: int | float) -> float:
+def _check_number(value: Any) -> None:
     try:
-        number = float(value)
+        finite = math.isfinite(float(value))
     except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
+        finite = False
+    if not finite:
         raise FormulaError("numbers below 1.8e308")
-    return number
 
 
 def _shown(part: ast.expr) -> str:
@@ -136,13 +108,12 @@ def _shown(part: ast.expr) -> str:
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
-def names_in(node: Node) -> Iterator[str]:
+def names_in(part: ast.expr) -> Iterator[str]:
     """Measures that a formula names."""
-    if isinstance(node, Named):
-        yield node.name
-    elif isinstance(node, Call):
-        for value in node.values:
-            yield from names_in(value)
+    if isinstance(part, ast.Name):
+        yield part.id
+    for value in _apart(part)[1]:
+        yield from names_in(value)
 
 
 def problems(own: Mapping[str, str], swept: Collection[str]) -> Iterator[Problem]:
@@ -171,7 +142,7 @@ def problems(own: Mapping[str, str], swept: Collection[str]) -> Iterator[Problem
         yield Problem(f"{KEY}.{circle[0]}", own[circle[0]], valid)
 
 
-def _in_order(trees: Mapping[str, Node]) -> list[str]:
+def _in_order(trees: Mapping[str, ast.expr]) -> list[str]:
     """Names of own measures, each after those that its formula names."""
     parts = {
         name: [part for part in names_in(tree) if part in trees] for name, tree in trees.items()
@@ -230,12 +201,13 @@ def with_own_measures(table: pd.DataFrame, own: Mapping[str, str]) -> pd.DataFra
             return np.full(len(table), np.nan)
         return pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
 
-    def computed(node: Node) -> Array:
-        if isinstance(node, Number):
-            return np.full(len(table), node.value)
-        if isinstance(node, Named):
-            return values[node.name] if node.name in values else measured(node.name)
-        function, (first, *others) = _COMPUTED[node.of], map(computed, node.values)
+    def computed(part: ast.expr) -> Array:
+        if isinstance(part, ast.Constant):
+            return np.full(len(table), part.value, dtype=np.float64)
+        if isinstance(part, ast.Name):
+            return values[part.id] if part.id in values else measured(part.id)
+        does, inner = _apart(part)
+        function, (first, *others) = _COMPUTED[does], map(computed, inner)
         if not others:
             return _finite_values(function(first))
         for other in others:

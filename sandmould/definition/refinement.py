@@ -10,6 +10,7 @@ from pydantic import Field
 from sandmould.bad_input import Problem
 from sandmould.definition.sweep import Point, Range, Sweep, points
 from sandmould.limits import RUNS
+from sandmould.runs.formatting import is_number
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.config import fewest_points
@@ -106,9 +107,7 @@ def _problems_of_points(refine: Refinement, sweep: Sweep, swept: list[Point]) ->
     keys = sweep.swept
     for key in keys:
         values = [p[key] for p in swept]
-        if isinstance(sweep.keys.get(key), Range) or all(
-            isinstance(v, int | float) and not isinstance(v, bool) for v in values
-        ):
+        if isinstance(sweep.keys.get(key), Range) or all(map(is_number, values)):
             if len(set(values)) == 1:
                 yield Problem(f"sweep.keys.{key}", values[0], "two values or more, with rounds")
             continue

@@ -191,14 +191,7 @@ def key_paths(tree: Tree | list[Any], above: str = "") -> Iterator[str]:
 
 
 def problems(sweep: Sweep, scenario: Section, replicates: int) -> list[Problem]:
-    """List what keeps a well-typed sweep from being laid over a scenario.
-
-    Parameters
-    ----------
-    sweep : Sweep
-    scenario : scenario of any kind
-    replicates : int
-    """
+    """List what keeps a well-typed sweep from being laid over a scenario."""
     misfits = [*_design(sweep), *_paths(sweep, scenario)]
     return misfits or [*RUNS.problems("sweep", sweep.number_of_points * replicates)]
 

@@ -162,14 +162,8 @@ def _choose(
 ) -> tuple[Ints, Ints, Places, Places]:
     """Near pairs among the listed ones.
 
-    Returns
-    -------
-    counts, crossing : (c,) int64
-        Near pairs of each chunk, and those of them that cross to a later one.
-    stop : (n,) uint32
-        Where those of each grain end, counted from the first of its chunk.
-    other : (p,) uint32
-        Their second grains.
+    Given are those of each chunk and those of them that cross to a later one, (c,) int64; where
+    those of each grain end, counted from the first of its chunk, (n,) uint32; their second grains.
     """
     position, kind, radius = grains.position, grains.kind, grains.radius_of
     start, listed = pairs.start, pairs.other

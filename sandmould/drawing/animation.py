@@ -10,9 +10,10 @@ from __future__ import annotations
 import base64
 import math
 import zlib
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,22 @@ ABSENT = 65535
 """Coordinate of a grain that has not been filled in yet."""
 
 
+class PackedFilm:
+    """A film whose frames are packed into one text."""
+
+    data: str
+
+    @property
+    def values(self) -> dict[str, object]:
+        """For JSON."""
+        return dict(vars(self))
+
+
+FilmT = TypeVar("FilmT", bound=PackedFilm)
+
+
 @dataclass(frozen=True)
-class Film:
+class Film(PackedFilm):
     """Frames of one run as the page reads them; coordinates are the box's own, in m."""
 
     run: str
@@ -52,11 +67,6 @@ class Film:
     data: str
     """Base64 of deflated bytes: coordinates by axis, frame and grain; radii (uint16, shares of
     the largest, low bytes first); layers (uint8)."""
-
-    @property
-    def values(self) -> dict[str, object]:
-        """For JSON."""
-        return asdict(self)
 
 
 def make_film(
@@ -89,12 +99,36 @@ def make_film(
     # positions deflate to a fifth or less, so more raw bytes than this are not worth a try
     raw_frame = max(1, 2 * last.position_m.size)
     count = min(len(moments), _MOST_FRAMES, max(2, 8 * budget_bytes // raw_frame))
+    return within_budget(
+        lambda chosen: _pack([moments[i] for i in chosen], run_folder.name, label, reading),
+        len(moments), count, budget_bytes,
+    )  # fmt: skip
+
+
+def within_budget(
+    pack: Callable[[list[int]], FilmT], total: int, count: int, budget_bytes: int
+) -> FilmT:
+    """Pack frames evenly over a run, fewer and fewer until they weigh little enough.
+
+    Parameters
+    ----------
+    pack : callable
+        Gives the film of some frames, by their places.
+    total, count : int
+        Frames of the run, and how many are tried first.
+    budget_bytes : int
+        Most that the film's data may weigh; two frames are kept whatever they weigh.
+    """
     while True:
-        chosen = [moments[i] for i in evenly(len(moments), count).tolist()]
-        film = _pack(chosen, run_folder.name, label, reading)
+        film = pack(evenly(total, count).tolist())
         if len(film.data) <= budget_bytes or count <= 2:
             return film
         count = max(2, min(count - 1, int(0.95 * count * budget_bytes / len(film.data))))
+
+
+def encoded(raw: bytes) -> str:
+    """Base64 of deflated bytes."""
+    return base64.b64encode(zlib.compress(raw, 6)).decode("ascii")
 
 
 def evenly(number: int, count: int) -> NDArray[np.int64]:
@@ -136,7 +170,7 @@ def _pack(
         quantum_m=quantum_m,
         largest_radius_m=largest_m,
         bent=tuple(_outline(f) for f in frames if f.pattern_m is not None),
-        data=base64.b64encode(zlib.compress(raw, 6)).decode("ascii"),
+        data=encoded(raw),
     )
 
 

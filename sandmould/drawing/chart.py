@@ -217,10 +217,6 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
     chart : Chart
     size : (int, int), px
         Width and height; rows of settings make the drawing as high as they need.
-
-    Returns
-    -------
-    Laid
     """
     width, height = float(size[0]), float(size[1])
     if chart.rows:

@@ -5,15 +5,20 @@ Packed as the films of sand are; ``templates/report/flow_film.js`` unpacks and d
 
 from __future__ import annotations
 
-import base64
-import zlib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.drawing.animation import ABSENT, changes, split_bytes
+from sandmould.drawing.animation import (
+    ABSENT,
+    PackedFilm,
+    changes,
+    encoded,
+    split_bytes,
+    within_budget,
+)
 
 Array = NDArray[np.float64]
 MOST_FRAMES = 150
@@ -23,7 +28,7 @@ SHADES = 255
 
 
 @dataclass(frozen=True)
-class FlowFilm:
+class FlowFilm(PackedFilm):
     """Frames of one run as the page reads them."""
 
     run: str
@@ -45,11 +50,6 @@ class FlowFilm:
     """Base64 of deflated bytes: coordinates by axis, frame and particle, then shades of pressure
     and of speed by frame and particle (uint8)."""
 
-    @property
-    def values(self) -> dict[str, object]:
-        """For JSON."""
-        return asdict(self)
-
 
 def make_flow_film(
     fields: Mapping[str, Array], run: str, label: str, highest_pa: float, budget_bytes: int
@@ -66,18 +66,16 @@ def make_flow_film(
     budget_bytes : int
         Most that ``data`` may weigh.
     """
-    count = min(len(fields["time_s"]), MOST_FRAMES)
-    while True:
-        chosen = np.unique(np.linspace(0, len(fields["time_s"]) - 1, count).round().astype(int))
-        film = _pack(fields, chosen, run, label, highest_pa)
-        if len(film.data) <= budget_bytes or count <= 2:
-            return film
-        count = max(2, min(count - 1, int(0.95 * count * budget_bytes / len(film.data))))
+    total = len(fields["time_s"])
+    return within_budget(
+        lambda chosen: _pack(fields, chosen, run, label, highest_pa),
+        total, min(total, MOST_FRAMES), budget_bytes,
+    )  # fmt: skip
 
 
 def _pack(
     fields: Mapping[str, Array],
-    chosen: NDArray[np.int64],
+    chosen: Sequence[int],
     run: str,
     label: str,
     highest_pa: float,
@@ -117,5 +115,5 @@ def _pack(
         wall_m=tuple(map(tuple, np.round(near[:, [0, -1]].astype(float), 6).tolist())),
         highest_pa=highest_pa,
         highest_m_s=highest_m_s,
-        data=base64.b64encode(zlib.compress(raw, 6)).decode("ascii"),
+        data=encoded(raw),
     )

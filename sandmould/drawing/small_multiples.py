@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sandmould.drawing.animation import evenly
 from sandmould.drawing.chart import NARROW, PLAIN, WIDE, Chart, Laid, Line, Range, lay_out
 from sandmould.runs.formatting import number
 
@@ -57,8 +58,7 @@ def small_multiples(chart: Chart) -> SmallMultiples | None:
             f"by {number(apart, 2)} or less."
         )
         return SmallMultiples((), (lay_out(bare, WIDE), lay_out(bare, NARROW)), note)
-    places = np.linspace(0, len(means) - 1, min(MOST_PANELS, len(means))).round().astype(int)
-    shown = [means[place] for place in places.tolist()]
+    shown = [means[place] for place in evenly(len(means), MOST_PANELS).tolist()]
     behind = tuple(
         replace(line, xy=_thinned(line, _POINTS_BEHIND), tint=PLAIN, style="behind", label="")
         for line in shown

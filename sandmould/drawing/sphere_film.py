@@ -7,11 +7,9 @@ unpacks and ``sphere_view.js`` draws them.
 
 from __future__ import annotations
 
-import base64
 import json
-import zlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 from urllib.parse import quote
 
@@ -19,7 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.analysis.density import apparent_density
-from sandmould.drawing.animation import ABSENT, changes, evenly, readings_at, rounded, split_bytes
+from sandmould.drawing.animation import (
+    ABSENT,
+    PackedFilm,
+    changes,
+    encoded,
+    evenly,
+    readings_at,
+    rounded,
+    split_bytes,
+    within_budget,
+)
 from sandmould.drawing.figures import DensityScale
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.kinds.sand.moments import Moment
@@ -40,7 +48,7 @@ UNKNOWN = 255
 
 
 @dataclass(frozen=True)
-class SphereFilm:
+class SphereFilm(PackedFilm):
     """Frames of one run as the page reads them; coordinates are the box's own, in m."""
 
     run: str
@@ -76,11 +84,6 @@ class SphereFilm:
     beside_frames: int = 0
 
     @property
-    def values(self) -> dict[str, object]:
-        """For JSON."""
-        return asdict(self)
-
-    @property
     def script(self) -> str:
         """The film as a script that hands itself to the page."""
         return f"sphereFilmArrived({json.dumps(self.values, separators=(',', ':'))});\n"
@@ -99,12 +102,13 @@ class SphereFrames:
     film: SphereFilm
     """All but the data."""
 
-    def packed(self, grains: NDArray[np.int64], frames: NDArray[np.int64]) -> SphereFilm:
+    def packed(self, grains: NDArray[np.int64], frames: Sequence[int]) -> SphereFilm:
         """Pack some of the grains at some of the frames.
 
         Parameters
         ----------
-        grains, frames : (k,) int64
+        grains : (k,) int64
+        frames : sequence of int
             Their places.
         """
         points = np.append(grains, np.arange(len(self.radius_m), self.place.shape[2]))
@@ -117,15 +121,14 @@ class SphereFrames:
         )
         of_frames = ("time_s", "vibration_time_s", "stage", "is_filling", "reading")
         chosen: dict[str, Any] = {
-            name: tuple(getattr(self.film, name)[i] for i in frames.tolist()) for name in of_frames
+            name: tuple(getattr(self.film, name)[i] for i in frames) for name in of_frames
         }
-        data = base64.b64encode(zlib.compress(raw, 6)).decode("ascii")
-        return replace(self.film, **chosen, grains=len(grains), data=data)
+        return replace(self.film, **chosen, grains=len(grains), data=encoded(raw))
 
     @property
     def whole(self) -> SphereFilm:
         """All grains at all frames, packed."""
-        return self.packed(np.arange(len(self.radius_m)), np.arange(self.place.shape[1]))
+        return self.packed(np.arange(len(self.radius_m)), range(self.place.shape[1]))
 
     def planned(self, of_grains: int, slice_m: tuple[float, float] | None) -> SphereFilm:
         """All that was drawn of a scene, perhaps a slice of it only."""
@@ -144,11 +147,8 @@ class SphereFrames:
         grains, slice_m = self._behind(cut_m)
         total = self.place.shape[1]
         count = max(2, min(total, budget_bytes // max(1, 4 * len(grains))))
-        while True:
-            film = self.packed(grains, evenly(total, count))
-            if len(film.data) <= budget_bytes or count <= 2:
-                return replace(film, slice_m=slice_m)
-            count = max(2, min(count - 1, int(0.95 * count * budget_bytes / len(film.data))))
+        film = within_budget(lambda frames: self.packed(grains, frames), total, count, budget_bytes)
+        return replace(film, slice_m=slice_m)
 
     def inside_and_beside(
         self, cut_m: float, budget_bytes: int, folder_href: str

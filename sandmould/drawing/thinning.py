@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from sandmould.drawing.animation import evenly
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import setting_text
 from sandmould.statistics.evidence import usable_values
@@ -48,8 +49,7 @@ def drawn_part(collected: Collected, verdict: Verdict) -> tuple[Collected, Verdi
 def _evenly(verdict: Verdict) -> tuple[Setting, ...]:
     """Settings over the whole sweep in its order, the two best among them."""
     settings = verdict.settings
-    places = np.linspace(0, len(settings) - 1, min(MOST_SETTINGS - 2, len(settings)))
-    labels = {settings[place].label for place in places.round().astype(int).tolist()}
+    labels = {settings[place].label for place in evenly(len(settings), MOST_SETTINGS - 2).tolist()}
     labels |= {s.label for s in (verdict.best, verdict.runner_up) if s is not None}
     return tuple(s for s in settings if s.label in labels)
 

@@ -25,13 +25,7 @@ class DeckSession(StagedSession):
     """Name of the engine's own file in a checkpoint."""
 
     def __init__(self, program: Program, deck: Deck) -> None:
-        """Read the deck's blocks; nothing is executed yet.
-
-        Parameters
-        ----------
-        program : Program
-        deck : Deck
-        """
+        """Read the deck's blocks; nothing is executed yet."""
         super().__init__(program)
         self._blocks = blocks_of(deck, program.scenario)
         self._setup_due = True

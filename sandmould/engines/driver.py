@@ -11,8 +11,7 @@ from types import FrameType
 
 from sandmould.engines.bed_step import limit_moments, limit_warning, with_bed_step
 from sandmould.engines.blockage import what_blocks
-from sandmould.engines.cost import cost_before
-from sandmould.engines.durations import grain_steps, run_s
+from sandmould.engines.durations import cost_before, grain_steps, run_s
 from sandmould.engines.guard import Guard
 from sandmould.engines.program import Program, Stage, build_program
 from sandmould.engines.recording import Recorder
@@ -143,13 +142,9 @@ class Driver:
         return RunOutcome(outcome, detail, self._simulated_s, run_s(self._program))
 
     def _go_on(self, newest: tuple[Path, CheckpointMark] | None) -> bool:
-        """Compute in a session from a checkpoint, or from the beginning.
+        """Compute in a session from a checkpoint, or from the beginning; whether the run has ended.
 
-        Returns
-        -------
-        bool
-            Whether the run has reached its end: not where the filled bed has given another step,
-            with which the next session goes on.
+        It has not where the filled bed has given another step, with which the next session goes on.
         """
         mark = newest[1] if newest else None
         if mark is not None and mark.bed_limit_s is not None:

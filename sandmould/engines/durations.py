@@ -1,6 +1,7 @@
 """How long stages and whole runs last: exact where it is given, foretold where sand must rest.
 
 No result depends on what is foretold here: prices, progress and records of what was planned do.
+Beside it the cost of a run that has not begun.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import math
 
 from sandmould.engines.program import Program, Stage
+from sandmould.runs.products import Cost
 from sandmould.scenario.placement import fall_s, filled_measure
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
@@ -71,3 +73,9 @@ def _outflow_s(scenario: Scenario) -> float:
     if width <= 0.0:
         return math.inf
     return filled_measure(scenario) / (OUTFLOW[d] * math.sqrt(g) * width ** (d - 0.5))
+
+
+def cost_before(scenario: Scenario) -> Cost:
+    """Cost row of a run that has not begun: its engine and its time step."""
+    fraction = scenario.step_s / scenario.critical_step.step_s
+    return Cost(scenario.engine.name, scenario.engine.ranks, scenario.step_s, fraction)

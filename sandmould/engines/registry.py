@@ -11,10 +11,9 @@ from typing import Any, Protocol, assert_never
 from sandmould import ROOT, geometry
 from sandmould.bad_input import Problem
 from sandmould.digest import code_identity, digest
-from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
-from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import RefusedError, SandSession
 from sandmould.scenario.checks.unbalance import unbalance_key
 from sandmould.scenario.engine import ENGINE_NAMES, DeckReader, EngineName
@@ -90,7 +89,7 @@ class EngineModule(Protocol):
 
 
 class DeckReaderModule(Protocol):
-    """What ``sandmould.engines.<name>.own_deck`` offers, of engines that read decks of users."""
+    """What the module of an engine offers besides, where it reads decks of users."""
 
     def read_deck(self, folder: Path, deck: str, log: Path) -> None:
         """Have the engine read a deck from its first line to its last; every rank calls this.
@@ -153,11 +152,11 @@ def deck_reader(name: DeckReader) -> DeckReaderModule:
     """Import how an engine reads decks of users, by its name."""
     match name:
         case "lammps":
-            from sandmould.engines.lammps import own_deck as lammps
+            from sandmould.engines.lammps import engine as lammps
 
             return lammps
         case "liggghts":
-            from sandmould.engines.liggghts import own_deck as liggghts
+            from sandmould.engines.liggghts import engine as liggghts
 
             return liggghts
         case _:

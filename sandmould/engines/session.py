@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -13,11 +14,30 @@ from numpy.typing import NDArray
 from sandmould.bad_input import Problem
 from sandmould.engines.program import Stage
 from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_periods import TablePeriod
 from sandmould.runs.outcome import Outcome
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepMover:
+    """A compiled function that an engine calls before every step, and what both exchange.
+
+    The engine writes the loads, calls, and moves the vertices with the velocities through one
+    step. What lies behind the function is known to its owner alone.
+    """
+
+    call: int
+    """Address of a compiled function of two integers, ``table`` and the step's number."""
+    table: int
+    """Address that it is given."""
+    load_n: Array
+    """(nv, d) float64, N: of the grains on the vertices, at the last step."""
+    velocity_m_s: Array
+    """(nv, d) float64, m/s: of the vertices until the next step, in the frame of the box."""
+
+
 Shared = TypeVar("Shared")
 
 

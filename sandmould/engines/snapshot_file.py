@@ -135,13 +135,7 @@ class SnapshotFile:
     """Takes the snapshots of a run that goes on."""
 
     def __init__(self, work: Path, snapshots: int) -> None:
-        """Open the file with the first so many snapshots; what came later is cut off.
-
-        Parameters
-        ----------
-        work : Path
-        snapshots : int
-        """
+        """Open the file with the first so many snapshots; what came later is cut off."""
         path = work / SNAPSHOTS
         first = stored_snapshots(work)[:snapshots]
         if not _is_closed_with(path, first):

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from sandmould.engines.box_motion import box_motion
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.rest import RestWatch
-from sandmould.engines.session import Array, RefusedError, Shared
+from sandmould.engines.session import Array, RefusedError, Shared, StepMover
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.step_counts import StepCounts
-from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_periods import TablePeriod
 from sandmould.scenario.fill import Settling
 from sandmould.scenario.stages import StageKind
@@ -60,12 +59,7 @@ class StagedSession(ABC):
     """What is named as valid where a mover of a surface is refused."""
 
     def __init__(self, program: Program) -> None:
-        """Stand before the first stage.
-
-        Parameters
-        ----------
-        program : Program
-        """
+        """Stand before the first stage."""
         self._program = program
         self._scenario = program.scenario
         self._counts = StepCounts.of(program.scenario)
@@ -226,14 +220,8 @@ class StagedSession(ABC):
     ) -> Snapshot:
         """Make a snapshot of all grains, relative to the box, out of what the engine computes with.
 
-        Parameters
-        ----------
-        ids : (n,) int64
-            In ascending order, which is that of all other arrays.
-        position_m, velocity_m_s : (n, d) float64, m and m/s
-            In the frame of the computation.
-        spin_rad_s, radius_m, orientation
-            See ``Snapshot``.
+        Ids ascend, and all other arrays follow them; places and velocities are given in the frame
+        of the computation.
         """
         shift, speed = self._box_motion()
         start = self._vibration_start
@@ -314,15 +302,7 @@ class StagedSession(ABC):
 
     @abstractmethod
     def _change_step(self, earlier_s: float, steps: int) -> None:
-        """Compute with another step from now on.
-
-        Parameters
-        ----------
-        earlier_s : float
-            Step of the state that was restored; that of the session follows.
-        steps : int
-            That count as done from now on.
-        """
+        """Compute with the step of the session from now on, after a state restored with another."""
 
     @property
     def can_checkpoint(self) -> bool:

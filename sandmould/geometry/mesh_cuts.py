@@ -44,10 +44,6 @@ def cut(vertices: Array, triangles: Ints, shell: Ints, near: float) -> CutShells
     shell : (nt,) int64
     near : float
         Points nearer than this are one.
-
-    Returns
-    -------
-    CutShells
     """
     pairs = _meeting(vertices, triangles, shell, near)
     if not len(pairs):

@@ -49,10 +49,6 @@ def read_surface(path: Path) -> tuple[Array, Triangles]:
     takes away from the solid round it. A shell that faces inwards with no solid round it was drawn
     inside out and is turned.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     vertices : (nv, 3) float64

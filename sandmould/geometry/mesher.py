@@ -35,10 +35,6 @@ def is_step(path: Path) -> bool:
 def step_surface(path: Path) -> tuple[Array, Ints]:
     """Triangles of the solids of a STEP file; several solids are one where they meet.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     vertices_m : (nv, 3) float64, m

@@ -67,10 +67,6 @@ class Revolved:
         Distances from the axis are widened so that every section across it keeps its area; the
         surface then lies within (pi/sides)^2/3 of its radius from the round one: 2e-4 of it for
         128 sides.
-
-        Parameters
-        ----------
-        sides : int
         """
         step = 2.0 * math.pi / sides
         widened = math.sqrt(step / math.sin(step))

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -229,6 +230,11 @@ def _value_lines(tree: Any, sources: Mapping[str, str], key: str = "") -> list[s
     return [
         line for n, v in each for line in _value_lines(v, sources, f"{key}.{n}" if key else str(n))
     ]
+
+
+def opened_later(module: str, name: str) -> Callable[[], Any]:
+    """Open a class of a module that is imported when it is first asked for."""
+    return lambda: getattr(import_module(module), name)()
 
 
 @dataclass(frozen=True)

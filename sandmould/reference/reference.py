@@ -27,10 +27,6 @@ _WRITTEN = "Written by `make schema` from the code; nothing here is edited by ha
 def measures_text(study: OpenStudy) -> str:
     """What the runs of a study can be measured by, a line a measure.
 
-    Parameters
-    ----------
-    study : OpenStudy
-
     Raises
     ------
     BadInputError

@@ -52,11 +52,6 @@ class AgreementPages:
 def agreement_pages(collected: Collected, study: Study) -> AgreementPages | None:
     """Draw the comparisons of a study.
 
-    Parameters
-    ----------
-    collected : Collected
-    study : Study
-
     Returns
     -------
     AgreementPages or None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -14,14 +14,13 @@ import pandas as pd
 
 from sandmould.bad_input import BadInputError
 from sandmould.drawing.chart import Area, Chart
-from sandmould.drawing.convergence_charts import ConvergenceChart, convergence_charts
+from sandmould.drawing.convergence_charts import convergence_charts
 from sandmould.drawing.thinning import drawn_part, listed_runs
 from sandmould.kinds.sand.bending import convergence_log_of, verdict_of
 from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, study_sentence
 from sandmould.pattern_fe.quality import mesh_sentence
 from sandmould.pattern_fe.scene import pattern_of
-from sandmould.report.bending_figure import draw_outlines
-from sandmould.report.coupling_map import CouplingMap, coupling_map
+from sandmould.report.bending_figures import coupling_map, draw_outlines
 from sandmould.report.curves import runs_of, setting_tints, time_chart
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import (
@@ -50,23 +49,6 @@ _RECOVERS = 0.02
 """Share of the deflection that must come back before the page says so."""
 
 
-@dataclass(frozen=True)
-class BendingPages:
-    """What the section on the pattern shows."""
-
-    sentences: tuple[str, ...]
-    deflection: Chart | None
-    outlines: str
-    """Picture; empty where the shown run has no shape."""
-    outlines_note: str
-    map: CouplingMap | None
-    convergence: tuple[ConvergenceChart, ...]
-    pictured_run: str
-    runs: Table
-    paper: tuple[str, ...]
-    """On the paper's L; empty under another scene."""
-
-
 def bending_pages(
     study_folder: Path,
     href: str,
@@ -74,8 +56,8 @@ def bending_pages(
     collected: Collected,
     verdict: Verdict,
     pictured_run: str,
-) -> BendingPages:
-    """Draw what a study shows of its pattern.
+) -> dict[str, Any]:
+    """Draw what ``bending.html`` shows of a study's pattern.
 
     Parameters
     ----------
@@ -98,21 +80,21 @@ def bending_pages(
     own = curves[curves[RUN] == pictured_run] if TIP in curves else curves.iloc[:0]
     picture, note = draw_outlines(study_folder / "runs" / pictured_run, scenario)
     log = convergence_log_of(study_folder / "runs" / pictured_run)
-    return BendingPages(
-        sentences=(
+    return {
+        "sentences": (
             study_sentence(list(verdicts.values())),
             *_tip_sentences(own, verdicts.get(pictured_run), scenario),
             *drawing_sentences(scenario),
         ),
-        deflection=deflection_chart(collected, verdict),
-        outlines=picture,
-        outlines_note=note,
-        map=coupling_map(collected, {run: v.state for run, v in verdicts.items()}),
-        convergence=() if log is None else convergence_charts(log, _begins_s(own)),
-        pictured_run=pictured_run,
-        runs=_runs_table(study_folder, href, collected, verdict, verdicts),
-        paper=paper_sentences(scenario, collected, pictured_run),
-    )
+        "deflection": deflection_chart(collected, verdict),
+        "outlines": picture,
+        "outlines_note": note,
+        "map": coupling_map(collected, {run: v.state for run, v in verdicts.items()}),
+        "convergence": () if log is None else convergence_charts(log, _begins_s(own)),
+        "pictured_run": pictured_run,
+        "runs": _runs_table(study_folder, href, collected, verdict, verdicts),
+        "paper": paper_sentences(scenario, collected, pictured_run),
+    }
 
 
 def drawing_sentences(scenario: Scenario) -> tuple[str, ...]:
@@ -217,11 +199,6 @@ def _mm(length_m: float) -> str:
 
 def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     """Deflection of the tip over the whole run, clocks set to the start of vibration.
-
-    Parameters
-    ----------
-    collected : Collected
-    verdict : Verdict
 
     Returns
     -------

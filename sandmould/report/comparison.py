@@ -19,6 +19,7 @@ from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import (
     display_scale,
+    is_number,
     listed,
     name_of,
     titled,
@@ -89,7 +90,7 @@ class SideBySide:
         """Settings of all studies, in rising order where they are numbers of one key."""
         values = {s.label: s.values for one in self._settings for s in one.values()}
         keys = {key for at in values.values() for key in at}
-        if len(keys) == 1 and all(_is_number(v) for at in values.values() for v in at.values()):
+        if len(keys) == 1 and all(is_number(v) for at in values.values() for v in at.values()):
             return sorted(values, key=lambda label: next(iter(values[label].values())))
         return list(values)
 
@@ -98,7 +99,7 @@ class SideBySide:
         """The one key with numbers that all of them sweep; empty where there is none."""
         swept = {each.keys for each in self.studies}
         values = [v for one in self._settings for s in one.values() for v in s.values.values()]
-        if len(swept) == 1 and len(key := swept.pop()) == 1 and all(map(_is_number, values)):
+        if len(swept) == 1 and len(key := swept.pop()) == 1 and all(map(is_number, values)):
             return key[0]
         return ""
 
@@ -183,10 +184,6 @@ class SideBySide:
         return "\n".join([f"Mean {titled(self.measure)} ± 95 %", "", *lines, "", *said])
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
-
-
 def _mean_cell(setting: Setting | None) -> Cell:
     if setting is None or not setting.n:
         return Cell("–", "nan")
@@ -198,7 +195,7 @@ def _value_text(stated: dict[str, Any], key: str) -> str:
     if key not in stated or stated[key] in (None, [], {}):
         return "–"
     value = stated[key]
-    text = f"{value:.9g}" if _is_number(value) else str(value)
+    text = f"{value:.9g}" if is_number(value) else str(value)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
 
 

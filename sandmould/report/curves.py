@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,6 +15,7 @@ from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, Tint, tints
 from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import (
     display_scale,
+    is_number,
     name_of,
     number,
     setting_text,
@@ -45,7 +45,7 @@ _MOST_ROWS = 30
 def setting_tints(verdict: Verdict, keys: Sequence[str]) -> dict[str, Tint]:
     """Colour of each setting by label: a run of colours along a scale, else one for each."""
     n = len(verdict.settings)
-    if len(keys) == 1 and _on_a_scale(verdict, keys[0]):
+    if are_on_a_scale(verdict, keys):
         return dict(zip((s.label for s in verdict.settings), tints(n, True), strict=True))
     if n <= 7:
         return dict(zip((s.label for s in verdict.settings), tints(n, False), strict=True))
@@ -67,17 +67,11 @@ def reported_lines(study: Study, key: str, low: float, high: float) -> list[Line
     ]  # fmt: skip
 
 
-def _on_a_scale(verdict: Verdict, key: str) -> bool:
-    values = [s.values[key] for s in verdict.settings]
-    return all(_is_number(v) for v in values) and len(values) > 1
-
-
-def _is_number(value: Any) -> bool:
-    return (
-        isinstance(value, int | float | np.number)
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-    )
+def are_on_a_scale(verdict: Verdict, keys: Sequence[str]) -> bool:
+    """Whether the settings are several numbers of one key."""
+    values = [s.values[key] for s in verdict.settings for key in keys]
+    numbers = all(is_number(v) and math.isfinite(v) for v in values)
+    return len(keys) == 1 and len(values) > 1 and numbers
 
 
 def runs_of(summary: pd.DataFrame, setting: Setting) -> pd.DataFrame:
@@ -197,12 +191,6 @@ def objective_charts(
     Over its axis for one numeric key, in rows for other settings, and for many settings of
     several keys as one cloud of points a key.
 
-    Parameters
-    ----------
-    summary : DataFrame
-    verdict : Verdict
-    keys : sequence of str
-
     Returns
     -------
     tuple of Chart
@@ -210,7 +198,7 @@ def objective_charts(
     """
     if not keys or not shown_values(summary, verdict.measure).notna().any():
         return ()
-    if len(keys) == 1 and _on_a_scale(verdict, keys[0]):
+    if are_on_a_scale(verdict, keys):
         return (_scale_chart(summary, verdict, keys[0]),)
     if len(verdict.settings) <= _MOST_ROWS:
         return (_row_chart(summary, verdict),)
@@ -328,12 +316,6 @@ def best_passage(
     collected: Collected, verdict: Verdict, measure: str
 ) -> tuple[float, float, float] | None:
     """A measure of the best setting at the start, at 3/4 and at the end of the vibration.
-
-    Parameters
-    ----------
-    collected : Collected
-    verdict : Verdict
-    measure : str
 
     Returns
     -------

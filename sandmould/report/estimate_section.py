@@ -14,12 +14,20 @@ import pandas as pd
 from sandmould.definition.study import Study
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.kinds.kind import AnyScenario
-from sandmould.report.heaps import Heap
 from sandmould.report.kinds.registry import report_of
-from sandmould.report.repose_figures import draw_map, draw_posterior, plotted
+from sandmould.report.repose_figures import Heap, draw_map, draw_posterior, plotted
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN, total_s
-from sandmould.runs.formatting import listed, name_of, number, seconds, titled, unit_of, with_margin
+from sandmould.runs.formatting import (
+    is_number,
+    listed,
+    name_of,
+    number,
+    seconds,
+    titled,
+    unit_of,
+    with_margin,
+)
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
 from sandmould.statistics.evidence import usable_values
@@ -129,9 +137,7 @@ def _headline(
     said = (
         f"The {what} goes from {told(low.mean)} ({low.label}) to {told(high.mean)} ({high.label})"
     )
-    is_on_a_scale = len(keys) == 1 and all(
-        isinstance(s.values[keys[0]], int | float | np.number) for s in settings
-    )
+    is_on_a_scale = len(keys) == 1 and all(is_number(s.values[keys[0]]) for s in settings)
     if not is_on_a_scale or len(settings) < 4:
         return f"{said}."
     still = list(itertools.takewhile(lambda s: abs(s.mean) < NOTHING * largest, settings))

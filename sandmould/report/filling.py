@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 from sandmould.analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart, Line, tints
-from sandmould.report.curves import reported_lines, runs_by_setting, runs_of
+from sandmould.report.curves import are_on_a_scale, reported_lines, runs_by_setting, runs_of
 from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
 from sandmould.scenario.scenario import Scenario
@@ -63,12 +63,9 @@ def filling_pages(
     if measure not in shaken or shaken.empty:
         return None
     keys = collected.keys
-    is_on_a_scale = len(keys) == 1 and all(
-        isinstance(s.values[keys[0]], int | float | np.number) for s in verdict.settings
-    )
     settings = [s for s in verdict.settings if s.n]
     advice = (_time_to_fill(collected.summary, shaken, best, measure),)
-    if not is_on_a_scale or len(settings) < 3:
+    if not are_on_a_scale(verdict, keys) or len(settings) < 3:
         return FillingPages(advice, None, "")
     table = _fill_at_times(collected.summary, shaken, settings, keys[0], measure)
     return FillingPages(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -18,20 +18,9 @@ _LISTED = 8
 _SIDES = {"under": "straight under", "over": "straight over", "beside": "beside"}
 
 
-@dataclass(frozen=True)
-class LooseSandPages:
-    """What stands in the section."""
-
-    sentence: str
-    table: Table
-    """Zones, the largest first."""
-    note: str
-    """How many are left out; empty where none is."""
-
-
 def loose_sand_pages(
     folder: Path, run: str, summary: pd.DataFrame, scenario: Scenario
-) -> LooseSandPages | None:
+) -> dict[str, Any] | None:
     """Say where sand lies loose in a run; None where that was not sought.
 
     Parameters
@@ -60,7 +49,7 @@ def loose_sand_pages(
     zones = pd.read_csv(path, sep="\t")
     more = len(zones) - _LISTED
     note = f"{more} smaller zones are in {LOOSE_ZONES} of the run." if more > 0 else ""
-    return LooseSandPages(sentence, _table(zones.head(_LISTED), scenario), note)
+    return {"sentence": sentence, "table": _table(zones.head(_LISTED), scenario), "note": note}
 
 
 def _percent(share: float) -> str:

@@ -60,10 +60,6 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
         Of one run; what the study sweeps is said apart.
     keys : sequence of str
     summary : DataFrame
-
-    Returns
-    -------
-    tuple of Row
     """
     sand, contact = scenario.sand, scenario.laws
     hardness = bed_hardness(scenario)
@@ -307,10 +303,6 @@ def provenance_rows(all_runs: Sequence[Mapping[str, Any]]) -> tuple[Row, ...]:
     ----------
     all_runs : sequence of mapping
         The ``provenance.json`` of each run.
-
-    Returns
-    -------
-    tuple of Row
     """
     flat = [dict(_flatten(p)) for p in all_runs if p]
     rows = []

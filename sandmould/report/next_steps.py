@@ -16,7 +16,7 @@ from sandmould.report.curves import best_passage
 from sandmould.report.optimum import OptimumPages
 from sandmould.report.robustness import RobustnessPages, follows_springs
 from sandmould.runs.columns import RUN, finished
-from sandmould.runs.formatting import listed, name_of, value_text
+from sandmould.runs.formatting import is_number, listed, name_of, value_text
 from sandmould.statistics.config import fewest_points
 from sandmould.statistics.verdict import FEW, MANY, MOST_NAMED, Verdict, further_replicates
 from sandmould.study.collect import Collected
@@ -215,10 +215,7 @@ def _beyond(verdict: Verdict, study: Study) -> list[NextStep]:
     for key in study.sweep.swept if verdict.best is not None else ():
         values = [s.values.get(key) for s in verdict.settings]
         mine = verdict.best.values.get(key) if verdict.best is not None else None
-        numbers = [
-            float(v) for v in values
-            if isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v)
-        ]  # fmt: skip
+        numbers = [float(v) for v in values if is_number(v) and math.isfinite(v)]
         if len(numbers) < len(values) or min(numbers) == max(numbers):
             continue
         if mine in (min(numbers), max(numbers)):

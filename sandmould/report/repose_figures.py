@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sandmould.analysis.plots import draw_grains
 from sandmould.analysis.repose import Slope
+from sandmould.drawing.animation import evenly
 from sandmould.drawing.figures import cut_m, panel, png
 from sandmould.engines.snapshot import Snapshot
+from sandmould.kinds.sand.moments import list_moments
 from sandmould.kinds.sand.outflow import slopes
-from sandmould.runs.formatting import name_of, unit_of
+from sandmould.runs.columns import RUN
+from sandmould.runs.formatting import name_of, number, unit_of
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.posterior import axes_of, surface
 from sandmould.statistics.calibration.sands import CalibratedSand
 from sandmould.statistics.emulator import Emulator
+from sandmould.statistics.evidence import usable_values
+from sandmould.statistics.verdict import Verdict
 
 _LINE = "#C00000"
 _BANDS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -101,11 +109,11 @@ def draw_map(
     ax.clabel(lines, fmt="%g", fontsize=8)
     figure.colorbar(filled, ax=ax, label=title)
     ax.plot(plotted(keys[1], points[:, 1]), plotted(keys[0], points[:, 0]), "k.", ms=4)
-    for number, sand in enumerate(sands):
+    for place, sand in enumerate(sands):
         line = sand.lines.get(emulator.measure)
         if line is None or np.isnan(line.first).all():
             continue
-        colour = _BANDS[number % len(_BANDS)]
+        colour = _BANDS[place % len(_BANDS)]
         x_line = plotted(keys[1], line.second)
         ax.fill_between(x_line, plotted(keys[0], line.low), plotted(keys[0], line.high),
                         color=colour, alpha=0.35, lw=0)  # fmt: skip
@@ -140,3 +148,46 @@ def draw_posterior(sand: CalibratedSand, keys: tuple[str, str]) -> str:
     ax.set_ylabel(axis_title(keys[0]))
     ax.legend(fontsize=9)
     return png(figure)
+
+
+PICTURED_HEAPS = 3
+
+
+@dataclass(frozen=True)
+class Heap:
+    """A picture of the sand at rest with the fitted lines."""
+
+    heading: str
+    picture: str
+    alt: str
+
+
+def steepest_heaps(
+    study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: Scenario
+) -> tuple[Heap, ...]:
+    """Draw runs with the least, the middle and the steepest slope; none without a level gate.
+
+    Parameters
+    ----------
+    study_folder : Path
+    summary : DataFrame
+        Of the sweep.
+    verdict : Verdict
+    scenario : Scenario
+        Of any run.
+    """
+    if scenario.gate is None or not scenario.gate.is_level:
+        return ()
+    values = usable_values(summary, verdict.measure).dropna().sort_values()
+    places = evenly(len(values), PICTURED_HEAPS).tolist()
+    heaps = []
+    for index in [values.index[i] for i in places] if len(values) else []:
+        run = str(summary.loc[index, RUN])
+        moments = list_moments(study_folder / "runs" / run)
+        if not moments:
+            continue
+        sand = moments[-1].load()
+        heading = f"{number(values[index])}°: {run}"
+        picture = draw_heap(sand, scenario, 1.02 * scenario.scene.top_m)
+        heaps.append(Heap(heading, picture, f"Heap and hopper of run {run} with fitted lines"))
+    return tuple(heaps)

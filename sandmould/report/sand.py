@@ -5,9 +5,8 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pandas as pd
@@ -22,12 +21,7 @@ from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
 from sandmould.drawing.sphere_scene import sphere_scene
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
-from sandmould.report.time_series import (
-    Curve,
-    late_conclusion,
-    measure_curves,
-    whole_conclusion,
-)
+from sandmould.report.time_series import late_conclusion, measure_curves, whole_conclusion
 from sandmould.runs.columns import (
     BED_HEIGHT_M,
     RUN,
@@ -47,37 +41,6 @@ _SECONDARY = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Panel:
-    """The sand at one moment: two pictures and what they are of."""
-
-    heading: str
-    by_layer: str
-    by_density: str
-    alt: str
-
-
-@dataclass(frozen=True)
-class SandPages:
-    """All that the sand sections of the report show."""
-
-    scene: str
-    scene_alt: str
-    pictured_run: str
-    role: str
-    panels: tuple[Panel, ...]
-    density_scale: figures.DensityScale
-    density_conclusion: str
-    layer_colours: tuple[tuple[int, str], ...]
-    layer_conclusion: str
-    films: tuple[Film, ...] | tuple[SphereFilm, ...]
-    film_scene: Mapping[str, object]
-    tubes: tuple[Curve, ...]
-    others: tuple[Curve, ...]
-    beside: Mapping[str, str]
-    """Scripts that lie beside the page, by file name: films of all grains."""
-
-
 def sand_pages(
     study_folder: Path,
     scenario: Scenario,
@@ -86,7 +49,7 @@ def sand_pages(
     film_budget_bytes: int,
     href: str,
     own_measures: Iterable[str] = (),
-) -> SandPages:
+) -> dict[str, Any]:
     """Draw everything that a study of sand shows.
 
     Parameters
@@ -105,8 +68,9 @@ def sand_pages(
 
     Returns
     -------
-    SandPages
-        Parts without data are empty.
+    dict of str to any
+        What ``sand.html`` names, empty without data; ``beside`` has films of all grains, scripts
+        that lie beside the page, by file name.
     """
     roles = pictured_runs(study_folder, collected.summary, verdict)
     run = next(iter(roles.values()), "")
@@ -126,41 +90,41 @@ def sand_pages(
         films, beside = _sphere_films(shown, scale, film_budget_bytes, f"{href}{SPHERES}/")
     bed_m = _bed_height_m(collected.curves, run)
     number_of_layers = max((int(s.layer.max(initial=1)) for s in snapshots), default=1)
-    return SandPages(
-        scene=figures.draw_dimensions(scenario, bed_m),
-        scene_alt=_scene_alt(scenario, bed_m),
-        pictured_run=run,
-        role=_role_text(next(iter(roles), ""), verdict, collected.summary),
-        panels=tuple(
-            Panel(
-                f"{heading}, {_clock_s(moment):.2f} s",
-                by_layer,
-                by_density,
-                f"The sand of run {run} {heading}",
-            )
+    return {
+        "scene": figures.draw_dimensions(scenario, bed_m),
+        "scene_alt": _scene_alt(scenario, bed_m),
+        "pictured_run": run,
+        "role": _role_text(next(iter(roles), ""), verdict, collected.summary),
+        "panels": tuple(
+            {
+                "heading": f"{heading}, {_clock_s(moment):.2f} s",
+                "by_layer": by_layer,
+                "by_density": by_density,
+                "alt": f"The sand of run {run} {heading}",
+            }
             for (heading, moment), by_layer, by_density in zip(
                 chosen, layers, densities, strict=True
             )
         ),
-        density_scale=scale,
-        density_conclusion=_density_conclusion(median_kg_m3),
-        layer_colours=tuple(
+        "density_scale": scale,
+        "density_conclusion": _density_conclusion(median_kg_m3),
+        "layer_colours": tuple(
             (n, LAYER_COLOURS[(n - 1) % len(LAYER_COLOURS)]) for n in range(1, number_of_layers + 1)
         ),
-        layer_conclusion=_layer_conclusion(snapshots, scenario),
-        films=films,
-        film_scene=_film_scene(scenario, height_m),
-        beside=beside,
-        tubes=measure_curves(
+        "layer_conclusion": _layer_conclusion(snapshots, scenario),
+        "films": films,
+        "film_scene": _film_scene(scenario, height_m),
+        "beside": beside,
+        "tubes": measure_curves(
             collected,
             verdict,
             _tube_measures(collected.curves, scenario, verdict),
             late_conclusion,
         ),
-        others=measure_curves(
+        "others": measure_curves(
             collected, verdict, _other_measures(scenario, verdict, own_measures), whole_conclusion
         ),
-    )
+    }
 
 
 def _clock_s(moment: Moment) -> float:

@@ -147,12 +147,7 @@ def sand_grounds(scenario: Scenario, study: Study, verdict: Verdict) -> tuple[Gr
 
 
 def weak_ground(by_setting: Mapping[str, Scenario]) -> tuple[Ground, ...]:
-    """Say at which settings the box never throws the sand.
-
-    Parameters
-    ----------
-    by_setting : mapping of label to Scenario
-    """
+    """Say at which settings the box never throws the sand."""
     weak = [label for label, scenario in by_setting.items() if throws_no_sand(scenario)]
     if not weak:
         return ()

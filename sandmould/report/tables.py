@@ -126,10 +126,6 @@ def share_of_what_fits(
 def key_numbers(summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
     """Runs that finished, size, cost and health of the runs.
 
-    Parameters
-    ----------
-    summary : DataFrame
-
     Returns
     -------
     tuple of KeyNumber

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from numbers import Real
+from typing import Any, TypeGuard
 
 from sandmould.digest import digest
 
@@ -162,6 +163,11 @@ def value_text(key: str, value: Any) -> str:
     else:
         text, unit = _text(value), unit_of(key)
     return f"{text} {unit}" if unit else text
+
+
+def is_number(value: Any) -> TypeGuard[float]:
+    """Whether a swept value is a number, of Python or of numpy, and no truth value."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def mark(value: Any) -> str:

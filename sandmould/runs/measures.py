@@ -7,11 +7,13 @@ Each kind of study lists its measures once; the plan checks names against that l
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Generic, TypeVar
 
 from sandmould.runs.formatting import unit_of
+from sandmould.scenario.yaml_text import load_planned
 
 SceneT = TypeVar("SceneT")
 _OF_WHAT = re.compile(r"<\w+>")
@@ -49,6 +51,28 @@ class MeasureGroup(Generic[SceneT]):
     things: Callable[[SceneT], Iterable[str]]
     """Names of what is measured in a scene; none where the scene lacks it."""
     measures: tuple[Measure, ...]
+
+
+def read_groups(
+    path: Path, things: Mapping[str, Callable[[SceneT], Iterable[str]]]
+) -> tuple[MeasureGroup[SceneT], ...]:
+    """Groups of measures as a file of a kind of study describes them.
+
+    Parameters
+    ----------
+    path : Path
+        Names and meanings by group; ``[words, meaning]`` of a measure that is no number.
+    things : mapping of str to callable
+        What each group measures in a scene.
+    """
+    return tuple(
+        MeasureGroup(when, things[when], tuple(_described(*each) for each in measures.items()))
+        for when, measures in load_planned(path.read_text(encoding="utf-8")).items()
+    )
+
+
+def _described(name: str, about: str | list[str]) -> Measure:
+    return Measure(name, about) if isinstance(about, str) else Measure(name, about[1], False)
 
 
 def once(is_there: bool = True) -> tuple[str, ...]:

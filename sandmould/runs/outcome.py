@@ -13,21 +13,30 @@ from sandmould.runs.files import write_text
 class Outcome(IntEnum):
     """Ways a run can end; codes of 400 and above can be continued from a checkpoint."""
 
-    FINISHED = 0
-    BAD_INPUT = 300
-    ENGINE_MISSING = 301
-    LOST_GRAINS = 310
-    OVERLAP_TOO_LARGE = 311
-    UNSTABLE = 312
-    NO_FLOW = 313
-    NOT_SETTLED = 314
-    COUPLING_DIVERGED = 315
-    ESCAPED_METAL = 316
-    NO_FREE_SURFACE = 317
-    NO_EQUILIBRIUM = 318
-    ENGINE_FAILED = 320
-    OUT_OF_WALL_TIME = 400
-    DISK_REFUSED = 401
+    meaning: str
+    """One sentence."""
+
+    def __new__(cls, code: int, meaning: str = "") -> Outcome:
+        """Give a code its sentence."""
+        outcome = int.__new__(cls, code)
+        outcome._value_, outcome.meaning = code, meaning
+        return outcome
+
+    FINISHED = 0, "The run reached its end."
+    BAD_INPUT = 300, "The scenario cannot be run as written."
+    ENGINE_MISSING = 301, "The engine is not installed or too old."
+    LOST_GRAINS = 310, "Grains left the box or passed through a wall."
+    OVERLAP_TOO_LARGE = 311, "Grains overlapped more than the guard allows."
+    UNSTABLE = 312, "Energy grew beyond what fall and vibration can give, or was not a number."
+    NO_FLOW = 313, "The sand stopped flowing before it was meant to."
+    NOT_SETTLED = 314, "A layer did not come to rest within the longest time its rule allows."
+    COUPLING_DIVERGED = 315, "The coupling of sand and pattern ran away."
+    ESCAPED_METAL = 316, "Metal left the mould."
+    NO_FREE_SURFACE = 317, "Metal without a free surface did not fit its place in the mould."
+    NO_EQUILIBRIUM = 318, "The pattern found no equilibrium under the load of the sand."
+    ENGINE_FAILED = 320, "The engine stopped with an error of its own."
+    OUT_OF_WALL_TIME = 400, "The wall-time limit came first; the same command continues."
+    DISK_REFUSED = 401, "The disk took no more; with room on it the same command continues."
 
     @property
     def label(self) -> str:
@@ -38,30 +47,6 @@ class Outcome(IntEnum):
     def restartable(self) -> bool:
         """Whether the same command continues the run."""
         return self >= 400
-
-    @property
-    def meaning(self) -> str:
-        """One sentence."""
-        return _MEANING[self]
-
-
-_MEANING = {
-    Outcome.FINISHED: "The run reached its end.",
-    Outcome.BAD_INPUT: "The scenario cannot be run as written.",
-    Outcome.ENGINE_MISSING: "The engine is not installed or too old.",
-    Outcome.LOST_GRAINS: "Grains left the box or passed through a wall.",
-    Outcome.OVERLAP_TOO_LARGE: "Grains overlapped more than the guard allows.",
-    Outcome.UNSTABLE: "Energy grew beyond what fall and vibration can give, or was not a number.",
-    Outcome.NO_FLOW: "The sand stopped flowing before it was meant to.",
-    Outcome.NOT_SETTLED: "A layer did not come to rest within the longest time its rule allows.",
-    Outcome.COUPLING_DIVERGED: "The coupling of sand and pattern ran away.",
-    Outcome.ESCAPED_METAL: "Metal left the mould.",
-    Outcome.NO_FREE_SURFACE: "Metal without a free surface did not fit its place in the mould.",
-    Outcome.NO_EQUILIBRIUM: "The pattern found no equilibrium under the load of the sand.",
-    Outcome.ENGINE_FAILED: "The engine stopped with an error of its own.",
-    Outcome.OUT_OF_WALL_TIME: "The wall-time limit came first; the same command continues.",
-    Outcome.DISK_REFUSED: "The disk took no more; with room on it the same command continues.",
-}
 
 
 @dataclass(frozen=True)

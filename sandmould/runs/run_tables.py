@@ -55,10 +55,6 @@ def read_tables(
     paths : sequence of Path
     check : callable
         Gives a table as it is kept; raises what a file cannot be read for.
-
-    Returns
-    -------
-    RunTables
     """
     alike: dict[str, list[tuple[int, str]]] = {}
     alone: list[int] = []

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sandmould.scenario.contact import wave_speed_m_s
 from sandmould.scenario.placement import nominal_fraction, plan_counts, predicted_bed_depth_m
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.springs import wave_speed_m_s
 
 LEAST_KAPPA = 1000.0
 """Below it packing, density and angles are those of softer grains: rigid ones want 1e3 to 1e4."""
@@ -58,10 +58,6 @@ def bed_hardness(scenario: Scenario) -> Hardness | None:
 
     The pressure at the foot is rho phi g H: the sand's density times the solid fraction that turns
     a layer's height into grains, over the depth of the bed that is expected.
-
-    Parameters
-    ----------
-    scenario : Scenario
 
     Returns
     -------

@@ -55,10 +55,6 @@ def likely_bed(s: Scenario, cut_m: float | None = None) -> LikelyBed:
     cut_m : float, m, optional
         y at which the slice begins of a box with too many grains; it lies in the middle unless
         given.
-
-    Returns
-    -------
-    LikelyBed
     """
     counts, d = plan_counts(s), s.dimension
     total, rng = sum(counts), np.random.default_rng([s.seed, 0])

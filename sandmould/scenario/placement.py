@@ -187,10 +187,6 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     number : int
         Number of the layer, or of the portion of one, from 1; with the seed it fixes the draw.
     count : int
-
-    Returns
-    -------
-    PlannedLayer
     """
     if s.fill.grains and number == 1:
         return placed_grains(s)

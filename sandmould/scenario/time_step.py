@@ -128,10 +128,6 @@ def critical_step(
         Its rotational inertia counts.
     dimension : int
 
-    Returns
-    -------
-    CriticalStep
-
     Notes
     -----
     The paper's (51) is the case of one contact with a fixed body. The smallest class stands for

@@ -92,11 +92,6 @@ class Unbalance(Section):
     ) -> float:
         """Steady amplitude of the table without sand, or with a mass that moves with it.
 
-        Parameters
-        ----------
-        angular_frequency_rad_s : float
-        added_mass_kg : float
-
         Returns
         -------
         float, m

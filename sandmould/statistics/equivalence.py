@@ -60,10 +60,6 @@ def agree(first: pd.Series[float], second: pd.Series[float], margin: float) -> A
         Values by block: replicates that share their seeds have one label. Blocks that both have
         are compared in pairs; without a common one the groups are compared by Welch's test.
     margin : float
-
-    Returns
-    -------
-    Agreement
     """
     shared = first.index.intersection(second.index)
     if len(shared):
@@ -120,15 +116,7 @@ def _without_spread(
 def _more(size: float, spread: float, margin: float, n: int, paired: bool) -> int | None:
     """Further replicates after which a verdict is likely, if size and spread stay as they are.
 
-    Parameters
-    ----------
-    size : float
-        Of the difference, without its sign.
-    spread : float
-        Standard error of the difference times the root of n.
-    margin : float
-    n : int
-    paired : bool
+    ``spread`` is the standard error of the difference times the root of n.
     """
     replicates = np.arange(n + 1, MOST_REPLICATES + 1)
     freedom = (replicates - 1) * (1 if paired else 2)

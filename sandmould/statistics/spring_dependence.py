@@ -230,10 +230,6 @@ def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> CurveLimbs:
         Filling of each run.
     value : (n,) float64
         The measure, more being better.
-
-    Returns
-    -------
-    CurveLimbs
     """
     distinct, place = np.unique(hz, return_inverse=True)
     last = len(distinct) - 1

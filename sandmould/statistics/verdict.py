@@ -113,10 +113,6 @@ def compare_settings(
     draws_by_lot : bool
         Whether runs of one setting differ by their seeds, so that few of them are a reason to
         doubt.
-
-    Returns
-    -------
-    Verdict
     """
     values = bounded_values(summary, measure)
     errors = loop_errors(summary, measure)[values.notna()].reindex(values.index)
@@ -210,10 +206,6 @@ def sand_notes(
         Whether the study looks for the best setting.
     is_controlled : bool
         Whether its controls have been run.
-
-    Returns
-    -------
-    tuple of str
     """
     notes = []
     if stage is not None and any(k.endswith("frequency_hz") for k in keys):
@@ -338,11 +330,6 @@ def further_replicates(comparisons: Sequence[Comparison], best: Setting) -> int 
 
     An interval shrinks with the root of the number of replicates, so that it leaves zero out once
     n (half width / difference)^2 of them are there.
-
-    Parameters
-    ----------
-    comparisons : sequence of Comparison
-    best : Setting
 
     Returns
     -------

@@ -18,15 +18,19 @@ import numpy as np
 import pandas as pd
 
 from sandmould.definition.own_measures import with_own_measures
+from sandmould.definition.run import FILLS
 from sandmould.definition.study import Study
 from sandmould.kinds.registry import DEFAULT_KIND, kind_named
 from sandmould.runs.columns import (
     CLOCK,
+    CPU_S,
     CROSS_CHECK,
     CROSS_CHECK_OWN,
     DETAIL,
     ENGINE,
     FILL,
+    FILL_CPU_S,
+    FILL_WALL_S,
     GRAINS,
     LARGEST_OVERLAP_FRACTION,
     OUTCOME,
@@ -40,6 +44,7 @@ from sandmould.runs.columns import (
     SWEEP,
     TIME_S,
     VIBRATION_TIME_S,
+    WALL_S,
 )
 from sandmould.runs.files import replaced
 from sandmould.runs.manifest import read_origin
@@ -60,7 +65,6 @@ from sandmould.statistics.agreement import (
     compare_pair,
     sweep_part,
 )
-from sandmould.study.fill_costs import shares_of_fills
 from sandmould.study.plan.plan_files import CHECKS, CURVES, STUDY_FILE, SUMMARY
 
 NO_OUTCOME = "no outcome written"
@@ -223,10 +227,6 @@ def gather(
     own_measures : mapping of str to str, optional
         Formulas of the study's own measures, by name.
 
-    Returns
-    -------
-    Collected
-
     Raises
     ------
     OSError, ValueError
@@ -280,6 +280,31 @@ def gather_runs(
     if FILL in table:
         table = table.assign(**shares_of_fills(table[FILL], study_folder))
     return Collected(table, _curves(table, swept_keys(runs), measures), swept_keys(runs))
+
+
+def shares_of_fills(fills: pd.Series[str], study_folder: Path) -> dict[str, pd.Series[float]]:
+    """What each run's fill took, over the runs that share it: sums count a fill once.
+
+    Parameters
+    ----------
+    fills : Series of str
+        Name of each run's fill; missing for a run that shares none.
+    study_folder : Path
+
+    Returns
+    -------
+    dict of str to Series
+        Columns for the summary, s.
+    """
+    names = fills.dropna().unique()
+    costs = read_costs([study_folder / FILLS / name for name in names])
+    last = costs.rows.drop_duplicates(PLACE, keep="last").set_index(PLACE)
+    cost = last.reindex(index=range(len(names)), columns=[WALL_S, CPU_S])
+    sharing = fills.map(fills.value_counts())
+    return {
+        share: fills.map(dict(zip(names, cost[whole], strict=True))) / sharing
+        for share, whole in ((FILL_WALL_S, WALL_S), (FILL_CPU_S, CPU_S))
+    }
 
 
 def _sentences(texts: Sequence[str]) -> str:

@@ -10,8 +10,7 @@ import pytest
 from sandmould.engines.guard import grain_masses_kg
 from sandmould.engines.liggghts.grains_file import read_grains
 from sandmould.engines.liggghts.session import LiggghtsSession
-from sandmould.engines.session import EngineStop, RefusedError
-from sandmould.engines.step_mover import StepMover
+from sandmould.engines.session import EngineStop, RefusedError, StepMover
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import (

@@ -11,9 +11,8 @@ import pytest
 
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.session import RefusedError
+from sandmould.engines.session import RefusedError, StepMover
 from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.step_mover import StepMover
 from sandmould.execution.simulate import RESTARTABLE_EXIT
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs

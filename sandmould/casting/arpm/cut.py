@@ -53,10 +53,6 @@ def with_cut(raster: Raster, solids: Sequence[Body]) -> Raster:
     raster : Raster
         Painted with the same solids. They may touch: there is no surface between them.
     solids : sequence of Body
-
-    Returns
-    -------
-    Raster
     """
     casting = raster.material != MOULD
     faces = _faces(casting)

@@ -46,10 +46,6 @@ def pieces_of(body: Body, low_m: Floats, cell_m: float) -> Pieces:
     cell_m : float, m
         Side of the grid's cells; triangles are halved until no side is longer than half of it.
 
-    Returns
-    -------
-    Pieces
-
     Raises
     ------
     TypeError

@@ -57,10 +57,6 @@ def from_rows(row: Ints, column: Ints, rate_w_m3_k: Floats, volume_m3: Floats) -
         The element that takes heat up, and the one that it comes from.
     rate_w_m3_k : (p,) float64, W/m3/K
     volume_m3 : (n,) float64, m3
-
-    Returns
-    -------
-    Exchange
     """
     n = len(volume_m3)
     matrix = coo_array((rate_w_m3_k, (row, column)), (n, n)).tocsr()

@@ -41,10 +41,6 @@ class Faces:
 def owners(elements: Elements) -> Ints:
     """Number of the element that covers each cell of the finest size.
 
-    Parameters
-    ----------
-    elements : Elements
-
     Returns
     -------
     (nx, ny) or (nx, ny, nz) int64
@@ -75,16 +71,7 @@ def owners(elements: Elements) -> Ints:
 
 
 def faces_of(elements: Elements) -> Faces:
-    """Find all faces between squares or cubes of any sizes on a grid.
-
-    Parameters
-    ----------
-    elements : Elements
-
-    Returns
-    -------
-    Faces
-    """
+    """Find all faces between squares or cubes of any sizes on a grid."""
     owner, n, cell = owners(elements), len(elements.size_m), elements.grid_m
     parts = []
     for axis in range(owner.ndim):
@@ -134,10 +121,6 @@ def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k
         On faces between different materials.
     consistent : bool
         Whether small faces on one large face share their flux; without it each has its own.
-
-    Returns
-    -------
-    Exchange
     """
     check_resistance(resistance_m2k_w)
     faces = faces_of(elements)
@@ -170,10 +153,6 @@ def over_faces(first: Ints, second: Ints, conductance_w_k: Floats, volume_m3: Fl
     first, second : (p,) int64
     conductance_w_k : (p,) float64, W/K
     volume_m3 : (n,) float64, m3
-
-    Returns
-    -------
-    Exchange
     """
     row, column = np.concatenate([first, second]), np.concatenate([second, first])
     rate = np.concatenate([conductance_w_k, conductance_w_k]) / volume_m3[row]

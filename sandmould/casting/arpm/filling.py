@@ -70,11 +70,6 @@ class Filling:
 def check_casting(elements: Elements, filling: Filling) -> None:
     """Refuse what cannot solidify.
 
-    Parameters
-    ----------
-    elements : Elements
-    filling : Filling
-
     Raises
     ------
     ValueError

@@ -76,11 +76,6 @@ def neighbours(elements: Elements, kernel_size: float) -> tuple[Ints, Ints, Floa
     Insulated walls are mirrors: elements have their images behind them, without which those at a
     wall would count too few neighbours and conduct too well along it.
 
-    Parameters
-    ----------
-    elements : Elements
-    kernel_size : float
-
     Returns
     -------
     own, other : (p,) int64

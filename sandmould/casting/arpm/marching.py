@@ -132,15 +132,10 @@ def _explicit_steps(
     steps: int, dt: float, time_s: float, system: HeatSystem, enthalpy: Floats, temperature: Floats,
     frozen: Floats,
 ) -> Floats:  # fmt: skip
-    """Take explicit steps; enthalpy and freezing times change in place.
+    """Take explicit steps and give the new temperatures; enthalpy and times change in place.
 
     Every element sums over its own neighbours in their order, so that the result does not depend
     on the threads.
-
-    Returns
-    -------
-    (n,) float64, K
-        The new temperatures.
     """
     start, neighbour, rate, material, rows, reference = system
     n = len(enthalpy)

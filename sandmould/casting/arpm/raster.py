@@ -82,10 +82,6 @@ def painted(low_m: Floats, high_m: Floats, cell_m: float, solids: Mapping[int, B
     solids : mapping of material to Body
         Outlines in 2D, meshes in 3D; material 0 is the mould round them.
 
-    Returns
-    -------
-    Raster
-
     Raises
     ------
     ValueError

@@ -199,10 +199,6 @@ def expected_s(scenario: Solidification) -> float:
 
     As :func:`sandmould.casting.arpm.estimates.freezes_s`, with the sand that the box holds.
 
-    Parameters
-    ----------
-    scenario : Solidification
-
     Returns
     -------
     float, s

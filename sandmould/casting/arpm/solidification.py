@@ -123,10 +123,6 @@ def solidify(
     keep : callable, optional
         Given the state after each record.
 
-    Returns
-    -------
-    Solidification
-
     Raises
     ------
     ValueError

@@ -103,14 +103,8 @@ class Bridge(NamedTuple):
 def _reader(named: Any, kind_of: Callable[[Any], Any], field_at: Callable[[Any, int], Any]) -> Any:
     """Make the function of compiled code that reads a named tuple, field by field, out of an array.
 
-    Parameters
-    ----------
-    named : type
-        The named tuple.
-    kind_of : callable
-        Type in compiled code of a field, by its annotation.
-    field_at : callable
-        Function of the array that gives a field, by its type and its place.
+    ``kind_of`` gives the type of a field by its annotation, ``field_at`` what reads one of a type
+    at a place.
     """
     kinds = [kind_of(hint) for hint in get_type_hints(named, include_extras=True).values()]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 from importlib import metadata
 from pathlib import Path
@@ -9,17 +10,16 @@ from typing import Any
 
 from sandmould.dem import source_files
 from sandmould.engines.bed_deck import sources_of_step
-from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
-from sandmould.engines.lammps.refusals import refuse as refuse
 from sandmould.engines.lammps.render import needs_callback
+from sandmould.engines.lammps.render import refuse as refuse
 from sandmould.engines.lammps.render import render_deck as render_deck
 from sandmould.engines.lammps.render import write_deck as write_deck
 from sandmould.engines.lammps.session import LammpsSession, load_library
 from sandmould.engines.program import Program
-from sandmould.engines.ranks import Ranks
-from sandmould.engines.session import SandSession
+from sandmould.engines.session import SandSession, engine_stop
 from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 2.5e6
@@ -30,11 +30,7 @@ CAPABILITIES = Capabilities(
     bends_in_frames=("box", "laboratory"),
     repeats_windows=True,
     calls_movers=True,
-    loads_of_every_step=False,
     checkpoints_at_setups=True,
-    moves_tables=False,
-    moves_walls=False,
-    changes_checks=False,
 )
 
 
@@ -97,3 +93,17 @@ def open_session(
         When LAMMPS lacks what the scenario asks for.
     """
     return LammpsSession(program, Deck.read(folder / "deck.in"), folder, log, checkpoint)
+
+
+def read_deck(folder: Path, deck: str, log: Path) -> None:
+    """Have LAMMPS read a deck in this process; see ``DeckReaderModule`` of the registry."""
+    lammps, _ = load_library()
+    arguments = ["-log", str(log.absolute()), "-screen", "none", "-nocite"]
+    with contextlib.chdir(folder):
+        lmp: Any = lammps(cmdargs=arguments)
+        try:
+            lmp.file(deck)
+        except Exception as error:  # the library raises plain Exception
+            raise engine_stop("LAMMPS", str(error), of_user=True) from error
+        finally:
+            lmp.close()

@@ -1,4 +1,4 @@
-"""Render a scenario into a LAMMPS deck and its layers of grains."""
+"""Render a scenario into a LAMMPS deck and its layers of grains; refuse what LAMMPS cannot do."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.dashpots import Dashpots
 from sandmould.engines.lammps.near_grains import NearGrains
 from sandmould.engines.program import Program
+from sandmould.engines.session import RefusedError
 from sandmould.geometry.geometry import Array, Block
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
@@ -156,3 +157,23 @@ def write_deck(
         path = folder / "layers" / f"layer_{number}.data"
         path.write_text(layer_data(program.scenario, layer, number), encoding="utf-8")
     render_deck(program, sources, run, study).write(folder)
+
+
+def refuse(scenario: Scenario) -> None:
+    """Refuse what this engine lacks.
+
+    Raises
+    ------
+    RefusedError
+        With one sentence.
+    """
+    if scenario.dimension == 3 and scenario.contact.rolling_axes == "all":
+        raise RefusedError("contact.rolling_axes", "all", "tangent on engine lammps in 3D")
+    if scenario.time_step.rotational_inertia == "scaled":
+        raise RefusedError("time_step.rotational_inertia", "scaled", "physical on engine lammps")
+    if scenario.record.orientation:
+        raise RefusedError("record.orientation", True, "false on engine lammps")
+    if scenario.engine.ranks > 1 and needs_callback(scenario):
+        # The force callback lives in one process.
+        valid = "1 on engine lammps with polygons, round solids, meshes or isotropic damping"
+        raise RefusedError("engine.ranks", scenario.engine.ranks, valid)

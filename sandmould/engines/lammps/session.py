@@ -15,13 +15,18 @@ from sandmould.engines.deck import Deck
 from sandmould.engines.deck_lines import skin_m
 from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.lammps import OLDEST_VERSION
-from sandmould.engines.lammps.refusals import refuse
-from sandmould.engines.lammps.render import needs_callback, surfaces
+from sandmould.engines.lammps.render import needs_callback, refuse, surfaces
 from sandmould.engines.lammps.wall_loads import WallLoads
 from sandmould.engines.program import Program
-from sandmould.engines.session import Array, EngineStop, RefusedError, Shared, engine_stop
+from sandmould.engines.session import (
+    Array,
+    EngineStop,
+    RefusedError,
+    Shared,
+    StepMover,
+    engine_stop,
+)
 from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.step_mover import StepMover
 from sandmould.runs.outcome import Outcome
 
 if TYPE_CHECKING:

@@ -33,10 +33,9 @@ from sandmould.engines.lammps.bridge import (
 )
 from sandmould.engines.lammps.callback import address_of
 from sandmould.engines.program import Program, Stage
-from sandmould.engines.session import Array
+from sandmould.engines.session import Array, StepMover
 from sandmould.engines.solid_surfaces import add_solids
 from sandmould.engines.step_counts import StepCounts
-from sandmould.engines.step_mover import StepMover
 
 _PER_ROW, _PER_SLOT = ("row_ids", "used"), ("normal", "friction", "rolling")
 """Arrays as long as the rows of the list, or as the slots of all rows; the rest is not in use."""

@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from sandmould.engines.bed_deck import sources_of_step
-from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck
 from sandmould.engines.liggghts import OLDEST_VERSION
-from sandmould.engines.liggghts.process import executable, version_of
+from sandmould.engines.liggghts.process import Conversation, LiggghtsDied, executable, version_of
 from sandmould.engines.liggghts.refusals import refuse as refuse
 from sandmould.engines.liggghts.render import render_deck as render_deck
 from sandmould.engines.liggghts.render import write_deck as write_deck
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.program import Program
-from sandmould.engines.ranks import Ranks
-from sandmould.engines.session import SandSession
+from sandmould.engines.session import EngineStop, SandSession, engine_stop
+from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 3e6
@@ -24,13 +24,7 @@ RUNS_ITS_DECK = True
 CAPABILITIES = Capabilities(
     bends_meshes=(2,),
     bends_in_frames=("box",),
-    repeats_windows=False,
-    calls_movers=False,
-    loads_of_every_step=False,
     checkpoints_at_setups=True,
-    moves_tables=False,
-    moves_walls=False,
-    changes_checks=False,
 )
 
 
@@ -83,3 +77,17 @@ def open_session(
         When LIGGGHTS lacks what the scenario asks for.
     """
     return LiggghtsSession(program, Deck.read(folder / "deck.in"), folder, log, checkpoint)
+
+
+def read_deck(folder: Path, deck: str, log: Path) -> None:
+    """Have LIGGGHTS read a deck in a process of its own; see ``DeckReaderModule``."""
+    path = executable()
+    if path is None:
+        raise EngineStop(Outcome.ENGINE_MISSING, "LIGGGHTS cannot be started: apt install liggghts")
+    conversation = Conversation(path, folder, log)
+    try:
+        conversation.say(f"include {deck}")
+    except LiggghtsDied as error:
+        raise engine_stop("LIGGGHTS", str(error), of_user=True) from error
+    finally:
+        conversation.close()

@@ -16,10 +16,6 @@ _HEADER = struct.Struct("=qq7i6dii")
 def read_grains(path: Path) -> Array:
     """Read a binary dump of one instant, written by one process.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     (n, columns) float64

@@ -104,10 +104,6 @@ class Conversation:
     def say(self, commands: str) -> str:
         """Have commands executed and wait for their end.
 
-        Parameters
-        ----------
-        commands : str
-
         Returns
         -------
         str

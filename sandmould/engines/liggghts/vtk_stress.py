@@ -33,14 +33,6 @@ class TriangleLoads:
 def read_triangle_loads(path: Path) -> TriangleLoads:
     """Read what ``dump mesh/vtk ... stresscomponents area`` wrote.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    TriangleLoads
-
     Raises
     ------
     ValueError

@@ -10,12 +10,11 @@ import numpy as np
 
 from sandmould.dem import source_files, source_hash
 from sandmould.digest import SHORT
-from sandmould.engines.capabilities import Capabilities
+from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
-from sandmould.engines.ranks import Ranks
 from sandmould.engines.session import SandSession
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.contact import SYMBOLS
@@ -34,7 +33,6 @@ CAPABILITIES = Capabilities(
     repeats_windows=True,
     calls_movers=True,
     loads_of_every_step=True,
-    checkpoints_at_setups=False,
     moves_tables=True,
     moves_walls=True,
     changes_checks=True,

@@ -13,7 +13,7 @@ from sandmould.dem.grains import Floats, Ints
 from sandmould.dem.steps import DONE, DemScene, Moving, Team, Walls, advance
 from sandmould.dem.table import TableSolver
 from sandmould.dem.vectors import OPTIONS
-from sandmould.engines.step_mover import StepMover
+from sandmould.engines.session import StepMover
 
 
 class _Mover(NamedTuple):

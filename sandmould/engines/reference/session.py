@@ -16,10 +16,9 @@ from sandmould.dem.table import MountedTable
 from sandmould.engines.box_motion import displacements, start_of_grains
 from sandmould.engines.program import Program, Stage
 from sandmould.engines.reference.model import grains_of, scene_of, solver_of
-from sandmould.engines.session import Array, EngineStop, RefusedError
+from sandmould.engines.session import Array, EngineStop, RefusedError, StepMover
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.staged_session import StagedSession
-from sandmould.engines.step_mover import StepMover
 from sandmould.engines.table_drive import table_motion
 from sandmould.engines.table_periods import TablePeriod, TablePeriods, window_of
 from sandmould.runs.outcome import Outcome

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from sandmould.definition.study import StudyBesideSand, kind_key
-from sandmould.kinds.kind import Execution, Kind, Planning
+from sandmould.kinds.kind import Kind, opened_later
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import quantity
 from sandmould.scenario.sand import ARGUED
@@ -45,23 +45,11 @@ class DeckStudy(StudyBesideSand):
         return self.allowed_folders
 
 
-def _open_planning() -> Planning[OwnDeck]:
-    from sandmould.kinds.deck.planning import DeckPlanning
-
-    return DeckPlanning()
-
-
-def _open_execution() -> Execution[OwnDeck]:
-    from sandmould.kinds.deck.execution import DeckExecution
-
-    return DeckExecution()
-
-
 DECK: Kind[OwnDeck] = Kind(
     name="deck",
     scenario=OwnDeck,
     study=DeckStudy,
-    open_planning=_open_planning,
-    open_execution=_open_execution,
+    open_planning=opened_later("sandmould.kinds.deck.planning", "DeckPlanning"),
+    open_execution=opened_later("sandmould.kinds.deck.execution", "DeckExecution"),
     draws_by_lot=True,
 )

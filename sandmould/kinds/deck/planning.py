@@ -9,11 +9,11 @@ from typing import Any
 from sandmould.bad_input import Problem
 from sandmould.digest import SHORT, digest
 from sandmould.engines.registry import engine_module
-from sandmould.kinds.deck.measures import MEASURES
 from sandmould.kinds.deck.own import deck as own_deck
 from sandmould.kinds.deck.own.deck import DECKS
 from sandmould.kinds.deck.speed import DeckSpeed
 from sandmould.kinds.kind import Planning, SpeedClass, UserProgram
+from sandmould.runs.measures import Measure, MeasureGroup
 from sandmould.scenario.own_deck import OwnDeck
 
 
@@ -58,7 +58,13 @@ class DeckPlanning(Planning[OwnDeck]):
     guess = "by expected_core_s, an estimate"
     speed = DeckSpeed()
     program = DeckProgram()
-    measures = MEASURES
+    measures = (
+        MeasureGroup(
+            "as scenario.measures names them",
+            lambda scenario: scenario.measures,
+            (Measure("<measure>", "Column of the engine's log that scenario.measures gives it."),),
+        ),
+    )
     measuring = ("sandmould/kinds/deck/measure.py",)
 
     def resolved(self, scenario: OwnDeck) -> OwnDeck:

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from sandmould.definition.study import CastingStudy, kind_key
-from sandmould.kinds.kind import Execution, Kind, Planning
+from sandmould.kinds.kind import Kind, opened_later
 from sandmould.scenario.casting.flow import MetalFlow
 
 
@@ -21,22 +21,10 @@ class FlowStudy(CastingStudy):
     )
 
 
-def _open_planning() -> Planning[MetalFlow]:
-    from sandmould.kinds.flow.planning import FlowPlanning
-
-    return FlowPlanning()
-
-
-def _open_execution() -> Execution[MetalFlow]:
-    from sandmould.kinds.flow.execution import FlowExecution
-
-    return FlowExecution()
-
-
 FLOW: Kind[MetalFlow] = Kind(
     name="flow",
     scenario=MetalFlow,
     study=FlowStudy,
-    open_planning=_open_planning,
-    open_execution=_open_execution,
+    open_planning=opened_later("sandmould.kinds.flow.planning", "FlowPlanning"),
+    open_execution=opened_later("sandmould.kinds.flow.execution", "FlowExecution"),
 )

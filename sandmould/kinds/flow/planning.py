@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
 from sandmould.bad_input import Problem
-from sandmould.casting.mps import computation, scene
+from sandmould.casting.mps import computation, scene, source_hash
+from sandmould.casting.mps.shoulder import PAPERS, POUR_M_S
 from sandmould.kinds.casting import CastingPlanning
-from sandmould.kinds.flow.limits import limit_problems
-from sandmould.kinds.flow.measures import MEASURES
-from sandmould.kinds.flow.speed import FlowSpeed
 from sandmould.kinds.kind import BASE_MEMORY_MB, Note, SpeedClass
+from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.limits import FRAMES, PARTICLES, RECORDS
+from sandmould.runs.measures import once, read_groups
 from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 PARTICLES_PER_MB = 300
@@ -19,6 +23,29 @@ RECORD_BYTES = 28
 RATES = {2: 1e6, 3: 4e5}
 """Particle-solves a second of one core by dimension: 0.9e6 to 1.4e6 and 4.0e5 on the machine where
 tank_small was first run; fixed, so that a study has the same batches everywhere."""
+TIMED_S = 0.5
+"""For how long metal flows to tell the speed of this machine."""
+
+
+class FlowSpeed(StoredSpeed[MetalFlow]):
+    """See ``StoredSpeed``."""
+
+    def computed_by(self, scenario: MetalFlow) -> str:
+        """What the speed depends on: our code, and the case, which has its dimension."""
+        return f"mps {source_hash()} {scenario.case.kind}"
+
+    def trial(self, scenario: MetalFlow, results: Path) -> float | None:
+        """Particle-solves per second of one core, in the first steps; of a mould that is full."""
+        flow = scene.open_flow(scenario, full=True)
+        with contextlib.suppress(ArithmeticError):
+            flow.step()  # compiled before it is timed
+        before, begun_s = flow.cost.particle_solves, time.process_time()
+        # what a guard stops so early has run for its share of the time
+        with contextlib.suppress(ArithmeticError):
+            while time.process_time() - begun_s < TIMED_S:
+                flow.step()
+        solves = flow.cost.particle_solves - before
+        return solves / (time.process_time() - begun_s) if solves else None
 
 
 class FlowPlanning(CastingPlanning[MetalFlow]):
@@ -27,13 +54,21 @@ class FlowPlanning(CastingPlanning[MetalFlow]):
     work_unit = computation.WORK
     solver = computation
     speed = FlowSpeed()
-    measures = MEASURES
+    measures = read_groups(
+        Path(__file__).with_name("measures.yaml"),
+        {
+            "every flow; from measured_from_s on, where it says so": lambda _: once(),
+            "at a probe, by its name; a flow without own probes has the paper's": lambda scenario: [
+                probe.name for probe in scene.probes_of(scenario)
+            ],
+        },
+    )
     # beside them only files of the solver: with those it is computed again
     measuring = (*CastingPlanning.measuring, "sandmould/kinds/flow/execution.py")
 
     def problems(self, scenario: MetalFlow) -> list[Problem]:
         """What keeps it from being computed, too much of it first: that cannot be laid out."""
-        return [*limit_problems(scenario)] or scene.problems(scenario)
+        return [*_limit_problems(scenario)] or scene.problems(scenario)
 
     def memory_mb(self, scenario: MetalFlow) -> int:
         """Libraries, some 3 kB a particle for its pairs, and the records, held twice at the end."""
@@ -76,3 +111,21 @@ class FlowPlanning(CastingPlanning[MetalFlow]):
             "so before a quarter was poured; with 0.8 they ran to their end."
         )
         return (Note("collisions", text),)
+
+
+def _limit_problems(scenario: MetalFlow) -> Iterator[Problem]:
+    """List what a flow asks too much of, by its sizes and times alone."""
+    case, metal = scenario.case, scenario.metal
+    # divided one by one: a power of a tiny particle is no number
+    side_m = case.particle_m
+    if isinstance(case, StillTank):
+        sites = (case.width_m / side_m) * (case.depth_m / side_m)
+    else:
+        sites = (PAPERS.lower_m / side_m) * (PAPERS.lower_m / side_m) * (PAPERS.height_m / side_m)
+        across = case.rate_kg_s / metal.density_kg_m3 / POUR_M_S / side_m / side_m
+        yield from PARTICLES.problems("case.rate_kg_s", across, case.rate_kg_s)
+    yield from PARTICLES.problems("case.particle_m", sites, side_m)
+    frames = scenario.duration_s / scenario.record_s
+    yield from FRAMES.problems("record_s", frames, scenario.record_s)
+    longest_s = scenario.dt_max_s  # a row of a table each, or more
+    yield from RECORDS.problems("dt_max_s", scenario.duration_s / longest_s, longest_s)

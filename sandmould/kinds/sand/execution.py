@@ -9,13 +9,12 @@ from pathlib import Path
 from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.definition.run import FILL, Run
 from sandmould.engines import recording, registry
-from sandmould.engines.cost import cost_before
 from sandmould.engines.driver import Driver, Opening
+from sandmould.engines.durations import cost_before
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.snapshot_file import close_torn
 from sandmould.kinds.kind import Execution
-from sandmould.kinds.sand.fill_apart import fill_apart
-from sandmould.kinds.sand.shared_fill import lay_fill
+from sandmould.kinds.sand.shared_fill import fill_apart, lay_fill
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.products import SAND_PRODUCTS, Computed, Cost
 from sandmould.scenario.pattern import MeshFile

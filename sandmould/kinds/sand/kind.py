@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from sandmould.definition.study import Study, kind_key
-from sandmould.kinds.kind import Execution, Kind, Planning
+from sandmould.kinds.kind import Kind, opened_later
 from sandmould.scenario.contact import BackgroundDamping, Contact
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.sand import Sand
@@ -33,24 +33,12 @@ class Material(Section):
     )
 
 
-def _open_planning() -> Planning[Scenario]:
-    from sandmould.kinds.sand.planning import SandPlanning
-
-    return SandPlanning()
-
-
-def _open_execution() -> Execution[Scenario]:
-    from sandmould.kinds.sand.execution import SandExecution
-
-    return SandExecution()
-
-
 SAND: Kind[Scenario] = Kind(
     name="sand",
     scenario=Scenario,
     study=SandStudy,
-    open_planning=_open_planning,
-    open_execution=_open_execution,
+    open_planning=opened_later("sandmould.kinds.sand.planning", "SandPlanning"),
+    open_execution=opened_later("sandmould.kinds.sand.execution", "SandExecution"),
     material=Material,
     draws_by_lot=True,
     labels_have_units=False,

@@ -13,12 +13,7 @@ LEAST_GRAINS = 5.0
 
 
 def narrow_spaces(scenario: Scenario) -> dict[str, str]:
-    """What to know of tubes and cavities that are narrow for the grains, by their names.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    """
+    """What to know of tubes and cavities that are narrow for the grains, by their names."""
     largest_m = scenario.sand.classes(scenario.dimension)[-1].diameter_m
     limit_m = LEAST_GRAINS * largest_m
     widths_m = {o.name: o.diameter_m for o in scenario.obstacles if isinstance(o, Tube)}

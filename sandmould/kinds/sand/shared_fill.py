@@ -1,17 +1,18 @@
-"""A run that goes on from the end of a fill that it shares with others."""
+"""A run that goes on from the end of a fill: one that it shares with others, or its own."""
 
 from __future__ import annotations
 
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 from sandmould.definition.run import FILLS, Run
 from sandmould.engines import registry
-from sandmould.engines.cost import cost_before
-from sandmould.engines.durations import run_s
-from sandmould.engines.program import Program
-from sandmould.runs.checkpoint_folders import END_CHECKPOINT
+from sandmould.engines.driver import Driver, Opening
+from sandmould.engines.durations import cost_before, run_s
+from sandmould.engines.program import Program, build_program
+from sandmould.runs import checkpoint_folders as checkpoints
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import SAND_TABLES, Computed
@@ -61,7 +62,7 @@ def _lay(run: Run, folder: Path, program: Program) -> RunOutcome | None:
             detail = f"in the fill {run.fill}, which it shares: {ended.detail}"
             return replace(ended, detail=detail, planned_s=run_s(program))
         lay_checkpoint(
-            fill / END_CHECKPOINT,
+            fill / checkpoints.END_CHECKPOINT,
             work,
             scenario_hash(scenario.before_vibration),
             scenario_hash(scenario),
@@ -72,4 +73,42 @@ def _lay(run: Run, folder: Path, program: Program) -> RunOutcome | None:
     except (OSError, ValueError, KeyError, TypeError) as error:
         why = f"the fill {run.fill} cannot be used ({error}), and the run fills by itself"
         print(f"{run.run}: {why}", file=sys.stderr)
+    return None
+
+
+def fill_apart(run: Run, folder: Path, program: Program, opening: Opening) -> Computed | None:
+    """Compute the fill of a run as a shared fill is computed, and lay its end as a checkpoint.
+
+    So a run ends alike whether it shares its fill or not.
+
+    Parameters
+    ----------
+    run : Run
+        Whose scenario has ``rest.shaken_check_every_s``.
+    folder : Path
+        Of the run.
+    program : Program
+        Of the run's scenario.
+    opening : callable
+        Opens a session.
+
+    Returns
+    -------
+    Computed or None
+        How the run ends where its fill did not finish; None once it may vibrate.
+    """
+    work, run_hash = folder / "work", scenario_hash(run.scenario)
+    newest, _ = checkpoints.newest_checkpoint(work)
+    if newest is not None and newest[1].scenario_hash == run_hash:
+        return None
+    fill = run.scenario.before_vibration
+    driver = Driver(build_program(fill), folder, run.run, scenario_hash(fill), opening, True)
+    ended = driver.run()
+    if ended.outcome is not Outcome.FINISHED:
+        return Computed(replace(ended, planned_s=run_s(program)), driver.cost, driver.is_root)
+    end = work / checkpoints.END_CHECKPOINT
+    checkpoints.seal(end, replace(checkpoints.read_mark(end), scenario_hash=run_hash))
+    for name in ("checkpoint_a", "checkpoint_b"):
+        shutil.rmtree(work / name, ignore_errors=True)
+    end.rename(work / "checkpoint_a")
     return None

@@ -10,7 +10,7 @@ from pydantic import Field
 from sandmould.bad_input import Problem
 from sandmould.definition.study import CastingStudy, kind_key
 from sandmould.definition.sweep import points
-from sandmould.kinds.kind import Execution, Kind, Planning
+from sandmould.kinds.kind import Kind, opened_later
 from sandmould.scenario.casting.solidification import MetalAndMould, Solidification
 
 
@@ -34,23 +34,13 @@ class SolidificationStudy(CastingStudy):
             yield Problem("reference", self.reference, f"a point of the sweep, such as {swept[0]}")
 
 
-def _open_planning() -> Planning[Solidification]:
-    from sandmould.kinds.solidification.planning import SolidificationPlanning
-
-    return SolidificationPlanning()
-
-
-def _open_execution() -> Execution[Solidification]:
-    from sandmould.kinds.solidification.execution import SolidificationExecution
-
-    return SolidificationExecution()
-
-
 SOLIDIFICATION: Kind[Solidification] = Kind(
     name="solidification",
     scenario=Solidification,
     study=SolidificationStudy,
-    open_planning=_open_planning,
-    open_execution=_open_execution,
+    open_planning=opened_later("sandmould.kinds.solidification.planning", "SolidificationPlanning"),
+    open_execution=opened_later(
+        "sandmould.kinds.solidification.execution", "SolidificationExecution"
+    ),
     material=MetalAndMould,
 )

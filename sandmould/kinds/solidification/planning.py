@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
 
 from sandmould.bad_input import Problem
-from sandmould.casting.arpm import computation, scene
+from sandmould.casting.arpm import computation, scene, source_hash
+from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.estimates import least_sand_share
 from sandmould.kinds.casting import CastingPlanning
 from sandmould.kinds.kind import BASE_MEMORY_MB, Note, SpeedClass
-from sandmould.kinds.solidification.limits import limit_problems
-from sandmould.kinds.solidification.measures import MEASURES
 from sandmould.kinds.solidification.notes import notes
-from sandmould.kinds.solidification.speed import SolidificationSpeed
+from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.limits import CELLS, RECORDS
+from sandmould.runs.measures import once, read_groups
 from sandmould.scenario.casting.shapes import with_file_hash
 from sandmould.scenario.casting.solidification import Solidification
 
@@ -24,6 +30,32 @@ RATE = 2e7
 RATE_OF_DIFFERENCES = 1e8
 """Element-steps a second of one core: 1.9e7 and 1.3e8 on the machine where plates_small was first
 run; fixed, so that a study has the same batches everywhere."""
+TIMED_S, STEPS = 0.5, 10
+"""For how long a casting cools to tell the speed of this machine, and the steps between two looks
+at the clock."""
+
+
+class SolidificationSpeed(StoredSpeed[Solidification]):
+    """See ``StoredSpeed``."""
+
+    def computed_by(self, scenario: Solidification) -> str:
+        """What the speed depends on: how heat is exchanged, our code, the dimension."""
+        return f"{scenario.exchange} {source_hash()} {scenario.dimensions}D"
+
+    def trial(self, scenario: Solidification, results: Path) -> float | None:
+        """Element-steps per second of one core, in the first steps of a casting."""
+        try:
+            raster, filling = scene.drawn_raster(scenario), scene.filling_of(scenario)
+            elements = placed(raster, scenario.layers)
+            marching = scene.method_of(scenario).marching(elements, filling, raster)
+            heat = filling.heat(elements)
+            marching.advance(heat, 1e-9)  # compiled before it is timed
+            before, begun_s = heat.element_steps, time.process_time()
+            while time.process_time() - begun_s < TIMED_S:
+                marching.advance(heat, STEPS * marching.step_s)
+        except (ArithmeticError, ValueError):
+            return None
+        return (heat.element_steps - before) / (time.process_time() - begun_s)
 
 
 class SolidificationPlanning(CastingPlanning[Solidification]):
@@ -32,7 +64,14 @@ class SolidificationPlanning(CastingPlanning[Solidification]):
     work_unit = "element-steps"
     solver = computation
     speed = SolidificationSpeed()
-    measures = MEASURES
+    measures = read_groups(
+        Path(__file__).with_name("measures.yaml"),
+        {
+            "every casting": lambda _: once(),
+            "every casting, by axis": lambda scenario: "xyz"[: scenario.dimensions],
+            "with a probe, by its name": lambda scenario: [probe.name for probe in scenario.probes],
+        },
+    )
     measuring = (
         *CastingPlanning.measuring,
         "sandmould/analysis/freezing.py",
@@ -46,7 +85,7 @@ class SolidificationPlanning(CastingPlanning[Solidification]):
 
     def problems(self, scenario: Solidification) -> list[Problem]:
         """What keeps it from being computed, too much of it first: that cannot be laid out."""
-        return [*limit_problems(scenario)] or scene.problems(scenario)
+        return [*_limit_problems(scenario)] or scene.problems(scenario)
 
     def threads(self, scenario: Solidification) -> int:
         """Of one process."""
@@ -90,3 +129,12 @@ class SolidificationPlanning(CastingPlanning[Solidification]):
     def notes(self, scenario: Solidification) -> Sequence[Note]:
         """What elements and box make of the casting."""
         return notes(scenario)
+
+
+def _limit_problems(scenario: Solidification) -> Iterator[Problem]:
+    """List what a casting asks too much of, by its sizes and times alone."""
+    sides_m = np.subtract(scenario.box.high_m, scenario.box.low_m)
+    cells = math.prod((sides_m / scenario.element_m).tolist())
+    yield from CELLS.problems("element_m", cells, scenario.element_m)
+    records = scenario.until_s / scenario.record_s
+    yield from RECORDS.problems("record_s", records, scenario.record_s)

@@ -1,49 +1,349 @@
-"""What the report of a study of flow says and shows of its own."""
+"""What the report of a study of flow says and shows of its own.
+
+A stability map, noise, histories, fields and films.
+"""
 
 from __future__ import annotations
 
-from sandmould.casting.mps.scene import scheme_of
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from sandmould.analysis.flow_plots import draw_frame, frame_of
+from sandmould.casting.mps import scene
+from sandmould.casting.mps.scheme import G_M_S2
+from sandmould.casting.mps.shoulder import HOP_SPEED_M_S, PAPERS
+from sandmould.casting.mps.stability_measures import NOISE_WINDOW_S, QUIET_PA, StabilityRating
+from sandmould.drawing.animation import evenly
 from sandmould.drawing.figure_files import numbered, pictures
-from sandmould.report.flow import flow_method, flow_pages
+from sandmould.drawing.figures import png
+from sandmould.drawing.flow_film import SHADES, make_flow_film
+from sandmould.report.flow_charts import (
+    condition_text,
+    pressure_history,
+    said_of,
+    stability_map,
+)
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
-from sandmould.scenario.casting.flow import MetalFlow, StillTank
+from sandmould.report.method import Row
+from sandmould.report.next_steps import NextStep
+from sandmould.report.sureness import Ground
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.time_series import measure_curves
+from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
+from sandmould.runs.formatting import listed, name_of, number, setting_text
+from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
 
+PICTURED_RUNS = 6
+"""Runs whose histories and fields are drawn."""
+FILMED = 2
+COLOURS = tuple(to_hex(colormaps["viridis"](shade / SHADES)) for shade in range(SHADES + 1))
 
-class FlowReport(KindReport[MetalFlow]):
-    """See ``KindReport``."""
 
-    def notes(
-        self, scenario: MetalFlow, collected: Collected, seeks_best: bool, is_controlled: bool
-    ) -> tuple[str, ...]:
-        """What the paper leaves open."""
-        gradient = (
-            "The gradient as printed, eq. (3), points the wrong way and makes every run fail. The "
-            f"gradient used here, {scheme_of(scenario).gradient}, is a choice."
-        )
-        if isinstance(scenario.case, StillTank):
-            return (gradient,)
-        return (
-            gradient,
-            "The paper gives neither the particle size in space nor the speed of the stream.",
-        )
+@dataclass(frozen=True)
+class _PicturedRun:
+    """A run that is drawn."""
 
-    def pages(self, findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
-        """See ``KindPages``."""
-        scenario, of_sweep = findings.scenario, findings.collected.of_sweep
-        pages = flow_pages(
-            findings.study_folder, scenario, of_sweep, findings.verdict, film_budget_bytes
+    run: str
+    label: str
+    folder: Path
+    verdict: str
+
+
+def _notes(
+    scenario: MetalFlow, collected: Collected, seeks_best: bool, is_controlled: bool
+) -> tuple[str, ...]:
+    """What the paper leaves open."""
+    gradient = (
+        "The gradient as printed, eq. (3), points the wrong way and makes every run fail. The "
+        f"gradient used here, {scene.scheme_of(scenario).gradient}, is a choice."
+    )
+    if isinstance(scenario.case, StillTank):
+        return (gradient,)
+    return (
+        gradient,
+        "The paper gives neither the particle size in space nor the speed of the stream.",
+    )
+
+
+def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
+    """Map, noise, histories, fields and films; the calmest runs first."""
+    scenario, collected = findings.scenario, findings.collected.of_sweep
+    keys = collected.keys
+    ranked = _ranked(scenario, collected.summary)
+    pictured = _pictured_runs(ranked, keys, findings.study_folder)
+    ideal_pa = scene.ideal_pa(scenario, scene.fluid_of(scenario))
+    highest_pa = max(ideal_pa.values())
+    filmed = [pictured[0], pictured[-1]][: min(FILMED, len(pictured))] if pictured else []
+    hopping = _hopping(scenario, ranked, keys)
+    measures = [*(f"{name}_pa" for name in ideal_pa), "largest_speed_m_s"]
+    stable = stability_map(ranked, keys)
+    fields = _fields(pictured, highest_pa)
+    histories = [pressure_history(run.folder, run.label, run.verdict, ideal_pa) for run in pictured]
+    films = [
+        make_flow_film(
+            _load(run.folder), run.run, f"{run.label}: {run.verdict}", highest_pa,
+            film_budget_bytes // len(filmed),
         )
-        return KindPages(
-            "flow.html",
-            flow_method(scenario, findings.collected.keys),
-            "the end of the run",
-            {"pages": pages},
-            {
-                **pictures(stability_map=pages.map, fields=pages.fields),
-                **numbered("histories", (history.chart for history in pages.histories)),
-            },
-            answer=pages.answer,
-            grounds=pages.grounds,
-            steps=pages.steps,
+        for run in filmed
+    ]  # fmt: skip
+    shown = {
+        "map": stable,
+        "sentences": (*_sentences(scenario, ranked, ideal_pa), *hopping),
+        "noise": _noise(scenario, ranked, keys),
+        "histories": histories,
+        "fields": fields,
+        "films": films,
+        "colours": COLOURS,
+        "curves": measure_curves(collected, findings.verdict, measures, lambda *_: ""),
+        "pours": not isinstance(scenario.case, StillTank),
+    }
+    return KindPages(
+        "flow.html",
+        _method(scenario, keys),
+        context={"pages": shown},
+        figures={
+            **pictures(stability_map=stable, fields=fields),
+            **numbered("histories", (history.chart for history in histories)),
+        },
+        answer=next(iter(hopping), "") or _calm(scenario, ranked, keys),
+        grounds=_grounds(scenario),
+        steps=_steps(scenario, ranked),
+    )
+
+
+def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
+    """Runs that ended: excellent, good and failed, the calmest of each first."""
+    order = {stability.value: place for place, stability in enumerate(StabilityRating)}
+    table = summary.copy()
+    for column in (CLASSIFICATION, f"{scene.deepest(scenario)}_sd_pa"):
+        if column not in table:
+            table[column] = np.nan
+    # a run that a guard stopped while it poured has no row of measures
+    table[CLASSIFICATION] = table[CLASSIFICATION].fillna(StabilityRating.FAILED.value)
+    table = table[table[OUTCOME_CODE].notna()]
+    return table.assign(rank=table[CLASSIFICATION].map(order)).sort_values(
+        ["rank", f"{scene.deepest(scenario)}_sd_pa"], kind="stable"
+    )
+
+
+def _pictured_runs(
+    ranked: pd.DataFrame, keys: Sequence[str], study_folder: Path
+) -> list[_PicturedRun]:
+    """Runs that left fields, evenly from the calmest to the worst."""
+    drawable = []
+    for _, row in ranked.iterrows():
+        folder = study_folder / "runs" / str(row[RUN])
+        if (folder / "fields.npz").is_file():
+            label = condition_text({key: row[key] for key in keys})
+            drawable.append(_PicturedRun(folder.name, label, folder, str(row[CLASSIFICATION])))
+    return [drawable[place] for place in evenly(len(drawable), PICTURED_RUNS).tolist()]
+
+
+def _load(folder: Path) -> dict[str, NDArray[np.float64]]:
+    with np.load(folder / "fields.npz", allow_pickle=False) as archive:
+        return dict(archive)
+
+
+def _sentences(
+    scenario: MetalFlow, ranked: pd.DataFrame, ideal_pa: dict[str, float]
+) -> tuple[str, ...]:
+    """How many settings hold, and how far their pressure is from rho g h."""
+    counts = ranked[CLASSIFICATION].value_counts()
+    parts = [f"{counts.get(s.value, 0)} {s.value}" for s in StabilityRating]
+    said = [f"By the rule of figure 6: {listed(parts)}, of {len(ranked)} runs."]
+    name = scene.deepest(scenario)
+    errors = pd.to_numeric(ranked[f"{name}_error_pa"], errors="coerce").dropna() if (
+        f"{name}_error_pa" in ranked) else pd.Series(dtype=float)  # fmt: skip
+    if len(errors):
+        share = 100.0 / ideal_pa[name]
+        said.append(
+            f"The hydrostatic pressure at {name} is {number(ideal_pa[name], 4)} Pa; the means of "
+            f"runs that held are {number(share * errors.min(), 2)} to "
+            f"{number(share * errors.max(), 2)} % off it."
         )
+        calm = (pd.to_numeric(ranked[f"{name}_window_sd_pa"]) < QUIET_PA).sum()
+        said.append(
+            "A run is judged by how much the pressure of single steps deviates. Of means over "
+            f"{1e3 * NOISE_WINDOW_S:g} ms it deviates by less than {QUIET_PA:g} "
+            f"Pa in {calm} of {len(ranked)} runs. The paper does not say which of both it means."
+        )
+    return tuple(said)
+
+
+def _calm(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> str:
+    """At which settings the pressure stays calm, the calmest first."""
+    if ranked.empty:
+        return "Not resolved: no run finished."
+    labels = [setting_text({key: row[key] for key in keys}) for _, row in ranked.iterrows()]
+    verdicts = list(ranked[CLASSIFICATION])
+    # the calmest come first
+    calm = labels[: verdicts.count(StabilityRating.EXCELLENT.value)]
+    stopped = verdicts.count(StabilityRating.FAILED.value)
+    noise_pa = float(pd.to_numeric(ranked[f"{scene.deepest(scenario)}_sd_pa"]).iloc[0])
+    broke = f" {stopped} of {len(labels)} runs broke down." if stopped else ""
+    if not calm:
+        return f"The pressure stays calm at none of {len(labels)} settings.{broke}"
+    where = "all" if len(calm) == len(labels) else f"{len(calm)} of {len(labels)}"
+    return (
+        f"The pressure stays calm at {where} settings, calmest at {calm[0]}: it deviates by "
+        f"{number(noise_pa, 2)} Pa there.{broke}"
+    )
+
+
+def _steps(scenario: MetalFlow, ranked: pd.DataFrame) -> tuple[NextStep, ...]:
+    """What a calm or restless tank asks for."""
+    if not isinstance(scenario.case, StillTank):
+        return ()
+    if (ranked[CLASSIFICATION] == StabilityRating.EXCELLENT.value).any():
+        return (NextStep("Pour with the calm setting: the study shoulder_pour shows how."),)
+    return (NextStep("Try more relaxations, a smaller c_poi (source_share) or a smaller step."),)
+
+
+def _grounds(scenario: MetalFlow) -> tuple[Ground, ...]:
+    """What calm means, and what the answer rests on."""
+    name = scene.deepest(scenario)
+    return (
+        Ground(
+            "Calm",
+            f"the pressure at {name} deviates by less than {QUIET_PA:g} Pa (standard "
+            "deviation), and no metal hops.",
+        ),
+        Ground("Chance", "nothing in these runs is left to it: one run of each setting is enough."),
+        Ground(
+            "Method",
+            "the gradient as the paper prints it makes every run fail; another one, "
+            f"{scene.scheme_of(scenario).gradient}, is used instead.",
+        ),
+    )
+
+
+def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> tuple[str, ...]:
+    """Where metal of a casting hops, and where it does not."""
+    if isinstance(scenario.case, StillTank) or HOPS not in ranked:
+        return ()
+    ended = ranked[ranked[CLASSIFICATION] != StabilityRating.FAILED.value]
+    parts = []
+    for hops, verb in ((1, "hops"), (0, "does not hop")):
+        own = ended[ended[HOPS] == hops]
+        where = [condition_text({key: row[key] for key in keys}) for _, row in own.iterrows()]
+        if where:
+            parts.append(f"it {verb} at {listed(where, most=6)}")
+    sentence = f"When the casting is full, metal that rises faster than {HOP_SPEED_M_S:g} m/s hops"
+    return (f"{sentence}: {'; '.join(parts)}.",) if parts else ()
+
+
+def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Table:
+    """Every run with its verdict, pressures and speeds, beside what the paper says."""
+    names = [probe.name for probe in scene.probes_of(scenario)]
+    deepest = scene.deepest(scenario)
+    is_papers = scenario.case == StillTank() and scenario.metal == PouredMetal()
+    said = [
+        said_of({key: row[key] for key in keys}) if is_papers else ""
+        for _, row in ranked.iterrows()
+    ]
+    columns = [Column("setting", False), Column("verdict", False)]
+    value_columns: list[tuple[str, int]] = []
+    for name in names:
+        columns += [Column(f"{name}: mean, Pa"), Column(f"{name}: deviation, Pa")]
+        value_columns += [(f"{name}_mean_pa", 4), (f"{name}_sd_pa", 3)]
+    window = f"{name_of(deepest)}: deviation of {1e3 * NOISE_WINDOW_S:g} ms means, Pa"
+    columns += [Column(window), Column("fastest, m/s"), Column("mean speed, m/s")]
+    value_columns += [
+        (f"{deepest}_window_sd_pa", 3),
+        ("peak_speed_m_s", 2),
+        ("average_speed_m_s", 2),
+    ]
+    if any(said):
+        columns.append(Column("paper's text", False))
+    rows = []
+    for (_, row), text in zip(ranked.iterrows(), said, strict=True):
+        label = condition_text({key: row[key] for key in keys})
+        note = str(row[DETAIL]) if str(row[DETAIL]) != "nan" else ""
+        cells = [Cell(label, label), Cell(str(row[CLASSIFICATION]), str(row["rank"]), note=note)]
+        values = [float(row.get(column, np.nan)) for column, _ in value_columns]
+        cells += [
+            Cell(number(value, digits), str(value))
+            for value, (_, digits) in zip(values, value_columns, strict=True)
+        ]
+        rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
+    failed = tuple(c == StabilityRating.FAILED.value for c in ranked[CLASSIFICATION])
+    return Table(tuple(columns), tuple(rows), failed)
+
+
+def _fields(runs: Sequence[_PicturedRun], highest_pa: float) -> str:
+    """Pressure over the particles at the end of each run, as the paper's figures 3 and 8."""
+    if not runs:
+        return ""
+    figure, panels = _grid(len(runs), 4.2)
+    for axes, run in zip(panels, runs, strict=False):
+        fields = _load(run.folder)
+        last = frame_of(fields, len(fields["count"]) - 1)
+        discs = draw_frame(fields, last, axes, highest_pa)
+        heading = f"{run.label}\n{run.verdict}, {last.time_s:.3g} s"
+        axes.set_title(heading, fontsize=8, parse_math=False)
+        axes.tick_params(labelsize=8)
+    figure.colorbar(discs, ax=panels, label="pressure, Pa", shrink=0.6, extend="max")
+    return png(figure)
+
+
+def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
+    """A figure of so many panels, three in a row."""
+    across = min(count, 3)
+    rows = -(-count // across)
+    figure = Figure(
+        figsize=(1.0 + 3.4 * across, height * rows + 0.6), dpi=100, layout="constrained"
+    )
+    panels = figure.subplots(rows, across, squeeze=False).ravel()
+    for axes in panels[count:]:
+        axes.set_axis_off()
+    return figure, list(panels[:count])
+
+
+def _collisions(scenario: MetalFlow, keys: Sequence[str]) -> str:
+    """Whether particles that come too near collide."""
+    if "collision_distance" in keys:
+        return "collisions as swept"
+    near = scenario.collision_distance
+    return f"particles nearer than {near:g} of their size collide" if near else "no collisions"
+
+
+def _method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Row, ...]:
+    """How the runs were computed; see ``sand_method``."""
+    case, metal, scheme = scenario.case, scenario.metal, scene.scheme_of(scenario)
+    size_mm = 1e3 * case.particle_m
+    if isinstance(case, StillTank):
+        where = (f"metal at rest in a tank, {1e3 * case.width_m:g} mm wide and "
+                 f"{1e3 * case.depth_m:g} mm deep, in two dimensions")  # fmt: skip
+    else:
+        where = (f"a cylinder {1e3 * PAPERS.height_m:g} mm high, {1e3 * PAPERS.lower_m:g} mm "
+                 f"wide below and {1e3 * PAPERS.upper_m:g} mm above, poured at "
+                 f"{1e3 * case.rate_kg_s:g} g/s")  # fmt: skip
+    return (
+        Row("Method", "moving particles, semi-implicit (MPS), with the improved multiple "
+            "relaxation of Hirata and Anzai (2017)"),
+        Row("Case", f"{where}; particles of {size_mm:g} mm"),
+        Row("Metal", f"{metal.density_kg_m3:g} kg/m³, {metal.viscosity_m2_s:g} m²/s; gravity "
+            f"{G_M_S2:g} m/s²"),
+        Row("Scheme", f"source {scheme.source}, gradient {scheme.gradient}, "
+            f"Laplacian {scheme.laplacian}, surface below {scheme.surface:g} of the full "
+            f"number density, Courant number {scheme.courant:g}; Poisson equation to "
+            f"{scheme.tolerance:g}; {_collisions(scenario, keys)}"),
+        Row("Measures", f"from {scenario.measured_from_s:g} to {scenario.duration_s:g} s, at the "
+            "particle nearest to each probe; excellent: deviation at the deepest probe below "
+            f"{QUIET_PA:g} Pa and no hopping; good: the run ends; failed: a guard stops "
+            "it"),
+        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
+    )  # fmt: skip
+
+
+REPORT = KindReport(_pages, _notes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic
@@ -13,9 +13,9 @@ from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart
 from sandmould.kinds.kind import ScenarioT
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.heaps import Heap
 from sandmould.report.method import Row
 from sandmould.report.next_steps import NextStep
+from sandmould.report.repose_figures import Heap
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sureness import Ground
 from sandmould.scenario.drive import BoxDrive
@@ -71,48 +71,20 @@ class Findings(Generic[ScenarioT]):
         return {label: scenario for label, (scenario, _) in self.by_setting.items()}
 
 
-class KindReport(Generic[ScenarioT]):
+@dataclass(frozen=True)
+class KindReport:
     """What reports of one kind of study say and show of their own: nothing, unless it says so."""
 
-    def pages(self, findings: Findings[ScenarioT], film_budget_bytes: int) -> KindPages:
-        """What it draws.
-
-        Parameters
-        ----------
-        findings : Findings
-        film_budget_bytes : int
-            Most that the film of one run may weigh.
-        """
-        return KindPages()
-
-    def notes(
-        self, scenario: ScenarioT, collected: Collected, seeks_best: bool, is_controlled: bool
-    ) -> tuple[str, ...]:
-        """What the simulation leaves open.
-
-        Parameters
-        ----------
-        scenario : scenario of the kind
-        collected : Collected
-        seeks_best, is_controlled : bool
-            Whether the study looks for the best setting; whether its controls have been run.
-        """
-        return ()
-
-    def drive(self, scenario: ScenarioT, runs: pd.DataFrame) -> BoxDrive | None:
-        """Drive of the vibrating table at a setting; parameters are those of ``drive_of``."""
-        return None
-
-    def robustness(self, findings: Findings[ScenarioT]) -> RobustnessPages | None:
-        """What its controls say."""
-        return None
-
-    def mode(self, findings: Findings[ScenarioT]) -> BedMode | None:
-        """First mode of the bed, for a frequency."""
-        return None
-
-    def heaps(
-        self, study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: ScenarioT
-    ) -> tuple[Heap, ...]:
-        """Pictures of what was measured; parameters are those of ``steepest_heaps``."""
-        return ()
+    pages: Callable[[Findings[Any], int], KindPages] = lambda *_: KindPages()
+    """What it draws; the film of one run may weigh so many bytes."""
+    notes: Callable[[Any, Collected, bool, bool], tuple[str, ...]] = lambda *_: ()
+    """What the simulation of a scenario leaves open, whether or not the study looks for the best
+    setting, and whether or not its controls have been run."""
+    drive: Callable[[Any, pd.DataFrame], BoxDrive | None] = lambda *_: None
+    """Drive of the vibrating table at a setting, as ``drive_of``."""
+    robustness: Callable[[Findings[Any]], RobustnessPages | None] = lambda _: None
+    """What its controls say."""
+    mode: Callable[[Findings[Any]], BedMode | None] = lambda _: None
+    """First mode of the bed, for a frequency."""
+    heaps: Callable[[Path, pd.DataFrame, Verdict, Any], tuple[Heap, ...]] = lambda *_: ()
+    """Pictures of what was measured, as ``steepest_heaps``."""

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from sandmould.kinds.kind import ScenarioT
+from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_of
-from sandmould.report.kinds.deck import DeckReport
-from sandmould.report.kinds.flow import FlowReport
+from sandmould.report.kinds import deck, flow, sand, solidification
 from sandmould.report.kinds.kind import KindReport
-from sandmould.report.kinds.sand import SandReport
-from sandmould.report.kinds.solidification import SolidificationReport
 
-REPORTS: dict[str, KindReport[Any]] = {
-    "sand": SandReport(),
-    "deck": DeckReport(),
-    "solidification": SolidificationReport(),
-    "flow": FlowReport(),
+REPORTS: dict[str, KindReport] = {
+    "sand": sand.REPORT,
+    "deck": deck.REPORT,
+    "solidification": solidification.REPORT,
+    "flow": flow.REPORT,
 }
 """The part of a report by the name of its kind."""
 
 
-def report_of(scenario: ScenarioT) -> KindReport[ScenarioT]:
+def report_of(scenario: AnyScenario) -> KindReport:
     """The part of a report that depends on the kind of a scenario."""
     return REPORTS[kind_of(scenario).name]

@@ -2,105 +2,78 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pandas as pd
 
 from sandmould.drawing.chart import Chart
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.kinds.sand.hardness_text import softness_warning
-from sandmould.report.bed_mode import BedMode, bed_mode
+from sandmould.report.bed_mode import bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
-from sandmould.report.hard_limit_text import hard_limit_text
-from sandmould.report.heaps import Heap, steepest_heaps
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
-from sandmould.report.loose_sand import LooseSandPages, loose_sand_pages
+from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
-from sandmould.report.robustness import RobustnessPages, robustness_pages
-from sandmould.report.sand import SandPages, sand_pages
+from sandmould.report.repose_figures import steepest_heaps
+from sandmould.report.robustness import robustness_pages
+from sandmould.report.sand import sand_pages
 from sandmould.report.sureness import sand_grounds, weak_ground
 from sandmould.report.time_series import curve_figures
 from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, TIME_STEP_S, finished
 from sandmould.runs.formatting import number
-from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import Verdict, sand_notes
+from sandmould.statistics.verdict import sand_notes
 from sandmould.study.collect import Collected
 
-if TYPE_CHECKING:
-    from sandmould.report.bending import BendingPages
+
+def _notes(
+    scenario: Scenario, collected: Collected, seeks_best: bool, is_controlled: bool
+) -> tuple[str, ...]:
+    """Steps that were too long, and what the drive and its controls leave open."""
+    stage = scenario.vibrations[0] if scenario.vibrations else None
+    notes = sand_notes(collected.keys, stage, seeks_best, is_controlled)
+    return (*_steps_above_limit(collected.summary), *notes)
 
 
-class SandReport(KindReport[Scenario]):
-    """See ``KindReport``."""
+def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
+    """See ``KindPages``."""
+    folder, study, scenario = findings.study_folder, findings.study, findings.scenario
+    collected, verdict = findings.collected, findings.verdict
+    of_sweep = collected.of_sweep
+    filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
+    own, href = study.own_measures, findings.href
+    pages = sand_pages(folder, scenario, of_sweep, verdict, film_budget_bytes, href, own)
+    run = pages["pictured_run"]
+    bending = None
+    if scenario.pattern is not None:
+        from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
 
-    def notes(
-        self, scenario: Scenario, collected: Collected, seeks_best: bool, is_controlled: bool
-    ) -> tuple[str, ...]:
-        """Steps that were too long, and what the drive and its controls leave open."""
-        stage = scenario.vibrations[0] if scenario.vibrations else None
-        notes = sand_notes(collected.keys, stage, seeks_best, is_controlled)
-        return (*_steps_above_limit(collected.summary), *notes)
-
-    def pages(self, findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
-        """See ``KindPages``."""
-        folder, study, scenario = findings.study_folder, findings.study, findings.scenario
-        collected, verdict = findings.collected, findings.verdict
-        of_sweep = collected.of_sweep
-        filling = filling_pages(study, of_sweep, verdict, scenario) if study.seeks_best else None
-        own, href = study.own_measures, findings.href
-        pages = sand_pages(folder, scenario, of_sweep, verdict, film_budget_bytes, href, own)
-        bending = None
-        if scenario.pattern is not None:
-            from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
-
-            bending = bending_pages(folder, href, scenario, of_sweep, verdict, pages.pictured_run)
-        loose = loose_sand_pages(folder, pages.pictured_run, of_sweep.summary, scenario)
-        limit = hard_limit_text(verdict, collected.keys, findings.scenarios)
-        return KindPages(
-            "sand.html",
-            sand_method(scenario, collected.keys, collected.summary),
-            measured_when(scenario),
-            {
-                "pages": pages,
-                "bending": bending,
-                "loose": loose,
-                "dimension": scenario.dimension,
-                "vibrates": bool(scenario.vibrations),
-                "ends_at_rest": scenario.ends_at_rest,
-                "filling": filling,
-            },
-            _sand_figures(pages, filling, bending, loose),
-            pages.beside,
-            advice=(*(filling.advice if filling else ()), *filter(None, [limit])),
-            grounds=(
-                *sand_grounds(scenario, study, verdict),
-                *weak_ground(findings.scenarios),
-            ),
-            warning=_softness(scenario, of_sweep.summary),
-        )
-
-    def drive(self, scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
-        """That of the first vibration."""
-        return drive_of(scenario, runs)
-
-    def robustness(self, findings: Findings[Scenario]) -> RobustnessPages | None:
-        """What the controls of an optimum say."""
-        f = findings
-        return robustness_pages(f.study_folder, f.study, f.collected, f.scenario)
-
-    def mode(self, findings: Findings[Scenario]) -> BedMode | None:
-        """That of the filled bed."""
-        return bed_mode(findings.scenario, findings.collected.of_sweep.summary)
-
-    def heaps(
-        self, study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: Scenario
-    ) -> tuple[Heap, ...]:
-        """The steepest of each setting."""
-        return steepest_heaps(study_folder, summary, verdict, scenario)
+        bending = bending_pages(folder, href, scenario, of_sweep, verdict, run)
+    loose = loose_sand_pages(folder, run, of_sweep.summary, scenario)
+    return KindPages(
+        "sand.html",
+        sand_method(scenario, collected.keys, collected.summary),
+        measured_when(scenario),
+        {
+            "pages": pages,
+            "bending": bending,
+            "loose": loose,
+            "dimension": scenario.dimension,
+            "vibrates": bool(scenario.vibrations),
+            "ends_at_rest": scenario.ends_at_rest,
+            "filling": filling,
+        },
+        _sand_figures(pages, filling, bending, loose is not None),
+        pages["beside"],
+        advice=filling.advice if filling else (),
+        grounds=(
+            *sand_grounds(scenario, study, verdict),
+            *weak_ground(findings.scenarios),
+        ),
+        warning=_softness(scenario, of_sweep.summary),
+    )
 
 
 def _steps_above_limit(summary: pd.DataFrame) -> tuple[str, ...]:
@@ -127,21 +100,32 @@ def _softness(scenario: Scenario, summary: pd.DataFrame) -> str:
 
 
 def _sand_figures(
-    pages: SandPages,
+    pages: dict[str, Any],
     filling: FillingPages | None,
-    bending: BendingPages | None,
-    loose: LooseSandPages | None,
+    bending: dict[str, Any] | None,
+    has_loose: bool,
 ) -> dict[str, Chart | bytes]:
     """The sand at its moments, the pattern, filling over what is swept, and over time."""
     files: dict[str, Chart | bytes] = {}
-    if pages.panels:
-        files["sand"] = strip([(panel.heading, panel.by_layer) for panel in pages.panels])
-    if pages.panels and loose:
-        files["density"] = strip([(panel.heading, panel.by_density) for panel in pages.panels])
+    panels = pages["panels"]
+    if panels:
+        files["sand"] = strip([(panel["heading"], panel["by_layer"]) for panel in panels])
+    if panels and has_loose:
+        files["density"] = strip([(panel["heading"], panel["by_density"]) for panel in panels])
     if filling and filling.chart:
         files["filling"] = filling.chart
     if bending:
-        files |= pictures(pattern=bending.outlines)
-    if bending and bending.deflection:
-        files["deflection"] = bending.deflection
-    return files | curve_figures(pages.tubes)
+        files |= pictures(pattern=bending["outlines"])
+    if bending and bending["deflection"]:
+        files["deflection"] = bending["deflection"]
+    return files | curve_figures(pages["tubes"])
+
+
+REPORT = KindReport(
+    _pages,
+    _notes,
+    drive_of,
+    lambda of: robustness_pages(of.study_folder, of.study, of.collected, of.scenario),
+    lambda of: bed_mode(of.scenario, of.collected.of_sweep.summary),
+    steepest_heaps,
+)

@@ -1,55 +1,103 @@
-"""What the report of a study of solidification says and shows of its own."""
+"""What the report of a study of solidification says and shows of its own.
+
+Fields, cooling curves, error and cost.
+"""
 
 from __future__ import annotations
 
-import pandas as pd
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from sandmould.analysis.freezing import freezing
+from sandmould.analysis.freezing_plots import draw_freezing, draw_temperature
+from sandmould.definition.sweep import Point
+from sandmould.drawing.chart import Chart, Mark, tints
 from sandmould.drawing.figure_files import numbered, pictures
+from sandmould.drawing.figures import png
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.method import Row
 from sandmould.report.next_steps import NextStep
-from sandmould.report.solidification import choose_pictured_run, solid_method, solid_pages
-from sandmould.report.time_series import curve_figures
-from sandmould.scenario.casting.solidification import Solidification
+from sandmould.report.sureness import Ground
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.time_series import curve_figures, measure_curves
+from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
+from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
+from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
 from sandmould.statistics.verdict import Verdict, rank_runs
 from sandmould.study.collect import Collected
+from sandmould.study.plan.plan_files import read_run
+
+NEAR_PERCENT = 5.0
+"""Off the reference's solidification time: as near as the answer takes for good."""
+STAND_IN = "stand-in"
+"""How the source of a value begins that is not what it stands for."""
 
 
-class SolidificationReport(KindReport[Solidification]):
-    """See ``KindReport``."""
+@dataclass(frozen=True)
+class _Error:
+    """How far one run is from the reference."""
 
-    def notes(
-        self, scenario: Solidification, collected: Collected, seeks_best: bool, is_controlled: bool
-    ) -> tuple[str, ...]:
-        """What two dimensions leave out."""
-        flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
-        return (flat,) if scenario.dimensions == 2 else ()
+    label: str
+    cpu_s: float
+    time_percent: float
+    curve_percent: float
+    """Error (7) of the worst probe, % of the initial difference; NaN without probes."""
 
-    def pages(self, findings: Findings[Solidification], film_budget_bytes: int) -> KindPages:
-        """See ``KindPages``."""
-        study, scenario, verdict = findings.study, findings.scenario, findings.verdict
-        of_sweep, keys = findings.collected.of_sweep, findings.collected.keys
-        # A study whose file is missing is read as one of sand.
-        reference = study.reference if isinstance(study, SolidificationStudy) else {}
-        best = _run_of(of_sweep.summary, verdict) if study.seeks_best else ""
-        pictured_run = choose_pictured_run(reference, of_sweep, best)
-        pages = solid_pages(
-            findings.study_folder, reference, scenario, of_sweep, verdict, pictured_run
-        )
-        return KindPages(
-            "solidification.html",
-            solid_method(scenario, keys),
-            "the end of the run",
-            {"pages": pages},
-            {
-                **pictures(fields=pages.fields),
-                **numbered("error_cost", pages.error_cost),
-                **curve_figures(pages.curves),
-            },
-            answer="" if study.seeks_best else pages.answer,
-            grounds=pages.grounds,
-            steps=_steps(scenario, bool(pages.reference)),
-        )
+
+def _notes(
+    scenario: Solidification, collected: Collected, seeks_best: bool, is_controlled: bool
+) -> tuple[str, ...]:
+    """What two dimensions leave out."""
+    flat = "Two dimensions: heat that leaves a casting across the plane is not counted."
+    return (flat,) if scenario.dimensions == 2 else ()
+
+
+def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPages:
+    """Fields, cooling curves, error and cost."""
+    study, scenario, verdict = findings.study, findings.scenario, findings.verdict
+    collected, keys = findings.collected.of_sweep, findings.collected.keys
+    # A study whose file is missing is read as one of sand.
+    reference = study.reference if isinstance(study, SolidificationStudy) else {}
+    best = _run_of(collected.summary, verdict) if study.seeks_best else ""
+    run = _pictured_run(reference, collected, best)
+    folder = findings.study_folder / "runs" / run
+    probes = [f"{probe.name}_k" for probe in scenario.probes]
+    curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"], lambda *_: "")
+    fields, sentences, spots = _fields(folder, scenario)
+    errors = _errors(reference, scenario, collected) if reference else []
+    error_cost = _error_charts(errors)
+    stand_ins = _stand_ins(folder / "scenario.yaml")
+    answer = _cheapest(errors, reference, collected) or sentences[0]
+    shown = {
+        "pictured_run": run,
+        "fields": fields,
+        "sentences": (*sentences, *stand_ins),
+        "spots": spots,
+        "curves": curves,
+        "reference": setting_text(reference) if reference else "",
+        "error_cost": error_cost,
+        "errors": _error_table(errors) if errors else None,
+    }
+    return KindPages(
+        "solidification.html",
+        _method(scenario, keys),
+        context={"pages": shown},
+        figures={
+            **pictures(fields=fields),
+            **numbered("error_cost", error_cost),
+            **curve_figures(curves),
+        },
+        answer="" if study.seeks_best else answer,
+        grounds=_grounds(bool(stand_ins), scenario),
+        steps=_steps(scenario, bool(reference)),
+    )
 
 
 def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...]:
@@ -64,3 +112,202 @@ def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...
 def _run_of(summary: pd.DataFrame, verdict: Verdict) -> str:
     """The best run of the objective; empty where none finished."""
     return rank_runs(summary, verdict.measure, verdict.better).get("best", "")
+
+
+def _stand_ins(path: Path) -> tuple[str, ...]:
+    """Which values are not what they stand for, by their sources."""
+    sources = read_run(path).sources if path.is_file() else {}
+    keys = [key for key, source in sources.items() if source.startswith(STAND_IN)]
+    if not keys:
+        return ()
+    names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
+    return (f"Stand-ins by their sources, so that times are those of no real casting: "
+            f"{listed(names, most=20)}.",)  # fmt: skip
+
+
+def _grounds(has_stand_ins: bool, scenario: Solidification) -> tuple[Ground, ...]:
+    """What the answer rests on."""
+    values = (
+        "some are stand-ins, so that the times are those of no real casting."
+        if has_stand_ins
+        else "those of the study's sources."
+    )
+    flat = "two dimensions: heat that leaves across the plane is not counted."
+    return (
+        Ground("Material values", values),
+        Ground("Chance", "nothing in these runs is left to it: one run of each setting is enough."),
+        *([Ground("Shape", flat)] if scenario.dimensions == 2 else []),
+    )
+
+
+def _pictured_run(reference: Point, collected: Collected, best: str) -> str:
+    """Run whose fields are shown: the best, else the reference, else the first that finished."""
+    done = collected.summary[finished(collected.summary)]
+    runs = [best, *_of_point(done, reference)[RUN].astype(str), *done[RUN].astype(str)]
+    return next((run for run in runs if run), "")
+
+
+def _of_point(summary: pd.DataFrame, reference: Point) -> pd.DataFrame:
+    """Rows of the reference; swept values are as ``runs.tsv`` has them."""
+    chosen = np.ones(len(summary), dtype=bool)
+    for key, value in reference.items():
+        kind = float if is_number(value) else str
+        chosen &= (summary[key].astype(kind) == kind(value)).to_numpy()
+    return summary[chosen]
+
+
+def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...], Table | None]:
+    """Picture of a run's fields, what it says in words, and its hot spots."""
+    if not (folder / "fields.npz").is_file():
+        return "", ("No run has left fields.",), None
+    with np.load(folder / "fields.npz", allow_pickle=False) as file:
+        fields = dict(file)
+    melts = fields["melts"]
+    frozen = freezing(
+        fields["position_m"][melts], fields["frozen_s"][melts], scenario.hot_spot_reach_m
+    )
+    figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
+    left, right = figure.subplots(1, 2)
+    draw_freezing(fields, frozen, left)
+    draw_temperature(fields, frozen, right)
+    said = "Some of the casting is still liquid at the end of the run."
+    if math.isfinite(frozen.solidification_time_s):
+        at = ", ".join(
+            f"{axis} = {number(1e3 * place_m)} mm"
+            for axis, place_m in zip("xyz", frozen.last_point_m, strict=False)
+        )
+        said = (
+            f"The casting is solid after {number(frozen.solidification_time_s, 4)} s; the last "
+            f"point to freeze lies at {at}."
+        )
+    axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
+    columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
+    rows = tuple(
+        tuple(Cell(number(v, 4), str(v)) for v in (*(1e3 * place), time_s))
+        for place, time_s in zip(frozen.hot_spots_m, frozen.hot_spot_s, strict=True)
+    )
+    return png(figure), (said,), Table(columns, rows, (False,) * len(rows))
+
+
+def _errors(point: Point, scenario: Solidification, collected: Collected) -> list[_Error]:
+    """Each finished run against the reference; nothing where that did not finish."""
+    done = collected.summary[finished(collected.summary)]
+    reference = _of_point(done, point)
+    if reference.empty:
+        return []
+    base = reference.iloc[0]
+    own = dict(list(collected.curves.groupby(RUN)))
+    probes = [f"{probe.name}_k" for probe in scenario.probes]
+    range_k = scenario.initial_k.casting - scenario.initial_k.mould
+    errors = []
+    for _, row in done.iterrows():
+        if row[RUN] == base[RUN]:
+            continue
+        time_s, base_s = float(row[SOLIDIFICATION_TIME_S]), float(base[SOLIDIFICATION_TIME_S])
+        curve = _curve_percent(own[row[RUN]], own[base[RUN]], probes, range_k)
+        label = setting_text({key: row[key] for key in collected.keys})
+        errors.append(_Error(label, float(row[CPU_S]), 100.0 * (time_s / base_s - 1.0), curve))
+    return sorted(errors, key=lambda error: error.cpu_s)
+
+
+def _cheapest(errors: Sequence[_Error], reference: Point, collected: Collected) -> str:
+    """The cheapest setting that is near the reference; empty where there is none to compare."""
+    if not errors:
+        return ""
+    near = [e for e in errors if abs(e.time_percent) <= NEAR_PERCENT]
+    of = "of the solidification time of the reference"
+    if not near:
+        nearest = min(errors, key=lambda e: abs(e.time_percent))
+        return (
+            f"No setting comes within {NEAR_PERCENT:g} % {of}: the nearest, {nearest.label}, is "
+            f"{number(abs(nearest.time_percent), 2)} % off it."
+        )
+    done = collected.summary[finished(collected.summary)]
+    reference_s = float(_of_point(done, reference)[CPU_S].iloc[0])
+    cheap = near[0]
+    return (
+        f"The cheapest setting within {NEAR_PERCENT:g} % {of} is {cheap.label}: "
+        f"{number(abs(cheap.time_percent), 2)} % off it in {seconds(cheap.cpu_s)} of processor "
+        f"time instead of {seconds(reference_s)}."
+    )
+
+
+def _curve_percent(
+    table: pd.DataFrame, base: pd.DataFrame, probes: Sequence[str], range_k: float
+) -> float:
+    """Error (7) of the worst probe over the time that both runs have."""
+    end_s = min(table[TIME_S].max(), base[TIME_S].max())
+    time_s = base[TIME_S].to_numpy()
+    time_s = time_s[time_s <= end_s]
+    off = [
+        np.abs(np.interp(time_s, table[TIME_S], table[p]) - base[p].to_numpy()[: len(time_s)])
+        for p in probes
+    ]
+    return max((100.0 * float(np.trapezoid(o, time_s)) / (range_k * end_s) for o in off),
+               default=math.nan)  # fmt: skip
+
+
+def _error_charts(errors: Sequence[_Error]) -> tuple[Chart, ...]:
+    """Both errors over the processor's time on logarithmic axes, settings by their number."""
+    colours = tints(len(errors), False)
+    charts = []
+    for what, values in (
+        ("error of the solidification time, %", [abs(e.time_percent) for e in errors]),
+        ("mean error of the worst cooling curve, %", [e.curve_percent for e in errors]),
+    ):
+        marks = tuple(
+            Mark(error.cpu_s, value, "mean", tint, title=f"{error.label}: {number(value)} %",
+                 label=str(place))
+            for place, (error, value, tint) in enumerate(
+                zip(errors, values, colours, strict=True), start=1)
+            if value > 0.0
+        )  # fmt: skip
+        if marks:
+            texts = "; ".join(f"{mark.label}: {mark.title}" for mark in marks)
+            alt = f"{what} over processor time by setting. {texts}."
+            charts.append(Chart("processor time, s", what, alt, marks=marks, is_logarithmic=True))
+    return tuple(charts)
+
+
+def _error_table(errors: Sequence[_Error]) -> Table:
+    columns = (
+        Column("no."), Column("setting", False), Column("processor time"),
+        Column("solidification time, %"), Column("worst cooling curve, %"),
+    )  # fmt: skip
+    rows = tuple(
+        (
+            Cell(str(place), str(place)),
+            Cell(error.label, error.label),
+            Cell(seconds(error.cpu_s), str(error.cpu_s)),
+            *(Cell(number(v), str(v)) for v in (error.time_percent, error.curve_percent)),
+        )
+        for place, error in enumerate(errors, start=1)
+    )
+    return Table(columns, rows, (False,) * len(rows))
+
+
+def _method(scenario: Solidification, keys: Sequence[str]) -> tuple[Row, ...]:
+    """How the runs were computed; see ``sand_method``."""
+    metal, mould, initial = scenario.casting, scenario.mould, scenario.initial_k
+    transfer = scenario.heat_transfer_w_m2_k
+    return (
+        Row("Method", "adaptive resolution particles of Hirata and Anzai (2019) in "
+            f"{scenario.dimensions}D, and finite differences beside them; the box lets no heat "
+            "through"),
+        Row("Casting", f"{metal.name}: {_conducts(metal)}, latent heat "
+            f"{metal.latent_heat_j_kg / 1e3:g} kJ/kg from {metal.liquidus_k:g} to "
+            f"{metal.solidus_k:g} K; poured at {initial.casting:g} K"),
+        Row("Mould", f"{mould.name}: {_conducts(mould)}; at {initial.mould:g} K"),
+        Row("Interface", f"{transfer:g} W/m²/K" if transfer else "perfect contact"),
+        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
+    )  # fmt: skip
+
+
+def _conducts(it: MouldMaterial) -> str:
+    return (
+        f"{it.density_kg_m3:g} kg/m³, {it.heat_capacity_j_kg_k:g} J/kg/K, "
+        f"{it.conductivity_w_m_k:g} W/m/K"
+    )
+
+
+REPORT = KindReport(_pages, _notes)

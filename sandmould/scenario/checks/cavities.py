@@ -14,15 +14,16 @@ from sandmould.geometry.outline import outline_fault
 from sandmould.scenario.box import AnyObstacle, Box, Tube, build_scene
 from sandmould.scenario.cavities import (
     CAVITY_KINDS,
+    CELLS_A_GRAIN,
     AnyCavity,
     BoxCavity,
     CylinderCavity,
     MeshCavity,
     PolygonCavity,
+    cavity_grid,
     cavity_space,
     inward,
 )
-from sandmould.scenario.cavity_grid import CELLS_A_GRAIN, cavity_grid
 from sandmould.scenario.scenario import Scenario
 
 _MOST_POINTS = 200_000

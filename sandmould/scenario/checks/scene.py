@@ -35,16 +35,7 @@ KINDS = {2: ("plate", "tube", "polygon"), 3: ("plate", "tube", "cylinder", "mesh
 
 
 def problems(scenario: Scenario) -> list[Problem]:
-    """List all that keeps a well-typed scenario from being run.
-
-    Parameters
-    ----------
-    scenario : Scenario
-
-    Returns
-    -------
-    list of Problem
-    """
+    """List all that keeps a well-typed scenario from being run."""
     faults = [
         *_obstacles(scenario),
         *_discharge(scenario),

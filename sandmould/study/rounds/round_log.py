@@ -6,7 +6,8 @@ import json
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.study import Study
@@ -83,21 +84,9 @@ def log_of(text: bytes) -> RoundLog:
         When they are no list of rounds.
     """
     try:
-        tree = json.loads(text)
-        return RoundLog(
-            str(tree["basis"]),
-            tuple(_round(round_) for round_ in tree["rounds"]),
-            str(tree["ended"]),
-            tuple(float(f) for f in tree["certified_hz"]),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        return TypeAdapter(RoundLog).validate_json(text)
+    except ValueError as error:
         raise ValueError(f"no list of rounds: {error}") from None
-
-
-def _round(tree: dict[str, Any]) -> Round:
-    runs = tuple((dict(point), int(replicate)) for point, replicate in tree["runs"])
-    interval = {key: (float(low), float(high)) for key, (low, high) in tree["interval"].items()}
-    return Round(runs, dict(tree["setting"]), interval, float(tree["spent_core_h"]))
 
 
 def write_rounds(log: RoundLog, folder: Path) -> None:

@@ -16,17 +16,7 @@ from sandmould.pattern_fe.coupling.schemes import SCHEMES, can_couple
 from sandmould.scenario.engine import ENGINE_NAMES, EngineName
 from sandmould.scenario.scenario import Scenario
 
-BARE = Capabilities(
-    bends_meshes=(2,),
-    bends_in_frames=("box",),
-    repeats_windows=False,
-    calls_movers=False,
-    loads_of_every_step=False,
-    checkpoints_at_setups=False,
-    moves_tables=False,
-    moves_walls=False,
-    changes_checks=False,
-)
+BARE = Capabilities(bends_meshes=(2,), bends_in_frames=("box",))
 
 
 def test_engines_are_listed_by_what_they_can_do() -> None:

@@ -15,8 +15,7 @@ from sandmould import ROOT
 
 LEFT_OUT = {
     "lammps/engine.py": ["load_session"],
-    "liggghts/engine.py": ["CAPABILITIES"],
-    "liggghts/own_deck.py": ["read_deck"],
+    "liggghts/engine.py": ["CAPABILITIES", "read_deck"],
     "liggghts/session.py": ["move_surface"],
     "reference/session.py": ["exact_limit_s", "set_state"],
 }

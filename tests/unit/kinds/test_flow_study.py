@@ -16,13 +16,12 @@ import yaml
 from sandmould.bad_input import BadInputError
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.scheme import Scheme
-from sandmould.casting.mps.stability import StabilityRating
-from sandmould.casting.mps.stability_measures import by_window, measure_flow
+from sandmould.casting.mps.stability_measures import StabilityRating, by_window, measure_flow
 from sandmould.drawing.animation import ABSENT
 from sandmould.drawing.flow_film import make_flow_film
 from sandmould.execution.simulate import measure_run, render_run, simulate
-from sandmould.report.flow import _hopping
-from sandmould.report.flow_map import _parts, condition_text, said_of, stability_map
+from sandmould.report.flow_charts import _parts, condition_text, said_of, stability_map
+from sandmould.report.kinds.flow import _hopping
 from sandmould.report.page import write_report
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.casting.flow import MetalFlow

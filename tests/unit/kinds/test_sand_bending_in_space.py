@@ -17,7 +17,7 @@ from sandmould.kinds.sand.bent_files import write_bent
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.scene import pattern_of
-from sandmould.report.bending_figure import _lines_m, draw_outlines
+from sandmould.report.bending_figures import _lines_m, draw_outlines
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import _one_thread  # noqa: F401
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import pandas as pd
 import pytest
@@ -80,7 +80,7 @@ def test_the_smallest_kind_is_planned_computed_and_reported(
     kind = Kind("fall", Fall, FallStudy, FallPlanning, FallExecution)
     monkeypatch.setitem(registry.KINDS, "fall", kind)
     monkeypatch.setitem(registry._OF_SCENARIO, Fall, kind)
-    monkeypatch.setitem(REPORTS, "fall", KindReport[Any]())
+    monkeypatch.setitem(REPORTS, "fall", KindReport())
     file = tmp_path / "stones.yaml"
     file.write_text(
         "kind: fall\nobjective: {measure: fall_s, better: smaller}\n"

@@ -107,9 +107,9 @@ def test_a_loop_that_does_not_hold_is_marked(study: Path) -> None:
     scenario = read_run(study / "runs" / "one" / "scenario.yaml").scenario
     pages = bending_pages(study, "", scenario, collected, verdict, "one")
     log.write_text(told)
-    assert "cycles in 1 of 3 runs" in pages.sentences[0]
-    assert pages.runs.marked == (True, False, False)
-    assert [c.chart.y_title for c in pages.convergence] == [
+    assert "cycles in 1 of 3 runs" in pages["sentences"][0]
+    assert pages["runs"].marked == (True, False, False)
+    assert [c.chart.y_title for c in pages["convergence"]] == [
         "displacement, mm", "energy, J", "share of the residual"
     ]  # fmt: skip
 

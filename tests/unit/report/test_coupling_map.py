@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from sandmould.pattern_fe.coupling.loop_verdict import State
-from sandmould.report.coupling_map import FACTOR, LIMIT, MODULUS, SCHEME, coupling_map
+from sandmould.report.bending_figures import FACTOR, LIMIT, MODULUS, SCHEME, coupling_map
 from sandmould.study.collect import Collected
 
 WINDOW = "pattern.loop.window_s"

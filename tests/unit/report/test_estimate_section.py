@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from sandmould.definition.run import Run
-from sandmould.engines.cost import cost_before
+from sandmould.engines.durations import cost_before
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.measure import write_measures
 from sandmould.report.estimate_section import _headline

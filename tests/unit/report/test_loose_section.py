@@ -71,13 +71,13 @@ def test_a_hollow_under_a_plate_is_measured_and_told(folder: Path) -> None:
     sentence = (
         "Sand lies loose at 100 % of the places straight under the obstacles, 0 % of the places"
     )
-    assert pages.sentence.startswith(sentence)
-    (row,) = pages.table.rows
+    assert pages["sentence"].startswith(sentence)
+    (row,) = pages["table"].rows
     assert [cell.text for cell in row[:2]] == ["under", "7, 7, 6"]
     assert float(row[3].sort) == pytest.approx(
         last["largest_loose_zone_m3"] / (np.pi / 6 * GRAIN_M**3), rel=1e-4
     )
-    assert pages.note == ""
+    assert pages["note"] == ""
 
 
 def test_none_is_sought_in_2d_without_obstacles_or_through_a_gate(folder: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sandmould.report.pressure_histories import BINS, HIGHEST, extremes, pressure_history
+from sandmould.report.flow_charts import BINS, HIGHEST, extremes, pressure_history
 
 
 def test_a_short_curve_is_whole() -> None:

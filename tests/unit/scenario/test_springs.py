@@ -11,10 +11,9 @@ from sandmould.engines.deck_lines import Lines
 from sandmould.engines.lammps.render import render_deck
 from sandmould.engines.program import build_program
 from sandmould.scenario.checks.scene import problems
-from sandmould.scenario.contact import Contact
+from sandmould.scenario.contact import Contact, wave_speed_m_s
 from sandmould.scenario.sand import Sand
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.springs import wave_speed_m_s
 from tests.scenes import tube_scene
 
 PAPER_N_M, PAPER_WALL_N_M = 7e4, 2e4

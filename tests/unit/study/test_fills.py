@@ -17,7 +17,7 @@ from sandmould.kinds.sand.kind import SAND
 from sandmould.report.tables import key_numbers
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, total_s
 from sandmould.runs.formatting import size_text
-from sandmould.study.fill_costs import shares_of_fills
+from sandmould.study.collect import shares_of_fills
 from sandmould.study.plan.build_plan import Plan, announce, open_plan, prepare
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import own_work, predicted_s, share_fills

@@ -12,7 +12,7 @@ from sandmould.arrays import Floats
 from sandmould.casting.mps.flow import Flow, RunningCost
 from sandmould.casting.mps.probes import History, Watch
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.stability import (
+from sandmould.casting.mps.stability_measures import (
     COUNTS,
     SHARES,
     STEPS_S,

@@ -9,7 +9,7 @@ from pathlib import Path
 from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.digest import digest, file_digest
-from sandmould.engines.ranks import Ranks
+from sandmould.engines.capabilities import Ranks
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own.columns import column_problems
 from sandmould.kinds.deck.own.template import MOST_CHARACTERS, names_in, rendered
@@ -61,12 +61,7 @@ def _commands(deck: str) -> str:
 
 
 def problems(scenario: OwnDeck) -> list[Problem]:
-    """List what keeps a template from being rendered with its values.
-
-    Parameters
-    ----------
-    scenario : OwnDeck
-    """
+    """List what keeps a template from being rendered with its values."""
     faults = [
         Problem("template" if n == scenario.template else "files", n, "a file that can be read")
         for n, path in scenario.paths.items()
