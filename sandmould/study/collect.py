@@ -20,6 +20,7 @@ import pandas as pd
 from sandmould.definition.own_measures import with_own_measures
 from sandmould.definition.study import Study
 from sandmould.kinds.registry import DEFAULT_KIND, kind_named
+from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import (
     CLOCK,
     CROSS_CHECK,
@@ -46,7 +47,6 @@ from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import (
     PLACE,
-    UNREADABLE,
     RunTables,
     problem_text,
     read_costs,

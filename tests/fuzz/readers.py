@@ -105,7 +105,7 @@ def _log(path: Path) -> object:
 def _pack(path: Path) -> object:
     from sandmould.execution.packs.unpack import unpack
 
-    return unpack(path, path.parent / "results", checkpoints=True).taken or None
+    return unpack(path, path.parent / "results")
 
 
 def _tables(path: Path) -> object:
