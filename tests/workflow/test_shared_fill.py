@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from sandmould.definition.run import FILLS, Run
+from sandmould.definition.run import Run
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution.again import _failed_fill
 from sandmould.execution.jobs import compute_run
