@@ -12,6 +12,7 @@ from pathlib import Path
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import FILLS, Run
 from sandmould.digest import file_digest
+from sandmould.execution.locks import is_locked, take_turn
 from sandmould.execution.packs.archive import (
     AT_END,
     SCENARIO_FILE,
@@ -19,7 +20,6 @@ from sandmould.execution.packs.archive import (
     open_pack,
     reasons_lines,
 )
-from sandmould.execution.locks import is_locked, take_turn
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.files import replaced
 from sandmould.runs.manifest import DECK_FILE, OUTCOME_FILE, read_origin
