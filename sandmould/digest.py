@@ -34,7 +34,8 @@ def file_digest(path: Path) -> str:
     OSError
         When it cannot be read.
     """
-    return digest(path.read_bytes())
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def code_identity(groups: Iterable[Iterable[Path]], *parts: str) -> str:

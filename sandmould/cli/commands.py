@@ -171,12 +171,18 @@ def again(
 
 
 @app.command(epilog="Example: sandmould status my_study.yaml")
-def status(study: StudyFile, cores: Cores = None) -> None:
+def status(
+    study: StudyFile,
+    cores: Cores = None,
+    deep: Annotated[
+        bool, typer.Option("--deep", help="Compare each file of each run with its hash, too.")
+    ] = False,
+) -> None:
     """Say where a study stands and what is left of it."""
     from sandmould.execution.status import status_text
     from sandmould.study.plan.build_plan import RESULTS, open_plan
 
-    typer.echo(status_text(open_plan(study), RESULTS, cores or _all_cores()))
+    typer.echo(status_text(open_plan(study), RESULTS, cores or _all_cores(), deep))
 
 
 @app.command(epilog="Example: sandmould tidy my_study.yaml --yes")
@@ -211,7 +217,7 @@ def pack(
         Path | None,
         typer.Option(
             "--output", "-o", metavar="FILE", show_default="STUDY_runs.zip",
-            help="File to write; a folder takes one more, of the runs that no pack in it holds.",
+            help="File to write.",
         ),
     ] = None,
     last_state: Annotated[
@@ -220,21 +226,12 @@ def pack(
             "--last-state", help="Leave out exports and all snapshots but the last: no films."
         ),
     ] = False,
-    checkpoints: Annotated[
-        bool,
-        typer.Option(
-            "--checkpoints", help="Take along runs that were stopped, and states of shared fills."
-        ),
-    ] = False,
 ) -> None:  # fmt: skip
     """Pack the finished runs of a study into one file."""
     from sandmould.execution.packs.pack import pack as pack_study
     from sandmould.study.plan.build_plan import RESULTS, open_plan
 
-    packed = pack_study(
-        open_plan(study), RESULTS, output, last_state=last_state, checkpoints=checkpoints
-    )
-    typer.echo(packed.text())
+    typer.echo(pack_study(open_plan(study), RESULTS, output, last_state=last_state))
 
 
 @app.command(epilog="Example: sandmould unpack runs.zip")
@@ -242,20 +239,13 @@ def unpack(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE...", help="What sandmould pack wrote.")
     ],
-    checkpoints: Annotated[
-        bool,
-        typer.Option(
-            "--checkpoints",
-            help="Take stopped runs and states of fills too; engines read their files unchecked.",
-        ),
-    ] = False,
 ) -> None:
     """Take packed runs into ./results."""
     from sandmould.execution.packs.unpack import unpack as unpack_runs
     from sandmould.study.plan.build_plan import RESULTS
 
     for file in files:
-        typer.echo(unpack_runs(file, RESULTS, checkpoints).text())
+        typer.echo(unpack_runs(file, RESULTS))
 
 
 @app.command(epilog="Example: sandmould measures tube_demo")

@@ -9,6 +9,7 @@ from pathlib import Path
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILLS
 from sandmould.execution.locks import is_locked
+from sandmould.plain_file import UNREADABLE
 from sandmould.runs.manifest import MANIFEST_FILE
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.build_plan import open_plan
@@ -76,7 +77,7 @@ def _failed_fill(folder: Path) -> list[Path]:
     fill = folder.parent.parent / FILLS / read_run(folder / "scenario.yaml").fill
     try:
         failed = RunOutcome.read(fill / "outcome.json").outcome is not Outcome.FINISHED
-    except (OSError, ValueError, KeyError):
+    except UNREADABLE:
         return []
     return [fill] if failed else []
 

@@ -24,8 +24,6 @@ from sandmould import ROOT
 from sandmould.definition.run import Run
 from sandmould.definition.study import Study
 from sandmould.digest import digest
-from sandmould.execution.packs.archive import SUFFIX
-from sandmould.execution.packs.pack import packed_in
 from sandmould.execution.packs.recorded import RECORDS, record_part
 from sandmould.kinds.registry import kind_of
 from sandmould.module_main import run_main
@@ -295,7 +293,7 @@ def main(arguments: list[str]) -> int:
         print(record(Path(arguments[1]), Path("results"), arguments[2:]))
         return 0
     if arguments[:1] == ["part"] and len(arguments) == 2:
-        print(record_part(open_plan(Path(arguments[1])), Path("results")).text())
+        print(record_part(open_plan(Path(arguments[1])), Path("results")))
         return 0
     if arguments != ["check"]:
         print(f"usage: {USAGE}", file=sys.stderr)
@@ -308,8 +306,6 @@ def _check() -> int:
     stale = stale_records()
     for name, why in stale:
         print(f"{name}: {_standing(why)}")
-    for folder in sorted({path.parent for path in RECORDS.glob(f"*/*{SUFFIX}")}):
-        print(f"{folder.name}: {len(packed_in(folder, folder.name))} runs packed")
     differences = recompute_smallest(Path("results"))
     for sentence in differences:
         print(sentence)

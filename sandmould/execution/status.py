@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
@@ -11,25 +10,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
 from sandmould.execution.cluster.queue import jobs_of, live_jobs, queue_lines
 from sandmould.execution.locks import is_locked
 from sandmould.execution.tidy import freed_bytes, orphans
 from sandmould.execution.time_left import TimeLeft
+from sandmould.plain_file import UNREADABLE, read_json
 from sandmould.runs.claim import owner_of
 from sandmould.runs.formatting import size_text
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import change, has_all_hashes, read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
 from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.build_plan import Plan, stored_speeds
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
+from sandmould.study.plan.plan_files import read_run
 from sandmould.study.rounds.round_log import read_rounds
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
 STATES: tuple[State, ...] = ("done", "failed", "running", "stopped", "waiting")
 LISTED_RUNS = 12
-_DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
-"""What reading a file may raise that was cut short or overwritten."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,8 @@ def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) ->
         return _ended(folder)
     path = folder / "work" / "progress.json"
     said, share, cpu_s = "", 0.0, 0.0
-    with contextlib.suppress(*_DAMAGED):
-        now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    with contextlib.suppress(*UNREADABLE):
+        now: dict[str, Any] = read_json(path)
         share = float(now["percent"]) / 100
         said = f"{now['percent']:.0f} %, {now['stage']}, {now['time_s']:.3g} s simulated"
         cpu_s = float(now["cpu_s"])
@@ -77,7 +79,7 @@ def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) ->
     if running:
         where = f", {owner.text()}" if owner else ""
         return RunStatus(name, "running", f"{said}{where}", cpu_s, share=share)
-    with contextlib.suppress(*_DAMAGED):
+    with contextlib.suppress(*UNREADABLE):
         said = f"{said}; {_why_stopped(folder / 'work' / 'outcome.json', path)}"
     return RunStatus(name, "stopped", said, cpu_s, share=share)
 
@@ -95,7 +97,7 @@ def _ended(folder: Path) -> RunStatus:
     """A run with all that it leaves behind."""
     outcome = RunOutcome.read(folder / "outcome.json")
     cpu_s = wall_s = math.nan
-    with contextlib.suppress(*_DAMAGED):
+    with contextlib.suppress(*UNREADABLE):
         cost = read_costs([folder]).rows.iloc[-1]
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
@@ -105,7 +107,7 @@ def _ended(folder: Path) -> RunStatus:
     return RunStatus(folder.name, "failed", said, cpu_s)
 
 
-def status_text(plan: Plan, results: Path, cores: int) -> str:
+def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> str:
     """Say where a study stands: done, running, failed, time left, cost so far.
 
     Parameters
@@ -114,6 +116,8 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
     results : Path
     cores : int
         That share what is left.
+    deep : bool
+        Whether all files of runs that are done or failed are compared with their hashes.
     """
     folder = results / plan.study.name
     lacks, live = plan.lacks(results), live_jobs()
@@ -150,7 +154,38 @@ def status_text(plan: Plan, results: Path, cores: int) -> str:
             lines.append(f"  {state}: and {len(chosen) - LISTED_RUNS} more")
     if any(status.state == "failed" for status in statuses.values()):
         lines.append("a failed run is computed once more by: sandmould again RUN")
+    if deep:
+        whole = [run for run in (*fills, *plan.runs) if run.run not in lacks]
+        lines += _deep_lines(whole, folder)
     return "\n".join([*lines, *_orphans(plan, results)])
+
+
+def _deep_lines(runs: Sequence[Run], folder: Path) -> list[str]:
+    """What the hashes say of files of runs that lack nothing by the sizes."""
+    damaged: dict[str, str] = {}
+    of_sizes = 0
+    for run in runs:
+        place = folder / run.place
+        manifest = read_manifest(place) or {}
+        of_sizes += not has_all_hashes(manifest)
+        if why := change(place, manifest) or _replanned(run, place / "scenario.yaml"):
+            damaged[run.place] = why
+    lines = [f"  damaged: {place}  {why}" for place, why in damaged.items()]
+    if damaged:
+        lines.append("remove a damaged file: the next start makes it again")
+    else:
+        lines.append(f"{len(runs)} runs and fills checked: no file is damaged")
+    if of_sizes:
+        lines.append(f"{of_sizes} of them are of an older version: only sizes are known")
+    return lines
+
+
+def _replanned(run: Run, path: Path) -> str:
+    """Say that a run's file of its scenario says something else; empty where it does not."""
+    with contextlib.suppress(BadInputError):
+        if scenario_hash(read_run(path).scenario) == scenario_hash(run.scenario):
+            return ""
+    return f"{path.name} is not as the plan wrote it"
 
 
 def _count(runs: Sequence[Run], statuses: dict[str, RunStatus]) -> str:

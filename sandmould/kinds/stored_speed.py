@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Generic, TypeVar
 
+from sandmould.plain_file import read_json
 from sandmould.runs.files import write_text
 from sandmould.scenario.quantity import Section
 
@@ -79,7 +80,7 @@ class StoredSpeed(ABC, Generic[SceneT]):
     def _stored(self, results: Path) -> dict[str, float]:
         """All that was measured; nothing where the file is damaged."""
         try:
-            tree = json.loads((results / self.file).read_text(encoding="utf-8"))
+            tree = read_json(results / self.file)
             return {machine: float(number) for machine, number in tree.items()}
         except (OSError, ValueError, TypeError, AttributeError):
             return {}

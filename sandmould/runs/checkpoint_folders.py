@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould.digest import file_digest
+from sandmould.plain_file import read_json
 from sandmould.runs.files import write_text
 
 END_CHECKPOINT = "end_checkpoint"
@@ -47,7 +48,7 @@ def _digests(folder: Path) -> dict[str, str]:
     return {
         p.name: file_digest(p)
         for p in sorted(folder.iterdir())
-        if not p.name.startswith("mark.json")
+        if p.is_file() and not p.name.startswith("mark.json")
     }
 
 
@@ -67,14 +68,14 @@ def read_mark(folder: Path) -> CheckpointMark:
         When the checkpoint is missing or damaged, or of a version with other files.
     """
     try:
-        sealed = json.loads((folder / "mark.json").read_text(encoding="utf-8"))
+        sealed = read_json(folder / "mark.json")
         if sealed["sha256"] != _digests(folder):
             raise ValueError("its files do not match their hashes")
         mark = CheckpointMark(**sealed["mark"])
         if mark.layout != LAYOUT:
             raise ValueError("another version of Sandmould wrote it")
         return mark
-    except (OSError, KeyError, TypeError, RecursionError) as error:
+    except (OSError, KeyError, TypeError) as error:
         raise ValueError(str(error)) from error
 
 

@@ -1,24 +1,31 @@
-"""What a run left behind: where it comes from, what it cost, and each file with its size.
+"""What a run left behind: where it comes from, what it cost, and each file with size and hash.
 
-What is lost or cut short later is seen by the sizes.
+What is lost or cut short later is seen by the sizes, at every start; all else by the hashes.
 """
 
 from __future__ import annotations
 
 import json
+import stat
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from sandmould.digest import file_digest
+from sandmould.digest import digest, file_digest
+from sandmould.plain_file import read_json
 from sandmould.runs.files import write_text
 
 MANIFEST_FILE = "products.json"
+OUTCOME_FILE = "outcome.json"
 DECK_FILE = "deck.in"
 LEFT_OUT = "left_out"
 """Step of files that a pack of the run did without: they are not missed, but cannot be measured."""
 MEASURED_BY = "measured_by"
 """What names the code that took the measures."""
+HASHES = "sha256"
+"""Of each file that a step left, and of the outcome; runs of older times have none."""
+SEAL = "seal"
+"""Hash of all else that is written down."""
 OLDER_ORIGIN, OLDER_COST = "provenance.json", "cost.tsv"
 """What runs of older times have beside it."""
 Manifest = dict[str, dict[str, Any]]
@@ -56,8 +63,9 @@ def write_manifest(
     origin: Mapping[str, Any] | None = None,
     cost: Mapping[str, Any] | None = None,
     code: str = "",
+    outcome: str = "",
 ) -> None:
-    """Write down what a step of a run left.
+    """Write down what a step of a run left, with the hashes of the files.
 
     ``computed`` begins anew, with the hash of the deck that was computed; ``measured`` adds to it.
 
@@ -73,6 +81,8 @@ def write_manifest(
         Its cost row.
     code : str, optional
         State of the code that measured.
+    outcome : str, optional
+        What the outcome's file will hold.
     """
     if step == "computed":
         deck = folder / DECK_FILE
@@ -81,7 +91,20 @@ def write_manifest(
         tree |= {name: dict(values) for name, values in stated.items() if values is not None}
     else:
         tree = (read_manifest(folder) or {}) | {MEASURED_BY: {"code_sha256": code}}
-    write_text(folder / MANIFEST_FILE, json.dumps({**tree, step: sizes}, indent=1) + "\n")
+    hashes = {OUTCOME_FILE: digest(outcome)} if outcome else {}
+    hashes |= {name: file_digest(folder / name) for name in sizes}
+    save_manifest(folder, {**tree, step: dict(sizes), HASHES: tree.get(HASHES, {}) | hashes})
+
+
+def save_manifest(folder: Path, tree: Manifest) -> None:
+    """Write what is written down of a run, and seal it."""
+    sealed = tree | {SEAL: {MANIFEST_FILE: _seal_of(tree)}}
+    write_text(folder / MANIFEST_FILE, json.dumps(sealed, indent=1) + "\n")
+
+
+def _seal_of(tree: Manifest) -> str:
+    rest = {name: part for name, part in tree.items() if name != SEAL}
+    return digest(json.dumps(rest, sort_keys=True))
 
 
 def read_manifest(folder: Path) -> Manifest | None:
@@ -93,7 +116,7 @@ def read_manifest(folder: Path) -> Manifest | None:
         When it cannot be read.
     """
     try:
-        tree = json.loads((folder / MANIFEST_FILE).read_text(encoding="utf-8"))
+        tree = read_json(folder / MANIFEST_FILE)
     except FileNotFoundError:
         return None
     if not (isinstance(tree, dict) and all(isinstance(files, dict) for files in tree.values())):
@@ -114,7 +137,7 @@ def read_origin(folder: Path) -> dict[str, Any]:
         return manifest["origin"]
     if manifest is None and not (folder / OLDER_ORIGIN).exists():
         raise FileNotFoundError(f"{MANIFEST_FILE} is missing")
-    origin: dict[str, Any] = json.loads((folder / OLDER_ORIGIN).read_text(encoding="utf-8"))
+    origin: dict[str, Any] = read_json(folder / OLDER_ORIGIN)
     return origin
 
 
@@ -150,9 +173,38 @@ def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
     """
     for name, size in sizes.items():
         try:
-            now = (folder / name).stat().st_size
+            now = (folder / name).stat()
         except (OSError, ValueError):  # no file can have such a name
             return f"{name} is missing"
-        if now != size:
-            return f"{name} has {now} of {size} bytes"
+        if not stat.S_ISREG(now.st_mode):
+            return f"{name} is no plain file"
+        if now.st_size != size:
+            return f"{name} has {now.st_size} of {size} bytes"
     return ""
+
+
+def change(folder: Path, manifest: Manifest) -> str:
+    """Say which file of a run without ``damage`` is another than it left; empty where none is."""
+    seal = manifest.get(SEAL, {MANIFEST_FILE: ""} if HASHES in manifest else None)
+    if seal is not None and seal.get(MANIFEST_FILE) != _seal_of(manifest):
+        return f"{MANIFEST_FILE} is not as the run wrote it"
+    for name, known in manifest.get(HASHES, {}).items():
+        if name not in (OUTCOME_FILE, *listed_files(manifest)):
+            continue
+        try:
+            now = file_digest(folder / name)
+        except OSError as error:
+            now = str(error)
+        if now != known:
+            return f"{name} is not as the run wrote it"
+    return ""
+
+
+def has_all_hashes(manifest: Manifest) -> bool:
+    """Whether more than the size is known of each file."""
+    return {OUTCOME_FILE, *listed_files(manifest)} <= manifest.get(HASHES, {}).keys()
+
+
+def listed_files(manifest: Manifest) -> dict[str, Any]:
+    """Size of each file that the steps of a run left."""
+    return manifest.get("computed", {}) | manifest.get("measured", {})

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from enum import IntEnum
 from pathlib import Path
 
+from sandmould.plain_file import read_json
 from sandmould.runs.files import write_text
 
 
@@ -58,8 +59,9 @@ class RunOutcome:
     simulated_s: float
     planned_s: float
 
-    def write(self, path: Path) -> None:
-        """Write as JSON."""
+    @property
+    def text(self) -> str:
+        """As its file holds it, in JSON."""
         values = {
             "code": int(self.outcome),
             "outcome": self.outcome.label,
@@ -67,12 +69,16 @@ class RunOutcome:
             "restartable": self.outcome.restartable,
             **{k: v for k, v in asdict(self).items() if k != "outcome"},
         }
-        write_text(path, json.dumps(values, indent=1) + "\n")
+        return json.dumps(values, indent=1) + "\n"
+
+    def write(self, path: Path) -> None:
+        """Write as JSON."""
+        write_text(path, self.text)
 
     @classmethod
     def read(cls, path: Path) -> RunOutcome:
         """Read from JSON."""
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = read_json(path)
         return cls(
             Outcome(values["code"]), values["detail"], values["simulated_s"], values["planned_s"]
         )

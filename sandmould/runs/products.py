@@ -11,7 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT
-from sandmould.runs.manifest import OLDER_COST, OLDER_ORIGIN, files_below, write_manifest
+from sandmould.runs.manifest import (
+    OLDER_COST,
+    OLDER_ORIGIN,
+    OUTCOME_FILE,
+    files_below,
+    write_manifest,
+)
 from sandmould.runs.outcome import RunOutcome
 
 
@@ -97,7 +103,7 @@ def finish(
 
     A finished run's work folder is removed, a failed one's renamed: asked for again, that run
     begins anew, since its tables are no longer beside its checkpoint. Where it comes from, its cost
-    and the sizes of all products are written down in ``products.json``.
+    and sizes and hashes of all products are written down in ``products.json``.
 
     Parameters
     ----------
@@ -119,10 +125,10 @@ def finish(
     for older in (OLDER_ORIGIN, OLDER_COST):
         (folder / older).unlink(missing_ok=True)
     sizes = files_below(folder, tuple(products))
-    write_manifest(folder, "computed", sizes, provenance, cost.columns())
+    write_manifest(folder, "computed", sizes, provenance, cost.columns(), outcome=outcome.text)
     shutil.rmtree(folder / LAST_WORK, ignore_errors=True)
     if outcome.outcome == 0:
         shutil.rmtree(work)
     else:
         os.replace(work, folder / LAST_WORK)
-    outcome.write(folder / "outcome.json")
+    outcome.write(folder / OUTCOME_FILE)

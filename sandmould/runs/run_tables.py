@@ -11,13 +11,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sandmould.plain_file import UNREADABLE
 from sandmould.runs.manifest import MANIFEST_FILE, OLDER_COST, read_cost
 
 PLACE = "place of the file"
 """Column of a joined table: the place of a row's file among those that were read."""
-
-UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError)
-"""What reading a broken file may raise."""
 
 
 def problem_text(name: str, error: Exception) -> str:

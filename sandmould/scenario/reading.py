@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.limits import YAML_BYTES
+from sandmould.plain_file import read_plain
 from sandmould.scenario.moved_keys import called, holds_anyway, instead_of
 from sandmould.scenario.quantity import units_at
 from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
@@ -61,7 +62,7 @@ def _named(name: str, problems: Iterable[Problem]) -> None:
 
 def _read(path: Path, name: str, load: Callable[[str], Any], text: str | None = None) -> Tree:
     try:
-        tree = load(path.read_text(encoding="utf-8") if text is None else text)
+        tree = load(read_plain(path) if text is None else text)
     except BadInputError as error:
         _named(name, error.problems)
     except (OSError, UnicodeDecodeError) as error:

@@ -108,28 +108,30 @@ def load_users(text: str) -> Any:
 def load_planned(text: str) -> Any:
     """Values of a text that the plan of a study wrote.
 
-    libyaml reads it six times as fast as Python, and a report reads hundreds. It is not trusted
-    with the files of users: what it says of a fault teaches less, and a file nested without end
-    crashes it.
+    libyaml reads it six times as fast as Python, and a report reads hundreds. What it says of a
+    fault teaches less, so it does not read the files of users. Nested without end a text crashes
+    it: one that may be so, or repeats a part of itself, is looked through first.
+
+    Raises
+    ------
+    yaml.YAMLError, ValueError, RecursionError
+        When it is no YAML as a plan writes it.
     """
+    if "&" in text or any(text.count(sign) > YAML_DEPTH.most for sign in "[{-?"):
+        _check_levels(text)
     return yaml.load(text, Loader=_OF_THE_PLAN)
 
 
-def is_of_a_plan(text: bytes) -> bool:
-    """Whether a text that anybody may have written is one that ``load_planned`` can be given.
-
-    It is nested no deeper than a study, and no alias repeats a part of it.
-    """
+def _check_levels(text: str) -> None:
+    """Refuse a text with an alias, or nested deeper than a study."""
     depth = 0
-    try:
-        for event in yaml.parse(text, Loader=_OF_THE_PLAN):
-            opens = isinstance(event, yaml.CollectionStartEvent)
-            depth += opens - isinstance(event, yaml.CollectionEndEvent)
-            if depth > YAML_DEPTH.most or isinstance(event, yaml.AliasEvent):
-                return False
-    except (yaml.YAMLError, ValueError):
-        return False
-    return True
+    for event in yaml.parse(text, Loader=_OF_THE_PLAN):
+        opens = isinstance(event, yaml.CollectionStartEvent)
+        depth += opens - isinstance(event, yaml.CollectionEndEvent)
+        if depth > YAML_DEPTH.most:
+            raise RecursionError
+        if isinstance(event, yaml.AliasEvent):
+            raise ValueError("a part of it is repeated")
 
 
 def fault_of(error: Exception) -> str:

@@ -21,6 +21,7 @@ from sandmould.definition.own_measures import with_own_measures
 from sandmould.definition.run import FILLS
 from sandmould.definition.study import Study
 from sandmould.kinds.registry import DEFAULT_KIND, kind_named
+from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import (
     CLOCK,
     CPU_S,
@@ -51,7 +52,6 @@ from sandmould.runs.manifest import read_origin
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import (
     PLACE,
-    UNREADABLE,
     RunTables,
     problem_text,
     read_costs,

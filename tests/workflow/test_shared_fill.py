@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from sandmould.definition.run import FILLS, Run
+from sandmould.definition.run import Run
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution.again import _failed_fill
 from sandmould.execution.jobs import compute_run
@@ -312,24 +312,16 @@ def test_packed_runs_need_no_fill_and_its_cost_travels(
     summary = (folder / "summary.tsv").read_bytes()
     assert b"\tfill_cpu_s" in summary
     end = [*(folder / fill.place / END_CHECKPOINT).iterdir()]
-    small, whole = (pack(plan, RESULTS, Path(f"{name}.zip"), checkpoints=name == "whole").path
-                    for name in ("small", "whole"))  # fmt: skip
-    for path, checkpoints in ((small, False), (whole, False), (whole, True)):
-        shutil.rmtree(RESULTS)
-        assert unpack(path, RESULTS, checkpoints).text() == "small: 2 runs taken"
-        announce(plan, RESULTS, 1)
-        assert plan.lacks(RESULTS) == {}
-        collect(folder)
-        assert (folder / "summary.tsv").read_bytes() == summary
-        # Engines read the state of a fill: it is taken where that is asked for.
-        assert all(file.exists() is checkpoints for file in end)
-    assert unpack(whole, RESULTS).text() == "small: 0 runs taken, 2 here already"
-    # A run that the pack lacks goes on from the fill, or from one that is made again.
-    shutil.rmtree(folder / run.place)
+    small = Path("small.zip")
+    pack(plan, RESULTS, small)
+    shutil.rmtree(RESULTS)
+    assert unpack(small, RESULTS) == "small: 2 runs taken"
     announce(plan, RESULTS, 1)
-    assert set(plan.lacks(RESULTS)) == {run.run}
-    shutil.rmtree(folder / FILLS)
-    unpack(small, RESULTS)
+    assert plan.lacks(RESULTS) == {}
+    collect(folder)
+    assert (folder / "summary.tsv").read_bytes() == summary
+    # Engines read the state of a fill: it does not travel, and a run that lacks it makes it again.
+    assert not any(file.exists() for file in end)
     shutil.rmtree(folder / run.place)
     announce(plan, RESULTS, 1)
     assert set(plan.lacks(RESULTS)) == {fill.run, run.run}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from sandmould.definition.run import FILLS, LAST_MEASURED
+from sandmould.plain_file import UNREADABLE, read_json
 from sandmould.runs.outcome import Outcome, RunOutcome
-
-_DAMAGED = (OSError, ValueError, KeyError, TypeError)
 
 
 @dataclass(frozen=True)
@@ -83,8 +81,8 @@ class RunWatch:
             return Running(run, "measures", 100.0, begun_s=max(begun_s, self.since_s))
         path = folder / "work" / "progress.json"
         if _time_ns(path) / 1e9 >= self.since_s:
-            with contextlib.suppress(*_DAMAGED):
-                now: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            with contextlib.suppress(*UNREADABLE):
+                now: dict[str, Any] = read_json(path)
                 return Running(
                     run, str(now["stage"]), float(now["percent"]), float(now["time_s"]),
                     float(now["work_per_s"]), max(begun_s, self.since_s),
@@ -96,7 +94,7 @@ def failure(folder: Path) -> str:
     """How the run of a folder failed, as a sentence; empty where it reached its end."""
     try:
         outcome = RunOutcome.read(folder / "outcome.json")
-    except _DAMAGED:
+    except UNREADABLE:
         return "Its outcome cannot be read."
     if outcome.outcome is Outcome.FINISHED:
         return ""

@@ -10,9 +10,9 @@ from pathlib import Path
 import pandas as pd
 
 from sandmould.definition.study import Study
+from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import name_of, number
-from sandmould.runs.run_tables import UNREADABLE
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting, setting_rows

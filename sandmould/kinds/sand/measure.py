@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import tempfile
-import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -41,7 +40,7 @@ from sandmould.kinds.sand.loose import (
 from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.kinds.sand.outflow import add_outflow, measure_outflow
 from sandmould.runs.columns import OVERLAP_P99_FRACTION
-from sandmould.runs.files import replaced
+from sandmould.runs.files import replaced, write_zip
 from sandmould.scenario.checks.cavities import free_share
 from sandmould.scenario.scenario import Scenario
 
@@ -169,9 +168,7 @@ def write_exports(scenario: Scenario, folder: Path, out: Path) -> None:
         if scenario.scene.solids:
             solids_to_vtk(scenario.scene, written / "solids.vtu")
         _write_moments(chosen, written)
-        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
-            for path in sorted(written.iterdir()):
-                archive.write(path, path.name)
+        write_zip(partial, {path.name: path for path in written.iterdir()})
 
 
 def _write_moments(moments: Iterable[Moment], out: Path) -> None:

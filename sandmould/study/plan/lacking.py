@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sandmould.definition.run import FILL, LAST_MEASURED, Run
 from sandmould.kinds.registry import kind_of
+from sandmould.plain_file import UNREADABLE
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT, read_mark
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import scenario_hash
@@ -26,8 +27,6 @@ from sandmould.runs.manifest import (
 )
 from sandmould.runs.outcome import Outcome, RunOutcome
 
-UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError)
-"""What reading a broken file may raise."""
 LISTED = 12
 _OF_ANY_COMPUTED = (OLDER_COST, "series.tsv")
 _OF_ANY_MEASURED = ("measures.tsv", LAST_MEASURED)

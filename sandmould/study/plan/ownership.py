@@ -7,6 +7,7 @@ from pathlib import Path
 
 from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem
+from sandmould.plain_file import read_plain
 from sandmould.runs.files import write_text
 
 OWNER_FILE = "study_file.txt"
@@ -30,7 +31,7 @@ def owner_text(path: Path) -> str:
 def owner_of(folder: Path) -> str | None:
     """What the results of a study name as its file; None where they name none."""
     try:
-        return (folder / OWNER_FILE).read_text(encoding="utf-8").strip() or None
+        return read_plain(folder / OWNER_FILE).strip() or None
     except (OSError, ValueError):
         return None
 

@@ -13,12 +13,12 @@ from pathlib import Path
 from sandmould.definition.run import Run
 from sandmould.kinds.kind import CORE_SECONDS, SpeedClass
 from sandmould.kinds.registry import kind_of
+from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import WALL_S
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.fills import own_work, predicted_s
 
-_DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError)
 BEGIN_S = 4.0
 """What Snakemake takes to read its rules, and the study to be planned."""
 END_S = 6.0
@@ -123,7 +123,7 @@ def computed_wall_s(folder: Path) -> float:
     """Wall time that a finished run's computation took; NaN where it failed or none is written."""
     from sandmould.runs.run_tables import read_costs  # pandas: no start waits for it
 
-    with contextlib.suppress(*_DAMAGED):
+    with contextlib.suppress(*UNREADABLE):
         if RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED:
             return float(read_costs([folder]).rows[WALL_S].iloc[-1])
     return math.nan

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from pathlib import Path
 
 import pytest
 
 from sandmould.digest import digest, file_digest
-from sandmould.runs.files import replaced, write_text
+from sandmould.runs.files import replaced, write_text, write_zip
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path: Path) -> None:
@@ -35,3 +36,13 @@ def test_digests_are_those_of_the_bytes(tmp_path: Path) -> None:
     first.write_bytes(b"one")
     second.write_bytes(b"two")
     assert digest("on", b"e") == file_digest(first) == hashlib.sha256(b"one").hexdigest()
+
+
+def test_the_same_files_give_the_same_zip(tmp_path: Path) -> None:
+    paths = {name: tmp_path / name for name in ("a", "b")}
+    for path in paths.values():
+        path.write_text(path.name)
+    write_zip(tmp_path / "one.zip", paths)
+    os.utime(paths["a"], (0, 0))
+    write_zip(tmp_path / "other.zip", dict(reversed(paths.items())))
+    assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "other.zip").read_bytes()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -112,3 +114,18 @@ def test_keys_of_a_path_are_known_from_the_types() -> None:
     assert thickness.description == "Thickness of the tube's wall."
     assert len(fields_at(Scenario, "obstacles.0.name")) == 6
     assert fields_at(Scenario, "") == fields_at(Scenario, "0") == []
+
+
+@pytest.mark.parametrize("read_file", [read_yaml, read_planned])
+def test_a_pipe_and_a_text_nested_without_end_are_sentences(
+    read_file: Callable[[Path, str], object], tmp_path: Path
+) -> None:
+    path = tmp_path / "trial.yaml"
+    for opening in ("[", "- ", "{a: ", "? "):
+        path.write_text(opening * 100_000)
+        with pytest.raises(BadInputError, match=r"trial\.yaml: "):
+            read_file(path, "trial.yaml")
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(BadInputError, match="file = 'it is no plain file' cannot be used"):
+        read_file(path, "trial.yaml")

@@ -199,3 +199,71 @@ def test_a_batch_mends_what_is_damaged(plan: Plan) -> None:
     assert lack(plan) == WHOLE
     assert before == {name: (folder / name).read_text() for name in before}
     assert run_status(folder, lack(plan)).state == "done"
+
+
+FILES = ("outcome.json", MANIFEST_FILE, "deck.in", "series.tsv", "fields.npz", "measures.tsv",
+         "final.png", "scenario.yaml")  # fmt: skip
+
+
+def flipped(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def other(make: Callable[[Path], object]) -> Callable[[Path], None]:
+    """Put something else in a file's place."""
+
+    def damage(path: Path) -> None:
+        path.unlink()
+        make(path)
+
+    return damage
+
+
+WAYS: dict[str, Callable[[Path], object]] = {
+    "missing": Path.unlink,
+    "empty": lambda path: path.write_bytes(b""),
+    "halved": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+    "flipped": flipped,
+    "garbage": lambda path: path.write_bytes(os.urandom(path.stat().st_size)),
+    "folder": other(Path.mkdir),
+    "pipe": other(os.mkfifo),
+    "link": other(lambda path: path.symlink_to("nowhere")),
+}
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_whatever_is_damaged_is_found_by_its_hash(file: str, plan: Plan) -> None:
+    folder = folder_of(plan)
+    said = status_text(plan, RESULTS, 1, deep=True)
+    assert "1 runs and fills checked: no file is damaged" in said
+    for way, damage in WAYS.items():
+        if (file, way) == ("scenario.yaml", "flipped"):
+            continue  # a letter of a comment
+        shutil.copytree(folder, "kept")
+        damage(folder / file)
+        said = status_text(plan, RESULTS, 1, deep=True)
+        assert f"{plan.runs[0].run}  {file} " in said, way
+        assert ("damaged: " in said) is (not lack(plan).need)
+        shutil.rmtree(folder)
+        os.rename("kept", folder)
+
+
+def test_of_a_run_without_hashes_sizes_alone_are_known(plan: Plan) -> None:
+    path = folder_of(plan) / MANIFEST_FILE
+    tree = json.loads(path.read_text())
+    path.write_text(json.dumps({k: v for k, v in tree.items() if k not in ("sha256", "seal")}))
+    assert lack(plan) == WHOLE
+    assert "1 of them are of an older version: only sizes" in status_text(plan, RESULTS, 1, True)
+    # What is lost of the hashes alone is no older version.
+    for key in ("sha256", "seal"):
+        path.write_text(json.dumps({k: v for k, v in tree.items() if k != key}))
+        assert f"{MANIFEST_FILE} is not as the run wrote it" in status_text(plan, RESULTS, 1, True)
+
+
+@pytest.mark.parametrize("file", ["outcome.json", MANIFEST_FILE, "scenario.yaml"])
+def test_what_is_nested_without_end_is_a_sentence(file: str, plan: Plan) -> None:
+    for text in ("[" * 100_000, "- " * 100_000):
+        (folder_of(plan) / file).write_text(text)
+        assert f"  {file} " in status_text(plan, RESULTS, 1, deep=True)

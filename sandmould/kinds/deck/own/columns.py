@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sandmould.bad_input import Problem
 from sandmould.digest import digest
+from sandmould.plain_file import read_json
 from sandmould.runs.files import write_text
 from sandmould.scenario.own_deck import CLOCK, OwnDeck
 
@@ -105,6 +106,6 @@ def keep_found(study_folder: Path, key: str, run: str, said: str) -> None:
 
 def _found(study_folder: Path) -> dict[str, tuple[str, str]]:
     with contextlib.suppress(OSError, ValueError, TypeError, AttributeError):
-        tree = json.loads((study_folder / FOUND).read_text(encoding="utf-8"))
+        tree = read_json(study_folder / FOUND)
         return {str(key): (str(run), str(said)) for key, (run, said) in tree.items()}
     return {}
