@@ -9,11 +9,13 @@ import yaml
 
 from sandmould.limits import YAML_ALIASES, YAML_DEPTH, YAML_VALUES
 
+_TAG = "tag:yaml.org,2002:"
+
 
 def _mapping(loader: Any, node: yaml.MappingNode) -> dict[str, Any]:
     first: dict[str, int] = {}
     for key_node, _ in node.value:
-        if key_node.tag == "tag:yaml.org,2002:merge":
+        if key_node.tag == f"{_TAG}merge":
             continue
         key, mark = loader.construct_object(key_node, deep=True), key_node.start_mark
         if not isinstance(key, str):
@@ -74,21 +76,65 @@ def _strict(parser: Any) -> Any:
         pass
 
     Loader.add_implicit_resolver(
-        "tag:yaml.org,2002:float",
+        f"{_TAG}float",
         re.compile(r"^[-+]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)([eE][-+]?\d+)?$"),
         list("-+0123456789."),
     )
-    Loader.add_implicit_resolver(
-        "tag:yaml.org,2002:int", re.compile(r"^[-+]?\d[\d_]*$"), list("-+0123456789")
-    )
+    Loader.add_implicit_resolver(f"{_TAG}int", re.compile(r"^[-+]?\d[\d_]*$"), list("-+0123456789"))
     # The first match wins in PyYAML: plain integers must be asked before floats.
     for resolvers in Loader.yaml_implicit_resolvers.values():
         resolvers.sort(key=lambda item: not item[0].endswith(":int"))
-    Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
+    Loader.add_constructor(f"{_TAG}map", _mapping)
     return Loader
 
 
-_OF_USERS = _strict(_Bounded)
+def _as_in_yaml_1_2(loader: Any) -> Any:
+    """Let a loader read plain scalars by the core schema of YAML 1.2, and text that can be seen.
+
+    YAML 1.1, which PyYAML reads, takes 1:30 for 90, 010 for 8 and ``no`` for false.
+    """
+    core = {
+        "null": r"~|null|Null|NULL|",
+        "bool": r"true|True|TRUE|false|False|FALSE",
+        "int": r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+",
+        "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+    }
+    loader.yaml_implicit_resolvers = {}
+    for name, pattern in core.items():
+        loader.add_implicit_resolver(f"{_TAG}{name}", re.compile(rf"(?:{pattern})$"), None)
+    loader.add_implicit_resolver(f"{_TAG}merge", re.compile("<<$"), None)
+    loader.yaml_constructors = {
+        tag: constructor
+        for tag, constructor in loader.yaml_constructors.items()
+        if tag is None or tag.removeprefix(_TAG) in (*core, "str", "seq", "map")
+    }
+    loader.add_constructor(f"{_TAG}int", _integer)
+    loader.add_constructor(f"{_TAG}str", _text)
+    return loader
+
+
+def _integer(loader: Any, node: yaml.ScalarNode) -> int:
+    text = str(loader.construct_scalar(node))
+    base = {"0o": 8, "0x": 16}.get(text[:2], 10)
+    return int(text, base)
+
+
+_UNSEEN = re.compile(
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+"""Characters that steer a terminal or the direction of a line, and halves of characters."""
+
+
+def _text(loader: Any, node: yaml.ScalarNode) -> str:
+    text = str(loader.construct_scalar(node))
+    if unseen := _UNSEEN.search(text):
+        fault = f"U+{ord(unseen[0]):04X} is no character that can be shown"
+        raise yaml.constructor.ConstructorError(None, None, fault, node.start_mark)
+    return text
+
+
+_OF_USERS = _as_in_yaml_1_2(_strict(_Bounded))
 _OF_THE_PLAN = _strict(getattr(yaml, "CSafeLoader", yaml.SafeLoader))
 
 

@@ -85,8 +85,8 @@ def log_of(text: bytes) -> RoundLog:
     """
     try:
         return TypeAdapter(RoundLog).validate_json(text)
-    except ValueError as error:
-        raise ValueError(f"no list of rounds: {error}") from None
+    except ValueError:
+        raise ValueError("no list of rounds") from None
 
 
 def write_rounds(log: RoundLog, folder: Path) -> None:

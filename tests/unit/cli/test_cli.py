@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 from pathlib import Path
 
@@ -168,7 +167,6 @@ def test_the_quick_demo_says_that_the_installation_works(
     monkeypatch.chdir(tmp_path)
     for status, opening in ((0, "The installation works. Use 6 g"), (1, "Use 6 g")):
         monkeypatch.setattr(run_study, "_snakemake", lambda *_, status=status: status)
-        monkeypatch.setattr(run_study, "_standing_by", lambda *_: contextlib.nullcontext())
         with pytest.raises(SystemExit) as ended:
             app(["demo", "--quick", "--cores", "1"])
         assert ended.value.code == status

@@ -21,6 +21,7 @@ from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile, stored_snap
 from sandmould.execution.packs import recorded
 from sandmould.execution.packs.pack import pack
 from sandmould.execution.packs.unpack import unpack
+from sandmould.kinds.registry import kind_of
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import MANIFEST_FILE, read_manifest, save_manifest
 from sandmould.scenario.own_deck import OwnDeck
@@ -370,7 +371,8 @@ def test_files_that_a_scenario_names_are_not_opened(packed: Path) -> None:
     scenario = OwnDeck(template="nowhere/deck.in.j2")
     run = Run("two", "own_r1_0a1b2c", {}, 1, scenario, {})
     write_plan([run], Path("plan"))
-    origin = {"scenario_sha256": scenario_hash(scenario), "template_sha256": "as it was there"}
+    template_sha256 = kind_of(scenario).planning.template_hash(scenario)
+    origin = {"scenario_sha256": scenario_hash(scenario), "template_sha256": template_sha256}
     members = members_of(packed)
     texts = {
         "scenario.yaml": (Path("plan") / run.place / "scenario.yaml").read_bytes(),

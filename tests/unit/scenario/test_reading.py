@@ -28,7 +28,6 @@ def read(folder: Path, text: str) -> dict[str, object]:
         ("-.5", -0.5),
         ("3", 3),
         ("3.", 3.0),
-        ("1_000", 1000),
         ("vertical", "vertical"),
         ("'7e4'", "7e4"),
         ("null", None),

@@ -17,7 +17,7 @@ PLACES = " and ".join([".", "config/studies", "config/scenarios"])
 CASES: dict[str, tuple[str | bytes, str]] = {
     "yes for a number": (
         "based_on: tube\nreplicates: yes",
-        "trial.yaml: replicates = True cannot be used: valid is a whole number.",
+        "trial.yaml: replicates = 'yes' cannot be used: valid is a whole number.",
     ),
     "unknown key named like a type": (
         "based_on: tube\nstrength: 1",

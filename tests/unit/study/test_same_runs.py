@@ -193,14 +193,13 @@ def test_runs_are_the_same_in_three_folders(
     monkeypatch.chdir(moved)
     check_whole(Path("studies"))
     # Packed there, unpacked beside a copy of the studies alone.
-    packs = [
-        pack(open_plan(Path("studies", f"{name}.yaml")), RESULTS, tmp_path / f"{name}.zip").path
-        for name in STUDIES
-    ]
+    packs = [tmp_path / f"{name}.zip" for name in STUDIES]
+    for name, path in zip(STUDIES, packs, strict=True):
+        pack(open_plan(Path("studies", f"{name}.yaml")), RESULTS, path)
     shutil.copytree(moved / "studies", tmp_path / "unpacked")
     monkeypatch.chdir(tmp_path / "unpacked")
     for path in packs:
-        said = unpack(path, RESULTS).text()
+        said = unpack(path, RESULTS)
         assert re.match(r"\w+: [1-9] runs? taken$", said), said
     check_whole()
 
