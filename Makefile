@@ -4,6 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 OTHER_PYTHON ?= $(shell for python in python3.13 python3.12 "$$HOME"/.pyenv/versions/3.13*/bin/python; do \
   "$$python" -c '' 2> /dev/null && echo "$$python" && break; done)
 CORES ?= $(shell nproc)
+OTHER_TESTS ?= tests
 STUDY ?= config/studies/tube_demo.yaml
 MINUTES ?= 60
 BIN := .venv/bin
@@ -14,7 +15,7 @@ TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo study plan status report quick fast-tests test other-python lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
+.PHONY: help install demo study plan status report quick fast-tests test all-tests other-python lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
 .PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop size reliability fuzz benchmarks peers scaling solidification flow \
   reproduction
 
@@ -55,12 +56,15 @@ quick: $(INSTALLED)
 
 ## lint, types, import contract and all tests
 test: lint
+	@$(MAKE) --no-print-directory all-tests
+
+all-tests: $(INSTALLED)
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 fast-tests: $(INSTALLED)
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and not browser"
 
-## the fast half of the tests on another supported Python, where there is one
+## the fast half of OTHER_TESTS on another supported Python, where there is one
 other-python:
 ifeq ($(OTHER_PYTHON),)
 	@echo 'No other Python from 3.12 on is found: the tests ran on one alone.'
@@ -68,7 +72,7 @@ else
 	$(OTHER_PYTHON) -m venv .venv-other
 	.venv-other/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	.venv-other/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	.venv-other/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and not browser"
+	.venv-other/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and not browser" $(OTHER_TESTS)
 endif
 
 ## lint, types and import contract alone

@@ -200,7 +200,7 @@ class FillLaw:
             [0.5] * len(self._groups), (0.05, 20.0), nu=2.5
         ) + WhiteKernel(1e-2, (1e-6, 1.0))
         self._process: Any = GaussianProcessRegressor(
-            kernel, normalize_y=True, n_restarts_optimizer=2, random_state=1
+            kernel, normalize_y=True, n_restarts_optimizer=0
         )
         with warnings.catch_warnings(), threadpool_limits(1):
             # A length at its bound says that the fill hardly depends on a group.

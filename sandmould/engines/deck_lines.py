@@ -94,8 +94,7 @@ def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, fl
 
 def skin_m(scenario: Scenario) -> float:
     """Neighbour skin of grains in LAMMPS and LIGGGHTS, and of grains near surfaces."""
-    classes = scenario.sand.classes(scenario.dimension)
-    return SKIN * sum(c.diameter_m * c.count_fraction for c in classes)
+    return SKIN * scenario.sand.mean_diameter_m(scenario.dimension)
 
 
 def vibration_key(program: Program, stage: Stage) -> str:

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from sandmould.scenario.quantity import Section, quantity
+from sandmould.sums import added
 
 PAPER = "Rojek 2004, section 4.1"
 ARGUED = "argued default, docs/choices.md"
@@ -118,6 +119,10 @@ class Sand(Section):
         passing = [p.passing_fraction for p in self.sieve]
         opening_m = [p.opening_m for p in self.sieve]
         return float(np.interp(0.5, passing, opening_m)) * self.size_scale
+
+    def mean_diameter_m(self, dimension: int) -> float:
+        """Mean diameter of the modelled grains by number."""
+        return added(c.diameter_m * c.count_fraction for c in self.classes(dimension))
 
     @property
     def thickness_m(self) -> float:

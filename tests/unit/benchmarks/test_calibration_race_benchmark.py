@@ -36,6 +36,7 @@ from benchmarks.calibration.oracle import (
     ANGLE,
     KEYS,
     SECOND,
+    Map,
     NoMapError,
     by_dem,
     by_emulator,
@@ -84,6 +85,11 @@ def summary(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def known(summary: Path) -> Map:
+    return read_map(summary)
+
+
 @pytest.fixture
 def fake(tmp_path: Path) -> Iterator[Peer]:
     """A peer's program without a peer: the nearest run of two generations of four."""
@@ -120,8 +126,7 @@ def miss(point: list[float]) -> float:
     return abs(point[0])
 
 
-def test_the_map_is_read_with_its_noise(summary: Path) -> None:
-    known = read_map(summary)
+def test_the_map_is_read_with_its_noise(known: Map) -> None:
     noise = known.noise()
     assert (known.replicates, known.freedom) == (2, 25)
     assert noise["low_deg"] < NOISE_DEG < noise["high_deg"]
@@ -217,8 +222,7 @@ def test_failures_count_as_longer_than_anything() -> None:
 
 
 @pytest.mark.slow
-def test_our_method_finds_the_ridge_of_the_map(summary: Path) -> None:
-    known = read_map(summary)
+def test_our_method_finds_the_ridge_of_the_map(known: Map) -> None:
     race = run_race(
         Ours(), problem(tolerance=known.tolerance), by_emulator(known, seed=1),
         lambda point: abs(known.mean(point) - 25.0), cap=20,
@@ -275,7 +279,7 @@ def test_a_peer_that_is_not_there_or_breaks_is_told(tmp_path: Path) -> None:
         Peer("broken", [sys.executable, "-c", "import no_such"])
 
 
-def test_regions_hold_what_they_should(summary: Path) -> None:
+def test_regions_hold_what_they_should(known: Map) -> None:
     samples = np.random.default_rng(1).normal(size=(400, 2)) * [1.0, 0.1]
     even = np.full(400, 1 / 400)
     assert ellipse_holds(samples, even, (2.0, 0.0))
@@ -284,12 +288,11 @@ def test_regions_hold_what_they_should(summary: Path) -> None:
     row = counted("m", "all", [True] * 19 + [False])
     assert row["held"] / row["truths"] == row["claimed"]
     assert row["low"] < 0.95 < row["high"]
-    known = read_map(summary)
     assert our_coverage(known, planted(known, 5))["held"] >= 3
 
 
 def test_the_page_says_what_was_measured(summary: Path, fake: Peer, tmp_path: Path) -> None:
-    settings = CalibrationExtent(seeds=2, truths=3, targets=(25.0,), cap=12)
+    settings = CalibrationExtent(seeds=1, truths=2, targets=(25.0,), cap=9)
     found = measure(summary, [Ours(), fake, Nearest()], settings)
     text = page(json.loads(json.dumps({"emulator": found, "dem": dem(found)})))
     noise = found["noise"]["sd_deg"]
@@ -318,13 +321,13 @@ def dem(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_truths_planted_by_runs_are_found_by_one_measure_and_better_by_two(
-    summary: Path, tmp_path: Path
+    summary: Path, known: Map, tmp_path: Path
 ) -> None:
     table = pd.read_csv(summary, sep="\t")
     # Where the angle rises with the arm, the outflow falls with friction alone.
     table[SECOND] = 0.9 - 0.2 * table[KEYS[0]] + np.tile([0.002, -0.002], len(table) // 2)
     table.to_csv(tmp_path / "second.tsv", sep="\t", index=False)
-    maps = {ANGLE: read_map(summary), SECOND: read_map(tmp_path / "second.tsv", SECOND)}
+    maps = {ANGLE: known, SECOND: read_map(tmp_path / "second.tsv", SECOND)}
 
     def runs(number: int) -> Callable[[list[float]], dict[str, float]]:
         simulate = {measure: by_emulator(known, seed=number) for measure, known in maps.items()}

@@ -41,11 +41,12 @@ def told(scenario: Scenario) -> str:
     return str(problem)
 
 
-def test_the_registry_lists_all_engines_and_their_templates() -> None:
+def test_the_registry_lists_all_engines_their_templates_and_their_golden_decks() -> None:
     folders = {path.parent.name for path in (ROOT / "sandmould" / "engines").glob("*/engine.py")}
     assert set(ENGINE_NAMES) == folders
     for name in ENGINE_NAMES:
         assert (ROOT / "templates" / name / "deck.in.j2").is_file()
+        assert (ROOT / "tests/decks/golden" / f"{name}_step_of_bed.in").is_file()
 
 
 def test_the_registry_says_which_engines_read_decks_of_users() -> None:
