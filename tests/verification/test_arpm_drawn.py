@@ -220,7 +220,7 @@ def test_a_turned_bar_freezes_as_the_bar_upright(case: str, way: str) -> None:
             assert found.solidification_time_s == pytest.approx(expected, rel=0.01)
 
 
-@pytest.mark.parametrize(("case", "cells"), zip(CASES, (8, 6), strict=True), ids=CASES)
+@pytest.mark.parametrize(("case", "cells"), list(zip(CASES, (8, 6), strict=True)), ids=CASES)
 def test_a_ball_freezes_as_the_radial_solution(case: str, cells: int) -> None:
     plain, ways = (), ("difference", "faces")
     for shift, way, layers in (*((x, way, plain) for x in (0.0, 0.5) for way in ways),
