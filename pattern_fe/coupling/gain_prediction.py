@@ -65,7 +65,7 @@ def predicted_gain(scenario: Scenario, pattern: Pattern, window_s: float) -> Gai
 
 def _row(scenario: Scenario, pattern: Pattern) -> csr_array:
     """Shape functions under mean grains side by side on what faces up, (grains, nv) float64."""
-    diameter_m = _diameter_m(scenario)
+    diameter_m = scenario.sand.mean_diameter_m(scenario.dimension)
     if scenario.dimension == 3:
         return shares_on_top(pattern, diameter_m, _UP)
     area = pattern.surface.vertex_area_vector_m2
@@ -76,7 +76,7 @@ def _row(scenario: Scenario, pattern: Pattern) -> csr_array:
 
 def _grain_n_m(scenario: Scenario, window_s: float) -> float:
     """Stiffness of one contact and the column on it against the mean motion of a window."""
-    diameter_m = _diameter_m(scenario)
+    diameter_m = scenario.sand.mean_diameter_m(scenario.dimension)
     contact = ContactBound.of_grain(scenario, diameter_m)
     contact_n_m = contact.stiffness_n_m + 2.0 * contact.damping_n_s_m / window_s
     mass_kg = scenario.sand.grain_mass_kg(diameter_m, scenario.dimension)
@@ -88,9 +88,3 @@ def _grain_n_m(scenario: Scenario, window_s: float) -> float:
     reached = window_s * math.sqrt(spring_n_m / mass_kg)
     column_n_m = 2.0 * mass_kg * max(1.0, min(in_column, reached)) / window_s**2
     return 1.0 / (1.0 / contact_n_m + 1.0 / column_n_m)
-
-
-def _diameter_m(scenario: Scenario) -> float:
-    """Mean over the grains by number."""
-    classes = scenario.sand.classes(scenario.dimension)
-    return sum(size.count_fraction * size.diameter_m for size in classes)

@@ -14,6 +14,7 @@ from sandmould.scenario.placement import PlannedLayer, plan_counts, plan_layer, 
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 from sandmould.scenario.vibration import RestStage, VibrationStage
+from sandmould.sums import added
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ class Program:
 
     def mass_kg(self, layers: int) -> float:
         """Mass of the grains of the first layers."""
-        return sum(self._masses_kg[:layers])
+        return added(self._masses_kg[:layers])
 
     @property
     def fill_stages(self) -> int:

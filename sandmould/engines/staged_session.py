@@ -24,6 +24,7 @@ from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.table_periods import TablePeriod
 from sandmould.scenario.fill import Settling
 from sandmould.scenario.stages import StageKind
+from sandmould.sums import added
 
 
 class StageState(NamedTuple):
@@ -199,7 +200,7 @@ class StagedSession(ABC):
         if self.steps - self._counts.check < self._stage_start:
             return
         loads = self.surface_loads() or {}
-        support_n = -sum(float(force[-1]) for force in loads.values())
+        support_n = -added(float(force[-1]) for force in loads.values())
         self._watch.check(self._rms_speed_m_s(), support_n, self._weight_n())
         long_enough = self.steps - self._stage_start >= self._counts.steps(settling.shortest_s)
         self.at_rest = long_enough and self._watch.at_rest

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sandmould.geometry.geometry import Array
 from sandmould.scenario.scenario import Scenario
+from sandmould.sums import added
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -60,7 +61,7 @@ def nominal_fraction(s: Scenario) -> float:
 
 
 def _mean_grain_measure(s: Scenario) -> float:
-    return sum(
+    return added(
         c.count_fraction * s.sand.grain_measure(c.diameter_m, s.dimension)
         for c in s.sand.classes(s.dimension)
     )
@@ -73,7 +74,7 @@ def plan_counts(s: Scenario) -> list[int]:
     counts over the whole floor: obstacles only lift the bed.
     """
     mean_measure = _mean_grain_measure(s)
-    mean_mass = sum(
+    mean_mass = added(
         c.count_fraction * s.sand.grain_mass_kg(c.diameter_m, s.dimension)
         for c in s.sand.classes(s.dimension)
     )
@@ -120,8 +121,8 @@ def predicted_bed_height_m(s: Scenario, counts: list[int]) -> float:
     gate_m = _gate_under_sand_m(s)
     if gate_m > 0.0 or s.fill.over_x_m or s.fill.over_y_m:
         return gate_m + sand / s.floor_measure
-    displaced = sum(solid.measure for solid in s.scene.solids)
-    displaced += sum(bore.measure for bore in s.scene.bores)
+    displaced = added(solid.measure for solid in s.scene.solids)
+    displaced += added(bore.measure for bore in s.scene.bores)
     return (sand + displaced) / s.floor_measure
 
 

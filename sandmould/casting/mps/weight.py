@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sandmould.compiled import njit
+from sandmould.sums import added
 
 OPTIONS: dict[str, Any] = {
     "nogil": True,
@@ -106,5 +107,5 @@ def make_kernel(
     across = np.arange(-math.ceil(reach), math.ceil(reach) + 1)
     site = np.stack(np.meshgrid(*[across] * dimension), axis=-1).reshape(-1, dimension)
     far_m = spacing_m * np.sqrt((site**2).sum(axis=1))
-    total = sum(weight(bare, float(r)) for r in far_m if r > 0.0)
+    total = added(weight(bare, float(r)) for r in far_m if r > 0.0)
     return bare._replace(lattice_density=total)

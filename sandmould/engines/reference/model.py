@@ -74,12 +74,10 @@ def surfaces_of(scenario: Scenario) -> Surfaces:
 
 def solver_of(scenario: Scenario, stage: Stage, step_s: float) -> MovedSolver:
     """Make the solver of a scenario, without grains."""
-    classes = scenario.sand.classes(scenario.dimension)
-    mean_m = sum(c.diameter_m * c.count_fraction for c in classes)
     return MovedSolver(
         scene_of(scenario, stage, step_s),
         surfaces_of(scenario),
-        SKIN_OVER_DIAMETER * mean_m,
+        SKIN_OVER_DIAMETER * scenario.sand.mean_diameter_m(scenario.dimension),
         scenario.engine.ranks,
         scenario.record.orientation,
     )
