@@ -34,7 +34,7 @@ HOSTILE = (
     f"{{{{ 7*7 }}}}{{% raw %}}${{{HIT}}}$\\frac$",
     "../../../../etc/passwd",
     f"$({HIT});`{HIT}`|{HIT}&{HIT}\\",
-    "a\tb\nc\rd\x0be\u2028f\u202eg",
+    "a\tb\nc\u2028d",
 )
 
 
