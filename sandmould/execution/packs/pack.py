@@ -87,6 +87,8 @@ def _files_of(place: Path, anew: Path | None) -> dict[str, Path]:
         Why it cannot be packed.
     """
     manifest = read_manifest(place)
+    if manifest is None:
+        raise ValueError("of an older version, without a list of its files")
     if why := change(place, manifest):
         raise ValueError(why)
     if anew is not None:
