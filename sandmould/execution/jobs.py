@@ -22,6 +22,7 @@ from sandmould.execution.locks import computing
 from sandmould.execution.pool import SERVER_LOST, do, start_server
 from sandmould.execution.simulate import RESTARTABLE_EXIT, measure, render, simulate, write_crash
 from sandmould.runs.formatting import listed
+from sandmould.runs.manifest import OUTCOME_FILE
 from sandmould.runs.parent import end_with_parent
 from sandmould.study.plan.batches import is_done
 from sandmould.study.plan.lacking import Need, lack_of
@@ -31,7 +32,6 @@ ASKED_EXIT = 143
 """Exit status of a run that stopped early since its job is to end, as a shell gives SIGTERM."""
 _ASKED = (ASKED_EXIT, -signal.SIGTERM)
 _KILLED = (SERVER_LOST, -signal.SIGKILL, -signal.SIGINT, -signal.SIGHUP, 128 + signal.SIGKILL)
-_OUTCOME = "outcome.json"
 
 
 class JobError(Exception):
@@ -135,7 +135,7 @@ def compute_batch(
 
 def _see_to_end(work: Callable[..., int], folder: Path, log: Path, ranks: int, mpi: str) -> None:
     """Do some work on a run, and have its outcome written where it could not do so itself."""
-    outcome = folder / _OUTCOME
+    outcome = folder / OUTCOME_FILE
     ended = do(work, folder, ranks, mpi, log=log, name=folder.name)
     if ended.status and not outcome.exists():
         if ended.status in _ASKED:
@@ -159,7 +159,7 @@ def _do_all(folder: Path, ranks: int, mpi: str) -> int:
     """Do what is missing of one run; the exit status."""
     run = read_run(folder / "scenario.yaml")
     if lack_of(run, folder).need is Need.COMPUTE:
-        for old in (_OUTCOME, LAST_MEASURED):
+        for old in (OUTCOME_FILE, LAST_MEASURED):
             (folder / old).unlink(missing_ok=True)  # damaged, or of another scenario or deck
         render(run, folder)
         if status := _simulate(folder, ranks, mpi, run):
@@ -174,7 +174,7 @@ def _do_all(folder: Path, ranks: int, mpi: str) -> int:
 def _simulate(folder: Path, ranks: int, mpi: str, run: Run | None = None) -> int:
     """Compute a run; the exit status."""
     with computing(folder) as lock, _asked_to_end() as is_asked:
-        if (folder / _OUTCOME).exists():
+        if (folder / OUTCOME_FILE).exists():
             return 0  # finished meanwhile by a process that outlived its own Snakemake
         if ranks > 1:
             status = _in_ranks(folder, ranks, mpi, lock)

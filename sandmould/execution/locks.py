@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TextIO
 
 from sandmould.runs.claim import Claim, owner_of
+from sandmould.runs.manifest import OUTCOME_FILE
 from sandmould.runs.words import say
 
 
@@ -27,12 +28,12 @@ def computing(folder: Path) -> Iterator[TextIO]:
     with _locked(folder / "lock", waiting) as (file, alone):
         claim = Claim(folder, alone, partial(_lost, folder))
         try:
-            if not (folder / "outcome.json").exists():
+            if not (folder / OUTCOME_FILE).exists():
                 (folder / "work").mkdir(exist_ok=True)
             yield file
         finally:
             claim.let_go()
-        if (folder / "outcome.json").exists():
+        if (folder / OUTCOME_FILE).exists():
             (folder / "lock").unlink(missing_ok=True)  # nothing is left to be guarded
 
 

@@ -242,3 +242,11 @@ def test_a_job_that_fails_says_why(tmp_path: Path) -> None:
     with pytest.raises(JobError, match="says why"):
         do_job("os:stat", str(tmp_path / "nothing"), log=str(tmp_path / "log"))
     assert "No such file" in (tmp_path / "log").read_text()
+
+
+def test_a_run_that_cannot_be_loaded_ends_no_server(tmp_path: Path) -> None:
+    environment = os.environ | {LOADED_FIRST: str(tmp_path / "nothing" / "scenario.yaml")}
+    loads = [sys.executable, "-c", "import sandmould.execution.preload"]
+    ran = subprocess.run(loads, env=environment, capture_output=True, text=True)
+    assert ran.returncode == 0
+    assert "nothing" in ran.stderr

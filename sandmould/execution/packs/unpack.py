@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from sandmould.bad_input import BadInputError
-from sandmould.definition.run import FILLS, Run
+from sandmould.definition.run import FILLS
 from sandmould.digest import file_digest
 from sandmould.execution.locks import is_locked, take_turn
 from sandmould.execution.packs.archive import (
@@ -20,9 +20,8 @@ from sandmould.execution.packs.archive import (
     open_pack,
     reasons_lines,
 )
-from sandmould.kinds.registry import kind_of
 from sandmould.runs.files import replaced
-from sandmould.runs.manifest import DECK_FILE, OUTCOME_FILE, read_origin
+from sandmould.runs.manifest import DECK_FILE, OUTCOME_FILE
 from sandmould.runs.products import LAST_WORK
 from sandmould.study.plan.build_plan import writing
 from sandmould.study.plan.lacking import Need, lack_of, template_hashes
@@ -116,23 +115,14 @@ class _Judge:
         return why and f"a start would compute it: {why}"
 
     def _why_computed(self, folder: Path, place: str) -> str:
-        """Why a start would compute the run whose files lie in a folder.
-
-        Files that a scenario names are not opened: whether a deck of the user's own is the same is
-        for the start to say.
-        """
+        """Why a start would compute the run whose files lie in a folder; opens no file it names."""
         try:
             run = read_run(folder / SCENARIO_FILE)
         except BadInputError:
             return f"its {SCENARIO_FILE} cannot be read by this version"
         if (run.study, run.place) != (self._study, place):
             return f"its {SCENARIO_FILE} is that of another run"
-
-        def stated(_: Run) -> str:
-            return str(read_origin(folder)["template_sha256"])
-
-        is_own = kind_of(run.scenario).planning.program is not None
-        lack = lack_of(run, folder, stated if is_own else self._template_hash)
+        lack = lack_of(run, folder, self._template_hash)
         return lack.why or "it is not at its end" if lack.need is Need.COMPUTE else ""
 
 
