@@ -29,7 +29,8 @@ SERVER_LOST = 255
 """Exit status of work whose end is not known, since the server was killed; Python's own."""
 _CONTEXT = multiprocessing.get_context("forkserver")
 _ONE_AT_A_TIME = threading.Lock()
-"""Starting a process asks all others whether they have ended, which two threads may not do."""
+"""Starting a server changes the environment, starting a process asks all others whether they have
+ended: two threads may do neither at a time."""
 
 
 class End(NamedTuple):
@@ -49,14 +50,15 @@ def start_server(scenarios: Iterable[Path] = ()) -> None:
     scenarios : iterable of Path
         Files ``scenario.yaml``, one of each class of the runs that are to be computed.
     """
-    _CONTEXT.set_forkserver_preload(["sandmould.execution.preload"])
-    before = dict(os.environ)
-    os.environ[LOADED_FIRST] = os.pathsep.join(str(path.absolute()) for path in scenarios)
-    os.environ["PYTHONSAFEPATH"] = "1"  # a module of the user's in the working folder is not ours
-    forkserver.ensure_running()
-    for name in (LOADED_FIRST, "PYTHONSAFEPATH"):
-        del os.environ[name]
-    os.environ.update(before)
+    with _ONE_AT_A_TIME:
+        _CONTEXT.set_forkserver_preload(["sandmould.execution.preload"])
+        before = dict(os.environ)
+        os.environ[LOADED_FIRST] = os.pathsep.join(str(path.absolute()) for path in scenarios)
+        os.environ["PYTHONSAFEPATH"] = "1"  # a module in the user's working folder is not ours
+        forkserver.ensure_running()
+        for name in (LOADED_FIRST, "PYTHONSAFEPATH"):
+            del os.environ[name]
+        os.environ.update(before)
 
 
 def do(work: Callable[..., int | None], *given: Any, log: Path, name: str = "") -> End:
@@ -75,10 +77,9 @@ def do(work: Callable[..., int | None], *given: Any, log: Path, name: str = "") 
     """
     start_server()
     reader, writer = _CONTEXT.Pipe(duplex=False)
-    process = _CONTEXT.Process(
-        target=_begin, args=(writer, os.getcwd(), dict(os.environ), work, given), daemon=True
-    )
     with _ONE_AT_A_TIME:
+        begin = (writer, os.getcwd(), dict(os.environ), work, given)
+        process = _CONTEXT.Process(target=_begin, args=begin, daemon=True)
         process.start()
     writer.close()
     words: collections.deque[str] = collections.deque(maxlen=3)

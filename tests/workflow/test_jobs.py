@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from sandmould.definition.run import Run
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution.jobs import JobError, do_job
 from sandmould.execution.locks import is_locked
-from sandmould.execution.pool import LOADED_FIRST
+from sandmould.execution.pool import LOADED_FIRST, start_server
 from sandmould.runs.claim import owner_of
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.batches import is_done
@@ -125,6 +126,20 @@ def test_a_killed_run_is_continued_and_its_job_goes_on(
     assert [is_done(folder) for folder in folders] == [False, True]
     compute_all(folders, tmp_path / "log", side_by_side=2)
     assert outcome_of(folders[0]).outcome is Outcome.FINISHED
+
+
+def test_threads_that_ask_for_the_server_leave_the_environment_as_it_was(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv(LOADED_FIRST, raising=False)
+    often = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as threads:
+            list(threads.map(lambda _: start_server(), range(100)))
+    finally:
+        sys.setswitchinterval(often)
+    assert LOADED_FIRST not in os.environ
 
 
 def test_a_run_that_is_asked_to_end_stops_softly_and_its_job_begins_no_other(
