@@ -7,7 +7,8 @@ from pathlib import Path
 
 from sandmould.execution.simulate import measure, render, simulate, write_crash
 from sandmould.study.collect import collect
-from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
+from tests.planned import announce
 
 ELEMENTS_M = (0.01, 0.02)
 EXCHANGES = ("corrected", "faces", "difference")

@@ -26,7 +26,7 @@ from sandmould.statistics.evidence import usable_values
 from sandmould.study.collect import gather
 from sandmould.study.plan.expand import replicate_seed
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import write_plan
+from sandmould.study.plan.plan_files import write_plan, write_run
 
 Floats = NDArray[np.float64]
 Measures = dict[str, float]
@@ -158,7 +158,7 @@ def _measures_of(run: Run) -> Measures:
     """Simulate and measure a run."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        run_folder = folder / "runs" / run.run
+        run_folder = write_run(run, folder)
         write_plan([run], folder)
         render_run(run_folder)
         simulate(run_folder)

@@ -16,7 +16,7 @@ from sandmould.execution.simulate import measure, render, simulate
 from sandmould.module_main import run_main
 from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, prepare
 from sandmould.study.plan.lacking import lack_of
-from sandmould.study.plan.plan_files import read_run
+from sandmould.study.plan.plan_files import read_run, write_run
 
 WARM_UP = 2
 """Runs that come first and do not count: they load what all others find loaded."""
@@ -30,14 +30,13 @@ def main(study: str) -> None:
     folder = RESULTS / plan.study.name
     (folder / "logs").mkdir(exist_ok=True)
     for fill in plan.fills:
-        scenario = folder / fill.place / "scenario.yaml"
-        compute_batch([str(scenario)], str(folder / "logs" / "fills"), 1, "")
+        compute_batch([write_run(fill, folder)], str(folder / "logs" / "fills"), 1, "")
     load_for(plan.runs[0].scenario)
     for run in plan.runs[:WARM_UP]:
-        _do(folder / run.place)
+        _do(write_run(run, folder))
     begun_s = time.process_time()
     for run in plan.runs[WARM_UP:]:
-        _do(folder / run.place)
+        _do(write_run(run, folder))
     print(json.dumps((time.process_time() - begun_s) / len(plan.runs[WARM_UP:])))
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
+
+from sandmould.digest import digest
 
 Part = str
 """``sweep``, ``cross_check``, a case of the certificate's controls, or ``FILL``."""
@@ -41,6 +44,12 @@ class Run:
     def place(self) -> str:
         """Where it lies in the folder of its study."""
         return f"{FILLS if self.part == FILL else 'runs'}/{self.run}"
+
+    @cached_property
+    def alike(self) -> str:
+        """Hash that it shares with runs which differ from it in their seed alone."""
+        own = self.part, bool(self.fill), type(self.scenario).__name__
+        return digest(f"{own}{self.scenario.model_dump_json(exclude={'seed'})}")
 
     @property
     def seed(self) -> int:

@@ -69,13 +69,13 @@ def _named(work: str, *given: Any) -> None:
     pkgutil.resolve_name(work)(*given)
 
 
-def compute_run(scenario: str, log: str, ranks: int, mpi: str) -> None:
+def compute_run(folder: Path, log: str, ranks: int, mpi: str) -> None:
     """Compute a run whose deck is there; an outcome is written whatever happens.
 
     Parameters
     ----------
-    scenario : str
-        Path of its ``scenario.yaml``.
+    folder : Path
+        Its own, with its ``scenario.yaml``.
     log : str
     ranks : int
         MPI ranks; 1 for an engine whose ranks are threads of one process.
@@ -87,19 +87,19 @@ def compute_run(scenario: str, log: str, ranks: int, mpi: str) -> None:
     JobError
         When it stopped early, and the same command continues it.
     """
-    start_server([Path(scenario)])
-    _see_to_end(_simulate, Path(scenario).parent, Path(log), ranks, mpi)
+    start_server([folder])
+    _see_to_end(_simulate, folder, Path(log), ranks, mpi)
 
 
 def compute_batch(
-    scenarios: Sequence[str], log: str, ranks: int, mpi: str, side_by_side: int = 1
+    folders: Sequence[Path], log: str, ranks: int, mpi: str, side_by_side: int = 1
 ) -> None:
     """Render, compute and measure runs, those left out that are there already.
 
     Parameters
     ----------
-    scenarios : sequence of str
-        Paths of their ``scenario.yaml``.
+    folders : sequence of Path
+        Their own, with their ``scenario.yaml``.
     log : str
         Takes what all of them print.
     ranks : int
@@ -112,9 +112,8 @@ def compute_batch(
     JobError
         At the end, when a run stopped or broke: the same job continues it and redoes none.
     """
-    start_server([Path(scenarios[0])])
+    start_server(folders[:1])
     asked_to_end = threading.Event()
-    folders = [Path(scenario).parent for scenario in scenarios]
     Path(log).touch()
 
     def compute(folder: Path) -> None:

@@ -42,18 +42,19 @@ class End(NamedTuple):
     """The last lines that it printed."""
 
 
-def start_server(scenarios: Iterable[Path] = ()) -> None:
+def start_server(folders: Iterable[Path] = ()) -> None:
     """Start the server of this process, unless it is there; it loads while this process goes on.
 
     Parameters
     ----------
-    scenarios : iterable of Path
-        Files ``scenario.yaml``, one of each class of the runs that are to be computed.
+    folders : iterable of Path
+        Of runs, one of each class of those that are to be computed.
     """
     with _ONE_AT_A_TIME:
         _CONTEXT.set_forkserver_preload(["sandmould.execution.preload"])
         before = dict(os.environ)
-        os.environ[LOADED_FIRST] = os.pathsep.join(str(path.absolute()) for path in scenarios)
+        files = [str(folder.absolute() / "scenario.yaml") for folder in folders]
+        os.environ[LOADED_FIRST] = os.pathsep.join(files)
         os.environ["PYTHONSAFEPATH"] = "1"  # a module in the user's working folder is not ours
         forkserver.ensure_running()
         for name in (LOADED_FIRST, "PYTHONSAFEPATH"):

@@ -17,6 +17,8 @@ _FILE = re.compile(r"(.*\.)?(file|files|template)(\.\d+)*")
 """Keys that name files."""
 _SHIPPED = re.compile(r"(?:sandmould/shipped/)?(config/(?:decks|meshes)/.+)")
 """A file that comes with us, as seen from a checkout or from an installed package."""
+_SEEDLESS: dict[tuple[type[Section], str], dict[str, Any]] = {}
+"""What was said by the last scenario whose hash was asked for, but for its seed."""
 
 
 def scenario_hash(scenario: Section) -> str:
@@ -25,7 +27,14 @@ def scenario_hash(scenario: Section) -> str:
     A value at the key's first default says nothing: a key that comes or goes later changes no
     hash of a scenario that leaves it alone. A file counts by its name and its hash.
     """
-    return digest(json.dumps(said(scenario), sort_keys=True))
+    seed = {"seed"} & type(scenario).model_fields.keys()
+    key = type(scenario), scenario.model_dump_json(exclude=seed)
+    if key not in _SEEDLESS:
+        _SEEDLESS.clear()  # replicates of a point follow each other
+        _SEEDLESS[key] = {name: value for name, value in said(scenario).items() if name != "seed"}
+    own = {name: getattr(scenario, name) for name in seed}
+    stated = {name: n for name, n in own.items() if n != _defaults(type(scenario))[name]}
+    return digest(json.dumps(_SEEDLESS[key] | stated, sort_keys=True))
 
 
 def said(scenario: Section) -> dict[str, Any]:

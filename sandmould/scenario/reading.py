@@ -84,6 +84,14 @@ class Origin:
     file: dict[str, str] = field(default_factory=dict)
     source: dict[str, str] = field(default_factory=dict)
 
+    def below(self, root: str) -> Origin:
+        """That of one section's values; what stands for all stays."""
+
+        def kept(table: Mapping[str, str]) -> dict[str, str]:
+            return {key: by for key, by in table.items() if f"{key}.".startswith((".", f"{root}."))}
+
+        return Origin(kept(self.file), kept(self.source))
+
     def file_of(self, key: str) -> str:
         """File that gave a key, or the nearest key above it."""
         return _nearest(self.file, key) or ""

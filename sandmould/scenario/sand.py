@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -89,6 +90,7 @@ class Sand(Section):
             raise PydanticCustomError("sieve", "a sieve curve from passing 0 to passing 1")
         return self
 
+    @lru_cache(maxsize=1000)  # noqa: B019  a sand is small, and asked for its classes all the time
     def classes(self, dimension: int) -> tuple[SizeClass, ...]:
         """Split the sieve curve into classes of equal width in log diameter.
 

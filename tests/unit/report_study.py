@@ -16,7 +16,7 @@ from sandmould.scenario.box import Box, Tube
 from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.study.plan.plan_files import write_plan
+from tests.planned import write_plan
 
 KEY = "vibration.0.frequency_hz"
 DURATION_S = 2.0

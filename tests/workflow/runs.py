@@ -26,7 +26,7 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import RunOutcome
 from sandmould.runs.products import finish
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.plan.plan_files import write_plan
+from tests.planned import write_plan
 
 SOON: dict[str, Any] = {"rms_speed_m_s": 0.05, "load_tolerance": 0.1, "checks": 3}
 """Rest that a bed finds soon, in a third of the steps: for runs asked about other things."""
@@ -65,8 +65,7 @@ def computed(scenario: Scenario, folder: Path) -> Path:
 
 def compute_all(folders: Sequence[Path], log: Path, side_by_side: int = 1) -> None:
     """Render, compute and measure runs as one job does."""
-    scenarios = [str(folder / "scenario.yaml") for folder in folders]
-    compute_batch(scenarios, str(log), 1, "mpiexec", side_by_side)
+    compute_batch(folders, str(log), 1, "mpiexec", side_by_side)
 
 
 def kill_at_a_checkpoint(

@@ -19,8 +19,8 @@ from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.fills import share_fills
-from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKEN_HZ, _shaken
+from tests.planned import write_plan
 from tests.scenes import tube_scene
 from tests.workflow.runs import SOON, kill_after_a_checkpoint, last_snapshot, run_folder
 from tests.workflow.test_shared_fill import REFERENCE, assert_same, compute

@@ -18,7 +18,7 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import write_plan
+from tests.planned import write_plan
 
 FALLING = """\
 {% if restart %}

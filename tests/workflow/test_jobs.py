@@ -24,7 +24,7 @@ from sandmould.execution.pool import LOADED_FIRST, start_server
 from sandmould.runs.claim import owner_of
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.batches import is_done
-from sandmould.study.plan.plan_files import write_plan
+from tests.planned import write_plan
 from tests.scenes import tube_scene
 from tests.workflow.runs import SOON, compute_all, computed, simulate
 
@@ -39,8 +39,9 @@ SOON_S = 300.0
 """What is called for the first time is compiled first, beside other tests."""
 JOB = """
 import sys
+from pathlib import Path
 from sandmould.execution.jobs import compute_batch
-compute_batch(sys.argv[2:], sys.argv[1], 1, "mpiexec")
+compute_batch([Path(folder) for folder in sys.argv[2:]], sys.argv[1], 1, "mpiexec")
 """
 
 
@@ -90,7 +91,7 @@ def job_of(folders: list[Path], log: Path) -> Iterator[list[str]]:
 
 def started(run: Path, log: Path) -> subprocess.Popen[str]:
     """Start a job of one run, and wait for the run's first checkpoint."""
-    command = [sys.executable, "-c", JOB, str(log), str(run / "scenario.yaml")]
+    command = [sys.executable, "-c", JOB, str(log), str(run)]
     job = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     wait_for_checkpoint(run)
     return job
@@ -244,7 +245,7 @@ def test_a_job_imports_nothing_from_the_folder_where_it_works(
 ) -> None:
     (run,) = runs_in(tmp_path, 1)
     (tmp_path / "yaml.py").write_text("raise SystemExit('a module of the user')\n")
-    command = [sys.executable, "-P", "-c", JOB, "log", str(run / "scenario.yaml")]
+    command = [sys.executable, "-P", "-c", JOB, "log", str(run)]
     ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
 

@@ -18,9 +18,9 @@ from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.plan.plan_files import write_plan
 from tests.hopper import DEEP, hopper_scene
 from tests.instep import bed_scene
+from tests.planned import write_plan
 from tests.scenes import tube_scene
 
 PIT = {"kind": "box", "name": "pit", "centre_m": [0.03, 0.03], "size_m": [0.04, 0.04]}

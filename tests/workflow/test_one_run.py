@@ -126,7 +126,7 @@ def test_time_step_past_the_critical_one_is_called_unstable(
 def test_two_ranks_fill_the_same_bed(straight: Path, tmp_path: Path) -> None:
     scene = tube_scene(engine={"ranks": 2})
     folder = run_folder(scene, tmp_path)
-    compute_run(str(folder / "scenario.yaml"), str(tmp_path / "log"), 2, "mpiexec")
+    compute_run(folder, str(tmp_path / "log"), 2, "mpiexec")
     outcome = RunOutcome.read(folder / "outcome.json")
     assert outcome.outcome is Outcome.FINISHED, outcome.detail
     # Sums run in another order, so grains part after a few collisions; the bed as a whole does not.
@@ -143,7 +143,7 @@ def test_engine_error_and_crash_leave_an_outcome(command: str, says: str, tmp_pa
     folder = run_folder(tube_scene(), tmp_path)
     broken = f"#--- block: header --- broken\n{command}\n#--- end: header ---\n"
     (folder / "deck.in").write_text(broken)
-    compute_run(str(folder / "scenario.yaml"), str(tmp_path / "log"), 1, "mpiexec")
+    compute_run(folder, str(tmp_path / "log"), 1, "mpiexec")
     ended = RunOutcome.read(folder / "outcome.json")
     assert ended.outcome is Outcome.ENGINE_FAILED
     assert says in ended.detail
@@ -163,7 +163,7 @@ def test_a_second_process_waits_for_the_first_and_takes_its_outcome(tmp_path: Pa
         threading.Timer(0.5, finish_and_release).start()
         with computing(folder):
             assert RunOutcome.read(folder / "outcome.json").detail == "by the first"
-    compute_run(str(folder / "scenario.yaml"), str(tmp_path / "log"), 1, "mpiexec")
+    compute_run(folder, str(tmp_path / "log"), 1, "mpiexec")
     assert RunOutcome.read(folder / "outcome.json").detail == "by the first"
 
 

@@ -33,12 +33,13 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import collect
-from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan, prepare
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Need, lack_of
-from sandmould.study.plan.plan_files import read_run, write_plan
+from sandmould.study.plan.plan_files import read_run
 from tests.liggghts_scenes import liggghts_scene, needs_liggghts
 from tests.patterns import _one_thread  # noqa: F401
+from tests.planned import announce, write_plan
 from tests.scenes import TUBE_SCENE, tube_scene
 from tests.workflow.runs import (
     SOON,
@@ -246,7 +247,7 @@ def test_two_jobs_never_make_one_fill(tmp_path: Path, capsys: pytest.CaptureFixt
             fcntl.flock(lock, fcntl.LOCK_UN)
 
         threading.Timer(0.3, other_job_ends).start()
-        compute_run(str(fill / "scenario.yaml"), str(tmp_path / "log"), 1, "")
+        compute_run(fill, str(tmp_path / "log"), 1, "")
     assert "waiting for the process that computes it already" in capsys.readouterr().err
     assert RunOutcome.read(fill / "outcome.json").detail == "by the other job"
 

@@ -1,11 +1,10 @@
 # One run: its deck, its computation, its measures; or several runs in one job.
-# What a run lacks is decided by what lies in its folder, not by times: its scenario is "ancient",
-# and a note that is newer than its products asks for them again (study/plan/lacking.py).
+# What a run lacks is decided by what lies in its folder, not by times: a note that is newer than its
+# products asks for them again (study/plan/lacking.py). A job writes what it reads of the plan.
 
 
 rule render:
     input:
-        scenario=ancient(f"{FOLDER}/runs/{{run}}/scenario.yaml"),
         note=compute_note_of,
     output:
         deck=f"{FOLDER}/runs/{{run}}/deck.in",
@@ -23,15 +22,13 @@ rule render:
     run:
         jobs.do_job(
             "sandmould.execution.simulate:render_run",
-            Path(input.scenario).parent,
+            *planned(wildcards.run),
             log=log[0],
         )
 
 
 rule fill:
     input:
-        # A list, as of a batch.
-        scenarios=[ancient(f"{FOLDER}/fills/{{fill}}/scenario.yaml")],
         note=fill_note_of,
     output:
         outcome=f"{FOLDER}/fills/{{fill}}/outcome.json",
@@ -47,23 +44,19 @@ rule fill:
         mpi=mpi_of,
         mem_mb=memory_mb_of,
         runtime=runtime_min_of,
-    params:
-        side_by_side=1,
     message:
         "Compute {wildcards.fill}, which runs share"
     run:
         jobs.compute_batch(
-            list(input.scenarios),
+            planned(wildcards.fill),
             log[0],
             resources.tasks,
             resources.mpi,
-            params.side_by_side,
         )
 
 
 rule simulate:
     input:
-        scenario=rules.render.input.scenario,
         deck=rules.render.output.deck,
         note=compute_note_of,
         fill=fill_of,
@@ -86,12 +79,11 @@ rule simulate:
     message:
         "Compute {wildcards.run}"
     run:
-        jobs.compute_run(input.scenario, log[0], resources.tasks, resources.mpi)
+        jobs.compute_run(*planned(wildcards.run), log[0], resources.tasks, resources.mpi)
 
 
 rule measure:
     input:
-        scenario=rules.render.input.scenario,
         series=rules.simulate.output.series,
         note=measure_note_of,
     output:
@@ -125,14 +117,13 @@ rule measure:
     run:
         jobs.do_job(
             "sandmould.execution.simulate:measure_run",
-            Path(input.scenario).parent,
+            *planned(wildcards.run),
             log=log[0],
         )
 
 
 rule batch:
     input:
-        scenarios=ancient(scenarios_of),
         notes=batch_notes_of,
         fills=batch_fills_of,
     output:
@@ -155,7 +146,7 @@ rule batch:
         "Compute and measure the runs from {wildcards.batch} on"
     run:
         jobs.compute_batch(
-            list(input.scenarios),
+            planned(*BATCHES[wildcards.batch]),
             log[0],
             resources.tasks,
             resources.mpi,

@@ -23,6 +23,7 @@ from sandmould.study.plan.build_plan import (
     study_path,
 )
 from sandmould.study.plan.plan_files import CHECKS as CHECK_TABLES
+from sandmould.study.plan.plan_files import write_run
 from sandmould.study.plan.load_study import CALIBRATED
 from sandmould.study.plan.lacking import Need, notes_of
 from sandmould.definition.run import FILL, RUN_NAME
@@ -66,7 +67,7 @@ try:
             say(f"{said}\n")
         if is_here and starts_jobs(sys.argv) and LACKING:
             start_server(
-                RESULTS / PLAN.study.name / run.place / "scenario.yaml"
+                write_run(run, RESULTS / PLAN.study.name)
                 for run in PLAN.first_of_each_class(LACKING)
             )
         for said in SUBMISSION.said:
@@ -173,10 +174,9 @@ def labels_of(wildcards):
     return PLAN.labels(wildcards.run)
 
 
-def scenarios_of(wildcards):
-    return [
-        f"{FOLDER}/{RUNS[run].place}/scenario.yaml" for run in BATCHES[wildcards.batch]
-    ]
+def planned(*runs):
+    """Folders of runs, made with what their jobs read of the plan."""
+    return [write_run(RUNS[run], Path(FOLDER)) for run in runs]
 
 
 def batch_notes_of(wildcards):

@@ -22,7 +22,7 @@ from sandmould.kinds.registry import kind_named
 from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
-from sandmould.study.plan.fills import share_fills
+from sandmould.study.plan.fills import planned_work, share_fills
 from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.measured import problems_elsewhere
@@ -60,12 +60,12 @@ class Plan:
 
         What a deck of the user's own takes may depend on the point more than the plan knows.
         """
-        planning, found = self.kind.planning, dict[SpeedClass, list[AnyScenario]]()
+        found: dict[SpeedClass, list[Run]] = {}
         for run in self.runs:
-            found.setdefault(planning.speed_class(run.scenario), []).append(run.scenario)
+            found.setdefault(self.kind.planning.speed_class(run.scenario), []).append(run)
         return {
-            each: [max(alike, key=planning.planned_work), alike[0], alike[-1]]
-            for each, alike in found.items()
+            each: [run.scenario for run in (max(runs, key=planned_work), runs[0], runs[-1])]
+            for each, runs in found.items()
         }
 
     def first_of_each_class(self, lacking: Container[str]) -> list[Run]:

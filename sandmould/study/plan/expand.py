@@ -21,14 +21,13 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.labels import Labels, letters
-from sandmould.study.plan.load_study import OpenStudy
+from sandmould.study.plan.load_study import ROOT_KEY, OpenStudy
 from sandmould.study.plan.measured import problems as measure_problems
 from sandmould.study.plan.trust import outside
 from sandmould.study.robustness.controls import Case, cases, swept_steps
 
 MOST_PROBLEMS = 10
 """Problems told at once; the first few are those that teach."""
-ROOT_KEY = "scenario"
 
 
 def replicate_seed(seed: int, replicate: int) -> int:
@@ -155,7 +154,8 @@ class _AtPoint:
         self.measured = measured
         self.study, self.base, self.point, self.labels = study, base, point, labels
         self.kind = kind_named(study.study.kind)
-        self.origin = Origin(dict(study.origin.file), dict(study.origin.source))
+        scene = study.scene_origin
+        self.origin = Origin(dict(scene.file), dict(scene.source))
         self.scenario: Any = None
         try:
             self.scenario = self._scenario(point, self.origin)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -58,15 +59,41 @@ def share_fills(runs: Sequence[Run], planning: Planning[Any]) -> tuple[list[Run]
     return shared, fills
 
 
+def asked_once(asked: Callable[[Run], float]) -> Callable[[Run], float]:
+    """Ask a question about runs once of all that differ in their seed alone."""
+    known = dict[str, float]()
+
+    @functools.wraps(asked)
+    def answer(run: Run) -> float:
+        if run.alike not in known:
+            known[run.alike] = asked(run)
+        return known[run.alike]
+
+    return answer
+
+
+@asked_once
+def planned_work(run: Run) -> float:
+    """Planned work of a run, with that of a fill that it shares."""
+    return kind_of(run.scenario).planning.planned_work(run.scenario)
+
+
+@asked_once
 def own_work(run: Run) -> float:
     """Planned work that a run does itself: all but that of a fill that it shares."""
     planning = kind_of(run.scenario).planning
-    whole = planning.planned_work(run.scenario)
-    return whole - planning.planned_work(planning.fill(run.scenario)) if run.fill else whole
+    shared = planning.planned_work(planning.fill(run.scenario)) if run.fill else 0.0
+    return planned_work(run) - shared
 
 
+@asked_once
 def predicted_s(run: Run) -> float:
     """Wall time of what a run does itself, at speeds that are the same on every machine."""
-    planning = kind_of(run.scenario).planning
-    share = own_work(run) / planning.planned_work(run.scenario) if run.fill else 1.0
-    return share * planning.predicted_s(run.scenario)
+    share = own_work(run) / planned_work(run) if run.fill else 1.0
+    return share * kind_of(run.scenario).planning.predicted_s(run.scenario)
+
+
+@asked_once
+def beside_s(run: Run) -> float:
+    """Wall time that a run takes beside its work."""
+    return kind_of(run.scenario).planning.beside_s(run.scenario)

@@ -207,6 +207,7 @@ def note_lacks(runs: Iterable[Run], found: dict[str, Lack], folder: Path) -> str
         if begun or any((run / file).exists() for file in ("deck.in", "outcome.json")):
             # The time makes each note differ: an input that says the same is no reason to compute.
             now = datetime.now(UTC).isoformat()
+            run.mkdir(parents=True, exist_ok=True)
             write_text(run / _NOTE[lack.need], f"{now} {lack.why or 'it was not at its end'}\n")
     return _told(found)
 

@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,8 @@ STUDIES = (SHIPPED / "config" / "studies", SHIPPED / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
 """Where studies write the sands that they calibrate."""
 MATERIALS = (SHIPPED / "config" / "materials", CALIBRATED)
+ROOT_KEY = "scenario"
+"""Key of a study that its scene stands below."""
 NEAREST = 3
 _OF_SWEEP = ("sweep", "equivalence", "cross_check", "calibration", "refine", "certificate")
 _FILE_KEY = (
@@ -55,6 +58,11 @@ class OpenStudy:
     """The merged files below the study, the scenario with all its defaults."""
     origin: Origin
     """File and source of each value, by key path from the study's root."""
+
+    @cached_property
+    def scene_origin(self) -> Origin:
+        """That of the scenario alone, without the many values of a sweep."""
+        return self.origin.below(ROOT_KEY)
 
     @property
     def file(self) -> str:

@@ -13,16 +13,20 @@ from pydantic import create_model
 
 from sandmould.definition.run import FILL, Part, Run
 from sandmould.definition.study import Study
+from sandmould.digest import SHORT, digest
 from sandmould.kinds.kind import Note
-from sandmould.kinds.registry import KINDS, kind_named, kind_of
+from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import size_text
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.quantity import Section
-from sandmould.scenario.reading import Origin, Tree, read_planned, validated
+from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.control_case import SPRINGS
+from sandmould.study.plan.fills import planned_work
 from sandmould.study.plan.price import Prices, study_s
 
+SCENARIO_FILE = "scenario.yaml"
+"""A run as planned: what its jobs and its report read."""
 STUDY_FILE = "study.yaml"
 """The study as planned, with all that it rests on."""
 SUMMARY, CURVES = "summary.tsv", "curves.tsv"
@@ -38,9 +42,6 @@ SPHERES = "spheres"
 LISTED_POINTS = 20
 # libyaml writes a thousand scenarios in seconds where pure Python takes half a minute.
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-
-
-_HEAD = "# Written by the plan of the study; change the study instead.\n"
 
 
 class _RunFile(Section):
@@ -68,10 +69,11 @@ def _file_model(kind: str) -> type[_RunFile]:
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
-    """Write ``runs.tsv`` and each run's ``scenario.yaml``, files that would not change left alone.
+    """Write ``runs.tsv``, and ``scenario.yaml`` anew in folders of runs whose plan has changed.
 
-    Rows keep the place they had in an earlier round; new ones are appended. Folders of runs that
-    are no longer listed stay, since they may hold results.
+    Rows keep the place they had in an earlier round; new ones are appended. A run has no folder
+    before it is computed, see ``write_run``. Folders of runs that are no longer listed stay, since
+    they may hold results.
 
     Parameters
     ----------
@@ -82,8 +84,8 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
         ``results/<study>``.
     """
     for run in runs:
-        text, without_kind = _scenario_texts(run)
-        _write(folder / run.place / "scenario.yaml", text, without_kind)
+        if (folder / run.place / SCENARIO_FILE).exists():
+            write_run(run, folder)
     table = folder / "runs.tsv"
     text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
     earlier = text.splitlines()[1:]
@@ -91,6 +93,34 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
     rows = (run for run in runs if run.part != FILL)
     ordered = sorted(rows, key=lambda run: place.get(run.run, len(place)))
     _write(table, _table_text(ordered))
+
+
+def write_run(run: Run, folder: Path) -> Path:
+    """Write the ``scenario.yaml`` of a run that is to be computed, unless it says so already.
+
+    Parameters
+    ----------
+    run : Run
+    folder : Path
+        ``results/<study>``.
+
+    Returns
+    -------
+    Path
+        The run's own folder.
+    """
+    place = folder / run.place
+    kind = kind_of(run.scenario).name
+    file = _file_model(kind)(kind=kind, **{name: getattr(run, name) for name in _OF_RUN})
+    # Most of a plan's time would be YAML, so the first line says what the others come from.
+    head = f"# Plan {digest(file.model_dump_json())[:SHORT]}. Change the study instead.\n".encode()
+    path = place / SCENARIO_FILE
+    if not path.is_file() or not path.read_bytes().startswith(head):
+        tree = file.model_dump(mode="json")
+        text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+        place.mkdir(parents=True, exist_ok=True)
+        write_text(path, f"{head.decode()}{text}")
+    return place
 
 
 def write_study(study: Study, folder: Path) -> None:
@@ -102,24 +132,11 @@ def write_study(study: Study, folder: Path) -> None:
     )
 
 
-def _write(path: Path, text: str, older: str = "") -> None:
-    """Write a file unless it says so already: Snakemake reruns what depends on newer files.
-
-    A file that says the same in the form of an older plan is left, too.
-    """
-    if path.is_file() and path.read_bytes() in (text.encode(), older.encode() or text.encode()):
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, text)
-
-
-def _scenario_texts(run: Run) -> tuple[str, str]:
-    """A run's file, and the same as plans wrote it before it stated its kind."""
-    kind = kind_of(run.scenario).name
-    file = _file_model(kind)(kind=kind, **{name: getattr(run, name) for name in _OF_RUN})
-    tree = file.model_dump(mode="json", exclude={"kind"})
-    text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
-    return f"{_HEAD}kind: {kind}\n{text}", f"{_HEAD}{text}"
+def _write(path: Path, text: str) -> None:
+    """Write a file unless it says so already: Snakemake reruns what depends on newer files."""
+    if not path.is_file() or path.read_bytes() != text.encode():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(path, text)
 
 
 def _table_text(runs: Sequence[Run]) -> str:
@@ -175,16 +192,9 @@ def read_run(path: Path) -> Run:
     """
     file_name = str(path)
     tree = read_planned(path, file_name)
-    kind = kind_named(tree["kind"], file_name).name if "kind" in tree else _kind_of_older(tree)
-    file = validated(_file_model(kind), {"kind": kind, **tree}, Origin({"": file_name}))
+    kind = kind_named(tree.get("kind", ""), file_name).name
+    file = validated(_file_model(kind), tree, Origin({"": file_name}))
     return Run(**{name: getattr(file, name) for name in _OF_RUN})
-
-
-def _kind_of_older(tree: Tree) -> str:
-    """Kind of a run whose file does not state it: the one whose scenario has most of its keys."""
-    keys = set(tree.get("scenario") or ())
-    has = {name: len(keys & set(kind.scenario.model_fields)) for name, kind in KINDS.items()}
-    return max(has, key=lambda name: has[name])
 
 
 def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
@@ -200,7 +210,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     points: dict[tuple[Any, ...], list[Run]] = {}
     for run in runs:
         # Fills of one size are one point; runs of a point may share a fill or not.
-        size = kind_of(run.scenario).planning.planned_work(run.scenario) if run.part == FILL else ""
+        size = planned_work(run) if run.part == FILL else ""
         alike_in = run.part, json.dumps(run.parameters), bool(run.fill), size
         points.setdefault(alike_in, []).append(run)
     notes: dict[str, list[tuple[str, Note]]] = {}

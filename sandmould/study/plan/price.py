@@ -17,7 +17,7 @@ from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import WALL_S
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.batches import START_S
-from sandmould.study.plan.fills import own_work, predicted_s
+from sandmould.study.plan.fills import beside_s, own_work, predicted_s
 
 BEGIN_S = 4.0
 """What Snakemake takes to read its rules, and the study to be planned."""
@@ -75,9 +75,8 @@ def foretold_s(run: Run, rate_per_s: Mapping[SpeedClass, float]) -> float:
     planning, scenario = kind_of(run.scenario).planning, run.scenario
     rate = rate_per_s.get(planning.speed_class(scenario))
     if rate is None:
-        return predicted_s(run) + planning.beside_s(scenario)
-    in_steps_s = own_work(run) / rate / planning.threads(scenario)
-    return in_steps_s + planning.beside_s(scenario)
+        return predicted_s(run) + beside_s(run)
+    return own_work(run) / rate / planning.threads(scenario) + beside_s(run)
 
 
 def ratios_of(

@@ -19,8 +19,9 @@ from sandmould.scenario.engine import ENGINE_NAMES
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
+from sandmould.study.plan.plan_files import plan_table, read_run
 from sandmould.study.plan.price import Prices
+from tests.planned import write_plan
 
 FREQUENCY = "vibration.0.frequency_hz"
 MARGINS = {"margins": {"tube_fill_fraction": 0.03}}

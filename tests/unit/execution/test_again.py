@@ -11,9 +11,10 @@ from typer.testing import CliRunner, Result
 from sandmould.cli.commands import app
 from sandmould.runs.manifest import MANIFEST_FILE
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.ownership import OWNER_FILE
 from tests.finished_study import study_text
+from tests.planned import announce
 
 CALLS: list[tuple[Path, list[str]]] = []
 

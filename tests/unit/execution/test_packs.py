@@ -27,11 +27,11 @@ from sandmould.runs.manifest import MANIFEST_FILE, read_manifest, save_manifest
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import collect
 from sandmould.study.plan.batches import mark_done
-from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.lacking import Need
-from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.rounds.round_log import ROUNDS_FILE
 from tests.finished_study import finished_study, study_text
+from tests.planned import announce, write_plan
 
 PACK = Path("two_runs.zip")
 

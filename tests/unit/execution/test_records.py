@@ -24,8 +24,9 @@ from sandmould.kinds.sand.measure import (
 )
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import read_run, write_plan
+from sandmould.study.plan.plan_files import read_run
 from sandmould.study.rounds.round_log import ROUNDS_FILE, Round, RoundLog, basis_of, write_rounds
+from tests.planned import write_plan
 from tests.scenes import tube_scene
 
 R = 0.002

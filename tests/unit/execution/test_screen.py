@@ -24,7 +24,8 @@ from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.kinds.stored_speed import STORED
 from sandmould.runs import words
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.plan.build_plan import Plan, announce, open_plan
+from sandmould.study.plan.build_plan import Plan, open_plan
+from tests.planned import announce
 
 FREQUENCY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"

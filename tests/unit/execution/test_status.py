@@ -19,7 +19,7 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.lacking import Lack, Need
-from sandmould.study.plan.plan_files import write_plan
+from tests.planned import write_plan
 
 RECORDS = "record.series_every_s"
 """Runs of other records share no fill: test_fills.py has those that do."""

@@ -11,8 +11,9 @@ from typer.testing import CliRunner, Result
 
 from sandmould.cli.commands import app
 from sandmould.execution.tidy import freed_bytes, leftovers, orphans
-from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from tests.finished_study import study_text
+from tests.planned import announce
 
 BLOCK = 4096
 

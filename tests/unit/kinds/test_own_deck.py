@@ -19,8 +19,9 @@ from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_study
 from sandmould.study.plan.price import Prices
+from tests.planned import write_plan
 
 TEMPLATE = """\
 variable a equal {{ angle_deg }}

@@ -18,8 +18,9 @@ from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.plan.plan_files import read_run, write_plan
+from sandmould.study.plan.plan_files import read_run
 from tests.bent_run import SCENE, tip_load, write_bent_run
+from tests.planned import write_plan
 
 
 @pytest.fixture(scope="module")

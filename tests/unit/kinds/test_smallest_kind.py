@@ -23,9 +23,10 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.study.collect import collect
-from sandmould.study.plan.build_plan import announce, open_plan
+from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.lacking import Need
 from sandmould.study.plan.plan_files import VERDICT_FILE
+from tests.planned import announce
 
 
 class Fall(Section):

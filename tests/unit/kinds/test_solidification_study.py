@@ -26,8 +26,9 @@ from sandmould.scenario.casting.solidification import Solidification
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import plan_table, read_run, write_plan, write_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_study
 from sandmould.study.plan.price import Prices
+from tests.planned import write_plan
 
 SMALL: dict[str, Any] = {
     "box": {"low_m": [0.0, 0.0], "high_m": [0.08, 0.08]},

@@ -31,8 +31,9 @@ from sandmould.scenario.pattern import Bar
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, collect, gather
-from sandmould.study.plan.plan_files import read_run, write_plan
+from sandmould.study.plan.plan_files import read_run
 from tests.bent_run import SCENE, write_bent_run
+from tests.planned import write_plan
 from tests.unit.report.test_page import Page
 
 SHARES = {"one": 0.8, "two": 1.0, "three": 1.2}

@@ -24,7 +24,8 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.settings import setting_of
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
-from sandmould.study.plan.plan_files import read_run, write_plan
+from sandmould.study.plan.plan_files import read_run
+from tests.planned import write_plan
 
 FRICTION = "contact.grain_grain.friction"
 ARM = "contact.grain_grain.rolling_arm_fraction"

@@ -23,7 +23,8 @@ from sandmould.runs.columns import RUN
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import read_run, write_plan, write_study
+from sandmould.study.plan.plan_files import read_run, write_study
+from tests.planned import write_plan
 
 HIT = "hit-by-a-name"
 HOSTILE = (

@@ -20,9 +20,9 @@ from sandmould.report.robustness import robustness_pages
 from sandmould.statistics.config import SandWaveSpeed
 from sandmould.statistics.verdict import Verdict, compare_settings
 from sandmould.study.collect import Collected, collect, gather, read_study
-from sandmould.study.plan.plan_files import write_plan
 from sandmould.study.robustness.controls import SHAKE_G, SHAKEN_HZ, cases
 from sandmould.study.rounds.round_log import RoundLog, basis_of, write_rounds
+from tests.planned import write_plan
 from tests.unit.report_study import KEY, scenario, write_run
 
 CERTIFIED_HZ = (35.5, 50.0, 70.5)

@@ -26,7 +26,8 @@ from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import read_run, write_plan
+from sandmould.study.plan.plan_files import read_run
+from tests.planned import write_plan
 from tests.workflow.runs import compute_all
 
 FREQUENCY = "vibration.0.frequency_hz"

@@ -16,8 +16,9 @@ from sandmould.definition.run import Run
 from sandmould.runs.hashing import scenario_hash
 from sandmould.study.plan.expand import MOST_PROBLEMS, expand, replicate_seed
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import read_run, write_plan
+from sandmould.study.plan.plan_files import read_run
 from tests.bracket import BRACKET
+from tests.planned import write_plan
 
 FREQUENCY = "vibration.0.frequency_hz"
 Runs = Callable[..., list[Run]]

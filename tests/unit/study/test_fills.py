@@ -23,8 +23,9 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import own_work, predicted_s, share_fills
 from sandmould.study.plan.lacking import Need
 from sandmould.study.plan.load_study import STUDIES, open_study
-from sandmould.study.plan.plan_files import plan_table, read_run
+from sandmould.study.plan.plan_files import plan_table, read_run, write_run
 from sandmould.study.plan.price import Prices
+from tests.planned import write_plan
 
 FREQUENCY = "vibration.0.frequency_hz"
 
@@ -125,9 +126,9 @@ def test_a_plan_writes_fills_beside_the_runs(tmp_path: Path) -> None:
     announce(plan, results, 1)
     folder = results / "trial"
     assert len((folder / "runs.tsv").read_text().splitlines()) == 5
-    fill = read_run(folder / plan.fills[0].place / "scenario.yaml")
+    fill = read_run(write_run(plan.fills[0], folder) / "scenario.yaml")
     assert (fill.part, fill.scenario) == (FILL, plan.fills[0].scenario)
-    assert read_run(folder / plan.runs[0].place / "scenario.yaml").fill == fill.run
+    assert read_run(write_run(plan.runs[0], folder) / "scenario.yaml").fill == fill.run
     assert {run: lack.need for run, lack in plan.lacks(results).items()} == {
         run.run: Need.COMPUTE for run in (*plan.runs, *plan.fills)
     }
@@ -139,7 +140,8 @@ def test_a_plan_writes_fills_beside_the_runs(tmp_path: Path) -> None:
 
 def test_fills_of_an_edited_study_can_go(tmp_path: Path) -> None:
     results = tmp_path / "results"
-    announce(planned(tmp_path, {FREQUENCY: [25, 50]}), results, 1)
+    earlier = planned(tmp_path, {FREQUENCY: [25, 50]})
+    write_plan([*earlier.runs, *earlier.fills], results / "trial")
     plan = planned(tmp_path, {FREQUENCY: [25, 50]}, replicates=1)
     gone = {folder.name.rsplit("_", 1)[0] for folder in orphans(plan, results)}
     assert gone == {"fill_r2", "frequency_25_r2", "frequency_50_r2"}

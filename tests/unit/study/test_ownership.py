@@ -48,11 +48,13 @@ def test_another_file_of_the_name_is_refused_and_changes_nothing() -> None:
 
 def test_adopting_takes_the_results_over() -> None:
     sandmould("plan", "a/trial.yaml")
+    for row in (FOLDER / "runs.tsv").read_text().splitlines()[1:]:
+        (FOLDER / "runs" / row.split("\t")[0]).mkdir(parents=True)
     assert sandmould("plan", "b/trial.yaml", "--adopt").exit_code == 0
     assert owner_of(FOLDER) == "b/trial.yaml"
     assert "0p02" in (FOLDER / "runs.tsv").read_text()
     assert sandmould("status", "a/trial.yaml").exit_code == 1
-    # What the first one planned is left over, to be tidied.
+    # What was begun of the first one is left over, to be tidied.
     assert "3 run folders of " in sandmould("status", "b/trial.yaml").output
 
 

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -25,12 +26,14 @@ from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import stage_kind
 from sandmould.scenario.vibration import STOP_PERIODS
+from sandmould.study.plan import plan_files
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.build_plan import announce, measure_speeds, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import plan_table, read_run, write_plan
+from sandmould.study.plan.plan_files import plan_table, read_run
 from sandmould.study.plan.price import BEGIN_S, END_S, Prices
+from tests.planned import write_plan
 
 LAMMPS = ("lammps", 2)
 SAND = SandPlanning()
@@ -103,15 +106,24 @@ def test_run_reads_back_as_it_was(demo: list[Run], tmp_path: Path) -> None:
         assert read_run(tmp_path / "runs" / run.run / "scenario.yaml") == run
 
 
-def test_run_of_an_older_plan_reads_back_and_is_left_alone(demo: list[Run], tmp_path: Path) -> None:
+def test_a_run_has_no_folder_before_it_is_computed(demo: list[Run], tmp_path: Path) -> None:
+    plan_files.write_plan(demo[:2], tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["runs.tsv"]
+    assert plan_files.write_run(demo[0], tmp_path) == tmp_path / demo[0].place
+
+
+def test_a_run_that_was_begun_follows_its_plan(demo: list[Run], tmp_path: Path) -> None:
+    path = plan_files.write_run(demo[0], tmp_path) / "scenario.yaml"
+    first = path.stat().st_mtime_ns
+    plan_files.write_plan(demo[:1], tmp_path)
+    assert path.stat().st_mtime_ns == first
     # Plans did not write the kind; results of weeks must not be computed again for that.
-    write_plan(demo[:1], tmp_path)
-    path = tmp_path / "runs" / demo[0].run / "scenario.yaml"
-    older = path.read_text(encoding="utf-8").replace("kind: sand\n", "")
-    path.write_text(older, encoding="utf-8")
+    path.write_text(path.read_text().replace("kind: sand\n", "").split("\n", 1)[1])
+    plan_files.write_plan(demo[:1], tmp_path)
     assert read_run(path) == demo[0]
-    write_plan(demo[:1], tmp_path)
-    assert path.read_text(encoding="utf-8") == older
+    elsewhere = replace(demo[0], sources=demo[0].sources | {"seed": "another file"})
+    plan_files.write_plan([elsewhere], tmp_path)
+    assert read_run(path) == elsewhere
 
 
 def price_line(text: str) -> str:
@@ -152,7 +164,7 @@ def test_damaged_run_file_is_bad_input(demo: list[Run], tmp_path: Path) -> None:
     path.write_text(text.replace("size_scale: 6.0", "size_scale: big"), encoding="utf-8")
     with pytest.raises(BadInputError, match=r"scenario\.sand\.size_scale = 'big'"):
         read_run(path)
-    path.write_text("run: x", encoding="utf-8")
+    path.write_text("kind: sand\nrun: x", encoding="utf-8")
     with pytest.raises(BadInputError, match="study = None"):
         read_run(path)
 

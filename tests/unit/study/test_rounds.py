@@ -19,7 +19,7 @@ from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import NEAR, propose
 from sandmould.study.collect import collect
-from sandmould.study.plan.build_plan import Plan, announce
+from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.rounds.decide import (
@@ -36,6 +36,7 @@ from sandmould.study.rounds.round_log import (
     read_rounds,
     write_rounds,
 )
+from tests.planned import announce
 
 FREQUENCY, GRAVITY = "vibration.0.frequency_hz", "vibration.0.acceleration_g"
 FILL = "tube_fill_fraction"

@@ -24,10 +24,11 @@ from sandmould.kinds.registry import kind_of
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.plan.build_plan import RESULTS, Plan, announce, open_plan
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.lacking import Need
 from sandmould.study.plan.load_study import open_study
+from tests.planned import announce
 
 MESHES = ROOT / "config" / "meshes"
 DECK = """\
