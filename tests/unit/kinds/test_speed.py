@@ -9,15 +9,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
+from typer.testing import CliRunner
 
 from sandmould import ROOT
+from sandmould.cli.commands import app
 from sandmould.engines.session import Session
 from sandmould.kinds.registry import kind_of
 from sandmould.kinds.sand.speed import SandSpeed, _spent_s, _window_rate
 from sandmould.kinds.stored_speed import STORED, StoredSpeed
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from tests.scenes import tube_scene
+from tests.liggghts_scenes import needs_liggghts
+from tests.scenes import TUBE_SCENE, tube_scene
 
 
 class OnABusyMachine:
@@ -65,6 +69,51 @@ def test_sand_that_settles_is_timed_while_it_does(
     rate = SandSpeed().trial(scene, tmp_path)
     assert rate is not None
     assert 0.0 < min(windows) <= rate <= max(windows)
+
+
+SCENES: dict[str, dict[str, Any]] = {
+    "pattern": {
+        "pattern": {
+            "shape": {"kind": "bar", "width_m": 0.02, "height_m": 0.01},
+            "position_m": [0.0, 0.02],
+            "supports": {"clamped": ["left"]},
+            "loop": {"scheme": "fixed", "factor": 0.02, "repeats": 0},
+        }
+    },
+    "obstacle": {
+        "obstacles": [
+            {"kind": "plate", "name": "gate", "centre_m": [0.06, 0.03], "size_m": [0.04, 0.01]}
+        ],
+        "discharge": {"gate": "gate"},
+    },
+    "cavity": {
+        "cavities": [
+            {"kind": "box", "name": "nook", "centre_m": [0.01, 0.01], "size_m": [0.02, 0.02]}
+        ]
+    },
+}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    "engine", ["lammps", "reference", pytest.param("liggghts", marks=needs_liggghts)]
+)
+def test_each_engine_prices_each_scene_in_an_empty_folder(
+    engine: str, scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The trial leaves parts of the scene away; what goes with them must go too."""
+    monkeypatch.chdir(tmp_path)
+    for name, value in {"WINDOWS": 1, "WINDOW_S": 1e-3, "FALL_WALL_S": 0.01}.items():
+        monkeypatch.setattr(f"sandmould.kinds.sand.speed.{name}", value)
+    bed = {"obstacles": [], "background_damping": {"form": "none"}}
+    sand = {**TUBE_SCENE["sand"], "disc_inertia": "sphere"}
+    scenario = {**TUBE_SCENE, **bed, "sand": sand, **SCENES[scene], "engine": {"name": engine}}
+    objective = {"measure": "solid_fraction", "better": "neither"}
+    tree = {"material": "rojek_2004", "scenario": scenario, "objective": objective}
+    Path("priced.yaml").write_text(yaml.safe_dump(tree))
+    ran = CliRunner().invoke(app, ["plan", "priced.yaml"])
+    assert ran.exit_code == 0, ran.output
+    assert "at the speed measured on this machine" in ran.stdout
 
 
 @pytest.mark.parametrize("name", ["plates_small", "bracket_freezes", "tank_small", "shoulder_pour"])
