@@ -21,7 +21,7 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.labels import Labels, letters
-from sandmould.study.plan.load_study import OpenStudy
+from sandmould.study.plan.load_study import OpenStudy, StudyFile, study_of
 from sandmould.study.plan.measured import problems as measure_problems
 from sandmould.study.plan.trust import outside
 from sandmould.study.robustness.controls import Case, cases, swept_steps
@@ -90,7 +90,8 @@ def expand(
     for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point, labels, measured)
         for problem in at_point.problems:
-            problems[str(problem)] = problem
+            if str(problem) not in problems:
+                problems[str(problem)] = at_point.at_later_key(problem)
         if len(problems) >= MOST_PROBLEMS:
             break
         if problems:
@@ -193,13 +194,44 @@ class _AtPoint:
         """A misfit told at the key that the user has to change."""
         if not self.point or problem in self._misfits(self.study.study.scenario):
             return replace(problem, file=self.study.origin.file_of(problem.key))
-        if any(_holds(key, problem.key) for key in self.point):
+        if any(_holds(f"{ROOT_KEY}.{key}", problem.key) for key in self.point):
             return self._at_swept_key(problem)
         guilty = {k: v for k, v in self.point.items() if self._alone_fails(k, v, problem.key)}
         blamed = guilty or self.point
         key, value = next(iter(blamed.items())) if len(blamed) == 1 else ("", dict(blamed))
-        valid = f"one with which {problem.key}, here {problem.value}, is {problem.valid}"
-        return Problem(self._file_key(key), value, valid, self.study.file)
+        return self._in_sweep(key, value, _fitting(problem))
+
+    def _in_sweep(self, key: str, value: Any, valid: str) -> Problem:
+        """A problem of a swept key; an empty one stands for all."""
+        key = swept_key(self.study, self.point, key)
+        return Problem(key, value, valid, self.study.origin.file_of(key))
+
+    def at_later_key(self, problem: Problem) -> Problem:
+        """A misfit of a key that was right in an earlier file, told at the key that changed it."""
+        files = self.study.files
+        wrong = (n for n in range(len(files)) if self._is_wrong(problem, files[: n + 1]))
+        if problem.sentence or not (number := next(wrong, 0)):
+            return problem
+        file = files[number]
+        stated = [*_stated(file.tree)]
+        if any(_holds(key, problem.key) or _holds(problem.key, key) for key, *_ in stated):
+            return problem
+        for key, value, alone in stated:
+            if self._is_wrong(problem, [*files[:number], replace(file, tree=alone)]):
+                by_default = problem.file == file.name
+                where = problem.key if by_default else f"{problem.key} of {problem.file}"
+                return Problem(key, value, _fitting(replace(problem, key=where)), file.name)
+        return problem
+
+    def _is_wrong(self, problem: Problem, files: Sequence[StudyFile]) -> bool:
+        """Whether some files alone have the misfit of a key at this point."""
+        try:
+            study = study_of(files)
+            base = study.study.scenario.model_dump(mode="json")
+            found = _AtPoint(study, base, self.point, self.labels, self.measured).problems
+        except (BadInputError, LookupError):  # or they lack a list that is swept in
+            return False
+        return any(p.key == problem.key for p in found)
 
     def _alone_fails(self, key: str, value: Any, problem_key: str) -> bool:
         """Whether one swept value, laid over the base alone, gives the same misfit."""
@@ -212,19 +244,14 @@ class _AtPoint:
     def _at_swept_key(self, problem: Problem) -> Problem:
         """A problem moved from the scenario's key to the sweep that gave its value."""
         for key, value in self.point.items():
-            if _holds(key, problem.key) or f"{ROOT_KEY}.{key}".startswith(f"{problem.key}."):
+            swept = f"{ROOT_KEY}.{key}"
+            if _holds(swept, problem.key) or _holds(problem.key, swept):
                 # Below a swept section the problem's own value says more than the section.
-                below = problem.key.removeprefix(f"{ROOT_KEY}.{key}")
+                below = problem.key.removeprefix(swept)
                 inner = below if below.startswith(".") else ""
-                wrong_value = problem.value if _holds(key, problem.key) else value
-                return Problem(
-                    self._file_key(key) + inner, wrong_value, problem.valid, self.study.file
-                )
+                wrong_value = problem.value if _holds(swept, problem.key) else value
+                return self._in_sweep(key + inner, wrong_value, problem.valid)
         return problem
-
-    def _file_key(self, key: str) -> str:
-        """Where a swept key stands in the file; an empty one stands for all."""
-        return swept_key(self.study, self.point, key)
 
     def runs(self, replicates: Iterable[int]) -> Iterator[Run]:
         """Some replicates of this point."""
@@ -256,10 +283,8 @@ class _AtPoint:
             wrong = list(error.problems)
         key, control_text = "certificate.controls", f"{case.control} {case.value}"
         return scenario, [
-            Problem(key, control_text, f"one with which {p.key}, here {p.value}, is {p.valid}",
-                    self.study.file)
-            for p in wrong
-        ]  # fmt: skip
+            Problem(key, control_text, _fitting(p), self.study.origin.file_of(key)) for p in wrong
+        ]
 
     def control(self, case: Case, scenario: Scenario, replicates: Iterable[int]) -> Iterator[Run]:
         """Replicates of a control at this point."""
@@ -309,9 +334,27 @@ def swept_key(study: OpenStudy, point: Point, key: str) -> str:
     return f"{place}.{key}".rstrip(".")
 
 
-def _holds(swept: str, problem_key: str) -> bool:
-    """Whether a problem lies at a swept key or below it."""
-    return f"{problem_key}.".startswith(f"{ROOT_KEY}.{swept}.")
+def _fitting(problem: Problem) -> str:
+    """What is valid where a value brings the misfit of another key."""
+    return f"one with which {problem.key}, here {problem.value}, is {problem.valid}"
+
+
+def _stated(tree: Tree) -> Iterator[tuple[str, Any, Tree]]:
+    """Keys of a file with their values, each also as a tree that has it alone.
+
+    A section that states its kind is one value.
+    """
+    for name, value in tree.items():
+        if isinstance(value, dict) and not {"kind", "value"} & set(value):
+            for key, inner, alone in _stated(value):
+                yield f"{name}.{key}", inner, {name: alone}
+        else:
+            yield name, value, {name: value}
+
+
+def _holds(above: str, key: str) -> bool:
+    """Whether a key is another one or lies below it."""
+    return f"{key}.".startswith(f"{above}.")
 
 
 def _put(tree: Any, parts: list[str], value: Any, origin: Origin, source: str) -> Any:

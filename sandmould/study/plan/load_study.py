@@ -6,7 +6,7 @@ import contextlib
 import difflib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -44,6 +44,16 @@ _FILE_KEY = (
 
 
 @dataclass(frozen=True)
+class StudyFile:
+    """One file of a study or material as it was read."""
+
+    path: Path
+    name: str
+    """In messages."""
+    tree: Tree
+
+
+@dataclass(frozen=True)
 class OpenStudy:
     """A study that was read whole and found sound."""
 
@@ -55,19 +65,13 @@ class OpenStudy:
     """The merged files below the study, the scenario with all its defaults."""
     origin: Origin
     """File and source of each value, by key path from the study's root."""
+    files: tuple[StudyFile, ...]
+    """The study's own file last, each after the one that it is based on."""
 
     @property
     def file(self) -> str:
         """Name of the study's file in messages."""
         return display_path(self.path)
-
-
-@dataclass(frozen=True)
-class _File:
-    path: Path
-    name: str
-    """In messages."""
-    tree: Tree
 
 
 def open_study(path: Path, text: str | None = None) -> OpenStudy:
@@ -93,10 +97,24 @@ def open_study(path: Path, text: str | None = None) -> OpenStudy:
     if not re.fullmatch(NAME, path.stem):
         valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
         raise BadInputError([Problem("file name", path.name, valid, file_name)])
-    files = _files(path, text)
+    return study_of(_files(path, text))
+
+
+def study_of(files: Sequence[StudyFile]) -> OpenStudy:
+    """Lay the files of a study over each other, and check the whole.
+
+    Parameters
+    ----------
+    files : sequence of StudyFile
+        The study's own last, each after the one that it is based on.
+
+    Raises
+    ------
+    BadInputError
+    """
     kind = _kind(files)
     problems = [p for f in files for p in _wrong_units(kind.study, f)]
-    origin = Origin(file={"": file_name})
+    origin = Origin(file={"": files[-1].name})
     tree: Tree = {"scenario": kind.defaults}
     material = _material(files, kind)
     if material is not None and kind.material is not None:
@@ -126,13 +144,19 @@ def open_study(path: Path, text: str | None = None) -> OpenStudy:
     ]
     if problems:
         raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in problems])
-    return OpenStudy(path.stem, path, study, tree, origin)
+    path = files[-1].path
+    return OpenStudy(path.stem, path, study, tree, origin, tuple(files))
 
 
-def _kind(files: list[_File]) -> Kind[Any]:
-    """Kind of the study, by the last file that states it."""
-    stated = [f for f in files if "kind" in f.tree]
-    return kind_named(stated[-1].tree["kind"], stated[-1].name) if stated else DEFAULT_KIND
+def _kind(files: Sequence[StudyFile]) -> Kind[Any]:
+    """Kind of the study: that of the study which it is based on."""
+    kind = DEFAULT_KIND
+    for n, file in enumerate(files):
+        below, kind = kind, kind_named(file.tree.get("kind", kind.name), file.name)
+        if n and kind is not below:
+            valid = f"{below.name}, the kind of {files[n - 1].name}, which this study is based on"
+            raise BadInputError([Problem("kind", kind.name, valid, file.name)])
+    return kind
 
 
 def _reported(study: Study) -> Iterator[Problem]:
@@ -142,7 +166,7 @@ def _reported(study: Study) -> Iterator[Problem]:
         yield Problem("objective.reported_best", values, "absent unless one key is swept")
 
 
-def _files(path: Path, text: str | None) -> list[_File]:
+def _files(path: Path, text: str | None) -> list[StudyFile]:
     """The study's file and all it is based on, the deepest base first."""
     files = [_read(path, text)]
     while (name := files[0].tree.get("based_on")) is not None:
@@ -162,7 +186,7 @@ def _files(path: Path, text: str | None) -> list[_File]:
     return files
 
 
-def _material(files: list[_File], kind: Kind[Any]) -> _File | None:
+def _material(files: Sequence[StudyFile], kind: Kind[Any]) -> StudyFile | None:
     """The material that the last file to name one names, of a kind that has materials."""
     stated = [f for f in files if "material" in f.tree]
     if kind.material is None or not stated or (name := stated[-1].tree["material"]) is None:
@@ -176,7 +200,7 @@ def _material(files: list[_File], kind: Kind[Any]) -> _File | None:
     raise BadInputError([Problem("material", name, valid, stated[-1].name)])
 
 
-def _check_material(material: _File, model: type[BaseModel]) -> None:
+def _check_material(material: StudyFile, model: type[BaseModel]) -> None:
     """Check a material by itself, so that a message has the key as its own file has it."""
     alone = Origin(file={"": material.name})
     validated(model, merge({}, material.tree, alone, material.name), alone)
@@ -198,9 +222,9 @@ def materials(model: type[BaseModel]) -> list[str]:
     return sorted(names)
 
 
-def _read(path: Path, text: str | None = None) -> _File:
+def _read(path: Path, text: str | None = None) -> StudyFile:
     name = display_path(path)
-    return _File(path, name, _from_root(read_yaml(path, name, text), path.parent))
+    return StudyFile(path, name, _from_root(read_yaml(path, name, text), path.parent))
 
 
 def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
@@ -248,7 +272,7 @@ def _yaml_files(folders: tuple[Path, ...]) -> Iterator[Path]:
     return (path for path in found if re.fullmatch(NAME, path.stem))
 
 
-def _wrong_units(model: type[BaseModel], file: _File) -> list[Problem]:
+def _wrong_units(model: type[BaseModel], file: StudyFile) -> list[Problem]:
     """Units that contradict the key's own."""
     problems = []
     for key, value, unit in _units(file.tree):
