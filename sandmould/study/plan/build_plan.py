@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
@@ -21,10 +21,11 @@ from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done, plan_batches
-from sandmould.study.plan.expand import expand, swept_key
+from sandmould.study.plan.expand import expand, scenario_at, swept_key
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
-from sandmould.study.plan.load_study import OpenStudy, open_study
+from sandmould.study.plan.later_key import StudyFile, at_later_key
+from sandmould.study.plan.load_study import OpenStudy, open_study, study_of
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import later_line, plan_table, write_plan, write_study
@@ -209,8 +210,11 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
     for run in (*runs, *trial):
         problem = planning.engine_problem(run.scenario)
         if problem is not None:
-            problem = _at_stated_key(study, run, problem)
-            problems[str(problem)] = problem
+            stated = _at_stated_key(study, run, problem)
+            if str(stated) not in problems:
+                problems[str(stated)] = at_later_key(
+                    stated, study.files, partial(_refused_keys, run)
+                )
     for problem in problems_elsewhere(study.study, results):
         found = replace(problem, file=study.origin.file_of(problem.key))
         problems[str(found)] = found
@@ -267,13 +271,23 @@ def _later(
 def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:
     """What an engine refuses, at the key that gave the value."""
     if problem.key in run.parameters:
-        key, file = swept_key(study, run.parameters, problem.key), study.file
+        key = swept_key(study, run.parameters, problem.key)
     elif problem.key == ENGINE and run.part == "cross_check":
-        key, file = "cross_check.engine", study.origin.file_of("cross_check.engine")
+        key = "cross_check.engine"
     else:
         key = f"scenario.{problem.key}"
-        file = study.origin.file_of(key)
-    return Problem(key, problem.value, problem.valid, file)
+    return Problem(key, problem.value, problem.valid, study.origin.file_of(key))
+
+
+def _refused_keys(run: Run, files: Sequence[StudyFile]) -> set[str]:
+    """Keys of what an engine refuses where some files alone are the study of a run."""
+    try:
+        study = study_of(files)
+        scenario = scenario_at(study, run.parameters)
+    except (BadInputError, LookupError, TypeError):  # or they lack what is swept in
+        return set()
+    problem = kind_named(study.study.kind).planning.engine_problem(scenario)
+    return set() if problem is None else {_at_stated_key(study, run, problem).key}
 
 
 def announce(

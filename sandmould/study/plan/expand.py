@@ -21,7 +21,8 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.labels import Labels, letters
-from sandmould.study.plan.load_study import OpenStudy, StudyFile, study_of
+from sandmould.study.plan.later_key import StudyFile, at_later_key, fitting, lies_in
+from sandmould.study.plan.load_study import OpenStudy, study_of
 from sandmould.study.plan.measured import problems as measure_problems
 from sandmould.study.plan.trust import outside
 from sandmould.study.robustness.controls import Case, cases, swept_steps
@@ -130,21 +131,28 @@ def _as_planned(point: Point, planned: Sequence[Point]) -> Point:
 
 
 def scenes(study: OpenStudy) -> Iterator[AnyScenario]:
-    """The scenario of each point of a sweep, whether or not it can be computed.
+    """The scenario of each point of a sweep, as of ``scenario_at``."""
+    return (scenario_at(study, point) for point in points(study.study.sweep, study.study.scenario))
+
+
+def scenario_at(study: OpenStudy, point: Point) -> AnyScenario:
+    """The scenario of a point of a sweep, whether or not it can be computed.
 
     Raises
     ------
     BadInputError
-        At a point whose values have a wrong type.
+        Where values have a wrong type.
     """
-    base = study.study.scenario.model_dump(mode="json")
+    at_point = _at_point(study, point)
+    if at_point.scenario is None:
+        raise BadInputError(at_point.problems)
+    return at_point.scenario
+
+
+def _at_point(study: OpenStudy, point: Point, measured: bool = True) -> _AtPoint:
     kind = kind_named(study.study.kind)
     labels = Labels(kind.scenario, kind.labels_have_units)
-    for point in points(study.study.sweep, study.study.scenario):
-        at_point = _AtPoint(study, base, point, labels)
-        if at_point.scenario is None:
-            raise BadInputError(at_point.problems)
-        yield at_point.scenario
+    return _AtPoint(study, study.study.scenario.model_dump(mode="json"), point, labels, measured)
 
 
 class _AtPoint:
@@ -194,12 +202,12 @@ class _AtPoint:
         """A misfit told at the key that the user has to change."""
         if not self.point or problem in self._misfits(self.study.study.scenario):
             return replace(problem, file=self.study.origin.file_of(problem.key))
-        if any(_holds(f"{ROOT_KEY}.{key}", problem.key) for key in self.point):
+        if any(lies_in(problem.key, f"{ROOT_KEY}.{key}") for key in self.point):
             return self._at_swept_key(problem)
         guilty = {k: v for k, v in self.point.items() if self._alone_fails(k, v, problem.key)}
         blamed = guilty or self.point
         key, value = next(iter(blamed.items())) if len(blamed) == 1 else ("", dict(blamed))
-        return self._in_sweep(key, value, _fitting(problem))
+        return self._in_sweep(key, value, fitting(problem))
 
     def _in_sweep(self, key: str, value: Any, valid: str) -> Problem:
         """A problem of a swept key; an empty one stands for all."""
@@ -208,30 +216,15 @@ class _AtPoint:
 
     def at_later_key(self, problem: Problem) -> Problem:
         """A misfit of a key that was right in an earlier file, told at the key that changed it."""
-        files = self.study.files
-        wrong = (n for n in range(len(files)) if self._is_wrong(problem, files[: n + 1]))
-        if problem.sentence or not (number := next(wrong, 0)):
-            return problem
-        file = files[number]
-        stated = [*_stated(file.tree)]
-        if any(_holds(key, problem.key) or _holds(problem.key, key) for key, *_ in stated):
-            return problem
-        for key, value, alone in stated:
-            if self._is_wrong(problem, [*files[:number], replace(file, tree=alone)]):
-                by_default = problem.file == file.name
-                where = problem.key if by_default else f"{problem.key} of {problem.file}"
-                return Problem(key, value, _fitting(replace(problem, key=where)), file.name)
-        return problem
+        return at_later_key(problem, self.study.files, self._wrong_keys)
 
-    def _is_wrong(self, problem: Problem, files: Sequence[StudyFile]) -> bool:
-        """Whether some files alone have the misfit of a key at this point."""
+    def _wrong_keys(self, files: Sequence[StudyFile]) -> set[str]:
+        """Keys of the misfits that some files alone have at this point."""
         try:
-            study = study_of(files)
-            base = study.study.scenario.model_dump(mode="json")
-            found = _AtPoint(study, base, self.point, self.labels, self.measured).problems
-        except (BadInputError, LookupError):  # or they lack a list that is swept in
-            return False
-        return any(p.key == problem.key for p in found)
+            found = _at_point(study_of(files), self.point, self.measured).problems
+        except (BadInputError, LookupError, TypeError):  # or they lack what is swept in
+            return set()
+        return {problem.key for problem in found}
 
     def _alone_fails(self, key: str, value: Any, problem_key: str) -> bool:
         """Whether one swept value, laid over the base alone, gives the same misfit."""
@@ -245,11 +238,11 @@ class _AtPoint:
         """A problem moved from the scenario's key to the sweep that gave its value."""
         for key, value in self.point.items():
             swept = f"{ROOT_KEY}.{key}"
-            if _holds(swept, problem.key) or _holds(problem.key, swept):
+            if lies_in(problem.key, swept) or lies_in(swept, problem.key):
                 # Below a swept section the problem's own value says more than the section.
                 below = problem.key.removeprefix(swept)
                 inner = below if below.startswith(".") else ""
-                wrong_value = problem.value if _holds(swept, problem.key) else value
+                wrong_value = problem.value if lies_in(problem.key, swept) else value
                 return self._in_sweep(key + inner, wrong_value, problem.valid)
         return problem
 
@@ -283,7 +276,7 @@ class _AtPoint:
             wrong = list(error.problems)
         key, control_text = "certificate.controls", f"{case.control} {case.value}"
         return scenario, [
-            Problem(key, control_text, _fitting(p), self.study.origin.file_of(key)) for p in wrong
+            Problem(key, control_text, fitting(p), self.study.origin.file_of(key)) for p in wrong
         ]
 
     def control(self, case: Case, scenario: Scenario, replicates: Iterable[int]) -> Iterator[Run]:
@@ -332,29 +325,6 @@ def swept_key(study: OpenStudy, point: Point, key: str) -> str:
         number = next((i for i, p in enumerate(sweep.points) if p == point), "")
         place = f"sweep.points.{number}".rstrip(".")
     return f"{place}.{key}".rstrip(".")
-
-
-def _fitting(problem: Problem) -> str:
-    """What is valid where a value brings the misfit of another key."""
-    return f"one with which {problem.key}, here {problem.value}, is {problem.valid}"
-
-
-def _stated(tree: Tree) -> Iterator[tuple[str, Any, Tree]]:
-    """Keys of a file with their values, each also as a tree that has it alone.
-
-    A section that states its kind is one value.
-    """
-    for name, value in tree.items():
-        if isinstance(value, dict) and not {"kind", "value"} & set(value):
-            for key, inner, alone in _stated(value):
-                yield f"{name}.{key}", inner, {name: alone}
-        else:
-            yield name, value, {name: value}
-
-
-def _holds(above: str, key: str) -> bool:
-    """Whether a key is another one or lies below it."""
-    return f"{key}.".startswith(f"{above}.")
 
 
 def _put(tree: Any, parts: list[str], value: Any, origin: Origin, source: str) -> Any:

@@ -29,6 +29,7 @@ from sandmould.kinds.registry import DEFAULT_KIND, KINDS, kind_named
 from sandmould.scenario.quantity import NAME, units_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
 from sandmould.scenario.units import in_unit
+from sandmould.study.plan.later_key import StudyFile, at_later_key
 
 STUDIES = (SHIPPED / "config" / "studies", SHIPPED / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
@@ -41,16 +42,6 @@ _FILE_KEY = (
     r"|\b(scenario|sweep\.keys|sweep\.points\.\d+)\.template"
     r"|\bscenario\.files\.\d+|\ballowed_folders\.\d+)(\.value)?$"
 )
-
-
-@dataclass(frozen=True)
-class StudyFile:
-    """One file of a study or material as it was read."""
-
-    path: Path
-    name: str
-    """In messages."""
-    tree: Tree
 
 
 @dataclass(frozen=True)
@@ -97,7 +88,22 @@ def open_study(path: Path, text: str | None = None) -> OpenStudy:
     if not re.fullmatch(NAME, path.stem):
         valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
         raise BadInputError([Problem("file name", path.name, valid, file_name)])
-    return study_of(_files(path, text))
+    files = _files(path, text)
+    try:
+        return study_of(files)
+    except BadInputError as error:
+        names = [file.name for file in files]  # a problem of the material's own file stays there
+        raise BadInputError(
+            [at_later_key(p, files, _wrong_keys) if p.file in names else p for p in error.problems]
+        ) from None
+
+
+def _wrong_keys(files: Sequence[StudyFile]) -> set[str]:
+    try:
+        study_of(files)
+    except BadInputError as error:
+        return {problem.key for problem in error.problems}
+    return set()
 
 
 def study_of(files: Sequence[StudyFile]) -> OpenStudy:
