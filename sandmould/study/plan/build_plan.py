@@ -379,7 +379,7 @@ def known_prices(plan: Plan, results: Path) -> Prices:
 
     The plan knows nothing of a program of the user's: its finished runs count, where there are any.
     """
-    rates = stored_speeds(plan, results)
+    rates = stored_speeds(plan)
     if plan.kind.planning.program is None:
         return Prices(rates)
     folder = results / plan.study.name
@@ -387,13 +387,13 @@ def known_prices(plan: Plan, results: Path) -> Prices:
     return Prices(rates, ratios_of([(run, s) for run, s in taken if s > 0.0], rates))
 
 
-def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
+def stored_speeds(plan: Plan) -> dict[SpeedClass, float]:
     """Work a second of a core of this machine by class, as far as it was measured before."""
     speed = plan.kind.planning.speed
     if speed is None:
         return {}
     stored = {
-        each: [rate for rate in (speed.stored(s, results) for s in scenarios) if rate is not None]
+        each: [rate for rate in (speed.stored(s) for s in scenarios) if rate is not None]
         for each, scenarios in plan.classes.items()
     }
     return {each: min(rates) for each, rates in stored.items() if rates}
@@ -414,8 +414,7 @@ def measure_speeds(plan: Plan, results: Path) -> None:
     if speed is None or not may_run(plan.study, plan.runs):
         return
     slow = sum(
-        any(speed.stored(scenario, results) is None for scenario in alike)
-        for alike in plan.classes.values()
+        any(speed.stored(scenario) is None for scenario in alike) for alike in plan.classes.values()
     )
     if slow:
         say(

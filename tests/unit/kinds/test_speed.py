@@ -17,7 +17,7 @@ from sandmould.cli.commands import app
 from sandmould.engines.session import Session
 from sandmould.kinds.registry import kind_of
 from sandmould.kinds.sand.speed import SandSpeed, _spent_s, _window_rate
-from sandmould.kinds.stored_speed import STORED, StoredSpeed
+from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from tests.liggghts_scenes import needs_liggghts
@@ -120,14 +120,16 @@ def test_each_engine_prices_each_scene_in_an_empty_folder(
 def test_castings_are_priced_by_a_trial_on_this_machine(name: str, tmp_path: Path) -> None:
     scenario = expand(open_study(ROOT / "config" / "studies" / f"{name}.yaml"))[0].scenario
     speed = kind_of(scenario).planning.speed
-    assert speed.stored(scenario, tmp_path) is None
+    assert speed.stored(scenario) is None
     rate = speed.measured(scenario, tmp_path)
     # within a hundred times the speed of a core of 2026
     assert 1e4 < rate < 5e10
-    assert speed.stored(scenario, tmp_path) == rate
+    assert speed.stored(scenario) == rate
 
 
-def test_a_speed_is_measured_once_and_a_damaged_file_is_written_anew(tmp_path: Path) -> None:
+def test_a_speed_is_measured_once_and_a_damaged_file_is_written_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     trials: list[str] = []
 
     class Speed(StoredSpeed[Any]):
@@ -140,12 +142,17 @@ def test_a_speed_is_measured_once_and_a_damaged_file_is_written_anew(tmp_path: P
 
     speed = Speed()
     assert speed.measured("fails", tmp_path) is None
-    assert not (tmp_path / STORED).exists()
+    assert not speed.file("fails").exists()
     for _ in range(2):
         assert speed.measured("one", tmp_path) == 2.0
     assert speed.measured("another", tmp_path) == 2.0
     assert trials == ["fails", "one", "another"]
-    assert speed.stored("one", tmp_path) == 2.0
-    (tmp_path / STORED).write_text("[1]")
-    assert speed.stored("one", tmp_path) is None
+    assert speed.stored("one") == 2.0
+    for damage in (b"", b"[1]", b"\xff", b"nan", b"-1", b"0"):
+        speed.file("one").write_bytes(damage)
+        assert speed.stored("one") is None
+        assert speed.measured("one", tmp_path) == 2.0
+        assert speed.stored("one") == 2.0
+    monkeypatch.setenv("XDG_CACHE_HOME", "/proc")  # where nothing can be written
     assert speed.measured("one", tmp_path) == 2.0
+    assert speed.stored("one") is None
