@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
@@ -21,11 +21,11 @@ from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done, plan_batches
-from sandmould.study.plan.expand import expand, scenario_at, swept_key
+from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
-from sandmould.study.plan.later_key import StudyFile, at_later_key
-from sandmould.study.plan.load_study import OpenStudy, open_study, study_of
+from sandmould.study.plan.later_key import at_later_key
+from sandmould.study.plan.load_study import OpenStudy, StudyFile, study_files, study_of
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import later_line, plan_table, write_plan, write_study
@@ -197,8 +197,29 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
         With one sentence a problem; a missing engine is one of them, and results that belong to
         another study file of the same name.
     """
-    study = open_study(path, text)
-    check_owner(path, results / study.name)
+    files = study_files(path, text)
+    try:
+        study = study_of(files)
+        check_owner(path, results / study.name)
+        runs, trial = _sound_runs(study, results)
+    except BadInputError as error:
+        raise BadInputError([at_later_key(p, files, _misfits) for p in error.problems]) from None
+    planning = kind_named(study.study.kind).planning
+    shared, fills = share_fills(runs, planning)
+    return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
+
+
+def _misfits(files: Sequence[StudyFile]) -> set[str]:
+    """Keys of what is wrong with a study of some files, without results."""
+    try:
+        _sound_runs(study_of(files), Path())
+    except BadInputError as error:
+        return {problem.key for problem in error.problems}
+    return set()
+
+
+def _sound_runs(study: OpenStudy, results: Path) -> tuple[list[Run], list[Run]]:
+    """Runs of a study and of a trial of its controls, all of which their engines can compute."""
     log = read_rounds(results / study.name, study.study)
     runs = expand(study, log.runs, log.certified_hz)
     problems: dict[str, Problem] = {}
@@ -210,18 +231,14 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
     for run in (*runs, *trial):
         problem = planning.engine_problem(run.scenario)
         if problem is not None:
-            stated = _at_stated_key(study, run, problem)
-            if str(stated) not in problems:
-                problems[str(stated)] = at_later_key(
-                    stated, study.files, partial(_refused_keys, run)
-                )
+            problem = _at_stated_key(study, run, problem)
+            problems[str(problem)] = problem
     for problem in problems_elsewhere(study.study, results):
         found = replace(problem, file=study.origin.file_of(problem.key))
         problems[str(found)] = found
     if problems:
         raise BadInputError(list(problems.values()))
-    shared, fills = share_fills(runs, planning)
-    return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
+    return runs, trial
 
 
 def checked_plan(path: Path, text: str | None = None) -> Plan:
@@ -277,17 +294,6 @@ def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:
     else:
         key = f"scenario.{problem.key}"
     return Problem(key, problem.value, problem.valid, study.origin.file_of(key))
-
-
-def _refused_keys(run: Run, files: Sequence[StudyFile]) -> set[str]:
-    """Keys of what an engine refuses where some files alone are the study of a run."""
-    try:
-        study = study_of(files)
-        scenario = scenario_at(study, run.parameters)
-    except (BadInputError, LookupError, TypeError):  # or they lack what is swept in
-        return set()
-    problem = kind_named(study.study.kind).planning.engine_problem(scenario)
-    return set() if problem is None else {_at_stated_key(study, run, problem).key}
 
 
 def announce(

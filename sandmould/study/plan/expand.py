@@ -21,8 +21,7 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.labels import Labels, letters
-from sandmould.study.plan.later_key import StudyFile, at_later_key, fitting, lies_in
-from sandmould.study.plan.load_study import OpenStudy, study_of
+from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.plan.measured import problems as measure_problems
 from sandmould.study.plan.trust import outside
 from sandmould.study.robustness.controls import Case, cases, swept_steps
@@ -91,8 +90,7 @@ def expand(
     for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point, labels, measured)
         for problem in at_point.problems:
-            if str(problem) not in problems:
-                problems[str(problem)] = at_point.at_later_key(problem)
+            problems[str(problem)] = problem
         if len(problems) >= MOST_PROBLEMS:
             break
         if problems:
@@ -131,28 +129,21 @@ def _as_planned(point: Point, planned: Sequence[Point]) -> Point:
 
 
 def scenes(study: OpenStudy) -> Iterator[AnyScenario]:
-    """The scenario of each point of a sweep, as of ``scenario_at``."""
-    return (scenario_at(study, point) for point in points(study.study.sweep, study.study.scenario))
-
-
-def scenario_at(study: OpenStudy, point: Point) -> AnyScenario:
-    """The scenario of a point of a sweep, whether or not it can be computed.
+    """The scenario of each point of a sweep, whether or not it can be computed.
 
     Raises
     ------
     BadInputError
-        Where values have a wrong type.
+        At a point whose values have a wrong type.
     """
-    at_point = _at_point(study, point)
-    if at_point.scenario is None:
-        raise BadInputError(at_point.problems)
-    return at_point.scenario
-
-
-def _at_point(study: OpenStudy, point: Point, measured: bool = True) -> _AtPoint:
+    base = study.study.scenario.model_dump(mode="json")
     kind = kind_named(study.study.kind)
     labels = Labels(kind.scenario, kind.labels_have_units)
-    return _AtPoint(study, study.study.scenario.model_dump(mode="json"), point, labels, measured)
+    for point in points(study.study.sweep, study.study.scenario):
+        at_point = _AtPoint(study, base, point, labels)
+        if at_point.scenario is None:
+            raise BadInputError(at_point.problems)
+        yield at_point.scenario
 
 
 class _AtPoint:
@@ -202,29 +193,13 @@ class _AtPoint:
         """A misfit told at the key that the user has to change."""
         if not self.point or problem in self._misfits(self.study.study.scenario):
             return replace(problem, file=self.study.origin.file_of(problem.key))
-        if any(lies_in(problem.key, f"{ROOT_KEY}.{key}") for key in self.point):
+        if any(_holds(key, problem.key) for key in self.point):
             return self._at_swept_key(problem)
         guilty = {k: v for k, v in self.point.items() if self._alone_fails(k, v, problem.key)}
         blamed = guilty or self.point
         key, value = next(iter(blamed.items())) if len(blamed) == 1 else ("", dict(blamed))
-        return self._in_sweep(key, value, fitting(problem))
-
-    def _in_sweep(self, key: str, value: Any, valid: str) -> Problem:
-        """A problem of a swept key; an empty one stands for all."""
-        key = swept_key(self.study, self.point, key)
-        return Problem(key, value, valid, self.study.origin.file_of(key))
-
-    def at_later_key(self, problem: Problem) -> Problem:
-        """A misfit of a key that was right in an earlier file, told at the key that changed it."""
-        return at_later_key(problem, self.study.files, self._wrong_keys)
-
-    def _wrong_keys(self, files: Sequence[StudyFile]) -> set[str]:
-        """Keys of the misfits that some files alone have at this point."""
-        try:
-            found = _at_point(study_of(files), self.point, self.measured).problems
-        except (BadInputError, LookupError, TypeError):  # or they lack what is swept in
-            return set()
-        return {problem.key for problem in found}
+        valid = f"one with which {problem.key}, here {problem.value}, is {problem.valid}"
+        return self._in_sweep(key, value, valid)
 
     def _alone_fails(self, key: str, value: Any, problem_key: str) -> bool:
         """Whether one swept value, laid over the base alone, gives the same misfit."""
@@ -237,14 +212,18 @@ class _AtPoint:
     def _at_swept_key(self, problem: Problem) -> Problem:
         """A problem moved from the scenario's key to the sweep that gave its value."""
         for key, value in self.point.items():
-            swept = f"{ROOT_KEY}.{key}"
-            if lies_in(problem.key, swept) or lies_in(swept, problem.key):
+            if _holds(key, problem.key) or f"{ROOT_KEY}.{key}".startswith(f"{problem.key}."):
                 # Below a swept section the problem's own value says more than the section.
-                below = problem.key.removeprefix(swept)
+                below = problem.key.removeprefix(f"{ROOT_KEY}.{key}")
                 inner = below if below.startswith(".") else ""
-                wrong_value = problem.value if lies_in(problem.key, swept) else value
+                wrong_value = problem.value if _holds(key, problem.key) else value
                 return self._in_sweep(key + inner, wrong_value, problem.valid)
         return problem
+
+    def _in_sweep(self, key: str, value: Any, valid: str) -> Problem:
+        """A problem of a swept key; an empty one stands for all."""
+        key = swept_key(self.study, self.point, key)
+        return Problem(key, value, valid, self.study.origin.file_of(key))
 
     def runs(self, replicates: Iterable[int]) -> Iterator[Run]:
         """Some replicates of this point."""
@@ -276,8 +255,10 @@ class _AtPoint:
             wrong = list(error.problems)
         key, control_text = "certificate.controls", f"{case.control} {case.value}"
         return scenario, [
-            Problem(key, control_text, fitting(p), self.study.origin.file_of(key)) for p in wrong
-        ]
+            Problem(key, control_text, f"one with which {p.key}, here {p.value}, is {p.valid}",
+                    self.study.file)
+            for p in wrong
+        ]  # fmt: skip
 
     def control(self, case: Case, scenario: Scenario, replicates: Iterable[int]) -> Iterator[Run]:
         """Replicates of a control at this point."""
@@ -325,6 +306,11 @@ def swept_key(study: OpenStudy, point: Point, key: str) -> str:
         number = next((i for i, p in enumerate(sweep.points) if p == point), "")
         place = f"sweep.points.{number}".rstrip(".")
     return f"{place}.{key}".rstrip(".")
+
+
+def _holds(swept: str, problem_key: str) -> bool:
+    """Whether a problem lies at a swept key or below it."""
+    return f"{problem_key}.".startswith(f"{ROOT_KEY}.{swept}.")
 
 
 def _put(tree: Any, parts: list[str], value: Any, origin: Origin, source: str) -> Any:

@@ -29,7 +29,6 @@ from sandmould.kinds.registry import DEFAULT_KIND, KINDS, kind_named
 from sandmould.scenario.quantity import NAME, units_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
 from sandmould.scenario.units import in_unit
-from sandmould.study.plan.later_key import StudyFile, at_later_key
 
 STUDIES = (SHIPPED / "config" / "studies", SHIPPED / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
@@ -56,13 +55,21 @@ class OpenStudy:
     """The merged files below the study, the scenario with all its defaults."""
     origin: Origin
     """File and source of each value, by key path from the study's root."""
-    files: tuple[StudyFile, ...]
-    """The study's own file last, each after the one that it is based on."""
 
     @property
     def file(self) -> str:
         """Name of the study's file in messages."""
         return display_path(self.path)
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """One file of a study or material as it was read."""
+
+    path: Path
+    name: str
+    """In messages."""
+    tree: Tree
 
 
 def open_study(path: Path, text: str | None = None) -> OpenStudy:
@@ -84,43 +91,15 @@ def open_study(path: Path, text: str | None = None) -> OpenStudy:
     BadInputError
         With one line a problem, each naming the file that holds the bad value.
     """
-    file_name = display_path(path)
-    if not re.fullmatch(NAME, path.stem):
-        valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
-        raise BadInputError([Problem("file name", path.name, valid, file_name)])
-    files = _files(path, text)
-    try:
-        return study_of(files)
-    except BadInputError as error:
-        names = [file.name for file in files]  # a problem of the material's own file stays there
-        raise BadInputError(
-            [at_later_key(p, files, _wrong_keys) if p.file in names else p for p in error.problems]
-        ) from None
-
-
-def _wrong_keys(files: Sequence[StudyFile]) -> set[str]:
-    try:
-        study_of(files)
-    except BadInputError as error:
-        return {problem.key for problem in error.problems}
-    return set()
+    return study_of(study_files(path, text))
 
 
 def study_of(files: Sequence[StudyFile]) -> OpenStudy:
-    """Lay the files of a study over each other, and check the whole.
-
-    Parameters
-    ----------
-    files : sequence of StudyFile
-        The study's own last, each after the one that it is based on.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """Check the whole of a study, from its files as of ``study_files``."""
+    path, file_name = files[-1].path, files[-1].name
     kind = _kind(files)
     problems = [p for f in files for p in _wrong_units(kind.study, f)]
-    origin = Origin(file={"": files[-1].name})
+    origin = Origin(file={"": file_name})
     tree: Tree = {"scenario": kind.defaults}
     material = _material(files, kind)
     if material is not None and kind.material is not None:
@@ -150,8 +129,7 @@ def study_of(files: Sequence[StudyFile]) -> OpenStudy:
     ]
     if problems:
         raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in problems])
-    path = files[-1].path
-    return OpenStudy(path.stem, path, study, tree, origin, tuple(files))
+    return OpenStudy(path.stem, path, study, tree, origin)
 
 
 def _kind(files: Sequence[StudyFile]) -> Kind[Any]:
@@ -172,8 +150,11 @@ def _reported(study: Study) -> Iterator[Problem]:
         yield Problem("objective.reported_best", values, "absent unless one key is swept")
 
 
-def _files(path: Path, text: str | None) -> list[StudyFile]:
-    """The study's file and all it is based on, the deepest base first."""
+def study_files(path: Path, text: str | None = None) -> list[StudyFile]:
+    """The study's file and all it is based on, the deepest base first; as of ``open_study``."""
+    if not re.fullmatch(NAME, path.stem):
+        valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
+        raise BadInputError([Problem("file name", path.name, valid, display_path(path))])
     files = [_read(path, text)]
     while (name := files[0].tree.get("based_on")) is not None:
         above = files[0]
