@@ -89,17 +89,21 @@ def cache_key(sources: Iterable[bytes], versions: Iterable[str], processor: Iter
     return digest(*map(digest, parts))[:SHORT]
 
 
-def cache_folder() -> Path:
-    """Where the machine code of this state of the house lies on this processor."""
+def user_cache() -> Path:
+    """Where the house keeps what every folder of the user's can use again."""
     # A relative one would lie in the folder that happens to be worked in; so it counts as none.
     stated = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    caches = stated if stated.is_absolute() else Path.home() / ".cache"
+    return (stated if stated.is_absolute() else Path.home() / ".cache") / "sandmould"
+
+
+def cache_folder() -> Path:
+    """Where the machine code of this state of the house lies on this processor."""
     key = cache_key(
         kernel_sources(Path(__file__).parents[1]).values(),
         (version("numba"), version("llvmlite")),
         (binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()),
     )
-    return caches / "sandmould" / f"kernels-{key}"
+    return user_cache() / f"kernels-{key}"
 
 
 def is_own(folder: Path) -> bool:

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from pathlib import Path
 
 import pytest
 
+from sandmould.kernel_cache import cache_folder, is_own
+
+KERNELS = cache_folder()
+"""Compiled once for all tests; what else is kept in the user's cache is a test's own."""
+is_own(KERNELS)
+CACHES = tempfile.TemporaryDirectory(prefix="caches_")
 LONG = ("verification", "workflow")
 """Folders of the longest tests."""
 
@@ -13,6 +21,22 @@ LONG = ("verification", "workflow")
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the switch that rewrites golden decks."""
     parser.addoption("--refresh-golden", action="store_true", help="rewrite the golden decks")
+
+
+def own_cache() -> str:
+    """An empty folder for what is kept in the user's cache, but for compiled kernels."""
+    folder = Path(tempfile.mkdtemp(dir=CACHES.name))
+    (folder / "sandmould").mkdir()
+    (folder / "sandmould" / KERNELS.name).symlink_to(KERNELS)
+    return str(folder)
+
+
+os.environ["XDG_CACHE_HOME"] = own_cache()
+
+
+@pytest.fixture(autouse=True)
+def _cache_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", own_cache())
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

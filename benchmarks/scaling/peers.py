@@ -98,9 +98,6 @@ class Trial:
             study = folder / "sweep.yaml"
             text = study.read_text(encoding="utf-8")
             study.write_text(text.replace("number: 20", f"number: {points}"), encoding="utf-8")
-            calibrated = folder.parent.parent / "scaling" / "results" / "calibration.json"
-            (folder / "results").mkdir()
-            shutil.copy(calibrated, folder / "results")
         self.environment = os.environ | {
             "STARTED": str(folder / "started"),
             "PYTHONPATH": str(ROOT) if tool.folder == "sandmould" else "",

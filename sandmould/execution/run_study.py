@@ -94,8 +94,8 @@ def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> in
             return status
         screen.tell_failures()
         if status and not screen.is_explained and (found := trouble(screen.log)):
-            for line in (*found, f"All that Snakemake said: {screen.log}"):
-                print(line, file=sys.stderr)
+            stopped = f'The study stopped outside its runs. Snakemake told "{"; ".join(found)}".'
+            print(f"{stopped} All that it said: {screen.log}", file=sys.stderr)
     return status
 
 

@@ -135,9 +135,7 @@ def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> st
     if any(statuses[fill.run].state != "done" for fill in fills):
         lines.append(f"{_count(fills, statuses)} of {len(fills)} fills that runs share")
     spent_s = sum(status.cpu_s for status in statuses.values())
-    lines.append(
-        f"processor time so far: {duration_text(spent_s)}; {_left(plan, results, statuses, cores)}"
-    )
+    lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
     if live is not None:
         lines += queue_lines(jobs_of(statuses, Path()))
     log = read_rounds(folder, plan.study.study)
@@ -206,9 +204,9 @@ def _orphans(plan: Plan, results: Path) -> list[str]:
     return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
 
 
-def _left(plan: Plan, results: Path, statuses: Mapping[str, RunStatus], cores: int) -> str:
+def _left(plan: Plan, statuses: Mapping[str, RunStatus], cores: int) -> str:
     """Wall time until the report is written."""
-    time_left = TimeLeft((*plan.fills, *plan.runs), stored_speeds(plan, results))
+    time_left = TimeLeft((*plan.fills, *plan.runs), stored_speeds(plan))
     for status in statuses.values():
         time_left.learn(status.run, status.wall_s)
     begun = {s.run: s.share for s in statuses.values() if s.state in ("running", "stopped")}

@@ -1,18 +1,22 @@
-"""The speed of this machine, measured once by a short trial and stored beside all results."""
+"""The speed of this machine, measured once by a short trial and kept in the user's cache."""
 
 from __future__ import annotations
 
-import json
+import contextlib
+import math
+import os
 import platform
 from abc import ABC, abstractmethod
+from importlib.metadata import version
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from sandmould.plain_file import read_json
-from sandmould.runs.files import write_text
+from llvmlite import binding
+
+from sandmould.digest import SHORT, digest
+from sandmould.kernel_cache import user_cache
 from sandmould.scenario.quantity import Section
 
-STORED = "calibration.json"
 SceneT = TypeVar("SceneT", bound=Section)
 
 
@@ -24,8 +28,6 @@ class StoredSpeed(ABC, Generic[SceneT]):
 
     basis = "at the speed measured on this machine"
     """What a price rests on that was reckoned with it."""
-    file = STORED
-    """In the folder of all results."""
 
     @abstractmethod
     def computed_by(self, scenario: SceneT) -> str:
@@ -39,21 +41,27 @@ class StoredSpeed(ABC, Generic[SceneT]):
         """Work a second of one core by what is stored."""
         return stored
 
-    def stored(self, scenario: SceneT, results: Path) -> float | None:
+    def stored(self, scenario: SceneT) -> float | None:
         """Work a second of one core as measured before; None where it was not. Starts nothing.
+
+        Parameters
+        ----------
+        scenario : scenario of the kind
+        """
+        try:
+            found = float(self.file(scenario).read_text(encoding="utf-8"))
+        except (OSError, ValueError):  # it was not measured, or the file is damaged
+            return None
+        return self.rate(scenario, found) if 0.0 < found < math.inf else None
+
+    def measured(self, scenario: SceneT, results: Path) -> float | None:
+        """The same, measured now and stored where it was not before.
 
         Parameters
         ----------
         scenario : scenario of the kind
         results : Path
             Folder of all results.
-        """
-        every = self._stored(results)
-        found = every.get(self._name_of(scenario)) if every else None
-        return None if found is None else self.rate(scenario, found)
-
-    def measured(self, scenario: SceneT, results: Path) -> float | None:
-        """The same, measured now and stored where it was not before; parameters as of ``stored``.
 
         Returns
         -------
@@ -65,22 +73,19 @@ class StoredSpeed(ABC, Generic[SceneT]):
         BadInputError
             Where a program of the user's stops with an error.
         """
-        rate = self.stored(scenario, results)
+        rate = self.stored(scenario)
         if rate is None and (found := self.trial(scenario, results)) is not None:
-            results.mkdir(parents=True, exist_ok=True)
-            # another start may have measured meanwhile
-            every = {**self._stored(results), self._name_of(scenario): found}
-            write_text(results / self.file, json.dumps(every, indent=1))
+            file = self.file(scenario)
+            partial = file.with_suffix(f".{os.getpid()}")  # another start may write its own
+            with contextlib.suppress(OSError):  # it is measured anew where nothing can be kept
+                file.parent.mkdir(parents=True, exist_ok=True)
+                partial.write_text(str(found), encoding="utf-8")
+                partial.replace(file)
             rate = self.rate(scenario, found)
         return rate
 
-    def _name_of(self, scenario: SceneT) -> str:
-        return f"{platform.node()} {self.computed_by(scenario)}"
-
-    def _stored(self, results: Path) -> dict[str, float]:
-        """All that was measured; nothing where the file is damaged."""
-        try:
-            tree = read_json(results / self.file)
-            return {machine: float(number) for machine, number in tree.items()}
-        except (OSError, ValueError, TypeError, AttributeError):
-            return {}
+    def file(self, scenario: SceneT) -> Path:
+        """Where the speed of a scenario is kept, by all that it depends on."""
+        processor = f"{platform.node()} {binding.get_host_cpu_name()} numba {version('numba')}"
+        key = digest(f"{processor} {self.computed_by(scenario)}")[:SHORT]
+        return user_cache() / "speeds" / f"{key}.txt"

@@ -122,8 +122,13 @@ def _is_sourced(value: Any) -> bool:
     }
 
 
+def _is_another_kind(value: Tree, below: Tree) -> bool:
+    """Whether a section states another kind than the one that it is laid over, whose keys go."""
+    return "kind" in value and "kind" in below and value["kind"] != below["kind"]
+
+
 def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -> Tree:
-    """Lay one tree over another: mappings merge, lists and values replace.
+    """Lay one tree over another: mappings merge, lists, values and other kinds replace.
 
     Parameters
     ----------
@@ -141,7 +146,7 @@ def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -
         key = f"{above}.{name}" if above else str(name)
         below = merged.get(name)
         lays_over = isinstance(value, dict) and not _is_sourced(value)
-        if not (lays_over and isinstance(below, dict)):
+        if not (lays_over and isinstance(below, dict)) or _is_another_kind(value, below):
             for table in (origin.file, origin.source):
                 for old in [k for k in table if k == key or k.startswith(key + ".")]:
                     del table[old]

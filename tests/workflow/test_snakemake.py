@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 from sandmould import ROOT
+from sandmould.kernel_cache import user_cache
 from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.run_tables import read_costs
@@ -48,7 +49,7 @@ def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for run in each.values():
         if speed := kind_of(run.scenario).planning.speed:
             speed.measured(run.scenario, results)
-    return results / "calibration.json"
+    return user_cache() / "speeds"
 
 
 @pytest.fixture
@@ -57,7 +58,7 @@ def checkout(tmp_path: Path, calibration: Path) -> Path:
     for name in ("Snakefile", "workflow", "templates", "config", "profiles"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "results").mkdir()
-    shutil.copy(calibration, tmp_path / "results")
+    shutil.copytree(calibration, user_cache() / "speeds")
     return tmp_path
 
 
@@ -77,8 +78,8 @@ def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
 
 
 def test_a_dry_run_starts_no_engine(checkout: Path) -> None:
-    stored = checkout / "results" / "calibration.json"
-    stored.unlink()
+    stored = user_cache() / "speeds"
+    shutil.rmtree(stored)
     ran = dry_run("--cores", "2", folder=checkout)
     assert ran.returncode == 0, ran.stderr
     assert ", an estimate" in ran.stderr

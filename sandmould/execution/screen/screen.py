@@ -58,7 +58,7 @@ class Screen:
         self.log = logs / "snakemake.log"
         """Takes all that Snakemake and its jobs print."""
         self._words = Words(logs / "words.txt")
-        self._plan, self._results, self._cores = plan, results, cores
+        self._plan, self._cores = plan, cores
         self._live = is_live_terminal() if live is None else live
         self._console = Console(stderr=True, highlight=False, markup=False, emoji=False)
         self._table: Live | None = None
@@ -163,7 +163,7 @@ class Screen:
         """What foretells the time: made anew until a run begins, once the speed is measured."""
         if self._time_left is None or not self._begun:
             every = (*self._plan.fills, *self._plan.runs)
-            self._time_left = TimeLeft(every, stored_speeds(self._plan, self._results))
+            self._time_left = TimeLeft(every, stored_speeds(self._plan))
             for run in self._whole:
                 self._time_left.learn(run, computed_wall_s(self._folders[run]))
             self._begun = begun or bool(self._watch.running)

@@ -23,7 +23,6 @@ from sandmould.runs.files import write_text
 from sandmould.runs.parent import end_with_parent
 from sandmould.scenario.own_deck import OwnDeck
 
-STORED = "pilots.json"
 FAILED_LOG = "pilot_failed.log"
 """Log of the last pilot that failed, in the folder of all results."""
 PILOT_S = 12.0
@@ -34,8 +33,7 @@ _LOOK_EVERY_S = 0.2
 class DeckSpeed(StoredSpeed[OwnDeck]):
     """See ``StoredSpeed``; what is stored is the processor time of a whole run."""
 
-    file = STORED
-    basis = f"by a pilot run (results/{STORED})"
+    basis = "by a pilot run"
 
     def computed_by(self, scenario: OwnDeck) -> str:
         """Engine and deck: a deck with other values is one of another price."""

@@ -44,6 +44,7 @@ class SandSpeed(StoredSpeed[Scenario]):
             update={
                 "fill": Fill(layers=(Layer(count=GRAINS),), settling=Settling(longest_s=LONG_S)),
                 "obstacles": (),
+                "pattern": None,
                 "vibration": tuple(s.model_copy(update={"duration_s": LONG_S}) for s in shaken[:1]),
                 "engine": scenario.engine.model_copy(update={"ranks": 1}),
             }

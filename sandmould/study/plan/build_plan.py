@@ -24,7 +24,8 @@ from sandmould.study.plan.batches import Batch, mark_done, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.fills import planned_work, share_fills
 from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
-from sandmould.study.plan.load_study import OpenStudy, open_study
+from sandmould.study.plan.later_key import at_later_key
+from sandmould.study.plan.load_study import OpenStudy, StudyFile, study_files, study_of
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import later_line, plan_table, write_plan, write_study
@@ -196,8 +197,29 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
         With one sentence a problem; a missing engine is one of them, and results that belong to
         another study file of the same name.
     """
-    study = open_study(path, text)
-    check_owner(path, results / study.name)
+    files = study_files(path, text)
+    try:
+        study = study_of(files)
+        check_owner(path, results / study.name)
+        runs, trial = _sound_runs(study, results)
+    except BadInputError as error:
+        raise BadInputError([at_later_key(p, files, _misfits) for p in error.problems]) from None
+    planning = kind_named(study.study.kind).planning
+    shared, fills = share_fills(runs, planning)
+    return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
+
+
+def _misfits(files: Sequence[StudyFile]) -> set[str]:
+    """Keys of what is wrong with a study of some files, without results."""
+    try:
+        _sound_runs(study_of(files), Path())
+    except BadInputError as error:
+        return {problem.key for problem in error.problems}
+    return set()
+
+
+def _sound_runs(study: OpenStudy, results: Path) -> tuple[list[Run], list[Run]]:
+    """Runs of a study and of a trial of its controls, all of which their engines can compute."""
     log = read_rounds(results / study.name, study.study)
     runs = expand(study, log.runs, log.certified_hz)
     problems: dict[str, Problem] = {}
@@ -216,8 +238,7 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
         problems[str(found)] = found
     if problems:
         raise BadInputError(list(problems.values()))
-    shared, fills = share_fills(runs, planning)
-    return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
+    return runs, trial
 
 
 def checked_plan(path: Path, text: str | None = None) -> Plan:
@@ -267,13 +288,12 @@ def _later(
 def _at_stated_key(study: OpenStudy, run: Run, problem: Problem) -> Problem:
     """What an engine refuses, at the key that gave the value."""
     if problem.key in run.parameters:
-        key, file = swept_key(study, run.parameters, problem.key), study.file
+        key = swept_key(study, run.parameters, problem.key)
     elif problem.key == ENGINE and run.part == "cross_check":
-        key, file = "cross_check.engine", study.origin.file_of("cross_check.engine")
+        key = "cross_check.engine"
     else:
         key = f"scenario.{problem.key}"
-        file = study.origin.file_of(key)
-    return Problem(key, problem.value, problem.valid, file)
+    return Problem(key, problem.value, problem.valid, study.origin.file_of(key))
 
 
 def announce(
@@ -365,7 +385,7 @@ def known_prices(plan: Plan, results: Path) -> Prices:
 
     The plan knows nothing of a program of the user's: its finished runs count, where there are any.
     """
-    rates = stored_speeds(plan, results)
+    rates = stored_speeds(plan)
     if plan.kind.planning.program is None:
         return Prices(rates)
     folder = results / plan.study.name
@@ -373,13 +393,13 @@ def known_prices(plan: Plan, results: Path) -> Prices:
     return Prices(rates, ratios_of([(run, s) for run, s in taken if s > 0.0], rates))
 
 
-def stored_speeds(plan: Plan, results: Path) -> dict[SpeedClass, float]:
+def stored_speeds(plan: Plan) -> dict[SpeedClass, float]:
     """Work a second of a core of this machine by class, as far as it was measured before."""
     speed = plan.kind.planning.speed
     if speed is None:
         return {}
     stored = {
-        each: [rate for rate in (speed.stored(s, results) for s in scenarios) if rate is not None]
+        each: [rate for rate in (speed.stored(s) for s in scenarios) if rate is not None]
         for each, scenarios in plan.classes.items()
     }
     return {each: min(rates) for each, rates in stored.items() if rates}
@@ -400,8 +420,7 @@ def measure_speeds(plan: Plan, results: Path) -> None:
     if speed is None or not may_run(plan.study, plan.runs):
         return
     slow = sum(
-        any(speed.stored(scenario, results) is None for scenario in alike)
-        for alike in plan.classes.values()
+        any(speed.stored(scenario) is None for scenario in alike) for alike in plan.classes.values()
     )
     if slow:
         say(

@@ -199,7 +199,7 @@ class _AtPoint:
         blamed = guilty or self.point
         key, value = next(iter(blamed.items())) if len(blamed) == 1 else ("", dict(blamed))
         valid = f"one with which {problem.key}, here {problem.value}, is {problem.valid}"
-        return Problem(self._file_key(key), value, valid, self.study.file)
+        return self._in_sweep(key, value, valid)
 
     def _alone_fails(self, key: str, value: Any, problem_key: str) -> bool:
         """Whether one swept value, laid over the base alone, gives the same misfit."""
@@ -217,14 +217,13 @@ class _AtPoint:
                 below = problem.key.removeprefix(f"{ROOT_KEY}.{key}")
                 inner = below if below.startswith(".") else ""
                 wrong_value = problem.value if _holds(key, problem.key) else value
-                return Problem(
-                    self._file_key(key) + inner, wrong_value, problem.valid, self.study.file
-                )
+                return self._in_sweep(key + inner, wrong_value, problem.valid)
         return problem
 
-    def _file_key(self, key: str) -> str:
-        """Where a swept key stands in the file; an empty one stands for all."""
-        return swept_key(self.study, self.point, key)
+    def _in_sweep(self, key: str, value: Any, valid: str) -> Problem:
+        """A problem of a swept key; an empty one stands for all."""
+        key = swept_key(self.study, self.point, key)
+        return Problem(key, value, valid, self.study.origin.file_of(key))
 
     def runs(self, replicates: Iterable[int]) -> Iterator[Run]:
         """Some replicates of this point."""

@@ -6,7 +6,7 @@ import contextlib
 import difflib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -71,7 +71,9 @@ class OpenStudy:
 
 
 @dataclass(frozen=True)
-class _File:
+class StudyFile:
+    """One file of a study or material as it was read."""
+
     path: Path
     name: str
     """In messages."""
@@ -97,11 +99,12 @@ def open_study(path: Path, text: str | None = None) -> OpenStudy:
     BadInputError
         With one line a problem, each naming the file that holds the bad value.
     """
-    file_name = display_path(path)
-    if not re.fullmatch(NAME, path.stem):
-        valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
-        raise BadInputError([Problem("file name", path.name, valid, file_name)])
-    files = _files(path, text)
+    return study_of(study_files(path, text))
+
+
+def study_of(files: Sequence[StudyFile]) -> OpenStudy:
+    """Check the whole of a study, from its files as of ``study_files``."""
+    path, file_name = files[-1].path, files[-1].name
     kind = _kind(files)
     problems = [p for f in files for p in _wrong_units(kind.study, f)]
     origin = Origin(file={"": file_name})
@@ -137,10 +140,15 @@ def open_study(path: Path, text: str | None = None) -> OpenStudy:
     return OpenStudy(path.stem, path, study, tree, origin)
 
 
-def _kind(files: list[_File]) -> Kind[Any]:
-    """Kind of the study, by the last file that states it."""
-    stated = [f for f in files if "kind" in f.tree]
-    return kind_named(stated[-1].tree["kind"], stated[-1].name) if stated else DEFAULT_KIND
+def _kind(files: Sequence[StudyFile]) -> Kind[Any]:
+    """Kind of the study: that of the study which it is based on."""
+    kind = DEFAULT_KIND
+    for n, file in enumerate(files):
+        below, kind = kind, kind_named(file.tree.get("kind", kind.name), file.name)
+        if n and kind is not below:
+            valid = f"{below.name}, the kind of {files[n - 1].name}, which this study is based on"
+            raise BadInputError([Problem("kind", kind.name, valid, file.name)])
+    return kind
 
 
 def _reported(study: Study) -> Iterator[Problem]:
@@ -150,8 +158,11 @@ def _reported(study: Study) -> Iterator[Problem]:
         yield Problem("objective.reported_best", values, "absent unless one key is swept")
 
 
-def _files(path: Path, text: str | None) -> list[_File]:
-    """The study's file and all it is based on, the deepest base first."""
+def study_files(path: Path, text: str | None = None) -> list[StudyFile]:
+    """The study's file and all it is based on, the deepest base first; as of ``open_study``."""
+    if not re.fullmatch(NAME, path.stem):
+        valid = "small letters, digits and _, a letter first, such as tube_demo.yaml"
+        raise BadInputError([Problem("file name", path.name, valid, display_path(path))])
     files = [_read(path, text)]
     while (name := files[0].tree.get("based_on")) is not None:
         above = files[0]
@@ -170,7 +181,7 @@ def _files(path: Path, text: str | None) -> list[_File]:
     return files
 
 
-def _material(files: list[_File], kind: Kind[Any]) -> _File | None:
+def _material(files: Sequence[StudyFile], kind: Kind[Any]) -> StudyFile | None:
     """The material that the last file to name one names, of a kind that has materials."""
     stated = [f for f in files if "material" in f.tree]
     if kind.material is None or not stated or (name := stated[-1].tree["material"]) is None:
@@ -184,7 +195,7 @@ def _material(files: list[_File], kind: Kind[Any]) -> _File | None:
     raise BadInputError([Problem("material", name, valid, stated[-1].name)])
 
 
-def _check_material(material: _File, model: type[BaseModel]) -> None:
+def _check_material(material: StudyFile, model: type[BaseModel]) -> None:
     """Check a material by itself, so that a message has the key as its own file has it."""
     alone = Origin(file={"": material.name})
     validated(model, merge({}, material.tree, alone, material.name), alone)
@@ -206,9 +217,9 @@ def materials(model: type[BaseModel]) -> list[str]:
     return sorted(names)
 
 
-def _read(path: Path, text: str | None = None) -> _File:
+def _read(path: Path, text: str | None = None) -> StudyFile:
     name = display_path(path)
-    return _File(path, name, _from_root(read_yaml(path, name, text), path.parent))
+    return StudyFile(path, name, _from_root(read_yaml(path, name, text), path.parent))
 
 
 def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
@@ -256,7 +267,7 @@ def _yaml_files(folders: tuple[Path, ...]) -> Iterator[Path]:
     return (path for path in found if re.fullmatch(NAME, path.stem))
 
 
-def _wrong_units(model: type[BaseModel], file: _File) -> list[Problem]:
+def _wrong_units(model: type[BaseModel], file: StudyFile) -> list[Problem]:
     """Units that contradict the key's own."""
     problems = []
     for key, value, unit in _units(file.tree):

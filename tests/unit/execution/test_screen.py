@@ -21,7 +21,6 @@ from sandmould.execution.screen.so_far import so_far_text
 from sandmould.execution.screen.table import counts_text, study_table
 from sandmould.execution.screen.view import RunView, StudyView
 from sandmould.kinds.sand.speed import SandSpeed
-from sandmould.kinds.stored_speed import STORED
 from sandmould.runs import words
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.build_plan import Plan, open_plan
@@ -178,7 +177,9 @@ def test_the_time_left_knows_a_speed_that_is_measured_after_the_first_line(
     assert measured.endswith(" days left")
     (STUDY / "runs" / plan.runs[0].run / "lock").write_text("")
     screen.look()
-    (RESULTS / STORED).unlink()  # nothing is looked up again once a run has begun
+    SandSpeed().file(
+        plan.runs[0].scenario
+    ).unlink()  # nothing is looked up again once a run has begun
     screen.look()
     assert all(line.endswith(" days left") for line in capsys.readouterr().err.splitlines())
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import pytest
 
 from sandmould.bad_input import BadInputError
+from sandmould.kernel_cache import user_cache
 from sandmould.kinds.deck import speed
 from sandmould.study.plan import build_plan
 from sandmould.study.plan.build_plan import (
@@ -39,12 +39,13 @@ def test_a_short_deck_is_computed_whole_once(
     plan = short(tmp_path, 2000)
     measure_speeds(plan, tmp_path)
     # the first and the last point, of which the dearer counts
-    ends_s = list(json.loads((tmp_path / speed.STORED).read_text()).values())
+    kept = {plan.kind.planning.speed.file(run.scenario) for run in plan.runs}
+    ends_s = [float(file.read_text()) for file in kept]
     assert len(ends_s) == 2
     assert all(0.0 < core_s < 20.0 for core_s in ends_s)
-    prices = Prices(stored_speeds(plan, tmp_path))
+    prices = Prices(stored_speeds(plan))
     assert prices.engine_s(plan.runs[0]) == pytest.approx(max(ends_s))
-    assert prices.basis(plan.runs) == "by a pilot run (results/pilots.json)"
+    assert prices.basis(plan.runs) == "by a pilot run"
     monkeypatch.setattr(speed, "pilot", lambda *_: pytest.fail("a second pilot"))
     measure_speeds(plan, tmp_path)
 
@@ -91,7 +92,7 @@ def test_plan_starts_no_deck(
         plan = short(tmp_path, 2000)
     said = announce(plan, tmp_path, 1, measure="engines")
     assert ", by expected_core_s, an estimate\n" in said
-    assert not (tmp_path / speed.STORED).exists()
+    assert not (user_cache() / "speeds").exists()
 
 
 def failing(folder: Path, angles_deg: str) -> Plan:
@@ -117,7 +118,7 @@ def test_a_deck_that_fails_is_told_with_the_engines_own_line(tmp_path: Path) -> 
     assert "Unknown command: nonsense here" in said
     assert said.endswith(f" Its log: {results / speed.FAILED_LOG}.")
     assert "nonsense here" in (results / speed.FAILED_LOG).read_text()
-    assert not (results / speed.STORED).exists()
+    assert not (user_cache() / "speeds").exists()
 
 
 def test_a_point_that_fails_alone_is_told_and_keeps_nothing_from_running(

@@ -22,8 +22,9 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "default that an engine cannot take": (
         "based_on: l_pattern\nscenario: {engine: {name: liggghts}, frame: box}",
-        "config/scenarios/l_pattern.yaml: scenario.pattern.loop.repeats = 12 cannot be used: "
-        "valid is 0 on engine liggghts, which cannot go back.",
+        "trial.yaml: scenario.engine.name = 'liggghts' cannot be used: valid is one with which "
+        "scenario.pattern.loop.repeats of config/scenarios/l_pattern.yaml, here 12, is 0 on engine "
+        "liggghts, which cannot go back.",
     ),
     "wrong type": (
         'based_on: tube\nscenario: {sand: {density_kg_m3: "heavy"}}',
@@ -57,13 +58,15 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "tube outside the box": (
         "based_on: tube\nscenario: {box: {width_m: 0.1}}",
-        "config/scenarios/tube.yaml: scenario.obstacles.0.length_m = 0.05 cannot be used: "
-        "valid is at most 0.03, so that the tube ends in the box.",
+        "trial.yaml: scenario.box.width_m = 0.1 cannot be used: valid is one with which "
+        "scenario.obstacles.0.length_m of config/scenarios/tube.yaml, here 0.05, is at most 0.03, "
+        "so that the tube ends in the box.",
     ),
     "tube beside the box": (
         "based_on: tube\nscenario: {box: {width_m: 0.06}}",
-        "config/scenarios/tube.yaml: scenario.obstacles.0.left_end_x_m = 0.07 cannot be used: "
-        "valid is less than box.width_m, 0.06 m.",
+        "trial.yaml: scenario.box.width_m = 0.06 cannot be used: valid is one with which "
+        "scenario.obstacles.0.left_end_x_m of config/scenarios/tube.yaml, here 0.07, is less than "
+        "box.width_m, 0.06 m.",
     ),
     "tube above the box": (
         "based_on: tube\nscenario: {obstacles: [{kind: tube, diameter_m: 0.024, length_m: 0.05, "
@@ -120,8 +123,9 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "grains larger than the tube": (
         "based_on: tube\nscenario: {sand: {size_scale: 30}}",
-        "config/scenarios/tube.yaml: scenario.obstacles.0.diameter_m = 0.024 cannot be used: "
-        "valid is more than the largest grain, 0.0290371 m.",
+        "trial.yaml: scenario.sand.size_scale = 30 cannot be used: valid is one with which "
+        "scenario.obstacles.0.diameter_m of config/scenarios/tube.yaml, here 0.024, is more than "
+        "the largest grain, 0.0290371 m.",
     ),
     "time step above critical": (
         "based_on: tube\nscenario: {time_step: {step_s: 1e-3}}",
@@ -182,8 +186,10 @@ CASES: dict[str, tuple[str, str]] = {
     "gate that is turned": (
         "based_on: hopper\nscenario: {obstacles: [{kind: plate, name: gate, "
         "centre_m: [0.6, 0.245], size_m: [0.06, 0.01], angle_deg: 10}]}",
-        "config/scenarios/hopper.yaml: scenario.discharge.gate = 'gate' cannot be used: "
-        "valid is a plate with angle_deg 0, level or upright.",
+        "trial.yaml: scenario.obstacles = [{'kind': 'plate', 'name': 'gate', 'centre_m': [0.6, "
+        "0.245], 'size_m': [0.06, 0.01], 'angle_deg': 10}] cannot be used: valid is one with which "
+        "scenario.discharge.gate of config/scenarios/hopper.yaml, here gate, is a plate with "
+        "angle_deg 0, level or upright.",
     ),
     "pouring over what is outside the box": (
         "based_on: hopper\nscenario: {fill: {over_x_m: [0.45, 1.25]}}",

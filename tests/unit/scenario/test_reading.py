@@ -128,3 +128,14 @@ def test_a_pipe_and_a_text_nested_without_end_are_sentences(
     os.mkfifo(path)
     with pytest.raises(BadInputError, match="file = 'it is no plain file' cannot be used"):
         read_file(path, "trial.yaml")
+
+
+def test_another_kind_starts_a_section_anew() -> None:
+    shape = {"kind": "bar", "width_m": 1, "height_m": 2}
+    origin = Origin()
+    base = merge({}, {"shape": shape, "box": {"depth_m": 1}}, origin, "base")
+    both = merge(base, {"shape": {"kind": "file", "file": "a"}}, origin, "own")
+    assert both == {"shape": {"kind": "file", "file": "a"}, "box": {"depth_m": 1}}
+    assert "shape.width_m" not in origin.file
+    same = merge(base, {"shape": {"kind": "bar", "height_m": 3}}, origin, "own")
+    assert same["shape"] == {**shape, "height_m": 3}

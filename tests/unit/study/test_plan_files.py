@@ -18,9 +18,9 @@ from sandmould.bad_input import BadInputError
 from sandmould.definition.run import RUN_NAME, Run
 from sandmould.engines.durations import REST_AFTER_FALL_S, REST_AFTER_MOTION_S, run_s, stage_s
 from sandmould.engines.program import build_program
+from sandmould.kernel_cache import user_cache
 from sandmould.kinds.sand.planning import SandPlanning
 from sandmould.kinds.sand.speed import SandSpeed
-from sandmould.kinds.stored_speed import STORED
 from sandmould.runs.progress import duration_text
 from sandmould.scenario.placement import loose_height_m, plan_counts
 from sandmould.scenario.scenario import Scenario
@@ -138,7 +138,7 @@ def test_plan_is_announced_without_an_engine(
     monkeypatch.setattr(SandSpeed, "trial", lambda *_: pytest.fail("an engine started"))
     plan = open_plan(ROOT / "config" / "studies" / "tube_demo.yaml")
     assert price_line(announce(plan, tmp_path, 1)).endswith(", an estimate")
-    assert not (tmp_path / STORED).exists()
+    assert not (user_cache() / "speeds").exists()
     monkeypatch.setattr(SandSpeed, "trial", lambda *_: 1e7)
     assert capsys.readouterr().err == ""
     measure_speeds(plan, tmp_path)
