@@ -11,7 +11,7 @@ import pytest
 from sandmould.kernel_cache import cache_folder, is_own
 
 KERNELS = cache_folder()
-"""Compiled once for all tests; what else is kept in the user's cache is a test's own."""
+"""Compiled once for all tests."""
 is_own(KERNELS)
 CACHES = tempfile.TemporaryDirectory(prefix="caches_")
 LONG = ("verification", "workflow")
@@ -23,7 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--refresh-golden", action="store_true", help="rewrite the golden decks")
 
 
-def own_cache() -> str:
+def _cache() -> str:
     """An empty folder for what is kept in the user's cache, but for compiled kernels."""
     folder = Path(tempfile.mkdtemp(dir=CACHES.name))
     (folder / "sandmould").mkdir()
@@ -31,12 +31,13 @@ def own_cache() -> str:
     return str(folder)
 
 
-os.environ["XDG_CACHE_HOME"] = own_cache()
+os.environ["XDG_CACHE_HOME"] = _cache()
 
 
-@pytest.fixture(autouse=True)
-def _cache_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", own_cache())
+@pytest.fixture
+def unmeasured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine whose speed is not known; other tests measure it once for all."""
+    monkeypatch.setenv("XDG_CACHE_HOME", _cache())
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

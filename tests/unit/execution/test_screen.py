@@ -163,6 +163,7 @@ def test_plain_lines_tell_the_whole_study_now_and_then(
     )
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_the_time_left_knows_a_speed_that_is_measured_after_the_first_line(
     plan: Plan, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -72,6 +72,7 @@ def claimed(folder: Path) -> None:
     (folder / CLAIM_FILE).write_text(json.dumps(owner))
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_time_left_of_nothing_begun_is_an_estimate(plan: Plan) -> None:
     said = status_text(plan, Path("results"), 2)
     assert said.startswith(

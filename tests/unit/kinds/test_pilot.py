@@ -22,6 +22,8 @@ from sandmould.study.plan.price import Prices
 
 LAMMPS = ("lammps", 0)
 
+pytestmark = pytest.mark.usefixtures("unmeasured")
+
 
 def short(folder: Path, steps: int) -> Plan:
     """The shipped deck with so many steps."""

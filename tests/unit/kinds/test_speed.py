@@ -23,6 +23,8 @@ from sandmould.study.plan.load_study import open_study
 from tests.liggghts_scenes import needs_liggghts
 from tests.scenes import TUBE_SCENE, tube_scene
 
+pytestmark = pytest.mark.usefixtures("unmeasured")
+
 
 class OnABusyMachine:
     """A session whose engine has a core for a small part of the time."""

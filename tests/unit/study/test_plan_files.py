@@ -132,6 +132,7 @@ def price_line(text: str) -> str:
     return line
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_plan_is_announced_without_an_engine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
