@@ -13,12 +13,10 @@ SHIPPED = ROOT if IS_CHECKOUT else ROOT / "sandmould" / "shipped"
 
 _PLACES = {
     "BadInputError": "sandmould.bad_input",
-    "Result": "sandmould.notebook",
-    "plan": "sandmould.notebook",
-    "run": "sandmould.notebook",
+    **dict.fromkeys(("Result", "again", "plan", "run", "status"), "sandmould.notebook"),
 }
 """Modules of what users of the package need: loaded when asked, since they take a second."""
-__all__ = ["BadInputError", "Result", "__version__", "plan", "run"]
+__all__ = [*_PLACES, "__version__"]
 
 
 def __getattr__(name: str) -> Any:

@@ -5,8 +5,10 @@ from pathlib import Path
 
 from sandmould.bad_input import BadInputError as BadInputError
 from sandmould.notebook import Result as Result
+from sandmould.notebook import again as again
 from sandmould.notebook import plan as plan
 from sandmould.notebook import run as run
+from sandmould.notebook import status as status
 
 ROOT: Path
 IS_CHECKOUT: bool

@@ -12,8 +12,8 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -26,13 +26,16 @@ from sandmould.cli.study_file import study_file
 from sandmould.drawing.figures import draw_layers
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.execution.again import forget
+from sandmould.execution.cluster.queue import live_jobs
+from sandmould.execution.status import run_statuses
 from sandmould.reference.dictionary import study_text, write_study_file
 from sandmould.runs.columns import RUN
 from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, read_collected
 from sandmould.study.plan.build_plan import RESULTS, checked_plan, known_prices, open_plan
-from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run
+from sandmould.study.plan.plan_files import SUMMARY, VERDICT_FILE, plan_rows, read_run
 from sandmould.study.plan.price import study_s
 
 AXES = ("x", "z"), ("x", "y", "z")
@@ -67,11 +70,24 @@ class Page:
         return f'<iframe src="{escape(address)}" width="100%" height="700"></iframe>'
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Result:
     """What a study has left in its folder of results."""
 
     folder: Path
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        """Read what is there, such as ``Result("results/tube_demo")``.
+
+        Raises
+        ------
+        BadInputError
+            Where no results of a study lie there.
+        """
+        object.__setattr__(self, "folder", Path(folder).absolute())
+        if not (self.folder / SUMMARY).is_file():
+            valid = f"the folder of a study's results, which has its {SUMMARY}"
+            raise BadInputError([Problem("folder", str(folder), valid)])
 
     @cached_property
     def verdict(self) -> str:
@@ -98,9 +114,40 @@ class Result:
         """The report."""
         return Page(self.folder / "report.html")
 
+    def write_report(self) -> Page:
+        """Write the report again from the tables.
+
+        Raises
+        ------
+        OSError, ValueError
+            When results are missing or cannot be read.
+        """
+        from sandmould.report.page import write_report  # with all that draws
+
+        write_report(self.folder, self.report.path)
+        return self.report
+
     def film(self) -> Page:
         """The report at its film of sand."""
         return Page(self.folder / "report.html", "#film")
+
+    def series(self, run: str) -> pd.DataFrame:
+        """What a run recorded over time, a row a record; units stand in the names.
+
+        Parameters
+        ----------
+        run : str
+            Its name, one of ``runs``.
+
+        Raises
+        ------
+        BadInputError
+            Where there is no such run, or it recorded nothing.
+        """
+        try:
+            return pd.read_csv(self._place(run) / "series.tsv", sep="\t")
+        except (OSError, ValueError) as error:
+            raise BadInputError([Problem("run", run, f"one with a record ({error})")]) from error
 
     def grains(self, run: str, time_s: float | None = None) -> pd.DataFrame:
         """The grains of a run of sand, a row each.
@@ -143,17 +190,19 @@ class Result:
         """
         run = self.runs[0] if run is None else run
         snapshot = self._snapshot(run, time_s)
-        scenario = read_run(self.folder / "runs" / run / "scenario.yaml").scenario
+        scenario = read_run(self._place(run) / "scenario.yaml").scenario
         assert isinstance(scenario, Scenario)
         (address,) = draw_layers([snapshot], scenario, scenario.box.height_m)
         return Picture(base64.b64decode(address.partition(",")[2]))
 
-    def _snapshot(self, run: str, time_s: float | None) -> Snapshot:
+    def _place(self, run: str) -> Path:
         if run not in self.runs:
-            raise BadInputError(
-                [Problem("run", run, f"one of result.runs, such as {self.runs[0]}")]
-            )
-        stored = stored_snapshots(self.folder / "runs" / run)
+            valid = f"one of result.runs, such as {self.runs[0]}"
+            raise BadInputError([Problem("run", run, valid)])
+        return self.folder / "runs" / run
+
+    def _snapshot(self, run: str, time_s: float | None) -> Snapshot:
+        stored = stored_snapshots(self._place(run))
         upto = [each for each in stored if time_s is None or each.times_s()[0] <= time_s]
         if not upto:
             valid = (
@@ -173,6 +222,10 @@ class Result:
         return f'<p>{escape(self.verdict)} <a href="{escape(page)}">report</a></p>'
 
 
+Progress = Callable[[int, int, str], object]
+"""Is told how many runs are at their end, of how many, and the line on the one that ended."""
+_ENDED = re.compile(r"\[(\d+)/(\d+)\] (.*)")
+"""A line of the command on a run that has ended."""
 Study = str | os.PathLike[str] | Mapping[str, Any]
 """Name of a shipped study, a study's file, or what such a file holds."""
 
@@ -184,6 +237,7 @@ def run(
     cores: int | None = None,
     folder: str | os.PathLike[str] = ".",
     quiet: bool = False,
+    progress: Progress | None = None,
 ) -> Result:
     """Compute a study, or what is missing of it, and read its results.
 
@@ -201,6 +255,9 @@ def run(
         Where ``results`` lies; the working folder unless given.
     quiet : bool
         Print nothing.
+    progress : callable, optional
+        Called when a run has ended, with the number of those at their end, that of all, and the
+        line that tells of it: ``progress(3, 28, "frequency_25_r3_45f4dc done, ...")``.
 
     Returns
     -------
@@ -217,9 +274,78 @@ def run(
     place = Path(folder).absolute()
     path, text = _file_and_text(study, name, place)
     with _within(place):
-        plan = checked_plan(path, text)
+        checked_plan(path, text)
         if text is not None:
             write_study_file(path, text)
+    return _run(path, place, cores, quiet, progress)
+
+
+def again(
+    *runs: str,
+    cores: int | None = None,
+    folder: str | os.PathLike[str] = ".",
+    quiet: bool = False,
+    progress: Progress | None = None,
+) -> list[Result]:
+    """Compute runs once more, such as failed ones, and what else their studies lack.
+
+    Parameters
+    ----------
+    *runs : str
+        Names of runs, or ``study/run``.
+    cores, folder, quiet, progress
+        As of ``run``.
+
+    Returns
+    -------
+    list of Result
+        One a study.
+
+    Raises
+    ------
+    BadInputError, RuntimeError
+        As of ``run``; where a run is unknown, nothing is forgotten.
+    """
+    place = Path(folder).absolute()
+    with _within(place):
+        studies = [path.absolute() for path in forget(runs, RESULTS)]
+    return [_run(path, place, cores, quiet, progress) for path in studies]
+
+
+def status(study: Study, *, name: str = "study", folder: str | os.PathLike[str] = ".") -> (
+    pd.DataFrame
+):  # fmt: skip
+    """See where the runs of a study stand.
+
+    Parameters
+    ----------
+    study, name, folder
+        As of ``run``.
+
+    Returns
+    -------
+    DataFrame
+        A row a run, the fills that runs share first: ``run``, ``state`` (done, failed, running,
+        stopped or waiting), ``said`` (how far it is, or why it failed), ``cpu_s``, ``share`` (of
+        one that has begun) and ``wall_s`` (of one that is done).
+
+    Raises
+    ------
+    BadInputError
+        With one sentence a problem.
+    """
+    place = Path(folder).absolute()
+    path, text = _file_and_text(study, name, place)
+    with _within(place):
+        opened = open_plan(path, text=text)
+        found = run_statuses(opened, RESULTS, opened.lacks(RESULTS), live_jobs())
+    return pd.DataFrame([asdict(each) for each in found.values()])
+
+
+def _run(
+    path: Path, place: Path, cores: int | None, quiet: bool, progress: Progress | None
+) -> Result:
+    """Have the command compute a study whose file is there."""
     command = [sys.executable, "-m", "sandmould.cli", "run", str(path)]
     command += [] if cores is None else ["--cores", str(cores)]
     with subprocess.Popen(
@@ -232,15 +358,17 @@ def run(
                 if not quiet:
                     print(line, end="", flush=True)
                 last = line.strip() or last
+                if progress and (ended := _ENDED.match(line)):
+                    progress(int(ended[1]), int(ended[2]), ended[3])
         except KeyboardInterrupt:
             process.terminate()  # a notebook interrupts this process alone
             process.wait()
             raise
-    results = place / RESULTS / plan.study.name
+    results = place / RESULTS / path.stem
     if not _has_ended(process.returncode, path, results):
         why = f"stopped by signal {-process.returncode}" if process.returncode < 0 else last
         raise RuntimeError(
-            f"{plan.study.name} did not end ({why}). Call it again to go on with what is missing."
+            f"{path.stem} did not end ({why}). Call it again to go on with what is missing."
         )
     return Result(results)
 

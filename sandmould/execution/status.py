@@ -107,6 +107,34 @@ def _ended(folder: Path) -> RunStatus:
     return RunStatus(folder.name, "failed", said, cpu_s)
 
 
+def run_statuses(
+    plan: Plan, results: Path, lacks: Mapping[str, Lack], live: Collection[str] | None
+) -> dict[str, RunStatus]:
+    """Where each run stands, by its name; the fills that runs share come first.
+
+    A fill that no run waits for any more counts where it was computed.
+
+    Parameters
+    ----------
+    plan : Plan
+    results : Path
+    lacks : mapping of str to Lack
+        See ``Plan.lacks``.
+    live : collection of str, optional
+        As of ``run_status``.
+    """
+    folder = results / plan.study.name
+    fills = [
+        fill
+        for fill in plan.fills
+        if fill.run in lacks or (folder / fill.place / "outcome.json").exists()
+    ]
+    return {
+        run.run: run_status(folder / run.place, lacks.get(run.run, WHOLE), live)
+        for run in (*fills, *plan.runs)
+    }
+
+
 def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> str:
     """Say where a study stands: done, running, failed, time left, cost so far.
 
@@ -121,16 +149,8 @@ def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> st
     """
     folder = results / plan.study.name
     lacks, live = plan.lacks(results), live_jobs()
-    # A fill that no run waits for any more counts where it was computed.
-    fills = [
-        fill
-        for fill in plan.fills
-        if fill.run in lacks or (folder / fill.place / "outcome.json").exists()
-    ]
-    statuses = {
-        run.run: run_status(folder / run.place, lacks.get(run.run, WHOLE), live)
-        for run in (*fills, *plan.runs)
-    }
+    statuses = run_statuses(plan, results, lacks, live)
+    fills = [fill for fill in plan.fills if fill.run in statuses]
     lines = [f"{plan.study.name}: {_count(plan.runs, statuses)} of {len(plan.runs)} runs"]
     if any(statuses[fill.run].state != "done" for fill in fills):
         lines.append(f"{_count(fills, statuses)} of {len(fills)} fills that runs share")

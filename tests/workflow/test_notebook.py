@@ -86,7 +86,11 @@ def test_a_study_is_computed_and_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    result = sandmould.run(STUDY, name="little", cores=2)
+    told: list[tuple[int, int]] = []
+    result = sandmould.run(
+        STUDY, name="little", cores=2, progress=lambda done, of, _: told.append((done, of))
+    )
+    assert told == [(1, 2), (2, 2)]
     # a study without a title does not ask what the one that it rests on asks
     assert yaml.safe_load(Path("little.yaml").read_text(encoding="utf-8"))["title"] == "little"
     said = capsys.readouterr().out
@@ -117,6 +121,16 @@ def test_a_study_is_computed_and_read(
     assert (len(names["grains"]), runs) == (20, 4)
     names, runs = _follow(_blocks_of_pages(), result, tmp_path, monkeypatch)
     assert (names["result"], runs) == (result, 12)
+    there = sandmould.Result("results/little")
+    assert there.verdict == result.verdict
+    assert {"time_s", "kinetic_energy_j"} <= set(there.series(run))
+    with pytest.raises(BadInputError, match=r"run = 'other' .* one of result.runs"):
+        there.series("other")
+    there.report.path.unlink()
+    assert there.write_report().path.is_file()
+    assert list(sandmould.status(STUDY, name="little")["state"]) == 3 * ["done"]  # and a fill
+    (again,) = sandmould.again(f"little/{run}", quiet=True)
+    assert again.summary[FREQUENCY].equals(result.summary[FREQUENCY])
     # The same study again computes nothing, and says nothing where that is asked for.
     capsys.readouterr()
     assert sandmould.run(STUDY, name="little", quiet=True).runs == result.runs
@@ -135,6 +149,8 @@ def test_what_is_no_study_is_told_before_anything_starts(
         sandmould.run(STUDY | {"replicates": 0}, name="wrong")
     assert not Path("wrong.yaml").exists()
     assert not Path("results").exists()
+    with pytest.raises(BadInputError, match=r"folder = 'results' .* has its summary.tsv"):
+        sandmould.Result("results")
 
 
 def test_the_package_says_what_it_has_not() -> None:
