@@ -43,6 +43,8 @@ def _locked(path: Path, waiting: str) -> Iterator[tuple[TextIO, bool]]:
 
     Beside the file stands False where the file system has no locks, even for one machine.
     """
+    if path.is_fifo():  # to open it would never end
+        path.unlink()
     while True:
         with path.open("a") as file:
             alone = _flock(file, waiting)
@@ -109,8 +111,11 @@ def let_go() -> None:
 
 def is_locked(folder: Path) -> bool:
     """Whether a process computes in a run's folder, on this machine or on another."""
+    path = folder / "lock"
+    if path.is_fifo():
+        return owner_of(folder) is not None
     try:
-        with (folder / "lock").open() as file:
+        with path.open() as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False

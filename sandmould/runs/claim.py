@@ -174,6 +174,8 @@ def _look(path: Path, now_s: float) -> tuple[Owner | None, float]:
     Where there is no file any more its age is 0: nobody takes over from it.
     """
     try:
+        if path.is_fifo():  # to open it would never end
+            return None, now_s - path.stat().st_mtime
         with path.open(encoding="utf-8") as file:  # opened, a file of NFS shows its newest time
             age_s = now_s - os.fstat(file.fileno()).st_mtime
             text = file.read()

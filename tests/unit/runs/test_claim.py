@@ -137,3 +137,12 @@ def test_of_many_machines_one_at_a_time_owns_a_folder(tmp_path: Path) -> None:
     for each in machines:
         each.join(60)
     assert (most.value, turns.value) == (1, 7 * 12 + 6)
+
+
+def test_pipes_in_place_of_files_of_a_lock_hang_nothing(tmp_path: Path) -> None:
+    for name in ("lock", "lock_owner"):
+        os.mkfifo(tmp_path / name)
+    assert not is_locked(tmp_path)
+    os.utime(tmp_path / "lock_owner", (0.0, 0.0))
+    with computing(tmp_path):
+        assert (tmp_path / "lock").is_file()
