@@ -94,6 +94,12 @@ COMMAND = [
 ]  # fmt: skip
 
 
+def planned_runs(folder: Path) -> list[str]:
+    """Names of the runs of a study, whether or not a job has begun any."""
+    rows = (folder / "results" / "small" / "runs.tsv").read_text().splitlines()[1:]
+    return [row.split("\t")[0] for row in rows]
+
+
 def start(
     slurm: SlurmNode, folder: Path, log: Path, command: list[str] = COMMAND
 ) -> subprocess.Popen[bytes]:
@@ -164,7 +170,7 @@ def test_a_run_of_two_ranks_gets_two_cores_and_the_time_that_its_partition_allow
     assert slurm.jobs() == {}
 
     # A job that can never begin, of an earlier start on another partition, is told and goes.
-    (run,) = (path.name for path in (folder / "results" / "small" / "runs").iterdir())
+    run = planned_runs(folder)[0]
     stuck = slurm.submit(
         "--job-name=sandmould_1", f"--comment=rule_batch_wildcards_{run}", f"--chdir={folder}",
         "--partition=short", "--time=60",

@@ -79,7 +79,9 @@ rule simulate:
     message:
         "Compute {wildcards.run}"
     run:
-        jobs.compute_run(*planned(wildcards.run), log[0], resources.tasks, resources.mpi)
+        jobs.compute_run(
+            *planned(wildcards.run), log[0], resources.tasks, resources.mpi
+        )
 
 
 rule measure:

@@ -13,7 +13,7 @@ from sandmould.execution import jobs
 from sandmould.execution.locks import hold_turn
 from sandmould.execution.packs.recorded import take_up
 from sandmould.execution.pool import start_server
-from sandmould.study.plan.batches import alone
+from sandmould.study.plan.batches import alone, read_batches, write_batches
 from sandmould.study.plan.build_plan import (
     RESULTS,
     announce,
@@ -39,33 +39,38 @@ MPI = OVERRIDES.pop("mpi", "mpiexec")
 CORES = workflow.resource_settings.cores or os.cpu_count()
 try:
     PLAN = plan_at_hand(study_path(workflow.configfiles, OVERRIDES))
-    if workflow.is_main_process and starts_jobs(sys.argv):
+    starts = workflow.is_main_process and starts_jobs(sys.argv)
+    if starts:
         hold_turn(RESULTS / PLAN.study.name)
         PLAN, taken = take_up(PLAN, RESULTS)
         if taken:
             say(taken)
-    LACKING = PLAN.lacks(RESULTS) if workflow.is_main_process else {}
-    # Jobs elsewhere plan the study again and must find the same batches there.
-    is_here = workflow.is_main_process and not may_be_elsewhere(sys.argv)
-    FREE_CORES = CORES if is_here else 0
-    BATCHED = PLAN.batches(
-        BATCH_WALL_S,
-        BATCH_LEAST,
-        BATCH_CORES,
-        FREE_CORES,
-        LACKING if FREE_CORES else (),
-    )
     STATED = workflow.resource_settings.default_resources or {}
     SUBMISSION = open_submission(PLAN, sys.argv, STATED)
-    if workflow.is_main_process and starts_jobs(sys.argv) and goes_to_slurm(sys.argv):
+    is_here = workflow.is_main_process and not may_be_elsewhere(sys.argv)
+    submits = starts and goes_to_slurm(sys.argv)
+    LACKING = PLAN.lacks(RESULTS) if workflow.is_main_process else {}
+    if workflow.is_main_process:
+        BATCHED = PLAN.batches(
+            BATCH_WALL_S,
+            BATCH_LEAST,
+            SUBMISSION.cores(BATCH_CORES) if submits else BATCH_CORES,
+            CORES if is_here else 0,
+            LACKING if is_here else (),
+        )
+    else:
+        # A job in a process of its own: what shares it was decided by the main one.
+        BATCHED = read_batches((*PLAN.fills, *PLAN.runs), RESULTS / PLAN.study.name)
+    if submits:
         SUBMISSION.ask(BATCHED)
     if workflow.is_main_process and "--lint" not in sys.argv:
         # A dry run starts no engine, and nothing is measured for runs that are all there.
-        measure = "all" if starts_jobs(sys.argv) and LACKING else "nothing"
-        say(announce(PLAN, RESULTS, CORES, measure))
+        say(announce(PLAN, RESULTS, CORES, "all" if starts and LACKING else "nothing"))
         if said := prepare(PLAN, RESULTS, BATCHED, LACKING):
             say(f"{said}\n")
-        if is_here and starts_jobs(sys.argv) and LACKING:
+        if starts:
+            write_batches(BATCHED, RESULTS / PLAN.study.name)
+        if is_here and starts and LACKING:
             start_server(
                 write_run(run, RESULTS / PLAN.study.name)
                 for run in PLAN.first_of_each_class(LACKING)

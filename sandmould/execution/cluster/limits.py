@@ -23,32 +23,40 @@ class Demand(NamedTuple):
     memory_mb: int
 
 
-def longest_min(cluster: Cluster) -> tuple[float, str]:
-    """Most minutes of wall time that a job may ask for, and what sets that.
+class Limits(NamedTuple):
+    """What every job of a start is allowed."""
+
+    longest_min: float = math.inf
+    """Wall time that it may ask for."""
+    why: str = ""
+    """What sets that."""
+    cores: float = math.inf
+    """Of the smallest node that it may be sent to."""
+
+
+def limits(cluster: Cluster) -> Limits:
+    """What the partitions that jobs are sent to allow.
 
     Raises
     ------
     BadInputError
         Where Slurm does not answer, or a partition is none of its.
     """
-    limits = _partitions()
-    default = [name for name, (_, is_default) in limits.items() if is_default]
-    names = cluster.partition.split(",") if cluster.partition else default
-    for name in names:
-        if name not in limits:
-            valid = f"a partition of this cluster: {', '.join(limits)}"
-            raise BadInputError([Problem("partition", name, valid, str(CLUSTER_FILE))])
-    allowed = [(limits[name][0], f"the limit of partition {name}") for name in names]
+    said = [line.split() for line in _answer(["sinfo", "-h", "-o", "%P %l %c"]).splitlines()]
+    rows = [row for row in said if len(row) == 3]  # several a partition whose nodes differ
+    there = list(dict.fromkeys(row[0].rstrip("*") for row in rows))
+    default = {row[0][:-1] for row in rows if row[0].endswith("*")}
+    names = set(cluster.partition.split(",")) if cluster.partition else default
+    for name in sorted(names.difference(there)):
+        valid = f"a partition of this cluster: {', '.join(there)}"
+        raise BadInputError([Problem("partition", name, valid, str(CLUSTER_FILE))])
+    used = [(p.rstrip("*"), limit, cores) for p, limit, cores in rows if p.rstrip("*") in names]
+    allowed = [(minutes(limit), f"the limit of partition {name}") for name, limit, _ in used]
     if cluster.longest_wall_h is not None:
         allowed.append((60 * cluster.longest_wall_h, f"longest_wall_h of {CLUSTER_FILE}"))
-    return min(allowed, default=(math.inf, ""))
-
-
-def _partitions() -> dict[str, tuple[float, bool]]:
-    """Longest minutes of each partition, and whether it is the default."""
-    said = _answer(["sinfo", "-h", "-o", "%P %l"])
-    rows = [line.split() for line in said.splitlines() if len(line.split()) == 2]
-    return {name.rstrip("*"): (minutes(limit), name.endswith("*")) for name, limit in rows}
+    # "16+" where nodes have 16 and more
+    cores = min((int(cores.rstrip("+")) for *_, cores in used), default=math.inf)
+    return Limits(*min(allowed, default=(math.inf, "")), cores)
 
 
 def minutes(text: str) -> float:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sandmould.execution.cluster.limits import Demand, check_jobs, longest_min
+from sandmould.execution.cluster.limits import Demand, Limits, check_jobs, limits
 from sandmould.execution.cluster.queue import Job, cancel, jobs_of
 from sandmould.execution.cluster.settings import (
     RESOURCES,
@@ -40,14 +40,25 @@ class Submission:
         """
         self._plan = plan
         self._cluster = cluster or Cluster()
-        self._longest_min = math.inf
+        self._limits = Limits()
         self._earlier: list[Job] = []
         self._asked_s = -math.inf
         self.said: list[str] = []
         """What a person should know before it begins."""
 
+    def cores(self, stated: int) -> int:
+        """Cores that a job of several runs should have: as stated, where all nodes have them.
+
+        Raises
+        ------
+        BadInputError
+            Where Slurm does not answer, or a partition is none of its.
+        """
+        self._limits = limits(self._cluster)
+        return int(min(stated, self._limits.cores))
+
     def ask(self, batches: Sequence[Batch]) -> None:
-        """Ask Slurm what it allows and what an earlier start has left in its queue.
+        """Ask Slurm whether it takes the jobs and what an earlier start has left in its queue.
 
         Parameters
         ----------
@@ -61,16 +72,16 @@ class Submission:
         """
         every = (*self._plan.fills, *self._plan.runs)
         names = [run.run for run in every]
-        self._longest_min, why = longest_min(self._cluster)
         single = set(alone(every, batches))
         jobs = [*batches, *(Batch(run.run, (run,)) for run in every if run.run in single)]
         planned = max((self._planned_min(job) for job in jobs), default=0)
         demands = [self._demand(job) for job in jobs]
         check_jobs(self._cluster, self.runtime_min(planned), demands)
-        if planned > self._longest_min:
-            number = math.ceil(planned / self._longest_min)
+        longest_min, why, _ = self._limits
+        if planned > longest_min:
+            number = math.ceil(planned / longest_min)
             self.said.append(
-                f"A job asks at most {duration_text(60 * self._longest_min)}, {why}. The longest "
+                f"A job asks at most {duration_text(60 * longest_min)}, {why}. The longest "
                 f"job is planned with {duration_text(60 * planned)}. It may take {number} jobs; "
                 "each goes on from the last checkpoint."
             )
@@ -101,7 +112,8 @@ class Submission:
 
         It is the same each time that a job is tried, since a run goes on from its checkpoint.
         """
-        return planned_min if planned_min <= self._longest_min else max(1, int(self._longest_min))
+        longest_min = self._limits.longest_min
+        return planned_min if planned_min <= longest_min else max(1, int(longest_min))
 
     def resources(self) -> Mapping[str, object]:
         """Resources of every job; those that are functions take a job's wildcards."""

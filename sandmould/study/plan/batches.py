@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
@@ -10,11 +11,14 @@ from typing import NamedTuple
 
 from sandmould.definition.run import FILL, FILLS, LAST_MEASURED, Run
 from sandmould.kinds.registry import kind_of
+from sandmould.plain_file import read_json
+from sandmould.runs.files import write_text
 from sandmould.study.plan.fills import predicted_s
 
 START_S = 0.3
 """What a run takes beside its steps: its process and its measures
 (docs/developers/workflow_cost.md)."""
+_LIST = "batches.json"
 
 
 def is_done(folder: Path) -> bool:
@@ -137,6 +141,28 @@ def mark_done(batches: Iterable[Batch], lacking: Container[str], folder: Path) -
         if not mark.exists() and not any(run.run in lacking for run in batch.runs):
             mark.parent.mkdir(exist_ok=True)
             mark.touch()
+
+
+def write_batches(batches: Iterable[Batch], folder: Path) -> None:
+    """Write which runs share jobs, for jobs elsewhere, into ``results/<study>``."""
+    listed = {each.name: [each.side_by_side, [run.run for run in each.runs]] for each in batches}
+    write_text(folder / _LIST, json.dumps(listed, indent=1) + "\n")
+
+
+def read_batches(runs: Iterable[Run], folder: Path) -> list[Batch]:
+    """Read what ``write_batches`` wrote: batches of some runs, those not listed any more left out.
+
+    Raises
+    ------
+    OSError, ValueError
+        When it cannot be read.
+    """
+    by_name = {run.run: run for run in runs}
+    batches = []
+    for name, (beside, names) in read_json(folder / _LIST).items():
+        if found := tuple(by_name[run] for run in names if run in by_name):
+            batches.append(Batch(name, found, beside))
+    return batches
 
 
 def alone(runs: Sequence[Run], batches: Sequence[Batch]) -> list[str]:

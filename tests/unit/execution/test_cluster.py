@@ -15,10 +15,11 @@ from sandmould.bad_input import BadInputError
 from sandmould.execution.cluster.limits import minutes
 from sandmould.execution.cluster.submission import Submission, open_submission
 from sandmould.execution.status import status_text
+from sandmould.study.plan.batches import Batch, read_batches, write_batches
 from sandmould.study.plan.build_plan import Plan, open_plan
 
 SLURM = ["--workflow-profile", "slurm"]
-PARTITIONS = "main* infinite\nshort 1:00:00\nlong 7-00:00:00\n"
+PARTITIONS = "main* infinite 64\nshort 1:00:00 16+\nlong 7-00:00:00 64\nlong 7-00:00:00 48\n"
 
 
 class Slurm:
@@ -82,6 +83,7 @@ def submission(plan: Plan, *stated: str) -> Submission:
     """What a start on Slurm asks for each run in a job of its own; with default resources."""
     resources = Resources.parse([*stated], allow_expressions=True)
     found = open_submission(plan, SLURM, resources)
+    found.cores(1)
     found.ask([])
     return found
 
@@ -223,6 +225,27 @@ def test_short_runs_take_whole_nodes_by_default(slurm: Slurm) -> None:
     (batch,) = plan.batches(float(config["batch_wall_s"]), cores=int(config["batch_cores"]))
     assert len(batch.runs) == batch.side_by_side == 2
     assert int(config["batch_cores"]) == 32
+
+
+@pytest.mark.parametrize(
+    ("partition", "cores"), [(None, 32), ("short", 16), ("long", 32), ("long,short", 16)]
+)
+def test_a_job_asks_for_no_more_cores_than_each_node_has(
+    partition: str | None, cores: int, slurm: Slurm, plan: Plan
+) -> None:
+    if partition:
+        cluster(partition=partition)
+    assert open_submission(plan, SLURM, {}).cores(32) == cores
+    slurm.says("sinfo", "main* infinite 2\n")
+    (Path("cluster.yaml")).unlink(missing_ok=True)
+    assert open_submission(plan, SLURM, {}).cores(32) == 2
+
+
+def test_jobs_elsewhere_read_which_runs_they_share(plan: Plan, tmp_path: Path) -> None:
+    batches = [Batch(plan.runs[0].run, plan.runs, 2)]
+    write_batches(batches, tmp_path)
+    assert read_batches(plan.runs, tmp_path) == batches
+    assert read_batches(plan.runs[1:], tmp_path) == [Batch(plan.runs[0].run, plan.runs[1:], 2)]
 
 
 def test_another_study_on_this_machine_asks_no_cluster(slurm: Slurm, plan: Plan) -> None:
