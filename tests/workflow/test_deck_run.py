@@ -176,6 +176,14 @@ def test_an_error_of_the_engine_is_quoted(tmp_path: Path) -> None:
     )
 
 
+def test_a_log_holds_what_the_engine_said_when_it_died(tmp_path: Path) -> None:
+    sphere = "particletemplate/sphere 12 atom_type 1 density constant 1 radius constant 1"
+    seeded = FALLING_IN_LIGGGHTS.replace("run 500", f"fix grains all {sphere}")
+    folder = planned(tmp_path, seeded, engine={"name": "liggghts"}, values={"density_kg_m3": 2400})
+    assert compute(folder) == 0
+    assert "a prime number" in (folder / "last_work" / "engine_1.log").read_text()
+
+
 def test_a_measure_that_the_log_lacks_is_told(tmp_path: Path) -> None:
     few = {**LAMMPS, "values": {"gravity_m_s2": 9.81, "number": 1000}}
     # Behind such a command the text of a deck does not show all that it prints.

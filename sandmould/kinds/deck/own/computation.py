@@ -97,6 +97,8 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
                 notes.append(f"{Path(restart).name} could not be gone on from: {stop.detail}")
                 continue
             outcome, detail = stop.outcome, stop.detail
+            if is_root:
+                _end_log(log, detail)
             break
     thermo = read_thermo(_logs(work))
     if outcome is Outcome.FINISHED:
@@ -171,6 +173,13 @@ def _lay_out(scenario: OwnDeck, output: Path, deck: str, goes_on: bool) -> None:
 def _logs(work: Path) -> list[Path]:
     """Logs of all attempts in order."""
     return sorted(work.glob("engine_*.log"), key=lambda path: int(path.stem.split("_")[1]))
+
+
+def _end_log(log: Path, said: str) -> None:
+    """End a log with what the engine said, where it died before it had written that."""
+    text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
+    if "ERROR" not in text:
+        log.write_text(f"{text}\n{said}\n".lstrip(), encoding="utf-8")
 
 
 class _Watch:
