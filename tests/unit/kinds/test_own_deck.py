@@ -113,6 +113,17 @@ def test_what_cannot_run_is_told_in_one_sentence(
         expand(open_study(opened(tmp_path, template, **scenario)))
 
 
+def test_a_deck_without_objective_is_asked_for_one(tmp_path: Path) -> None:
+    path = opened(tmp_path, measures={"speed_m_s": "v_speed", "height_m": "v_height"})
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"objective": {}}))
+    with pytest.raises(BadInputError) as told:
+        expand(open_study(path))
+    assert str(told.value) == (
+        f"{path}: state an objective, such as objective: {{measure: height_m}}: this study "
+        "measures height_m and speed_m_s."
+    )
+
+
 PRINTS = TEMPLATE + "thermo_style custom step time v_speed &\n  v_height # v_width\n"
 
 
