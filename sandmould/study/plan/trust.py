@@ -11,7 +11,7 @@ from sandmould.definition.run import Run
 from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.formatting import listed
-from sandmould.study.plan.load_study import OpenStudy
+from sandmould.study.plan.load_study import OpenStudy, from_root
 
 
 def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
@@ -39,7 +39,7 @@ def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
         "allowed_folders"
     )
     return [
-        Problem(f"scenario.{key}", display_path(path), valid)
+        study.as_written(Problem(f"scenario.{key}", from_root(path), valid))
         for key, path in program.files(scenario).items()
         if not any(path.resolve().is_relative_to(folder) for folder in allowed)
     ]

@@ -99,7 +99,8 @@ def _answer(request: dict[str, Any], most_characters: int) -> dict[str, Any]:
     except RecursionError:
         return {"fault": "it is nested too deeply", "line": None}
     except Exception as error:  # a template can raise anything
-        return {"fault": str(error) or type(error).__name__, "line": _line_of(error)}
+        fault = str(error).partition("\n")[0] or type(error).__name__
+        return {"fault": fault, "line": _line_of(error)}
 
 
 def _line_of(error: Exception) -> int | None:
