@@ -10,17 +10,24 @@ import sys
 import tempfile
 import textwrap
 import time
+from collections.abc import Sequence
 from pathlib import Path
+
+import numpy as np
+import pandas as pd
 
 from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.digest import SHORT, digest
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
+from sandmould.kinds.deck.own.thermo import STEP
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.module_main import run_main
 from sandmould.runs.files import write_text
+from sandmould.runs.formatting import display_number, name_of
 from sandmould.runs.parent import end_with_parent
+from sandmould.runs.words import say
 from sandmould.scenario.own_deck import OwnDeck
 
 FAILED_LOG = "pilot_failed.log"
@@ -28,6 +35,10 @@ FAILED_LOG = "pilot_failed.log"
 PILOT_S = 12.0
 """A shorter run is computed whole; of a longer one its steps are counted."""
 _LOOK_EVERY_S = 0.2
+MOST_OFF = 1e-3
+"""Share of a measure that a restart may change before it is said."""
+ROUND_OFF = 1e-9
+"""Share of a measure's largest value below which it is as good as nothing."""
 
 
 class DeckSpeed(StoredSpeed[OwnDeck]):
@@ -77,19 +88,80 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float |
         folder = Path(name) / "runs" / "pilot"
         folder.mkdir(parents=True)
         write_text(folder / "scenario.json", scenario.model_dump_json())
-        with (folder / "log").open("w") as log:
-            process = subprocess.Popen(
-                [sys.executable, "-m", __name__, str(folder)],
-                stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=end_with_parent,
-            )  # fmt: skip
-        try:
-            core_s = _watched(process, folder, pilot_s)
-            if process.returncode is not None and not (folder / "whole.json").exists():
-                raise BadInputError([_failure(scenario, folder, process.returncode, results)])
-            return core_s
-        finally:
-            process.kill()
-            process.wait()
+        core_s, status = _computed(folder, pilot_s)
+        if status is not None and not (folder / "whole.json").exists():
+            raise BadInputError([_failure(scenario, folder, status, results)])
+        if said := _resumed(scenario, folder, pilot_s):
+            say(f"{_of_values(scenario)}: {said}.")
+        return core_s
+
+
+def _computed(folder: Path, pilot_s: float) -> tuple[float | None, int | None]:
+    """Processor time of a whole run, and the status with which the pilot ended, if it did."""
+    with (folder / "log").open("w") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", __name__, str(folder)],
+            stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=end_with_parent,
+        )  # fmt: skip
+    try:
+        return _watched(process, folder, pilot_s), process.returncode
+    finally:
+        process.kill()
+        process.wait()
+
+
+def _resumed(scenario: OwnDeck, folder: Path, pilot_s: float) -> str:
+    """Have the deck go on from the older of its restart files, and say what that changes."""
+    work, why = folder / "work", folder / "why.txt"
+    if not (files := computation.restarts(scenario, work)):
+        return ""
+    whole = computation.series(scenario, work)
+    for newer in files[:-1]:
+        newer.unlink()
+    for left in (folder / "begun", folder / "whole.json", why):
+        left.unlink(missing_ok=True)
+    _computed(folder, pilot_s)
+    said = why.read_text(encoding="utf-8") if why.exists() else computation.WENT_ON
+    if not said.startswith(computation.WENT_ON):
+        return f"a run that is killed does not go on as it should. {said}"
+    return difference(whole, computation.series(scenario, work), list(scenario.measures))
+
+
+def difference(whole: pd.DataFrame, resumed: pd.DataFrame, measures: Sequence[str]) -> str:
+    """Say which measures a restart changes, at the last step that both series have.
+
+    Parameters
+    ----------
+    whole, resumed : pandas.DataFrame
+        Series of the deck in one piece, and of what was computed anew from a restart file on.
+    measures : sequence of str
+    """
+    step = computation.LOGGED + STEP
+    names = [name for name in measures if name in whole]
+    one, other = (
+        table.drop_duplicates(step, keep="last").set_index(step)[names]
+        for table in (whole, resumed)
+    )
+    gap = (other - one).dropna(how="all").abs()
+    parted = gap[(gap > 0).any(axis=1)]
+    if parted.empty:
+        return ""
+    last, largest = gap.index[-1], one.abs().max()
+    off = gap.loc[last] > np.maximum(MOST_OFF * one.loc[last].abs(), ROUND_OFF * largest)
+    told = [
+        f"{name_of(n)} {display_number(n, now, 4)} instead of {display_number(n, before, 4)}"
+        for n, now, before in zip(names, other.loc[last], one.loc[last], strict=True)
+        if off[n]
+    ]
+    if not told:
+        return ""
+    grew = "they part slowly, as colliding grains make much of the last digit"
+    if (parted.iloc[0] > MOST_OFF * largest).any():
+        grew = "they part at once, so the deck does not bring back all that it needs"
+    return (
+        "gone on from a restart file, it comes to other values than in one piece: at step "
+        f"{last:.0f} {', '.join(told)}; {grew}"
+    )
 
 
 def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Problem:
@@ -100,12 +172,17 @@ def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Pro
     kept = results / FAILED_LOG
     results.mkdir(parents=True, exist_ok=True)
     shutil.copy(logs[0], kept)
-    values = textwrap.shorten(json.dumps(scenario.values, ensure_ascii=False), 120)
     return Problem(
         "scenario.template", scenario.template, "a deck that runs",
-        sentence=f"{Path(scenario.template).name} with the values {values} stopped in a short "
-        f"pilot run. {said.rstrip('. ')}. Its log: {display_path(kept)}",
+        sentence=f"{_of_values(scenario)} stopped in a short pilot run. {said.rstrip('. ')}. Its "
+        f"log: {display_path(kept)}",
     )  # fmt: skip
+
+
+def _of_values(scenario: OwnDeck) -> str:
+    """Name the deck of a pilot."""
+    values = textwrap.shorten(json.dumps(scenario.values, ensure_ascii=False), 120)
+    return f"{Path(scenario.template).name} with the values {values}"
 
 
 def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> float | None:
@@ -134,10 +211,10 @@ def main(name: str) -> int:
     scenario = OwnDeck.model_validate_json((folder / "scenario.json").read_text())
     write_text(folder / "begun", "")
     computed = computation.compute(scenario, folder, "pilot", "pilot")
-    if computed.outcome.outcome == 0:
+    outcome = computed.outcome
+    write_text(folder / "why.txt", outcome.detail or outcome.outcome.label)
+    if outcome.outcome == 0:
         write_text(folder / "whole.json", json.dumps(computed.cost.cpu_s))
-    else:
-        write_text(folder / "why.txt", computed.outcome.detail or computed.outcome.outcome.label)
     return 0
 
 

@@ -261,7 +261,8 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
             of_run / "series.tsv", sep="\t", index=False
         )
         (of_run / "outcome.json").write_text(
-            '{"code": 0, "detail": "", "simulated_s": 1.0, "planned_s": 0.0}'
+            '{"code": 0, "detail": "gone on from restart.a at step 5", "simulated_s": 1.0, '
+            '"planned_s": 0.0}'
         )
         (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
         DECK.execution.measure(run, of_run)
@@ -273,6 +274,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
     page = (folder / "report.html").read_text()
     assert "Use 20 °: there the speed is highest." in page
     assert "speed from v_speed" in page
+    assert "Runs gone on with from a restart file after a kill: 4." in page
     assert (folder / "figures" / "curves.svg").exists()
     assert "vibration" not in page.split("<style>")[0] + page.split("</style>")[1]
 
@@ -309,7 +311,8 @@ def test_a_deck_that_goes_on_too_far_has_failed(tmp_path: Path) -> None:
         else:
             assert ended.outcome is Outcome.BAD_INPUT
             assert ended.detail == (
-                "the deck ended at step 200, not at steps = 100: after a restart write run 100 upto"
+                "the deck ended at step 200, not at steps = 100: after a restart write run 100 "
+                "upto; gone on from restart.b at step 100"
             )
 
 

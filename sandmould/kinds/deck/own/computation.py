@@ -31,11 +31,15 @@ from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_byte
 from sandmould.runs.progress import LINE_EVERY_S, Progress
 from sandmould.scenario.own_deck import CLOCK, OwnDeck
 
+LOGGED = "log_"
+"""Begins the names of the log's own columns in ``series.tsv``."""
 OUTPUT = "output"
 """Folder that a deck runs in; all that it writes there is kept."""
 FLUSH_EVERY_S = 0.5
 """What a killed run can lose of its log."""
 _DECK = "deck.in"
+WENT_ON = "gone on from"
+"""How the outcome of a run that was killed begins to say where it was taken up again."""
 
 
 def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
@@ -62,7 +66,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     is_root = world is None or world.rank == 0
     work = folder / "work"
     output = work / OUTPUT
-    candidates = _restarts(scenario, work) if is_root else []
+    candidates = [f"../{path.name}" for path in restarts(scenario, work)] if is_root else []
     if world is not None:
         candidates = world.bcast(candidates)
     begun, cpu_begun = time.monotonic(), cpu_time_s()
@@ -91,6 +95,8 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         try:
             with watch:
                 reader.read_deck(output, _DECK, log)
+            if restart and not (rows := read_thermo([log]).table).empty:
+                notes.append(f"{WENT_ON} {Path(restart).name} at step {rows[STEP].iloc[0]:.0f}")
             break
         except EngineStop as stop:
             if restart and read_thermo([log] if log.exists() else []).table.empty:
@@ -138,7 +144,12 @@ def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
 
 
 def write_series(scenario: OwnDeck, work: Path) -> None:
-    """Write ``series.tsv``: time in s, the measures by name, and the whole log beside them."""
+    """Write ``series.tsv``."""
+    series(scenario, work).to_csv(work / "series.tsv", sep="\t", index=False)
+
+
+def series(scenario: OwnDeck, work: Path) -> pd.DataFrame:
+    """Time in s, the measures by name, and the whole log beside them."""
     table = read_thermo(_logs(work)).table
     named = {
         "time_s": CLOCK,
@@ -147,17 +158,15 @@ def write_series(scenario: OwnDeck, work: Path) -> None:
     if CLOCK not in table:
         named.pop("time_s")
     measured = pd.DataFrame({name: table[column] for name, column in named.items()})
-    whole = table.add_prefix("log_")
-    pd.concat([measured, whole], axis=1).to_csv(work / "series.tsv", sep="\t", index=False)
+    return pd.concat([measured, table.add_prefix(LOGGED)], axis=1)
 
 
-def _restarts(scenario: OwnDeck, work: Path) -> list[str]:
-    """Restart files of an earlier attempt as the deck names them, the newest first."""
+def restarts(scenario: OwnDeck, work: Path) -> list[Path]:
+    """Restart files of an earlier attempt, the newest first."""
     if "restart" not in names_used(scenario):
         return []
     files = [work / name for name in RESTART_FILES if (work / name).is_file()]
-    files.sort(key=lambda path: path.stat().st_mtime, reverse=True)
-    return [f"../{path.name}" for path in files]
+    return sorted(files, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
 def _lay_out(scenario: OwnDeck, output: Path, deck: str, goes_on: bool) -> None:
