@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sandmould.analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.definition.study import Study
@@ -20,6 +19,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.settings import Setting, setting_of
+from sandmould.statistics.student import stdtrit
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 

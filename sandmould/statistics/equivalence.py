@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtr, stdtrit
 
 from sandmould.statistics.mean_tests import compare_means
+from sandmould.statistics.student import stdtr, stdtrit
 
 EquivalenceVerdict = Literal["equivalent", "different", "not resolved", "not tested"]
 CONFIDENCE = 0.9

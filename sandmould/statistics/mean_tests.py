@@ -8,7 +8,8 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtr, stdtrit
+
+from sandmould.statistics.student import stdtr, stdtrit
 
 CONFIDENCE = 0.95
 

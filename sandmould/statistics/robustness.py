@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import pandas as pd
-from scipy.special import stdtrit
 
 from sandmould.runs.columns import PART, RUN, SWEEP, finished
 from sandmould.runs.formatting import listed, number
@@ -17,6 +16,7 @@ from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.spring_dependence import FOLLOWS, SHARE, STAYS, SpringCheck
+from sandmould.statistics.student import stdtrit
 
 ShiftVerdict = Literal["up", "down", "held", "unclear", "no result"]
 Cause = Literal[

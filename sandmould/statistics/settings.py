@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sandmould.runs.columns import REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
 from sandmould.statistics.contrasts import Spread
 from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest
+from sandmould.statistics.student import stdtrit
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sandmould.runs.columns import PART, SWEEP
 from sandmould.runs.formatting import listed, number
@@ -26,6 +25,7 @@ from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.settings import number_blocks
+from sandmould.statistics.student import stdtrit
 
 Array = NDArray[np.float64]
 Shape = Literal["inner", "rising", "falling", "open", "no result"]
