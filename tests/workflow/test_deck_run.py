@@ -7,17 +7,22 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import yaml
 
+from sandmould.execution.packs.pack import pack
+from sandmould.execution.packs.unpack import unpack
 from sandmould.execution.simulate import measure_run, render_run, simulate
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
+from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.trust import reading_help
 from tests.planned import write_plan
 
 FALLING = """\
@@ -226,6 +231,35 @@ def test_a_column_that_one_run_lacks_stops_the_others_before_they_compute(tmp_pa
     # Asked for what the deck prints, all are computed.
     for folder in study("v_height"):
         assert RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED
+
+
+def test_a_file_from_outside_is_listed_and_stays_out_of_packs(tmp_path: Path) -> None:
+    (tmp_path / "away").mkdir()
+    (tmp_path / "away" / "grains.data").write_text("of others")
+    scenario = {"template": "deck.in.j2", "files": ["../away/grains.data"]}
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "deck.in.j2").write_text("units si\n")
+    path, results = tmp_path / "here" / "trial.yaml", tmp_path / "results"
+    told = {"kind": "deck", "allowed_folders": ["../away"], "scenario": scenario}
+    path.write_text(yaml.safe_dump(told))
+    plan = open_plan(path, results)
+    listed = "../away/grains.data (from outside the study's folder, taken into results)"
+    assert listed in reading_help(plan.study, plan.runs)
+    write_plan(plan.runs, results / "trial")
+    write_study(plan.study.study, results / "trial")
+    (folder,) = (results / "trial" / run.place for run in plan.runs)
+    render_run(folder)
+    assert simulate(folder) == 0
+    measure_run(folder)
+    copy = f"trial/runs/{folder.name}/output/grains.data"
+    for asked in (False, True):
+        said = pack(plan, results, tmp_path / "runs.zip", outside_files=asked)
+        assert ("../away/grains.data" in said) is not asked
+        with zipfile.ZipFile(tmp_path / "runs.zip") as packed:
+            assert (copy in packed.namelist()) is asked
+    pack(plan, results, tmp_path / "runs.zip")
+    unpack(tmp_path / "runs.zip", tmp_path / "elsewhere")
+    assert open_plan(path, tmp_path / "elsewhere").lacks(tmp_path / "elsewhere") == {}
 
 
 def test_a_misspelt_style_is_no_missing_engine(tmp_path: Path) -> None:

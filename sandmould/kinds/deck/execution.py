@@ -19,7 +19,7 @@ from sandmould.scenario.own_deck import OwnDeck
 class DeckExecution(Execution[OwnDeck]):
     """See ``Execution``."""
 
-    products = ("series.tsv", computation.OUTPUT)
+    products = ("series.tsv", own_deck.OUTPUT)
 
     def render(self, run: Run, folder: Path) -> None:
         """Write the deck as the engine reads it at the beginning."""

@@ -21,6 +21,7 @@ class DeckProgram(UserProgram[OwnDeck]):
     """See ``UserProgram``."""
 
     shipped = DECKS
+    copied = own_deck.OUTPUT
 
     def files(self, scenario: OwnDeck) -> Mapping[str, Path]:
         """Template and files by key."""

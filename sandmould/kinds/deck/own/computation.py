@@ -20,6 +20,7 @@ from sandmould.kinds.deck.own.columns import (
     missing_columns,
 )
 from sandmould.kinds.deck.own.deck import (
+    OUTPUT,
     RESTART_FILES,
     check_unchanged,
     names_used,
@@ -33,8 +34,6 @@ from sandmould.scenario.own_deck import CLOCK, OwnDeck
 
 LOGGED = "log_"
 """Begins the names of the log's own columns in ``series.tsv``."""
-OUTPUT = "output"
-"""Folder that a deck runs in; all that it writes there is kept."""
 FLUSH_EVERY_S = 0.5
 """What a killed run can lose of its log."""
 _DECK = "deck.in"

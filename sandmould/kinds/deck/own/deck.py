@@ -17,6 +17,8 @@ from sandmould.scenario.own_deck import RESERVED, OwnDeck
 
 DECKS = SHIPPED / "config" / "decks"
 """Decks that come with us."""
+OUTPUT = "output"
+"""Folder that a deck runs in; all that it writes there is kept."""
 RESTART_FILES = ("restart.a", "restart.b")
 """Written in turn beside the folder that a deck runs in."""
 
