@@ -91,7 +91,7 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
 
 def deck_method(scenario: OwnDeck, keys: Sequence[str], summary: pd.DataFrame) -> tuple[Row, ...]:
     """What is known of the runs of a user's deck; see ``sand_method``."""
-    read = [f"{name_of(name)} from {column}" for name, column in scenario.measures.items()]
+    read = [f"{name_of(name)} from {taken.text}" for name, taken in scenario.taken.items()]
     given = [f"{name} = {value}" for name, value in scenario.values.items() if
              f"values.{name}" not in keys]  # fmt: skip
     template, fixed = Path(scenario.template).name, listed(given, most=20) or "no fixed values"

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pytest
 import yaml
 
 from sandmould.execution.packs.pack import pack
@@ -164,6 +165,74 @@ def test_a_deck_runs_on_liggghts(tmp_path: Path) -> None:
     time_s = 0.005
     # Velocity Verlet is exact in free fall; the log has seven digits.
     assert abs(height_m.iloc[-1] - (0.01 - 9.81 * time_s**2 / 2)) < 1e-8
+
+
+TWO_FALL = """\
+units si
+atom_style sphere
+boundary p p f
+region box block 0 1 0 1 -9 1
+create_box 1 box
+create_atoms 1 single 0.5 0.5 0.5
+create_atoms 1 single 0.5 0.5 0.75
+set group all diameter 0.1
+set group all density 1000
+pair_style none
+comm_modify cutoff 0.2
+fix gravity all gravity 10 vector 0 0 -1
+fix motion all nve/sphere
+timestep 1e-3
+variable speed equal vcm(all,z)
+thermo_style custom step time v_speed
+thermo_modify format float %20.12g
+thermo 10
+dump grains all custom 25 grains.dump id z
+run 100
+"""
+
+
+def test_measures_of_a_fall_are_those_worked_out_by_hand(tmp_path: Path) -> None:
+    rate = {"of": "v_speed", "take": "rate"}
+    top = {"of": "z", "dump": "grains.dump", "grains": "largest"}
+    worked_out = {
+        "speed_m_s": ("v_speed", -1.0),
+        # speed falls on a line: its mean is that of the ends of the window
+        "late_m_s": ({"of": "v_speed", "take": "mean", "over_last_s": 0.05}, -0.75),
+        "mean_m_s": ({"of": "v_speed", "take": "mean"}, -0.5),
+        "rate_m_s2": ({**rate, "from_s": 0.02}, -10.0),
+        "last_m": ({**top, "take": "last"}, 0.75 - 0.05),
+        "low_m": ({**top, "grains": "smallest"}, 0.5 - 0.05),
+        "both_m": ({**top, "grains": "sum"}, 1.25 - 0.1),
+        "middle_m": ({**top, "grains": "mean"}, 0.625 - 0.05),
+        # from 0.75 - 10 t²/2 at 0.05 s to the same at 0.1 s
+        "sinks_m_s": ({**top, "take": "rate", "over_last_s": 0.05}, -(0.05 - 0.0125) / 0.05),
+        # three moments, 25 steps apart: 0.05, 0.075 and 0.1 s
+        "mean_top_m": (
+            {**top, "take": "mean", "over_last_s": 0.05},
+            0.75 - (0.0125 / 2 + 0.028125 + 0.05 / 2) / 2,
+        ),
+    }
+    measures = {name: of for name, (of, _) in worked_out.items()}
+    folder = planned(tmp_path, TWO_FALL, measures=measures)
+    assert simulate(folder) == 0
+    series = pd.read_csv(folder / "series.tsv", sep="\t")
+    exact = {name: value for name, (_, value) in worked_out.items()}
+    # a dump of LAMMPS has six digits
+    assert series.iloc[-1][list(exact)].to_dict() == pytest.approx(exact, abs=1e-5)
+    assert series["rate_m_s2"].isna().sum() == 3  # before 0.02 s, and at it
+
+
+@pytest.mark.parametrize(
+    ("of", "told"),
+    [
+        ({"of": "vz", "dump": "grains.dump"}, "grains.dump has no moment with vz (measures.top_m)"),
+        ({"of": "z", "dump": "other.dump"}, "the deck wrote no file other.dump (measures.top_m)"),
+    ],
+)
+def test_a_dump_that_lacks_a_measure_is_told(tmp_path: Path, of: dict[str, str], told: str) -> None:
+    folder = planned(tmp_path, TWO_FALL, measures={"top_m": of})
+    assert simulate(folder) == 0
+    assert RunOutcome.read(folder / "outcome.json").detail == told
 
 
 def test_an_error_of_the_engine_is_quoted(tmp_path: Path) -> None:

@@ -118,6 +118,25 @@ def test_what_cannot_run_is_told_in_one_sentence(
         expand(open_study(opened(tmp_path, template, **scenario)))
 
 
+@pytest.mark.parametrize(
+    ("of", "told"),
+    [
+        ({"take": "mean"}, ".of = None cannot be used: valid is a value"),
+        ({"of": "KinEng", "take": "median"}, ".take = 'median' .* one of 'last', 'mean' or 'rate'"),
+        (
+            {"of": "KinEng", "from_s": 1},
+            "valid is take: mean or take: rate with one of over_last_s",
+        ),
+        ({"of": "y", "dump": "../a.dump"}, r".dump = '../a.dump' cannot be used"),
+        (3, "speed_m_s = 3 cannot be used: valid is text or a mapping of keys to values"),
+    ],
+)
+def test_what_no_measure_is_taken_from_is_told(tmp_path: Path, of: Any, told: str) -> None:
+    with pytest.raises(BadInputError, match=told) as error:
+        open_study(opened(tmp_path, measures={"speed_m_s": of}))
+    assert len(error.value.problems) == 1
+
+
 def test_a_deck_without_objective_is_asked_for_one(tmp_path: Path) -> None:
     path = opened(tmp_path, measures={"speed_m_s": "v_speed", "height_m": "v_height"})
     path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"objective": {}}))

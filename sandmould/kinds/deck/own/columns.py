@@ -37,7 +37,7 @@ def column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
     if "time" not in printed:
         valid = "a deck that prints the time: thermo_style custom step time ..."
         yield Problem("template", scenario.template, valid)
-    for name, column in scenario.measures.items():
+    for name, column in scenario.columns.items():
         # LIGGGHTS heads columns by other names, and so do all engines those of their own.
         if scenario.engine.name == "lammps" and _OF_USER.match(column) and column not in printed:
             valid = f"a column that the deck prints: {', '.join(printed)}"
@@ -74,7 +74,7 @@ def missing_columns(scenario: OwnDeck, columns: Sequence[str]) -> str:
     columns : sequence of str
         Those that it has.
     """
-    wanted = {"the time": CLOCK, **{f"measures.{n}": c for n, c in scenario.measures.items()}}
+    wanted = {"the time": CLOCK, **{f"measures.{n}": c for n, c in scenario.columns.items()}}
     lacks = [f"{column} ({what})" for what, column in wanted.items() if column not in columns]
     if not lacks:
         return ""
@@ -85,7 +85,7 @@ def missing_columns(scenario: OwnDeck, columns: Sequence[str]) -> str:
 def deck_key(scenario: OwnDeck, deck: str) -> str:
     """What decks have in common that print the same columns and are asked for the same."""
     printing = [" ".join(line) for line in _commands(deck) if line[0].startswith("thermo")]
-    wanted = [f"{name} {column}" for name, column in scenario.measures.items()]
+    wanted = [f"{name} {column}" for name, column in scenario.columns.items()]
     files = [scenario.sha256[name] for name in scenario.files]
     return digest("\n".join([scenario.engine.name, *printing, *sorted(wanted), *sorted(files)]))
 

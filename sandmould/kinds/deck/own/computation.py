@@ -26,6 +26,7 @@ from sandmould.kinds.deck.own.deck import (
     names_used,
     render,
 )
+from sandmould.kinds.deck.own.measures import measured, missing_dump
 from sandmould.kinds.deck.own.thermo import STEP, Thermo, read_thermo
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_bytes
@@ -110,6 +111,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         missing = missing_columns(scenario, [str(column) for column in thermo.table])
         if is_root:
             keep_found(study_folder, key, run, missing)
+        missing = missing or missing_dump(scenario, output)
         if said := missing or _wrong_end(scenario, thermo, bool(restart)):
             outcome, detail = Outcome.BAD_INPUT, said
     cost.version = str(engine.installed_version())
@@ -150,14 +152,9 @@ def write_series(scenario: OwnDeck, work: Path) -> None:
 def series(scenario: OwnDeck, work: Path) -> pd.DataFrame:
     """Time in s, the measures by name, and the whole log beside them."""
     table = read_thermo(_logs(work)).table
-    named = {
-        "time_s": CLOCK,
-        **{name: column for name, column in scenario.measures.items() if column in table},
-    }
-    if CLOCK not in table:
-        named.pop("time_s")
-    measured = pd.DataFrame({name: table[column] for name, column in named.items()})
-    return pd.concat([measured, table.add_prefix(LOGGED)], axis=1)
+    clock = table[[CLOCK]].set_axis(["time_s"], axis=1) if CLOCK in table else table[[]]
+    each = measured(scenario, table, work / OUTPUT)
+    return pd.concat([clock, each, table.add_prefix(LOGGED)], axis=1)
 
 
 def restarts(scenario: OwnDeck, work: Path) -> list[Path]:
