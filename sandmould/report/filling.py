@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import NDArray
 
 from sandmould.analysis.filling import Limb, first_reach_s, fit_limbs
@@ -19,7 +20,6 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import barred
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.settings import Setting, setting_of
-from sandmould.statistics.student import stdtrit
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
@@ -193,5 +193,5 @@ def _limbs(table: _AtTimes, key: str, measure: str) -> str:
 
 def _exponent(limb: Limb) -> str:
     """An exponent with its 95 % interval, two degrees of freedom less than points."""
-    reach = float(stdtrit(limb.points - 2, 0.5 + CONFIDENCE / 2)) * limb.se
+    reach = float(scipy.special.stdtrit(limb.points - 2, 0.5 + CONFIDENCE / 2)) * limb.se
     return f"{with_margin(limb.exponent, reach)} ({limb.points} settings)"

@@ -47,7 +47,7 @@ class Taken(Section):
         "", "Dump of text that the deck writes beside itself.", source="user",
         pattern=r"^(\w[\w.-]*)?$",
     )  # fmt: skip
-    grains: Literal["mean", "largest", "smallest", "sum"] = quantity(
+    grains: Literal["mean", "max", "min", "sum"] = quantity(
         "mean", "What of the dumped grains counts at one moment.", source="user"
     )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import pandas as pd
+import scipy
 
 from sandmould.runs.columns import PART, RUN, SWEEP, finished
 from sandmould.runs.formatting import listed, number
@@ -16,7 +17,6 @@ from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.spring_dependence import FOLLOWS, SHARE, STAYS, SpringCheck
-from sandmould.statistics.student import stdtrit
 
 ShiftVerdict = Literal["up", "down", "held", "unclear", "no result"]
 Cause = Literal[
@@ -135,7 +135,7 @@ def assess_robustness(
         ci, verdict = (math.nan, math.nan), _without_interval(shift)
         if math.isfinite(shift) and freedom:
             error = sd * math.sqrt(sum(1.0 / count[end] for end in ends))
-            reach = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
+            reach = float(scipy.special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
             ci = (shift - reach, shift + reach)
             verdict = _of_interval(ci, margin)
         means = tuple(sign * mean.get((part, f), math.nan) for f in certified_hz)

@@ -21,6 +21,7 @@ from sandmould.digest import SHORT, digest
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
+from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.thermo import STEP
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.module_main import run_main
@@ -91,8 +92,10 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float |
         core_s, status = _computed(folder, pilot_s)
         if status is not None and not (folder / "whole.json").exists():
             raise BadInputError([_failure(scenario, folder, status, results)])
-        if said := _resumed(scenario, folder, pilot_s):
-            say(f"{_of_values(scenario)}: {said}.")
+        whole = computation.series(scenario, folder / "work")
+        for said in (_lacks(scenario, whole), _resumed(scenario, whole, folder, pilot_s)):
+            if said:
+                say(f"{_of_values(scenario)}: {said}.")
         return core_s
 
 
@@ -110,12 +113,18 @@ def _computed(folder: Path, pilot_s: float) -> tuple[float | None, int | None]:
         process.wait()
 
 
-def _resumed(scenario: OwnDeck, folder: Path, pilot_s: float) -> str:
+def _lacks(scenario: OwnDeck, series: pd.DataFrame) -> str:
+    """Say which columns the log of a pilot has not printed yet."""
+    logged = [str(name).removeprefix(computation.LOGGED) for name in series]
+    missing = missing_columns(scenario, logged) if len(series) else ""
+    return f"in its first seconds {missing.rstrip('.')}" if missing else ""
+
+
+def _resumed(scenario: OwnDeck, whole: pd.DataFrame, folder: Path, pilot_s: float) -> str:
     """Have the deck go on from the older of its restart files, and say what that changes."""
     work, why = folder / "work", folder / "why.txt"
     if not (files := computation.restarts(scenario, work)):
         return ""
-    whole = computation.series(scenario, work)
     for newer in files[:-1]:
         newer.unlink()
     for left in (folder / "begun", folder / "whole.json", why):
@@ -128,14 +137,7 @@ def _resumed(scenario: OwnDeck, folder: Path, pilot_s: float) -> str:
 
 
 def difference(whole: pd.DataFrame, resumed: pd.DataFrame, measures: Sequence[str]) -> str:
-    """Say which measures a restart changes, at the last step that both series have.
-
-    Parameters
-    ----------
-    whole, resumed : pandas.DataFrame
-        Series of the deck in one piece, and of what was computed anew from a restart file on.
-    measures : sequence of str
-    """
+    """Say which measures a restart changes, at the last step of both series, or nothing."""
     step = computation.LOGGED + STEP
     names = [name for name in measures if name in whole]
     one, other = (

@@ -13,12 +13,7 @@ import pandas as pd
 
 from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
-from sandmould.kinds.deck.own.columns import (
-    deck_key,
-    found_missing,
-    keep_found,
-    missing_columns,
-)
+from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.deck import (
     OUTPUT,
     RESTART_FILES,
@@ -71,17 +66,6 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         candidates = world.bcast(candidates)
     begun, cpu_begun = time.monotonic(), cpu_time_s()
     cost = Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
-    # run folders lie in the folder runs of their study's
-    study_folder, key, known = folder.parent.parent, "", ""
-    if is_root:
-        key = deck_key(scenario, render(scenario, run, study))
-        known = found_missing(study_folder, key, run)
-    if world is not None:
-        known = world.bcast(known)
-    if known:
-        if is_root:
-            output.mkdir(parents=True, exist_ok=True)
-        return Computed(RunOutcome(Outcome.BAD_INPUT, known, 0.0, 0.0), cost, is_root)
     notes: list[str] = []
     outcome, detail = Outcome.FINISHED, ""
     for restart in (*candidates, ""):
@@ -109,8 +93,6 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     thermo = read_thermo(_logs(work))
     if outcome is Outcome.FINISHED:
         missing = missing_columns(scenario, [str(column) for column in thermo.table])
-        if is_root:
-            keep_found(study_folder, key, run, missing)
         missing = missing or missing_dump(scenario, output)
         if said := missing or _wrong_end(scenario, thermo, bool(restart)):
             outcome, detail = Outcome.BAD_INPUT, said

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -12,13 +12,6 @@ from numpy.typing import NDArray
 
 from sandmould.kinds.deck.own.thermo import STEP
 from sandmould.scenario.own_deck import CLOCK, OwnDeck, Taken
-
-_OF_GRAINS: dict[str, Callable[[NDArray[np.float64]], np.floating]] = {
-    "mean": np.mean,
-    "largest": np.max,
-    "smallest": np.min,
-    "sum": np.sum,
-}
 
 
 def measured(scenario: OwnDeck, table: pd.DataFrame, output: Path) -> pd.DataFrame:
@@ -37,14 +30,10 @@ def measured(scenario: OwnDeck, table: pd.DataFrame, output: Path) -> pd.DataFra
     for name, taken in scenario.taken.items():
         if not taken.dump and taken.of in table:
             found[name] = over_window(time_s, table[taken.of].to_numpy(), taken)
-        elif taken.dump and len(table) and not _unread(taken, output):
-            steps = table[STEP].to_numpy()
-            of_grains = _OF_GRAINS[taken.grains]
-            each = {step: float(of_grains(x)) for step, x in _frames(output, taken)}
-            step = np.array(sorted(each))
-            values = over_window(
-                np.interp(step, steps, time_s), np.array([each[s] for s in step]), taken
-            )
+        elif taken.dump and len(table) and (each := dict(_moments(output, taken))):
+            steps, step = table[STEP].to_numpy(), np.array(sorted(each))
+            values = np.array([each[one] for one in step])
+            values = over_window(np.interp(step, steps, time_s), values, taken)
             newest = np.searchsorted(step, steps, side="right") - 1
             found[name] = np.where(newest < 0, np.nan, values[newest])
     return pd.DataFrame(found, index=table.index)
@@ -53,55 +42,43 @@ def measured(scenario: OwnDeck, table: pd.DataFrame, output: Path) -> pd.DataFra
 def over_window(
     time_s: NDArray[np.float64], value: NDArray[np.float64], taken: Taken
 ) -> NDArray[np.float64]:
-    """What is taken of values up to each moment: the mean of the line through them, or its rate.
+    """What is taken of values up to each moment, (n,) float64 as these; NaN before the window.
 
-    Parameters
-    ----------
-    time_s, value : (n,) float64
-    taken : Taken
-
-    Returns
-    -------
-    (n,) float64
-        NaN where the window holds no moment, and no two of a rate.
+    The mean of the line through them, or its rate: over the stretch before a moment at least.
     """
     if taken.take == "last":
         return value
     begins_s = np.full(len(time_s), taken.from_s or 0.0)
     if taken.over_last_s is not None:
         begins_s = time_s - taken.over_last_s
-    # round-off of the engine's clock
-    first = np.searchsorted(time_s, begins_s - 1e-9 * np.abs(time_s))
-    now = np.arange(len(time_s))
-    inside = first <= now
-    first = np.minimum(first, now)
-    length_s = time_s - time_s[first]
-    areas = (value[1:] + value[:-1]) / 2 * np.diff(time_s)
-    area = np.concatenate([[0.0], np.cumsum(areas)])
-    change = area - area[first] if taken.take == "mean" else value - value[first]
-    at_once = value if taken.take == "mean" else np.full(len(value), np.nan)
+    first = np.searchsorted(time_s, begins_s - 1e-9 * np.abs(time_s))  # round-off of the clock
+    now, total = np.arange(len(time_s)), value
+    if taken.take == "mean":
+        areas = (value[1:] + value[:-1]) / 2 * np.diff(time_s)
+        total = np.concatenate([[0.0], np.cumsum(areas)])
+    begin = np.minimum(first, np.maximum(now - 1, 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(inside, np.where(length_s > 0, change / length_s, at_once), np.nan)
+        per_s = (total - total[begin]) / (time_s - time_s[begin])
+    return np.where(first > now, np.nan, per_s)
 
 
 def missing_dump(scenario: OwnDeck, output: Path) -> str:
-    """Say which measure cannot be read from its dump; nothing where each can."""
-    dumped = [(name, taken) for name, taken in scenario.taken.items() if taken.dump]
-    said = [f"{why} (measures.{name})" for name, taken in dumped if (why := _unread(taken, output))]
-    return said[0] if said else ""
+    """Say which measures cannot be read from a dump; nothing where all can."""
+    lacks = [
+        f"{taken.dump} with {taken.of} (measures.{name})"
+        for name, taken in scenario.taken.items()
+        if taken.dump and not any(_moments(output, taken))
+    ]
+    return f"the deck wrote no {', '.join(lacks)}" if lacks else ""
 
 
-def _unread(taken: Taken, output: Path) -> str:
-    if not (output / taken.dump).is_file():
-        return f"the deck wrote no file {taken.dump}"
-    return "" if any(_frames(output, taken)) else f"{taken.dump} has no moment with {taken.of}"
-
-
-def _frames(output: Path, taken: Taken) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """Steps of a dump of text, each with a column of its grains; a last one cut short is no more.
+def _moments(output: Path, taken: Taken) -> Iterator[tuple[int, float]]:
+    """Steps of a dump of text and what of the grains counts; a last one cut short is left out.
 
     A run that went on writes some steps twice.
     """
+    if not (output / taken.dump).is_file():
+        return
     step = grains = 0
     with (output / taken.dump).open(encoding="utf-8", errors="replace") as dump:
         for line in dump:
@@ -113,4 +90,5 @@ def _frames(output: Path, taken: Taken) -> Iterator[tuple[int, NDArray[np.float6
                 place = columns.index(taken.of)
                 rows = [row.split() for row in islice(dump, grains)]
                 if grains and len(rows) == grains and len(rows[-1]) == len(columns):
-                    yield step, np.array([float(row[place]) for row in rows])
+                    column = [float(row[place]) for row in rows]
+                    yield step, float(getattr(np, taken.grains)(column))
