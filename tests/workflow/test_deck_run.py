@@ -23,6 +23,7 @@ from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import write_study
 from sandmould.study.plan.trust import reading_help
 from tests.planned import write_plan
 

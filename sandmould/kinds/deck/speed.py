@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import shutil
@@ -50,20 +51,39 @@ class DeckSpeed(StoredSpeed[OwnDeck]):
     def computed_by(self, scenario: OwnDeck) -> str:
         """Engine and deck: a deck with other values is one of another price."""
         version = engine_module(scenario.engine.name).installed_version()
-        deck = digest(own_deck.render(scenario.model_copy(update={"seed": 1}), "pilot", "pilot"))
+        seeded = scenario.model_copy(update={"seed": 1})
+        starts = ("", own_deck.RESTART_FILES[0])
+        decks = [own_deck.render(seeded, "pilot", "pilot", start) for start in starts]
+        deck = digest(*decks, *sorted(f"{name} {of}" for name, of in scenario.measures.items()))
         return f"{scenario.engine.name} {version} {deck[:SHORT]}"
 
     def trial(self, scenario: OwnDeck, results: Path) -> float | None:
-        """Processor time of a whole run, by a pilot."""
-        return pilot(scenario, results)
+        """Processor time of a whole run, by a pilot; what else it has shown is kept beside it."""
+        core_s, said = pilot(scenario, results)
+        kept = self._said(scenario)
+        with contextlib.suppress(OSError):
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            kept.write_text(said, encoding="utf-8")
+        return core_s
+
+    def measured(self, scenario: OwnDeck, results: Path) -> float | None:
+        """The same as of any speed; what a pilot has shown is said at each start."""
+        rate = super().measured(scenario, results)
+        with contextlib.suppress(OSError):
+            if said := self._said(scenario).read_text(encoding="utf-8"):
+                say(said)
+        return rate
+
+    def _said(self, scenario: OwnDeck) -> Path:
+        return self.file(scenario).with_suffix(".said")
 
     def rate(self, scenario: OwnDeck, stored: float) -> float:
         """Expected core-seconds that a second of a core computes."""
         return scenario.expected_core_s / stored
 
 
-def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float | None:
-    """Compute the deck for some seconds in a folder of its own; processor time of a whole run.
+def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[float | None, str]:
+    """Compute the deck for some seconds in a folder of its own, in one piece and gone on with.
 
     Parameters
     ----------
@@ -76,7 +96,10 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float |
     Returns
     -------
     float or None
-        None where the deck states no ``steps`` and did not end in time.
+        Processor time of a whole run; None where the deck states no ``steps`` and did not end in
+        time.
+    str
+        What else it has shown: sentences on lines, or nothing.
 
     Raises
     ------
@@ -84,7 +107,7 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float |
         With what the engine said, where the deck stopped with an error.
     """
     if scenario.engine.ranks > 1:
-        return None
+        return None, ""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "runs" / "pilot"
         folder.mkdir(parents=True)
@@ -93,10 +116,8 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float |
         if status is not None and not (folder / "whole.json").exists():
             raise BadInputError([_failure(scenario, folder, status, results)])
         whole = computation.series(scenario, folder / "work")
-        for said in (_lacks(scenario, whole), _resumed(scenario, whole, folder, pilot_s)):
-            if said:
-                say(f"{_of_values(scenario)}: {said}.")
-        return core_s
+        shown = (_lacks(scenario, whole), _resumed(scenario, whole, folder, pilot_s))
+        return core_s, "\n".join(f"{_of_values(scenario)}: {said}." for said in shown if said)
 
 
 def _computed(folder: Path, pilot_s: float) -> tuple[float | None, int | None]:
