@@ -20,6 +20,7 @@ from matplotlib.patches import Polygon as Patch
 from numpy.typing import NDArray
 from PIL import Image
 
+from sandmould.analysis.density import apparent_density
 from sandmould.analysis.plots import (
     SceneSection,
     draw_by_layer,
@@ -254,8 +255,6 @@ def draw_densities(
     tuple of float, kg/m3
         Median of each snapshot.
     """
-    from sandmould.analysis.density import apparent_density  # a third of a second
-
     density_kg_m3 = [
         apparent_density(
             s.position_m, s.radius_m, scenario.sand.density_kg_m3, scene=scene_at(scenario, s)
